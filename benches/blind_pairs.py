@@ -43,21 +43,21 @@ from trihedron.simulate import Scenario, hand_session, simulate
 from trihedron.simulate.effects import with_effect
 
 KINDS = (
-    "same", "nominal", "other-unit", "accel-zero", "gyro-zero", "accel-scale", "gyro-scale", "accel-misalignment",
+    "same", "nominal", "other-unit", "accel-bias", "gyro-bias", "accel-scale", "gyro-scale", "accel-misalignment",
     "gyro-misalignment", "triad-alignment", "gravity", "missing", "surplus", "both", "noise", "resolution",
 )  # fmt: skip
 NOT_PAIRED = {
     *ON_A_TABLE, "disturbed-pose", "dropped-samples", "timing-jitter", "axis-handedness", "earth-rate", "lever-arm",
     "accel-saturation", "gyro-saturation", "quantisation", "supply-sensitivity",
 }  # fmt: skip
-NAMED_NUISANCES = {"gyro-zero-scatter", "accel-zero-scatter", "periodic-interference"}
+NAMED_NUISANCES = {"gyro-bias-repeatability", "accel-bias-repeatability", "periodic-interference"}
 """What the nuisances of this bench are: named, they are no false name, and missing physics is said rightly."""
 FAINT = 0.09
 """Share of the samples' variance below which a line of the recording is a footnote, no missing physics."""
 IS_TOO = {"accel-size-effect": ("lever-arm",)}
 """Three accelerometers drawn at three places lie, in their mean, away from the centre of rotation."""
 GROUPS = (
-    "accel-zero", "accel-scale", "accel-misalignment", "gyro-zero", "gyro-scale", "gyro-misalignment",
+    "accel-bias", "accel-scale", "accel-misalignment", "gyro-bias", "gyro-scale", "gyro-misalignment",
     "triad-alignment", "gravity",
 )  # fmt: skip
 
@@ -89,9 +89,9 @@ def turned(angle: np.ndarray) -> np.ndarray:
 def moved(kind: str, accel: Any, gyro: Any, rng: np.random.Generator) -> tuple[Any, Any]:
     """One number moved, in the direction in which the instrument is made: raw = S⁻¹(truth - b)."""
     sign = rng.choice((-1.0, 1.0), 3) * rng.uniform(0.5, 1.5, 3)
-    if kind == "accel-zero":
+    if kind == "accel-bias":
         accel = replace(accel, b=triple(np.array(accel.b) + 0.03 * sign))
-    elif kind == "gyro-zero":
+    elif kind == "gyro-bias":
         gyro = replace(gyro, b=triple(np.array(gyro.b) + np.radians(0.3) * sign))
     elif kind in ("accel-scale", "gyro-scale", "accel-misalignment", "gyro-misalignment", "triad-alignment"):
         sensor = accel if kind.startswith("accel") else gyro
@@ -228,7 +228,7 @@ def true_differences(sim: Any, real: Any, kind: str) -> dict[str, list[float]]:
             n = (M.T / k).T
             cosines = n @ n.T
             side.append((-(M @ b) / k, np.log(k), np.arccos(cosines[[0, 0, 1], [1, 2, 2]]), n))
-        for group, index in (("zero", 0), ("scale", 1), ("misalignment", 2)):
+        for group, index in (("bias", 0), ("scale", 1), ("misalignment", 2)):
             out[f"{name}-{group}"] = (side[1][index] - side[0][index]).tolist()
         axes[name] = (side[0][3], side[1][3])
     from scipy.linalg import polar

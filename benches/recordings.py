@@ -103,8 +103,8 @@ def as_row(name, d, why, seconds):
         h = e.held_out[0] if e.held_out else None
         held.append("–" if h is None else f"{h.domain} {h.chi2_per_dof_before:.2g} → {h.chi2_per_dof_after:.2g}")
     left = ", ".join(f"{t.domain} {t.chi2_per_dof:.2g}" for t in d.remaining if t.disagrees)
-    laws = "".join(f"; law: {', '.join(law.depends_on)}" for law in d.laws)
-    told = "; ".join(ids) + laws
+    related = "".join(f"; relation: {', '.join(one.depends_on)}" for one in d.relations)
+    told = "; ".join(ids) + related
     return (f"| {name} | {d.segments.n_holds} | {d.verdict}{': ' if told else ''}{told} | {'; '.join(sizes)} "
             f"| {'; '.join(held)} | {left or '–'} | {seconds:.0f} s |")  # fmt: skip
 

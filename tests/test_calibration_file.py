@@ -72,7 +72,7 @@ def test_the_file_follows_its_own_schema_and_states_equation_direction_and_units
     assert document["equation"] == "truth = S * raw + b"
     assert "raw to true" in document["direction"]
     assert document["accelerometer"]["raw_unit"] == "counts"
-    assert document["parameter_order"][:2] == ["accelerometer.S11", "accelerometer.S12"]
+    assert document["parameter_order"][:2] == ["accelerometer.S_xx", "accelerometer.S_xy"]
     assert np.shape(document["covariance"]) == (24, 24)
     assert len(document["recording"]["sha256"]) == 64
 
@@ -128,7 +128,7 @@ def damaged(document, path, value):
         (("accelerometer", "raw_unit"), "furlongs", "accelerometer.raw_unit"),
         (("covariance",), [[1.0]], "covariance must be 24 x 24"),
         (("gravity_m_s2",), -9.8, "gravity_m_s2"),
-        (("parameter_order",), ["b1"], "parameter_order"),
+        (("parameter_order",), ["b_x"], "parameter_order"),
         (("frame",), "sideways", "frame"),
     ],
 )

@@ -177,7 +177,7 @@ def test_the_screen_fits_the_terminal_and_says_what_matters(led, width, height):
         assert max(len(line) for line in lines) <= width
         assert view.instruction[:40] in lines[1]
         assert "…" not in "".join(lines[3:])
-    assert "error bar" in "\n".join(lines)
+    assert "uncertainty" in "\n".join(lines)
 
 
 def test_a_log_is_replayed_through_the_guide_to_a_calibration(tmp_path, capsys):

@@ -64,9 +64,9 @@ def test_verify_on_another_session_passes_and_a_limit_turns_the_status(session, 
     other = tmp_path / "other.csv"
     other.write_text(log_text(simulated(hand_session(n_poses=10, hold_s=3.0, move_s=1.5, layout=4), seed=9)))
     assert main(["verify", str(session / "c.json"), str(other)]) == 0
-    assert "gravity predicted" in capsys.readouterr().out
+    assert "tilt error after a rotation" in capsys.readouterr().out
     assert main(["verify", str(session / "c.json"), str(other), "--limit-mg", "0.001"]) == 2
-    assert "NOT PASSED" in capsys.readouterr().out
+    assert "NOT VERIFIED" in capsys.readouterr().out
 
 
 def test_verify_says_when_it_is_given_the_recording_the_calibration_was_made_from(session, capsys):
@@ -199,7 +199,7 @@ def test_poses_that_do_not_determine_the_answer_end_with_status_two_and_poses_to
     assert main(["calibrate", str(log), "--gravity", G]) == 2, name
     out = capsys.readouterr().out
     assert "NOT TO BE TRUSTED" in out
-    assert "Add still poses" in out
+    assert "Add poses" in out
     assert main(["check", str(log)]) == 2
 
 

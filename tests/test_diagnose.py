@@ -18,7 +18,7 @@ CASES = {
     "accel-scale-asymmetry": {"asymmetry": (1e-3, -1.5e-3, 1e-3)},
     "accel-hysteresis": {"offset_m_s2": (0.01, 0.015, 0.01), "width_m_s2": 2.0},
     "gyro-g-sensitivity": {"matrix": ((1e-4, 2e-5, 0), (0, -1e-4, 5e-5), (5e-5, 0, 1e-4))},
-    "gyro-hidden-drift": {"amplitude": (2e-3, -1e-3, 2e-3), "tau_s": 60.0},
+    "gyro-bias-drift": {"amplitude": (2e-3, -1e-3, 2e-3), "tau_s": 60.0},
     "dropped-samples": {"losses": [(90.0, 12)]},
     "timing-jitter": {"jitter_s": 1e-3},
     "periodic-interference": {"sensor": "accelerometer", "frequency_hz": 17.0, "amplitude": 0.05},

@@ -49,7 +49,7 @@ def test_jacobians_agree_with_the_spread_of_perturbed_calibrations():
         assert np.allclose(rotation_vector(there @ here.T), J_t[:, :9] @ step[:9], rtol=1e-4, atol=1e-11)
 
 
-@pytest.mark.parametrize("group", ["accel-zero", "accel-scale", "accel-misalignment", "gyro-zero", "gyro-scale",
+@pytest.mark.parametrize("group", ["accel-bias", "accel-scale", "accel-misalignment", "gyro-bias", "gyro-scale",
                                    "gyro-misalignment", "triad-alignment", "gravity"])  # fmt: skip
 def test_one_number_that_moves_leaks_into_no_other_group(group):
     (S_a, b_a), (S_g, b_g) = sensor(RNG), sensor(RNG)
@@ -59,7 +59,7 @@ def test_one_number_that_moves_leaks_into_no_other_group(group):
     M = np.linalg.inv(S)
     k, offset = np.linalg.norm(M, axis=1), -M @ b
     n = M / k[:, None]
-    if group.endswith("zero"):
+    if group.endswith("bias"):
         offset = offset + k * np.array([1e-2, -2e-2, 3e-2])
     elif group.endswith("scale") or group == "gravity":
         factor = 1.0 + (2e-3 if group == "gravity" else np.array([1e-3, -2e-3, 3e-3]))
@@ -103,12 +103,12 @@ def test_a_zero_that_moved_since_the_calibration_is_a_number_and_no_drift(unit):
     moved = replace(gyro, b=(gyro.b[0], gyro.b[1], gyro.b[2] - np.radians(0.31)))
     found = trihedron.diagnose(log(profile, accel, moved, 2, 2), calibration=known)
     assert found.verdict == "parameters-differ"
-    assert {p.id for p in found.parameters if p.significant} == {"gyro-zero"}
-    z = next(p for p in found.parameters if p.id == "gyro-zero" and p.name == "z")
+    assert {p.id for p in found.parameters if p.significant} == {"gyro-bias"}
+    z = next(p for p in found.parameters if p.id == "gyro-bias" and p.name == "z")
     # One fixed pair: 4 sigma of its own error bar, which must be below 0.02 °/s to be of use.
     assert abs(z.difference - np.radians(0.31)) < 4.0 * z.std
     assert z.std < np.radians(0.02)
-    assert "gyro z zero" in str(found)
+    assert "gyro Z bias" in str(found)
     assert found.updated is not None
 
 
@@ -159,7 +159,7 @@ def test_a_scenario_is_driven_compared_and_improved_until_it_cannot_be_told_from
     words = ["diagnose", str(real), "--gravity", "9.80665", "--against"]
     assert main([*words, str(given), "--improved", str(better)]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "accel-quadratic was left out of the model" in said
+    assert "accel-quadratic is missing from the model" in said
     assert "the model has gyro-g-sensitivity, which the recording lacks" in said
     text = better.read_text()
     assert "# the data sheet's noise" in text

@@ -82,7 +82,7 @@ def test_a_scenario_needs_a_gyro_to_be_moved_by(tmp_path, capsys):
     given = tmp_path / "mine.toml"
     given.write_text(GOOD)
     assert main(["diagnose", str(bare), "--gravity", G, "--against", str(given)]) == 1
-    assert "this recording has no gyro to tell how" in " ".join(capsys.readouterr().err.split())
+    assert "this recording has no gyro to show how" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_calibration_in_place_of_a_simulated_log_is_told_where_it_belongs(tmp_path, capsys):

@@ -113,7 +113,7 @@ def test_the_root_of_the_rate_is_that_of_the_model(real):
 def test_readings_without_steps_are_named_where_the_recordings_steps_matter():
     coarse = log(7, step=3e-3)
     found = said(log(8, step=0.0), coarse)
-    assert "The model has no converter steps" in found["gyroscope", "resolution"]
+    assert "The model has no resolution (LSB)" in found["gyroscope", "resolution"]
     # Steps of a tenth of the noise are not missed.
     assert said(log(8, step=0.0), log(1)) == {}
 
@@ -140,8 +140,8 @@ def test_one_time_constant_for_both_sensors_is_named_with_all_four_times():
 def test_a_bias_that_was_drawn_and_never_added_is_named_and_a_drawn_one_is_not():
     real = numbers((0.05, -0.03, 0.08), (0.01, -0.02, 0.005))
     rows = compare_numbers(numbers(), real, alpha=0.01).parameters
-    assert {(p.id, bool(p.remark)) for p in rows if p.significant} == {("accel-zero", True), ("gyro-zero", True)}
-    assert "drawn and never added" in next(p.remark for p in rows if p.id == "gyro-zero")
+    assert {(p.id, bool(p.remark)) for p in rows if p.significant} == {("accel-bias", True), ("gyro-bias", True)}
+    assert "was the drawn bias never applied?" in next(p.remark for p in rows if p.id == "gyro-bias")
     other = numbers((-0.02, 0.06, 0.01), (0.02, 0.01, -0.01))
     assert not any(p.remark for p in compare_numbers(other, real, alpha=0.01).parameters)
     # A recording whose zeros are as good as none refutes nothing.

@@ -43,10 +43,10 @@ def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
     plain = Scenario(motion, "unit", accel, gyro, profile.clock)
     # Half of what the zeros do is the scatter: without it in the noise, a drift does not remove half of their misfit.
     size = np.radians(0.1)
-    flawed = with_effect(plain, "gyro-hidden-drift", amplitude=(size, -size, size), tau_s=80.0)
+    flawed = with_effect(plain, "gyro-bias-drift", amplitude=(size, -size, size), tau_s=80.0)
     recording = scattered(simulate(flawed, 11)[0], 0.03 * 65.5, 3)
     found = trihedron.diagnose(recording, gravity_m_s2=9.80665)
-    assert [one.id for one in found.effects] == ["gyro-hidden-drift", "gyro-zero-scatter"]
+    assert [one.id for one in found.effects] == ["gyro-bias-drift", "gyro-bias-repeatability"]
     assert found.verdict == "missing-physics"
 
 

@@ -98,7 +98,7 @@ def test_restless_poses_hide_neither_a_scatter_nor_the_g_sensitivity_beside_it()
             sway = np.sin(2.0 * np.pi * 0.7 * np.arange(holds[k].stop - a) / recording.rate_hz)
             gyro[a : holds[k].stop, 1] += 1.0 * sway * scale[1]
     found = trihedron.diagnose(replace(recording, gyroscope=gyro), gravity_m_s2=truth.gravity_m_s2)
-    assert {"gyro-zero-scatter", "gyro-g-sensitivity"} <= {one.id for one in found.effects}
+    assert {"gyro-bias-repeatability", "gyro-g-sensitivity"} <= {one.id for one in found.effects}
     G = next(one for one in found.effects if one.id == "gyro-g-sensitivity")
     xx = next(p for p in G.parameters if p.name == "G_xx")
     assert abs(xx.value - np.radians(0.004)) < 4.0 * xx.std + 0.02 * np.radians(0.004)

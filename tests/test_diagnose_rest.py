@@ -72,7 +72,7 @@ def test_a_zero_that_swings_without_a_logged_cause_is_hidden_drift():
     t, accelerometer, gyroscope = still(60000, 50.0, 46)
     gyroscope[:, 1] += 0.2 * DEG * np.sin(2.0 * np.pi * t / t[-1] * 1.3)
     d = trihedron.diagnose(recording(t, accelerometer, gyroscope), gravity_m_s2=9.8)
-    assert [e.id for e in d.effects] == ["gyro-hidden-drift"]
+    assert [e.id for e in d.effects] == ["gyro-bias-drift"]
     spans = {p.name: p.value for p in d.effects[0].parameters}
     assert spans["range_y"] == pytest.approx(0.4 * DEG, rel=0.1)
 

@@ -50,7 +50,7 @@ MECHANISMS = {
         "mpu", WARMING, "accel-thermal-bias", {"per_k": (0.009, -0.008, 0.01), "warm_up_tau_s": 120.0},
     ),
     "drift in time, not with a temperature of another course": (
-        "mpu", WARMING, "accel-hidden-drift", {"amplitude": (0.06, -0.05, 0.06), "tau_s": 35.0},
+        "mpu", WARMING, "accel-bias-drift", {"amplitude": (0.06, -0.05, 0.06), "tau_s": 35.0},
     ),
     "gyro bias with the temperature, not with time": (
         "mpu", WARMING, "gyro-thermal-bias", {"per_k": (5e-4, -4e-4, 6e-4), "warm_up_tau_s": 120.0},
@@ -72,7 +72,7 @@ MECHANISMS = {
 # Nothing in the recording tells these from the other: both must be named.
 TWINS = {
     "drift in time with the very course of the temperature": (
-        "mpu", WARMING, "accel-hidden-drift", {"amplitude": (0.06, -0.05, 0.06), "tau_s": 120.0},
+        "mpu", WARMING, "accel-bias-drift", {"amplitude": (0.06, -0.05, 0.06), "tau_s": 120.0},
     ),
     # Equal on all axes, this is a rate along the vertical: the Earth seen from its pole.
     "force on the gyro that is exactly a vertical Earth rate": (

@@ -223,8 +223,8 @@ def test_px4_compensates_temperature_by_the_sum_of_both_polynomials(is_compensat
 def by_temperature(known):
     """A calibration of several recordings `--by temperature`: bias and scale of the accelerometer's axes follow it."""
     terms = [
-        {"id": "accel-zero", "coefficients": [[0.0, 0.0, 0.0], [2e-3, -1e-3, 5e-4], [1e-5, 2e-5, -1e-5]]},
-        {"id": "gyro-zero", "coefficients": [[0.0, 0.0, 0.0], [1e-4, -2e-4, 5e-5]]},
+        {"id": "accel-bias", "coefficients": [[0.0, 0.0, 0.0], [2e-3, -1e-3, 5e-4], [1e-5, 2e-5, -1e-5]]},
+        {"id": "gyro-bias", "coefficients": [[0.0, 0.0, 0.0], [1e-4, -2e-4, 5e-5]]},
     ]
     thermal = {"reference_degc": 25.0, "axis_signs": [1.0, 1.0, 1.0], "triad": np.eye(3).tolist(), "terms": terms}
     extensions = {**known.extensions, "thermal": thermal, "valid_range": {"temperature_degc": [5.0, 45.0]}}

@@ -48,7 +48,7 @@ def test_every_log_has_its_row_and_the_bad_one_its_reason(done):
     assert bad["path"].item().endswith("notes.txt")
     assert len(bad["reason"].item()) > 20
     assert polars.read_csv(out / "fleet.csv").height == 5
-    zero = table.filter(polars.col("status") == "done")["gyro_zero_x_rad_s"]
+    zero = table.filter(polars.col("status") == "done")["gyro_bias_x_rad_s"]
     # Zeros along the axis: -(M b) with scales within 2 % of one.
     np.testing.assert_allclose(sorted(-zero), sorted([0.01, 0.01, 0.015, 0.035]), rtol=0.05, atol=1e-3)
 
@@ -56,7 +56,7 @@ def test_every_log_has_its_row_and_the_bad_one_its_reason(done):
 def test_the_page_names_the_device_that_changed(done):
     result, out = done
     moved = [(c.group, c.id) for c in result.summary.changes if c.significant]
-    assert moved == [("unit_1", "gyro-zero")]
+    assert moved == [("unit_1", "gyro-bias")]
     page = (out / "fleet.html").read_text()
     assert "unit_1" in page
     assert "notes.txt" in page

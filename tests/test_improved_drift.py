@@ -18,31 +18,31 @@ def test_a_straight_drift_is_carried_into_the_improved_scenario(tmp_path, monkey
     accel, gyro = profile.unit(4)
     base = Scenario(hand_session(26, hold_s=3.0, layout=5), "unit", accel, gyro, profile.clock)
     length_s = float(simulate(base, 3)[0].duration_s)
-    flawed = with_effect(base, "accel-hidden-drift", change=CHANGE, length_s=length_s)
+    flawed = with_effect(base, "accel-bias-drift", change=CHANGE, length_s=length_s)
     recording = simulate(flawed, 3)[0]
     given, better = tmp_path / "ideal.toml", tmp_path / "better.toml"
     given.write_text('name = "ideal"\nprofile = "ideal"\n\n[session]\nkind = "hand"\n')
     monkeypatch.setattr(driving, "N_SEEDS", 2)
     found = trihedron.diagnose(recording, against=given, gravity_m_s2=G)
-    drift = next(e for e in found.effects if e.id == "accel-hidden-drift")
+    drift = next(e for e in found.effects if e.id == "accel-bias-drift")
     improvement = improve(given, found)
-    assert "accel-hidden-drift" not in improvement.left_out
+    assert "accel-bias-drift" not in improvement.left_out
     better.write_text(improvement.text)
-    table = next(e for e in tomllib.loads(better.read_text())["effect"] if e["id"] == "accel-hidden-drift")
+    table = next(e for e in tomllib.loads(better.read_text())["effect"] if e["id"] == "accel-bias-drift")
     assert drift.model["variant"] == "line"
     assert table["length_s"] == pytest.approx(length_s, rel=0.01)
     sigma = [p.std for p in drift.parameters if p.name.startswith("drift_")]
     assert np.abs((np.array(table["change"]) - CHANGE) / sigma).max() < 4.0
     again = trihedron.diagnose(recording, against=better, gravity_m_s2=G)
-    assert not {e.id for e in again.effects} & {"accel-hidden-drift", "accel-zero-scatter"}
+    assert not {e.id for e in again.effects} & {"accel-bias-drift", "accel-bias-repeatability"}
 
 
 def test_a_straight_drift_of_a_session_whose_length_nobody_says_is_left_out():
     values = [{"name": f"drift_{axis}", "value": v} for axis, v in zip("xyz", CHANGE, strict=True)]
-    effect = {"id": "accel-hidden-drift", "parameters": values, "model": {"variant": "line"}}
+    effect = {"id": "accel-bias-drift", "parameters": values, "model": {"variant": "line"}}
     sizes, left_out = diagnosed_sizes([effect])
     assert not sizes
-    assert "needs the length of its session" in left_out["accel-hidden-drift"]
+    assert "needs the length of its session" in left_out["accel-bias-drift"]
     sizes, left_out = diagnosed_sizes([effect], 200.0)
-    assert sizes == [("accel-hidden-drift", {"change": CHANGE, "length_s": 200.0})]
+    assert sizes == [("accel-bias-drift", {"change": CHANGE, "length_s": 200.0})]
     assert not left_out

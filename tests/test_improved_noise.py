@@ -10,7 +10,7 @@ import trihedron
 from trihedron.estimate.noise import gain_of, noise_of_holds
 from trihedron.pipeline import driving
 from trihedron.pipeline.comparing_noise import _are_even
-from trihedron.pipeline.driving import MovedAlike, driven, flicker_of_poses, zero_in_moves, zero_of_poses
+from trihedron.pipeline.driving import MovedAlike, bias_in_moves, bias_of_poses, driven, flicker_of_poses
 from trihedron.pipeline.improving import _unlike
 from trihedron.records.hold_noise import Measured
 from trihedron.simulate import (
@@ -23,8 +23,8 @@ from trihedron.simulate import (
     noise_of_octaves,
     simulate,
 )
+from trihedron.simulate.bias_repeatability import bias_in_moves as straying
 from trihedron.simulate.profiles import profile_by_name
-from trihedron.simulate.zero_scatter import zero_in_moves as straying
 
 RATE = 100.0
 
@@ -99,28 +99,28 @@ def session(seed, strays=0.0):
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(5)
     gyro = replace(gyro, S=tuple(tuple(2.0 * v for v in row) for row in gyro.S))
-    electronics = replace(gyro.electronics, zero_in_moves=(strays,) * 3)
+    electronics = replace(gyro.electronics, bias_in_moves=(strays,) * 3)
     scenario = Scenario(
         hand_session(20, hold_s=3.0, layout=8), "unit", accel, replace(gyro, electronics=electronics), profile.clock
     )
     return scenario, simulate(scenario, seed)[0]
 
 
-def test_what_moves_miss_is_put_on_the_gyros_zero_in_moves_and_then_both_miss_alike():
+def test_what_moves_miss_is_put_on_the_gyros_bias_in_moves_and_then_both_miss_alike():
     _, recording = session(3, strays=2e-3)
     clean, other = session(4)
     own = trihedron.calibrate(recording, gravity_m_s2=9.80665)
-    found = zero_in_moves(clean, MovedAlike(recording, own.segments, own.calibration))
+    found = bias_in_moves(clean, MovedAlike(recording, own.segments, own.calibration))
     # Twenty moves, each of two angles: known to a sixth; four of those, and what the poses add.
     assert found == pytest.approx((2e-3,) * 3, rel=0.6)
-    electronics = replace(clean.gyroscope.electronics, zero_in_moves=found)
+    electronics = replace(clean.gyroscope.electronics, bias_in_moves=found)
     better = replace(clean, gyroscope=replace(clean.gyroscope, electronics=electronics))
-    again = zero_in_moves(better, MovedAlike(recording, own.segments, own.calibration))
+    again = bias_in_moves(better, MovedAlike(recording, own.segments, own.calibration))
     # Alike within a twentieth, or a small step is left.
     assert again is None or again == pytest.approx(found, rel=0.15)
     # A recording that misses no more than the scenario, but for chance (a sixth), asks for little.
     own = trihedron.calibrate(other, gravity_m_s2=9.80665)
-    little = zero_in_moves(clean, MovedAlike(other, own.segments, own.calibration))
+    little = bias_in_moves(clean, MovedAlike(other, own.segments, own.calibration))
     assert little is None or max(little) < 0.4 * 2e-3
 
 
@@ -162,20 +162,20 @@ def test_what_poses_miss_is_put_on_the_accelerometers_zero_and_then_both_miss_al
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(5)
     clean = Scenario(hand_session(24, hold_s=3.0, layout=8), "unit", accel, gyro, profile.clock)
-    electronics = replace(accel.electronics, zero_scatter=(0.02,) * 3)
+    electronics = replace(accel.electronics, bias_repeatability=(0.02,) * 3)
     scattered = replace(clean, accelerometer=replace(accel, electronics=electronics))
     own = trihedron.calibrate(simulate(scattered, 6)[0], gravity_m_s2=9.80665)
-    found = zero_of_poses(clean, beside(own))
+    found = bias_of_poses(clean, beside(own))
     # 24 poses less nine numbers and the worst: a root known to a fifth; two of those, and the pose that is spared.
     assert found == pytest.approx((0.02,) * 3, rel=0.5)
-    better = replace(accel, electronics=replace(accel.electronics, zero_scatter=found))
-    again = zero_of_poses(replace(clean, accelerometer=better), beside(own))
+    better = replace(accel, electronics=replace(accel.electronics, bias_repeatability=found))
+    again = bias_of_poses(replace(clean, accelerometer=better), beside(own))
     assert again is None or again == pytest.approx(found, rel=0.15)
     healthy = trihedron.calibrate(simulate(clean, 7)[0], gravity_m_s2=9.80665)
-    little = zero_of_poses(clean, beside(healthy))
+    little = bias_of_poses(clean, beside(healthy))
     assert little is None or max(little) < 0.15 * 0.02
     # What the scenario has too much is taken out.
-    rest = zero_of_poses(scattered, beside(healthy))
+    rest = bias_of_poses(scattered, beside(healthy))
     assert max(rest) < 0.4 * 0.02
 
 
@@ -188,7 +188,7 @@ def test_one_pose_that_was_pushed_makes_no_scatter_for_all_of_them():
     readings = np.array(recording.accelerometer)
     readings[own.segments.holds[7].samples()] *= 1.003
     pushed = trihedron.calibrate(replace(recording, accelerometer=readings), gravity_m_s2=9.80665)
-    strays = zero_of_poses(clean, beside(pushed))
+    strays = bias_of_poses(clean, beside(pushed))
     # 30 mm/s² in one pose of 24: all of it shared out would be 6 mm/s², what the others take up in the fit is less.
     assert strays is None or max(strays) < 4e-3
 

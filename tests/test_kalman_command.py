@@ -98,7 +98,7 @@ def test_a_log_of_rest_in_counts_of_another_range_is_refused(session, tmp_path, 
     half = np.loadtxt(rest, delimiter=",", skiprows=1) * [1.0, 0.5, 0.5, 0.5]
     np.savetxt(rest, half, delimiter=",", header="t,ax [m/s^2],ay [m/s^2],az [m/s^2]", comments="", fmt="%.9g")
     assert run(session, "--reference", session / "angles.csv", "--noise", rest) == 1
-    assert "another converter, range or unit" in capsys.readouterr().err
+    assert "another ADC, range or unit" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -79,7 +79,7 @@ def test_hold_numbers_pick_still_poses_and_a_mismatch_is_said(head, table):
     recording, segments = head
     few = PoseTable(table.specific_force[::9], hold=np.arange(0, 324, 9))
     assert len(pose_readings(recording, segments, few).mean) == 36
-    with pytest.raises(ValueError, match=r"lists 36 poses, but .* has 324 still poses"):
+    with pytest.raises(ValueError, match=r"lists 36 poses, but .* has 324 poses"):
         pose_readings(recording, segments, PoseTable(table.specific_force[::9]))
     with pytest.raises(ValueError, match="pose 500 is asked for"):
         pose_readings(recording, segments, PoseTable(table.specific_force[:1], hold=np.array([499])))
@@ -161,7 +161,7 @@ def test_a_pose_table_is_read_by_its_header(tmp_path, text, expected):
         ("a,b\n3,4\n5,6\n", "neither angles .* nor a direction"),
         ("pitch,theta\n3,4\n5,6\n", "both mean pitch"),
         ("fx,fy,fz\n0,0,1\n0,0,0\n", "line 3: the direction has no length"),
-        ("hold,pitch\n0,0\n1,10\n", "count still poses from 1"),
+        ("hold,pitch\n0,0\n1,10\n", "count poses from 1"),
         ("start,pitch\n0,0\n1,10\n", "both start and stop"),
         ("start,stop,pitch\n0,1,0\n3,2,10\n", "stops before it starts"),
         ("pitch,roll\n0,0\n10,nan\n", "roll is missing"),

@@ -13,7 +13,7 @@ from trihedron.diagnose.laws.room import search_room
 from trihedron.diagnose.laws.search import Candidate, search
 from trihedron.diagnose.laws.written import effect_file
 from trihedron.pipeline import diagnose
-from trihedron.records.diagnosis import EffectParameter, Law
+from trihedron.records.diagnosis import EffectParameter, Relation
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.text import to_text
 from trihedron.simulate import Scenario, hand_session, simulate
@@ -109,10 +109,10 @@ def test_zeros_that_scatter_are_named_and_sized_in_a_session():
     rng = np.random.default_rng(21)
     log = added(log, truth, 0.02 * DEG * rng.normal(size=(n_poses, 3))[pose])
     result = diagnose(log, gravity_m_s2=truth.gravity_m_s2)
-    assert result.effects[0].id == "gyro-zero-scatter"
+    assert result.effects[0].id == "gyro-bias-repeatability"
     for p in result.effects[0].parameters:
         assert abs(p.value - 0.02 * DEG) < 4.0 * p.std
-    assert not result.laws
+    assert not result.relations
     # The scale of the gyro is not pulled by zeros that differ: a tenth of a per cent is three of its errors here.
     ratio = np.array(result.extended.gyroscope["S"]) @ np.linalg.inv(truth.gyroscope_S)
     sigma = np.linalg.norm(np.array(result.extended.gyroscope["sigma_S"])) / np.linalg.norm(truth.gyroscope_S)
@@ -124,13 +124,13 @@ def test_a_field_in_the_room_is_unexplained_with_a_law_not_scatter():
     vector = Rotation.from_quat(np.roll(truth.attitude, -1, axis=1)).inv().apply([0.8, 0.3, -0.5])
     log = added(log, truth, 0.05 * DEG * vector @ np.array([[1.0, 0.2, 0], [0, -0.8, 0.5], [0.3, 0, 0.9]]))
     result = diagnose(log, gravity_m_s2=truth.gravity_m_s2)
-    assert "gyro-zero-scatter" not in [effect.id for effect in result.effects]
-    assert result.laws[0].depends_on == ("vector fixed in the room",)
+    assert "gyro-bias-repeatability" not in [effect.id for effect in result.effects]
+    assert result.relations[0].depends_on == ("vector fixed in the room",)
     assert "fixed in the room" in to_text(diagnosis_report(result))
 
 
 def test_a_law_is_written_out_as_an_effect_that_runs(tmp_path):
-    law = Law(
+    law = Relation(
         "gyroscope", ("u_x u_y", "u_z^2"), "reading of x grows by c1·(u_x u_y) + c2·(u_z^2)",
         (EffectParameter("x: u_x u_y", 1e-3, 1e-4, "(rad/s)/(g^2)"),
          EffectParameter("z: u_z^2", 2e-3, 1e-4, "(rad/s)/(g^2)")),
@@ -151,7 +151,7 @@ def test_a_law_is_written_out_as_an_effect_that_runs(tmp_path):
     done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["True", "1.0"]
-    past = Law("gyroscope", ("previous u_x",), "", (EffectParameter("x: previous u_x", 1.0, 0.1, ""),), 0.5, None)
+    past = Relation("gyroscope", ("previous u_x",), "", (EffectParameter("x: previous u_x", 1.0, 0.1, ""),), 0.5, None)
     assert effect_file(past) is None
 
 
@@ -159,4 +159,4 @@ def test_a_healthy_session_has_neither_scatter_nor_law():
     log, truth, _, _ = session(1)
     result = diagnose(log, gravity_m_s2=truth.gravity_m_s2)
     assert result.verdict == "consistent"
-    assert not result.laws
+    assert not result.relations

@@ -40,7 +40,7 @@ def test_the_table_names_every_term_and_the_files_hold_the_same(log, tmp_path, c
     assert status == 0
     for words in (
         "angle random walk",
-        "95 % intervals, every other term free",
+        "95 % intervals with every other term free",
         "bias instability",
         "accelerometer_noise_density",
         "best averaging time",

@@ -47,9 +47,9 @@ def test_calibrate_and_diagnose_publish_the_same_figures_in_print_and_in_json(he
     figures = published_figures(result.calibration)
     assert diagnosis.to_dict()["figures"] == figures
     assert calibration_record(result.calibration, result.segments, result.recording)["figures"] == figures
-    assert set(figures) == {"gravity_at_rest", "gravity_after_moves"}
-    assert "one zero for the session" in figures["gravity_at_rest"]["definition"]
-    assert "a zero per pose" in figures["gravity_after_moves"]["definition"]
+    assert set(figures) == {"gravity_error_in_static_poses", "tilt_error_after_rotations"}
+    assert "one bias for the session" in figures["gravity_error_in_static_poses"]["definition"]
+    assert "bias refitted per pose" in figures["tilt_error_after_rotations"]["definition"]
     words = figures_in_words(result.calibration)
     assert any("held out" in value for _, value in words)
     for text in (str(result), str(diagnosis)):
@@ -81,15 +81,15 @@ def test_the_held_out_figure_at_rest_is_that_of_the_saved_model_refitted_without
 
 def test_a_zero_that_drifts_is_named_and_the_table_shows_what_the_calibration_leaves():
     scenario = replace(scenario_by_name("hand-session"), motion=hand_session(24, layout=131))
-    drifting = with_effect(scenario, "accel-hidden-drift", amplitude=(0.03, -0.02, 0.025), tau_s=60.0)
+    drifting = with_effect(scenario, "accel-bias-drift", amplitude=(0.03, -0.02, 0.025), tau_s=60.0)
     recording, truth = simulate(drifting, 131)
     result = calibrate(recording, gravity_m_s2=truth.gravity_m_s2)
     diagnosis = diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
     # A walk as fast as its grid allows would take the drift up, and the poses would then seem to agree.
-    assert diagnosis.effects[0].id == "accel-hidden-drift"
+    assert diagnosis.effects[0].id == "accel-bias-drift"
     assert next(one for one in diagnosis.domains if one.domain == "static-accel").disagrees
     shown = next(one for one in diagnosis.residuals if one.domain == "static-accel")
     rms = np.sqrt(np.mean(shown.before**2))
     # A session that drifts has no zero: each estimate of it leaves at least what the calibration does.
-    assert rms > 0.95 * published_figures(result.calibration)["gravity_at_rest"]["rms"]
+    assert rms > 0.95 * published_figures(result.calibration)["gravity_error_in_static_poses"]["rms"]
     assert np.sqrt(np.mean(shown.after**2)) < 0.5 * rms

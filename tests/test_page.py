@@ -133,7 +133,7 @@ def test_a_point_tells_its_value_and_a_figure_zooms_and_returns(folder, browser)
 
 def test_a_table_is_sorted_by_its_numbers_and_back(folder, browser):
     page = Visit(browser, folder / "calibrate.html", 1280, "light").page
-    summary = page.query_selector("summary:has-text('of every still pose')")
+    summary = page.query_selector("summary:has-text('of every pose')")
     summary.click()
     table = page.query_selector("details[open] table")
     cells = "(t) => [...t.tBodies[0].rows].map((r) => r.cells[4].textContent)"

@@ -62,7 +62,7 @@ def test_the_result_has_what_a_user_looks_for_and_prints_as_a_report(result):
     assert result.gyroscope.covariance.shape == (12, 12)
     assert isinstance(result.findings, tuple)
     text = str(result)
-    for heading in ("Result", "Findings", "Axes", "Certainty", "Residuals"):
+    for heading in ("Result", "Findings", "Axes", "Uncertainty", "Residuals"):
         assert f"\n{heading}\n" in text
     assert max(map(len, text.splitlines())) < 140
     assert " at 0x" not in repr(result)
@@ -166,7 +166,7 @@ def test_a_check_predicts_the_error_bars_that_the_calibration_has(recording, res
     checked = trihedron.check(recording)
     assert checked.is_fit
     np.testing.assert_allclose(checked.calibration.accelerometer.sigma_b, result.accelerometer.sigma_b, rtol=0.05)
-    assert "Error bars to expect" in str(checked)
+    assert "Expected standard uncertainty" in str(checked)
 
 
 @pytest.mark.parametrize("fit", ["calibrate_joint", "calibrate_moves"])

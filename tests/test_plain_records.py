@@ -14,10 +14,10 @@ from trihedron.records.diagnosis import (
     AcceptedEffect,
     Candidate,
     EffectParameter,
-    Law,
     LinearModel,
     NoiseDifference,
     ParameterDifference,
+    Relation,
     Stage,
 )
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut, Where
@@ -28,7 +28,8 @@ from trihedron.records.reference import Estimate, FitToReference
 OF_DIAGNOSIS = {
     "where": Where, "domain": DomainTest, "heldout": HeldOut, "parameter": EffectParameter, "effect": AcceptedEffect,
     "candidate": Candidate, "linear": LinearModel, "residuals": DomainResiduals, "finding": Finding,
-    "parameter_difference": ParameterDifference, "noise_difference": NoiseDifference, "law": Law, "stage": Stage,
+    "parameter_difference": ParameterDifference, "noise_difference": NoiseDifference, "relation": Relation,
+    "stage": Stage,
     "estimate": Estimate, "against_reference_sensor": FitToReference,
 }  # fmt: skip
 OF_CALIBRATION = {"residuals": FitQuality, "observability": Observability}

@@ -112,9 +112,9 @@ def test_three_turns_about_level_axes_show_six_numbers_and_nine_with_a_stop_in_e
 
 
 def test_turns_that_determine_nothing_are_refused_in_words():
-    with pytest.raises(ValueError, match="no turn about axis 3"):
+    with pytest.raises(ValueError, match="no turn about Z"):
         design_least_squares([0, 1], [1.0, 1.0], [1.0, 1.0], 1.0, N)
-    with pytest.raises(ValueError, match="nothing tells the zero"):
+    with pytest.raises(ValueError, match="nothing determines the bias"):
         design_least_squares([0, 1, 2], [1.0] * 3, [1.0] * 3, 0.0, N)
 
 

@@ -158,7 +158,7 @@ def test_verify_says_which_parameters_the_log_cannot_judge(session):
     result = trihedron.verify(known, log, gravity_m_s2=9.81)
     assert len(result.verification.parameters) == 21
     assert all(one.is_judged for one in result.verification.parameters)
-    assert all(abs(one.times_sigma) < 4 for one in result.verification.parameters if one.id != "gyro-zero")
+    assert all(abs(one.times_sigma) < 4 for one in result.verification.parameters if one.id != "gyro-bias")
     # A log of one pose knows the gyro's bias and nothing else.
     rest = replace(
         log,
@@ -170,7 +170,7 @@ def test_verify_says_which_parameters_the_log_cannot_judge(session):
         auxiliary={},
     )
     few = trihedron.verify(known, rest, gravity_m_s2=9.81).verification.parameters
-    assert not any(one.is_judged for one in few if one.id != "gyro-zero")
+    assert not any(one.is_judged for one in few if one.id != "gyro-bias")
     assert "not judged by this log" in str(trihedron.verify(known, rest, gravity_m_s2=9.81)) or few
 
 

@@ -81,7 +81,7 @@ def test_motion_tells_whether_samples_were_taken_evenly_or_when_stamped(tmp_path
     np.testing.assert_allclose(np.diff(by_clock.time_s), T, rtol=1e-3)
     by_stamp = read_recording(write(tmp_path / "b.csv", np.column_stack([stamps, motion(stamps)]), HEADER))
     assert not by_stamp.sampling.is_even
-    assert FindingCode.STAMPS_KEPT in codes(by_stamp)
+    assert FindingCode.TIMESTAMPS_KEPT in codes(by_stamp)
     np.testing.assert_allclose(by_stamp.time_s, stamps - stamps[0], atol=1e-9)
 
 
@@ -90,7 +90,7 @@ def test_without_motion_stamps_stay_and_the_doubt_is_said(tmp_path):
     still = motion(np.zeros(N))
     recording = read_recording(write(tmp_path / "a.csv", np.column_stack([stamps, still]), HEADER))
     assert not recording.sampling.is_even
-    assert "no motion tells" in finding(recording, FindingCode.CLOCK_UNDECIDED).seen
+    assert "no motion shows" in finding(recording, FindingCode.CLOCK_UNDECIDED).seen
     assert FindingCode.TIME_GAP not in codes(recording)
 
 

@@ -128,7 +128,7 @@ def test_two_devices_row_by_row_are_asked_for_whatever_the_column_is_called(tmp_
     stamps = np.stack([t, t if same_stamps else t + 0.005], axis=1).ravel()
     which = [k % 2 for k in range(len(stamps))]
     log = written(tmp_path / "log.csv", *table(stamps, force, rate), which, header=f"{HEADER},{name}")
-    with pytest.raises(ReadError, match=rf"'{name}' tells 2 devices apart"):
+    with pytest.raises(ReadError, match=rf"'{name}' identifies 2 devices"):
         read_recording(log)
     recording = read_recording(log, instance=1)
     np.testing.assert_allclose(recording.accelerometer, second[0], atol=1e-5)

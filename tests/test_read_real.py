@@ -193,9 +193,9 @@ def test_kim_is_even_behind_stamps_of_5_ms_ticks(real_data, run):
     even = finding(recording, FindingCode.EVEN_CLOCK)
     assert even.numbers["period_s"] == pytest.approx(0.0100001, abs=5e-8)
     assert recording.sampling.n_lost == 0
-    assert set(recording.auxiliary) == {"qx", "qy", "qz", "qw", "mx", "my", "mz", "stamps as logged [s]"}
+    assert set(recording.auxiliary) == {"qx", "qy", "qz", "qw", "mx", "my", "mz", "timestamps as logged [s]"}
     np.testing.assert_allclose(
-        recording.auxiliary["stamps as logged [s]"], written[:, 0] - written[0, 0], rtol=0, atol=1e-6
+        recording.auxiliary["timestamps as logged [s]"], written[:, 0] - written[0, 0], rtol=0, atol=1e-6
     )
 
 
@@ -215,7 +215,7 @@ def test_xsens_trackers_were_sampled_when_they_say(real_data):
     recording = read_recording(real_data / "dual_xsens" / "imu_a_45_1.csv")
     assert not recording.sampling.is_even
     assert recording.sampling.followed == pytest.approx(1.0, abs=0.15)
-    assert FindingCode.STAMPS_KEPT in codes(recording)
+    assert FindingCode.TIMESTAMPS_KEPT in codes(recording)
     assert set(np.round(1e3 * np.diff(recording.time_s), 3)) == {7.5, 10.0}
 
 

@@ -65,7 +65,7 @@ def test_stages_are_drawn_domain_by_domain():
         for name, size in (("as-given", 1.0), ("numbers", 0.1), ("noise", 0.1), ("effects", 0.05))
     ]
     chart = stages_chart(SimpleNamespace(stages=stages))
-    assert [panel.title for panel in chart.panels] == ["gravity after moves", "noise, octave by octave"]
-    assert chart.panels[0].x.names == ("as given", "numbers", "noise", "effects")
+    assert [panel.title for panel in chart.panels] == ["tilt error after rotations", "noise, octave by octave"]
+    assert chart.panels[0].x.names == ("as given", "parameters", "noise", "effects")
     assert len(stages_pictures(SimpleNamespace(stages=stages))) == 1
     assert stages_pictures(SimpleNamespace(stages=())) == ()

@@ -98,10 +98,10 @@ def test_every_candidate_says_why_it_was_not_taken():
 
 def test_a_drift_among_biases_that_scatter_is_named():
     scenario = _of(profile_by_name("mpu"), hand_session(32, layout=7), "session", 7)
-    scenario = with_effect(scenario, "accel-hidden-drift", amplitude=(0.15, -0.12, 0.13), tau_s=80.0)
-    recording, truth = simulate(with_effect(scenario, "accel-zero-scatter", sigma=(0.003,) * 3), 7)
+    scenario = with_effect(scenario, "accel-bias-drift", amplitude=(0.15, -0.12, 0.13), tau_s=80.0)
+    recording, truth = simulate(with_effect(scenario, "accel-bias-repeatability", sigma=(0.003,) * 3), 7)
     found = trihedron.diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
-    assert found.effects[0].id == "accel-hidden-drift"
+    assert found.effects[0].id == "accel-bias-drift"
 
 
 @pytest.mark.parametrize("delay_s", [0.04, -0.025])
@@ -150,4 +150,4 @@ def test_a_flaw_of_moves_is_not_swallowed_by_zeros_that_scatter(seed):
     names = [effect.id for effect in found.effects]
     # The scatter may stray between poses as far as moves show: without its cost it explained the moves alone.
     assert names[0] == "gyro-scale-nonlinearity"
-    assert "gyro-zero-scatter" in names
+    assert "gyro-bias-repeatability" in names

@@ -122,7 +122,7 @@ def test_a_log_that_begins_in_motion_is_segmented_alike(session):
     )
     segments = segment_recording(late)
     assert segments.n_holds == len(truth.holds) - 1
-    assert FindingCode.NO_INITIAL_REST in codes(segments)
+    assert FindingCode.NO_INITIAL_POSE in codes(segments)
 
 
 @pytest.mark.parametrize("rate_deg_s", [0.3, 1.0, 5.0])
@@ -173,7 +173,7 @@ def test_a_push_inside_a_hold_is_left_out_and_said():
     recording, truth = simulate(scenario(Motion(tuple(steps))), 1)
     segments = segment_recording(recording)
     assert segments.n_holds == 7
-    assert FindingCode.HOLD_BUMPED in codes(segments)
+    assert FindingCode.POSE_DISTURBED in codes(segments)
     for push in (s for s in truth.segments if s.kind == "disturbance"):
         hold = next(h for h in segments.holds if h.start < push.start < h.stop)
         assert not set(range(push.start + 10, push.stop - 10)) & set(hold.samples().tolist())
@@ -185,7 +185,7 @@ def test_a_creeping_hold_stays_a_hold_and_is_said():
         steps += [MoveTo(edge, 2.0), Hold(10.0, creep_deg=0.3 if k == 3 else 0.0)]
     segments = segment_recording(simulate(scenario(Motion(tuple(steps)), 0.3), 1)[0])
     assert segments.n_holds == 13
-    finding = next(f for f in segments.findings if f.code is FindingCode.HOLD_CREEPS)
+    finding = next(f for f in segments.findings if f.code is FindingCode.POSE_SETTLING)
     assert finding.numbers["holds"] == 1.0
 
 
@@ -207,7 +207,7 @@ def test_a_pose_held_in_the_hand_is_told_from_a_table():
     )
     assert segments.n_holds == 12
     assert [h.index for h in segments.holds if h.is_unsteady] == [6]
-    assert FindingCode.HOLD_UNSTEADY in codes(segments)
+    assert FindingCode.POSE_UNSTEADY in codes(segments)
     others = np.delete(segments.accelerometer_sigma_mean, 6, axis=0)
     across = np.arange(3) != along
     assert np.all(segments.accelerometer_sigma_mean[6, across] > others.max(axis=0)[across])

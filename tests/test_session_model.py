@@ -78,7 +78,7 @@ def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_
     result = calibrate(recording, gravity_m_s2=9.803)
     assert result.calibration.gyroscope is not None
     assert result.calibration.gyroscope.S[0, 0] == pytest.approx(1.0, abs=0.01)
-    assert published_figures(result.calibration)["gravity_after_moves"]["rms"] < 0.35
+    assert published_figures(result.calibration)["tilt_error_after_rotations"]["rms"] < 0.35
 
 
 def test_samples_that_share_a_stamp_are_spread_to_the_next():

@@ -98,17 +98,17 @@ def test_a_unit_that_did_not_change_is_rarely_called_changed():
 def test_the_common_model_and_the_session_that_is_apart_are_found(four_sessions):
     result = trihedron.calibrate_sessions(four_sessions, gravity_m_s2=G)
     changed = [change for change in result.model.changes if change.significant]
-    assert [(c.id, c.kind, c.where) for c in changed] == [("gyro-zero", "apart", "session-3.csv")]
+    assert [(c.id, c.kind, c.where) for c in changed] == [("gyro-bias", "apart", "session-3.csv")]
     size = np.array(changed[0].size)
     # Five of its own standard errors: the truth of the zero along the axis, with its sign (b is added to S w').
     np.testing.assert_allclose(size, [-0.01, 0.0, 0.0], atol=5 * max(changed[0].std) + 1e-4)
     accel = result.calibration.accelerometer
     z = (accel.S - UNIT.S_a)[np.tril_indices(3)] / accel.sigma_S[np.tril_indices(3)]
     assert np.abs(z).max() < 4.0
-    zero_x = next(one for one in result.model.repeated if one.parameter.id == "gyro-zero")
+    zero_x = next(one for one in result.model.repeated if one.parameter.id == "gyro-bias")
     # 0.01 in one of four is a standard deviation of 0.005.
     assert zero_x.within.low < 0.005 < zero_x.within.high
-    assert "gyro-zero" in str(result)
+    assert "gyro-bias" in str(result)
     assert "session-3.csv" in str(result)
 
 
@@ -143,10 +143,10 @@ def thermal():
 def test_a_thermal_model_has_the_order_and_size_that_the_unit_has(thermal):
     terms = {term.id: term for term in thermal.model.thermal.terms}
     orders = {name: term.order for name, term in terms.items()}
-    assert orders["accel-zero"] == 2
-    assert orders["gyro-zero"] == 1
-    assert all(order == 0 for name, order in orders.items() if not name.endswith("zero"))
-    slope, sigma = terms["gyro-zero"].coefficients[1], np.sqrt(terms["gyro-zero"].covariance[:, 1, 1])
+    assert orders["accel-bias"] == 2
+    assert orders["gyro-bias"] == 1
+    assert all(order == 0 for name, order in orders.items() if not name.endswith("bias"))
+    slope, sigma = terms["gyro-bias"].coefficients[1], np.sqrt(terms["gyro-bias"].covariance[:, 1, 1])
     # Zero along the axis is -(M b): -1e-4 per degree over a scale near one; four standard errors.
     np.testing.assert_allclose(slope[1], -1e-4, atol=4 * sigma[1] + 2e-6)
 
@@ -171,7 +171,7 @@ def test_apply_follows_temperature_inside_the_range_and_says_so_outside(thermal,
 
 def test_hysteresis_between_heating_and_cooling_is_found_and_not_invented():
     rng = np.random.default_rng(8)
-    picked = [k for k, p in enumerate(PARAMETERS) if p.id == "gyro-zero"]
+    picked = [k for k, p in enumerate(PARAMETERS) if p.id == "gyro-bias"]
     found = {}
     for size in (0.0, 4e-4):
         sessions = []
@@ -185,7 +185,7 @@ def test_hysteresis_between_heating_and_cooling_is_found_and_not_invented():
         found[size] = {term.id: term.hysteresis for term in thermal_model(sessions).terms}
     assert all(value is None for value in found[0.0].values())
     # Twelve sessions of 1e-4: 3e-5; four standard errors.
-    np.testing.assert_allclose(found[4e-4]["gyro-zero"], 4e-4, atol=1.2e-4)
+    np.testing.assert_allclose(found[4e-4]["gyro-bias"], 4e-4, atol=1.2e-4)
 
 
 def test_several_logs_on_the_command_line_make_one_calibration(four_sessions, tmp_path, capsys):
@@ -197,7 +197,7 @@ def test_several_logs_on_the_command_line_make_one_calibration(four_sessions, tm
     status = main(["calibrate", *map(str, paths), "--gravity", str(G), "-o", str(out), "--json"])
     document = json.loads(capsys.readouterr().out)
     assert status == 0
-    assert {change["id"] for change in document["changes"] if change["significant"]} == {"gyro-zero"}
+    assert {change["id"] for change in document["changes"] if change["significant"]} == {"gyro-bias"}
     known = read_calibration(out)
     assert len(known.extensions["sessions"]) == 3
     assert main(["apply", str(out), str(paths[0]), "-o", str(tmp_path / "si.csv")]) == 0

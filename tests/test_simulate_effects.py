@@ -24,9 +24,9 @@ from trihedron.simulate import (
     table_turns,
     with_effect,
 )
+from trihedron.simulate.bias_repeatability import bias_of_poses
 from trihedron.simulate.motion import attitude_with_up
 from trihedron.simulate.motion.plan import Label
-from trihedron.simulate.zero_scatter import zero_of_poses
 
 IDEAL = Scenario(hand_session(8, hold_s=1.0, first_hold_s=2.0, arm_m=0.1), "ideal")
 
@@ -70,12 +70,12 @@ STATIC = {
     ),
     "gyro-saturation": ({"limit": 1.5}, lambda f, w, _t: (f, np.clip(w, -1.5, 1.5)), 1e-12),
     "accel-saturation": ({"limit": 8.0}, lambda f, w, _t: (np.clip(f, -8, 8), w), 1e-12),
-    "accel-hidden-drift": (
+    "accel-bias-drift": (
         {"amplitude": (0.05, 0.0, -0.02), "tau_s": 7.0},
         lambda f, w, _t: (f + np.exp(-_t / 7.0)[:, None] * [0.05, 0, -0.02], w),
         1e-12,
     ),
-    "gyro-hidden-drift": (
+    "gyro-bias-drift": (
         {"amplitude": (0.005, 0.0, -0.02), "tau_s": 7.0, "change": (0.0, 0.03, 0.01), "length_s": 40.0},
         lambda f, w, t: (
             f,
@@ -332,7 +332,7 @@ def test_a_left_handed_triad_has_a_negative_determinant_and_one_axis_reversed():
 
 
 @pytest.mark.parametrize(
-    ("effect_id", "sensor"), [("accel-zero-scatter", "accelerometer"), ("gyro-zero-scatter", "gyroscope")]
+    ("effect_id", "sensor"), [("accel-bias-repeatability", "accelerometer"), ("gyro-bias-repeatability", "gyroscope")]
 )
 def test_scattered_zeros_are_constant_in_a_pose_and_drawn_anew_after_a_move(effect_id, sensor):
     base = Scenario(hand_session(40, hold_s=1.0))
@@ -354,7 +354,7 @@ def test_a_pushed_pose_keeps_its_zero():
     labels = [Label(s.kind, s.name, s.start_s, s.stop_s, s.axis, s.turn_rad) for s in truth.segments]
     pushed = next(k for k, label in enumerate(labels) if label.kind == "disturbance")
     t = np.array([labels[pushed].start_s - 0.1, labels[pushed].stop_s + 0.1])
-    before, after = zero_of_poses(tuple(labels), t, (1.0, 1.0, 1.0), np.random.default_rng(1))
+    before, after = bias_of_poses(tuple(labels), t, (1.0, 1.0, 1.0), np.random.default_rng(1))
     assert np.array_equal(before, after)
 
 
@@ -370,9 +370,9 @@ def test_a_wrong_question_is_answered_in_one_sentence():
     with pytest.raises(ValueError, match="has no 'k9'; it takes k3"):
         with_effect(IDEAL, "accel-cubic", k9=1.0)
     with pytest.raises(ValueError, match="a drift needs an amplitude that dies away, or a change"):
-        with_effect(IDEAL, "accel-hidden-drift", tau_s=3.0)
+        with_effect(IDEAL, "accel-bias-drift", tau_s=3.0)
     with pytest.raises(ValueError, match="positive tau_s and length_s"):
-        with_effect(IDEAL, "accel-hidden-drift", change=0.1, length_s=0.0)
+        with_effect(IDEAL, "accel-bias-drift", change=0.1, length_s=0.0)
     with pytest.raises(ValueError, match="hits its stop"):
         simulate(with_effect(IDEAL, "accel-cubic", k3=0.1))
     with pytest.raises(ValueError, match="three numbers"):

@@ -157,7 +157,7 @@ def test_truth_reads_back_as_it_was(tmp_path):
 def test_the_command_writes_log_and_truth_and_refuses_in_one_sentence(tmp_path, capsys):
     log, truth = tmp_path / "a.csv", tmp_path / "a.npz"
     assert main(["simulate", "table-turns", "-o", str(log), "--truth", str(truth), "--seed", "4"]) == 0
-    assert "21 holds" in capsys.readouterr().out
+    assert "21 poses" in capsys.readouterr().out
     recording, _ = simulate(scenario_by_name("table-turns"), seed=4)
     assert np.array_equal(read(log).gyroscope, recording.gyroscope)
     assert read_truth(truth).seed == 4

@@ -104,5 +104,5 @@ def test_a_twin_says_what_it_lacks():
         twin_scenario(replace(recording, gyroscope=None), segments, calibration)
     none = np.zeros((0, 3))
     empty = Segments((), (), None, None, none, none, none, none, np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
-    with pytest.raises(ValueError, match="at least one still pose"):
+    with pytest.raises(ValueError, match="at least one pose"):
         twin_scenario(recording, empty, calibration)

@@ -16,7 +16,7 @@ from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.text import Style
 
 HEAD = ("what", "domain", "residual", "χ²/dof", "p", "model", "with the effects")
-ROW = ("gravity after a move", "static-accel", "5.49 mm/s²", "7.92", "9.0e−19", "disagrees", "1.02 agrees")
+ROW = ("tilt error after a rotation", "static-accel", "5.49 mm/s²", "7.92", "9.0e−19", "disagrees", "1.02 agrees")
 
 
 def document():
@@ -93,12 +93,12 @@ def test_moves_that_were_left_out_are_listed_in_one_sentence():
         Finding(
             FindingCode.OUTLIER_MOVE,
             Severity.WARNING,
-            f"Move {k} (hold {k} to hold {k + 1}) misses gravity by {miss} m/s², and is left out.",
+            f"Move {k} (pose {k} to pose {k + 1}) has a gravity error of {miss} m/s², and is excluded.",
         )
         for k, miss in ((7, 0.113), (9, 0.362), (22, 0.0986))
     ]
     (told,) = findings_block(found).findings
-    assert told.seen == "Moves 7, 9 and 22: each misses gravity by 0.0986 to 0.362 m/s², and is left out."
+    assert told.seen == "Moves 7, 9 and 22: each has a gravity error of 0.0986 to 0.362 m/s², and is excluded."
 
 
 def run(*words, **environment):

@@ -137,10 +137,10 @@ _PARAMETERS: dict[str, Callable[[dict[str, Any], Scenario, Recording, Truth], Se
     "gyro-thermal-bias": _thermal_bias,
     "accel-thermal-scale": _thermal_scale,
     "gyro-thermal-scale": _thermal_scale,
-    "accel-hidden-drift": lambda size, *_: (
+    "accel-bias-drift": lambda size, *_: (
         per_axis("warm_up", size["amplitude"]) | {"time_constant": float(size["tau_s"])}
     ),
-    "gyro-hidden-drift": lambda size, *_: (
+    "gyro-bias-drift": lambda size, *_: (
         per_axis("warm_up", size["amplitude"]) | {"time_constant": float(size["tau_s"])}
     ),
     "gyro-g-sensitivity": _g_sensitivity,

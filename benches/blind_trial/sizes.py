@@ -85,11 +85,11 @@ SIZES: dict[str, Draw] = {
     "accel-thermal-scale": lambda rng, s, _: {"per_k": signed(rng, 3e-4 * s)},
     "gyro-thermal-bias": lambda rng, s, _: {"per_k": signed(rng, np.radians(0.03) * s)},
     "gyro-thermal-scale": lambda rng, s, _: {"per_k": signed(rng, 4e-4 * s)},
-    "accel-hidden-drift": lambda rng, s, _: {
+    "accel-bias-drift": lambda rng, s, _: {
         "amplitude": signed(rng, 5e-3 * G * s),
         "tau_s": float(rng.uniform(40, 120)),
     },
-    "gyro-hidden-drift": lambda rng, s, _: {
+    "gyro-bias-drift": lambda rng, s, _: {
         "amplitude": signed(rng, np.radians(0.15) * s),
         "tau_s": float(rng.uniform(40, 120)),
     },
@@ -136,8 +136,8 @@ SAME_SIGNATURE: tuple[frozenset[str], ...] = tuple(
         ("accel-cubic", "accel-saturation"),
         ("accel-gyro-time-offset", "sensor-lag"),
         # One warm-up, one sag: everything here follows the same exponential of time.
-        ("accel-thermal-bias", "accel-thermal-scale", "accel-hidden-drift", "supply-sensitivity"),
-        ("gyro-thermal-bias", "gyro-thermal-scale", "gyro-hidden-drift"),
+        ("accel-thermal-bias", "accel-thermal-scale", "accel-bias-drift", "supply-sensitivity"),
+        ("gyro-thermal-bias", "gyro-thermal-scale", "gyro-bias-drift"),
         # Both move the proof masses: the simulator has one place for each.
         ("lever-arm", "accel-size-effect"),
         # Clipped moves are left out of the fit, and the fast ones are what shows a scale that depends on the rate.

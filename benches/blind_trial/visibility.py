@@ -27,7 +27,7 @@ PARAMETERS = {"earth-rate": 3, "gyro-g-sensitivity": 9, "accel-size-effect": 6, 
 """Parameters that a test must pay for; three where not listed."""
 OF_THE_MEANS = (
     "accel-quadratic", "accel-cubic", "accel-scale-asymmetry", "accel-hysteresis", "accel-thermal-bias",
-    "accel-thermal-scale", "gyro-thermal-bias", "gyro-thermal-scale", "accel-hidden-drift", "gyro-hidden-drift",
+    "accel-thermal-scale", "gyro-thermal-bias", "gyro-thermal-scale", "accel-bias-drift", "gyro-bias-drift",
     "gyro-g-sensitivity", "gyro-scale-nonlinearity", "accel-size-effect", "earth-rate", "supply-sensitivity",
     "vibration-rectification", "accel-saturation", "gyro-saturation",
 )  # fmt: skip

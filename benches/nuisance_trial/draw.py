@@ -11,15 +11,15 @@ G = 9.81
 DEG = np.pi / 180.0
 FLAWS = (
     "accel-quadratic", "accel-cubic", "accel-scale-asymmetry", "accel-thermal-bias", "gyro-thermal-bias",
-    "accel-hidden-drift", "gyro-hidden-drift", "gyro-g-sensitivity", "gyro-scale-nonlinearity", "gyro-saturation",
+    "accel-bias-drift", "gyro-bias-drift", "gyro-g-sensitivity", "gyro-scale-nonlinearity", "gyro-saturation",
     "accel-saturation", "lever-arm", "accel-gyro-time-offset", "sensor-lag", "dropped-samples",
     "vibration-rectification", "periodic-interference", "quantisation", "accel-hysteresis", "none",
 )  # fmt: skip
 NUISANCES = ("scatter", "stamps", "line", "soft", "bumps", "jolt", "warm", "coarse")
 ALLOWED_BESIDE = {
-    "scatter": {"gyro-zero-scatter", "accel-zero-scatter"}, "stamps": {"timing-jitter"},
+    "scatter": {"gyro-bias-repeatability", "accel-bias-repeatability"}, "stamps": {"timing-jitter"},
     "line": {"periodic-interference"}, "soft": {"disturbed-pose"}, "bumps": {"disturbed-pose"},
-    "jolt": {"disturbed-pose"}, "warm": {"accel-hidden-drift", "gyro-hidden-drift"}, "coarse": {"quantisation"},
+    "jolt": {"disturbed-pose"}, "warm": {"accel-bias-drift", "gyro-bias-drift"}, "coarse": {"quantisation"},
 }  # fmt: skip
 """What may be said besides the flaw, because it is there too."""
 ALSO_RIGHT = {"accel-gyro-time-offset": {"sensor-lag"}, "sensor-lag": {"accel-gyro-time-offset"},
@@ -116,7 +116,7 @@ def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
             c = _signed(rng, 0.01, 0.04) * size * DEG
             rate = rate + (temperature - 25)[:, None] * c
         values = {"per_k": c}
-    if flaw.endswith("hidden-drift"):
+    if flaw.endswith("bias-drift"):
         u = t / duration
         curve = (np.exp(-u / rng.uniform(0.05, 0.4)), np.sin(2 * np.pi * u * rng.uniform(0.6, 1.4) + rng.uniform(0, 6)),
                  1 / (1 + np.exp((rng.uniform(0.3, 0.7) - u) / 0.08)))[rng.integers(3)]  # fmt: skip

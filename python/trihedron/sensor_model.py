@@ -5,7 +5,7 @@ Inverse form, truth → raw (*distort*):  ``a' = S_a f + b_a`` with ``S_a = S⁻
 
 Signs and handedness
 --------------------
-``|f| = |g|`` is unchanged when Mz is reflected, so nothing in still poses decides the sign of a row of ``S``. A frame
+``|f| = |g|`` is unchanged when Mz is reflected, so nothing in poses decides the sign of a row of ``S``. A frame
 is therefore reached from another by a *proper rotation* only: a triad whose documented axes are left-handed
 (``det S < 0``) stays left-handed in every frame, with the signs on the diagonal of ``S``, and is reported, not mended.
 """
@@ -159,7 +159,7 @@ def in_frame(calibration: Calibration, frame: Frame) -> Calibration:
     Raises
     ------
     ValueError
-        When the accelerometer's S is singular, or ``case`` is asked for: no still pose knows the case.
+        When the accelerometer's S is singular, or ``case`` is asked for: no pose knows the case.
     """
     if frame == calibration.frame:
         return calibration

@@ -80,7 +80,7 @@ class ClockFit:
             order = np.lexsort((y - slope * x, bins))
             first = order[np.unique(bins[order], return_index=True)[1]]
             px, py = x[first], y[first]
-            # Stretches in which every arrival was late say little: twice the median distance is left out.
+            # Stretches in which every arrival was late say little: twice the median distance is excluded.
             residual = py - slope * px
             residual -= np.median(residual)
             keep = np.abs(residual) <= 4.0 * max(float(np.median(np.abs(residual))), 1e-9)

@@ -1,7 +1,7 @@
 """A guided calibration as a state machine without a screen: readings in, what to show out.
 
-It knows no estimator: ``examine`` tells where the session stands (poses, error bars, the most useful next pose) and is
-called once per hold. Whoever composes it gives the real one (``trihedron.pipeline.guiding``) or a stand-in.
+It knows no estimator: ``examine`` tells where the session stands (poses, uncertainties, the most useful next pose) and
+is called once per pose. Whoever composes it gives the real one (``trihedron.pipeline.guiding``) or a stand-in.
 """
 
 from __future__ import annotations
@@ -136,7 +136,7 @@ class Guide:
         self.examination = examination
         self._asked_s = examination.hold_s
         if len(examination.poses_up) <= before and before:
-            self._remark = "This pose does not count yet: hold on, hands off."
+            self._remark = "This pose is not long enough yet: hands off."
             self._asked_s = self._stillness.still_for_s + RETRY_HOLD_S
             if self._stillness.still_for_s > 3.0 * examination.hold_s:
                 self._remark = "This pose was counted before: turn the board on."
@@ -151,7 +151,7 @@ class Guide:
             self.phase = Phase.CHECK if self._n_checks else Phase.DONE
             self._target = self._far_from_all()
         elif len(examination.poses_up) >= self._most:
-            self._remark = f"{self._most} poses and the accuracy is not reached: the warnings say what limits it."
+            self._remark = f"{self._most} poses and the accuracy is not reached: see the warnings for the cause."
             self.cut_s = self._time_s
             self.phase = Phase.CHECK if self._n_checks else Phase.DONE
             self._target = self._far_from_all()
@@ -207,7 +207,7 @@ class Guide:
             return "Done.", "The calibration and its check follow."
         if self.phase is Phase.BEGIN:
             if self._stillness.still_for_s > 0.0:
-                return f"Hold still: {left:.0f} s", "The first rest measures the noise of the board."
+                return f"Hold still: {left:.0f} s", "The first pose measures the noise of the board."
             return "Put the board down and take your hands off.", "Anything firm will do; it need not be level."
         if self._is_taken or self._stillness.still_for_s <= 0.0:
             return self._where_to()

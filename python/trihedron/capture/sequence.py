@@ -26,13 +26,13 @@ MOST_SILENT_S = 3600.0
 """A clock that jumps further was set, not overrun."""
 
 LONG_GAP = 50
-"""Steps after which the error of the step itself hides where a stamp should stand."""
+"""Steps after which the error of the step itself hides where a timestamp should stand."""
 
 AGREEMENT = 0.35
-"""Of a step: how far the difference of two stamps may be from one step and still confirm both."""
+"""Of a step: how far the difference of two timestamps may be from one step and still confirm both."""
 
 COARSE = 2.4
-"""Ticks per frame below which rounding moves a stamp by a good part of a frame: a step of two may then be one, and
+"""Ticks per frame below which rounding moves a timestamp by a good part of a frame: a step of two may then be one, and
 single losses are not countable (only holes longer than ``COARSE_SPAN`` ticks)."""
 
 COARSE_SPAN = 8
@@ -83,7 +83,7 @@ class Sequence:
         self.is_coarse = False
         self._last: int | None = None
         self._newest: Frame | None = None
-        # How far the last stamp stood after where a steady clock would have put it, in ticks.
+        # How far the last timestamp stood after where a steady clock would have put it, in ticks.
         self._late = 0.0
         self._index = -1
         self._waiting: list[tuple[float, Frame]] = []
@@ -174,14 +174,14 @@ class Sequence:
         return abs(self._difference(a, b) / self._period - 1.0) < AGREEMENT
 
     def _agree_of_three(self) -> bool:
-        """Where equal stamps are usual, a frame sent twice would confirm itself: a third one has to go on."""
+        """Where equal timestamps are usual, a frame sent twice would confirm itself: a third one has to go on."""
         if len(self._waiting) < 3:
             return False
         first, second, third = (self._key(frame) for _, frame in self._waiting[-3:])
         return self._follows(first, second) and self._difference(first, third) > 0
 
     def _ahead(self, key: int) -> int:
-        """Steps from the last frame placed, whose own stamp may have been early or late."""
+        """Steps from the last frame placed, whose own timestamp may have been early or late."""
         assert self._last is not None
         difference = self._difference(self._last, key)
         if self._by_counter or self.is_coarse or difference == 0:
@@ -201,7 +201,7 @@ class Sequence:
         if self._by_clock and self._period == 0.0:
             forward = [d for d in differences if d > 0] or [1]
             usual = [d for d in forward if d <= 1.6 * median(forward)]
-            # Equal stamps are neighbours within one tick, not repeats.
+            # Equal timestamps are neighbours within one tick, not repeats.
             n = len(usual) + sum(d == 0 for d in differences)
             self._period = sum(usual) / n
             self.is_coarse = self._period < COARSE
@@ -222,7 +222,7 @@ class Sequence:
         waiting = self._waiting
         newest = self._key(waiting[-1][1])
         if self._ahead(newest) == len(waiting):
-            # Where it belongs if those between only have a wrong count, or a stamp early or late.
+            # Where it belongs if those between only have a wrong count, or a timestamp early or late.
             self._in_place(out)
             return
         if len(waiting) >= 2:
@@ -314,7 +314,7 @@ class Sequence:
             if restarted or ahead > LONG_GAP:
                 self._late = 0.0
             else:
-                # The step follows the clock slowly, the phase faster; a single stamp moves neither much.
+                # The step follows the clock slowly, the phase faster; a single timestamp moves neither much.
                 limit = 0.3 * self._period
                 gain = max(1e-3, 1.0 / (LEARN + self.tally.saved))
                 self._period += gain * min(max(surprise / ahead, -limit), limit)

@@ -86,7 +86,7 @@ def _unbroken(part: FloatArray) -> list[FloatArray]:
 
 @dataclass(frozen=True, eq=False)
 class _Power:
-    """Half the mean squared difference of each hold (k,), and its degrees of freedom (k,)."""
+    """Half the mean squared difference of each pose (k,), and its degrees of freedom (k,)."""
 
     variance: FloatArray
     dof: FloatArray
@@ -97,7 +97,7 @@ class _Power:
         squares = [np.diff(part) ** 2 for part in parts]
         mean = np.array([float(s.mean()) for s in squares])
         count = np.array([len(s) for s in squares], dtype=np.float64)
-        # Relative to each hold's own level: holds may differ.
+        # Relative to each pose's own level: holds may differ.
         about = [s / m - 1.0 for s, m in zip(squares, mean, strict=True) if m > 0.0]
         spread = np.zeros(LAGS + 1)
         for lag in range(LAGS + 1):

@@ -1,4 +1,4 @@
-"""Lines that the holds of a session have in common, and the holds without them."""
+"""Lines that the holds of a session have in common, and the poses without them."""
 
 from __future__ import annotations
 

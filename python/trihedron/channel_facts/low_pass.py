@@ -49,7 +49,7 @@ MISFIT = 3.0
 class Spectrum:
     """Mean power (k,) at frequencies (k,) of ``count`` segments of one axis, two-sided densities.
 
-    ``rounding`` is the density that the converter's steps add, ``scatter`` by how much the holds' power differs;
+    ``rounding`` is the density that the converter's steps add, ``scatter`` by how much the poses' power differs;
     ``slow`` are the powers of 1/f that lie beneath: flicker and walk, or what leaks from below where that was cut off.
     """
 
@@ -146,7 +146,7 @@ def corners_tried(spectra: Sequence[Spectrum], rate_hz: float) -> FloatArray:
 def undisturbed(spectrum: Spectrum, rate_hz: float) -> Spectrum:
     """The spectrum from the lowest octave on above which a filter, flicker and walk account for it; all, if none does.
 
-    Knocks that ring, a swaying stand and a trembling hand fill the lowest octaves of many holds, and only those.
+    Knocks that ring, a swaying stand and a trembling hand fill the lowest octaves of many poses, and only those.
     """
     grid = corners_tried([spectrum], rate_hz)[::2]
     lowest = 0.0

@@ -1,4 +1,4 @@
-"""Figures of many holds in one, and the ratio of two such figures."""
+"""Figures of many poses in one, and the ratio of two such figures."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ MOST_LEFT_OUT = 0.25
 UNKNOWN = 50.0
 """Logarithm beyond which an interval says no more: 21 decades either way."""
 FAR = 5.0
-"""Robust standard deviations beyond which a hold is disturbed: one clean hold in a million."""
+"""Robust standard deviations beyond which a pose is disturbed: one clean hold in a million."""
 
 
 @dataclass(frozen=True)
 class Pooled:
-    """Mean logarithm over holds, its standard error with the degrees of freedom of that, and the holds' own scatter."""
+    """Mean logarithm over holds, its standard error with the degrees of freedom of that, and the poses' own scatter."""
 
     mean: float
     sigma: float
@@ -31,7 +31,7 @@ class Pooled:
 
 
 def robust_holds(variance: FloatArray, dof: FloatArray) -> npt.NDArray[np.bool_]:
-    """(k,) holds whose noise is not far above the rest's; at most a quarter is left out, the worst first."""
+    """(k,) holds whose noise is not far above the rest's; at most a quarter is excluded, the worst first."""
     keep = np.asarray(variance > 0.0)
     if np.count_nonzero(keep) < 4:
         return keep if keep.any() else np.ones(len(variance), dtype=bool)

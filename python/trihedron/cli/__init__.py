@@ -89,7 +89,7 @@ def build_app() -> typer.Typer:
     """The command with all its subcommands."""
     app = typer.Typer(
         name="trihedron",
-        help="Calibrate an IMU from a raw log, with honest error bars.",
+        help="Calibrate an IMU from a raw log, with the uncertainty of every parameter.",
         cls=Group,
         add_completion=True,
         pretty_exceptions_enable=False,
@@ -110,7 +110,7 @@ def trihedron(
         False, "--man", help="Print the manual page (trihedron --man | man -l -).", is_eager=True, callback=_manual
     ),
 ) -> None:
-    """Calibrate an IMU from a raw log, with honest error bars."""
+    """Calibrate an IMU from a raw log, with the uncertainty of every parameter."""
 
 
 def _a_reference_each(words: list[str]) -> list[str]:

@@ -39,7 +39,7 @@ KeepEvents = Annotated[
 ]
 Accuracy = Annotated[
     float,
-    typer.Option("--accuracy", metavar="PERCENT", help="How long to record to know each term this well; --full."),
+    typer.Option("--accuracy", metavar="PERCENT", help="How long to record for this uncertainty of each term; --full."),
 ]
 Plot = Annotated[
     Optional[Path],  # noqa: UP045

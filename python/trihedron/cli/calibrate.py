@@ -21,7 +21,7 @@ Method = Annotated[
 ]
 Frame = Annotated[
     Optional[str],  # noqa: UP045 -- typer evaluates it at run time
-    typer.Option(help="Instrument trihedron: lower, symmetric, or case (with --method faces)."),
+    typer.Option(help="Body frame: lower, symmetric, or case (with --method faces)."),
 ]
 Faces = Annotated[
     Optional[str],  # noqa: UP045
@@ -41,7 +41,7 @@ AxisSigns = Annotated[
 Loss = Annotated[str, typer.Option(help="How far outlying poses count: linear, huber, soft_l1, cauchy.")]
 GyroNominal = Annotated[
     Optional[float],  # noqa: UP045
-    typer.Option(metavar="X", help="Nominal rad/s per gyro unit, where counts and few moves cannot tell it."),
+    typer.Option(metavar="X", help="Nominal rad/s per gyro unit, where counts and few moves do not determine it."),
 ]
 Reference = Annotated[
     Optional[list[Path]],  # noqa: UP045
@@ -87,7 +87,7 @@ def calibrate(
     full: Full = False,
     force: Force = False,
 ) -> None:
-    """Calibrate both sensors from a log of still poses and moves.
+    """Calibrate both sensors from a log of poses and moves.
 
     With several logs of one unit: one model, and how far every parameter repeats.
     """
@@ -194,7 +194,7 @@ def numbers(option: str, text: str) -> list[float]:
     try:
         return [float(word) for word in text.split(",")]
     except ValueError:
-        raise typer.BadParameter(f"{option} is numbers with commas between, not {text!r}") from None
+        raise typer.BadParameter(f"{option} is a list of numbers with commas between, not {text!r}") from None
 
 
 def signs(option: str, text: str) -> list[int]:

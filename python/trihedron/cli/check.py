@@ -8,7 +8,7 @@ from trihedron.cli.output import check_outputs, leave, show, write_json, write_r
 
 @with_options(source=LogSource)
 def check(source: LogSource, report: Report = None, json: Json = None, force: Force = False) -> None:
-    """Is a log fit for calibration? Its faults, its poses, and the error bars to expect."""
+    """Is a log fit for calibration? Its faults, its poses, and the uncertainties to expect."""
     check_outputs(json, force=force, report=report, inputs=source.files)
     recording = source.read()
     from trihedron import pipeline

@@ -63,7 +63,7 @@ def diagnose(
     full: Full = False,
     force: Force = False,
 ) -> None:
-    """Where a log and its model differ, which physics was left out, and does adding it help. Status 0 if it ran."""
+    """Where a log and its model differ, which effects are missing, and does adding it help. Status 0 if it ran."""
     if calibration is not None and against is not None:
         raise typer.BadParameter("give either --calibration or --against: each is the model")
     if not 0.0 < alpha < 0.5:
@@ -134,7 +134,7 @@ def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -
     for what, ratio in better.unlike.items():
         say(
             f"{what} of the improved scenario miss gravity by {ratio:.2f} times what the log's do: "
-            "what inside the poses looks like noise or makes zeros stray is not all told apart by this log."
+            "this log does not separate all noise within poses from bias changes."
         )
     write_scenario(better.text, path, overwrite=force)
     say(f"improved scenario: {path}")

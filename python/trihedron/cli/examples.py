@@ -43,23 +43,23 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ),
     ),
     "kalman": (
-        ("With the noise of a rest log:", "trihedron kalman log.csv --noise rest.csv --report kalman.html"),
+        ("With the noise of a static log:", "trihedron kalman log.csv --noise static.csv --report kalman.html"),
         (
-            "Poses of a dividing head, its angles known to 0.01°:",
+            "Poses of a dividing head, its angles with 0.01° uncertainty:",
             "trihedron kalman log.csv --reference poses.csv --angle-sigma 0.01",
         ),
     ),
     "allan": (
-        ("The terms, the curves and Kalibr's imu.yaml:", "trihedron allan rest.csv --report noise.html"),
+        ("The terms, the curves and Kalibr's imu.yaml:", "trihedron allan static.csv --report noise.html"),
         (
             "Counts of a known size:",
-            'trihedron allan rest.npz --rate 100 --gyro-lsb "0.05 deg/s" --accel-lsb "3.33 mg"',
+            'trihedron allan static.npz --rate 100 --gyro-lsb "0.05 deg/s" --accel-lsb "3.33 mg"',
         ),
-        ("Without the first minute and a knock:", "trihedron allan rest.csv --exclude :60 --exclude 812:815"),
-        ("A log larger than the memory:", "trihedron allan rest.npy --stream --columns gx,gy,gz --rate 1000"),
+        ("Without the first minute and a knock:", "trihedron allan static.csv --exclude :60 --exclude 812:815"),
+        ("A log larger than the memory:", "trihedron allan static.npy --stream --columns gx,gy,gz --rate 1000"),
     ),
     "verify": (
-        ("Does it still hold?", "trihedron verify cal.json today.csv"),
+        ("Is the calibration still valid?", "trihedron verify cal.json today.csv"),
         ("Status 2 beyond 2 mg, for a script:", "trihedron verify cal.json today.csv --limit-mg 2"),
         ("Is the vendor's right? Which is best?", "trihedron verify today.csv cal.json camera.json imu-result.yaml"),
     ),
@@ -79,6 +79,6 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "simulate": (
         ("What there is ready-made:", "trihedron simulate --list"),
         ("A log with its truth beside it:", "trihedron simulate hand-session -o log.csv --truth truth.json --seed 3"),
-        ("The twin of a recording:", "trihedron simulate --like log.csv --calibration cal.json -o twin.csv"),
+        ("The digital twin of a recording:", "trihedron simulate --like log.csv --calibration cal.json -o copy.csv"),
     ),
 }

@@ -10,7 +10,7 @@ import typer
 from trihedron.cli.options import Force
 from trihedron.cli.output import check_outputs, leave, say
 
-LOSSES = ("lost", "Left out, since", "upper limit", "NOT TO BE TRUSTED")
+LOSSES = ("lost", "Not in this file", "upper limit", "NOT TO BE TRUSTED")
 """Words by which a file says what it cannot hold."""
 
 
@@ -29,11 +29,11 @@ def export(
     ] = Path("-"),
     noise: Annotated[
         Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
-        typer.Option("--noise", metavar="FILE", help="Noise of a rest log: the JSON of trihedron allan."),
+        typer.Option("--noise", metavar="FILE", help="Noise of a static log: the JSON of trihedron allan."),
     ] = None,
     rate: Annotated[
         Optional[float],  # noqa: UP045
-        typer.Option("--rate", metavar="HZ", help="Rate of the samples; that of the rest log when not said."),
+        typer.Option("--rate", metavar="HZ", help="Rate of the samples; that of the static log when not said."),
     ] = None,
     topic: Annotated[str, typer.Option("--topic", metavar="NAME", help="Where the samples are published.")] = "/imu0",
     accel_lsb: Annotated[

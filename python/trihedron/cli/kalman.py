@@ -32,12 +32,10 @@ def kalman(
         Optional[Path],  # noqa: UP045
         typer.Option(
             metavar="FILE",
-            help="A log of rest to identify the noise from, or its terms (JSON).",
+            help="A static log to identify the noise from, or its terms (JSON).",
         ),
     ] = None,
-    frame: Annotated[
-        str, typer.Option(help="Instrument trihedron without a pose table: lower or symmetric.")
-    ] = "lower",
+    frame: Annotated[str, typer.Option(help="Body frame without a pose table: lower or symmetric.")] = "lower",
     output: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("-o", "--output", metavar="FILE", help="Write the calibration file (JSON)."),

@@ -16,7 +16,9 @@ def plan(
         str, typer.Option(metavar="LIST", help="Known turns about every axis, in degrees: '90,-90' or '1440,-1440'.")
     ] = "90,-90",
     turn_time: Annotated[float, typer.Option(metavar="S", help="How long a turn takes.")] = 2.0,
-    hold: Annotated[float, typer.Option(metavar="S", help="How long a pose, and the zero turn, is held.")] = 4.0,
+    hold: Annotated[
+        float, typer.Option(metavar="S", help="Length of a pose, and of the stretch without rotation.")
+    ] = 4.0,
     gyro_noise: Annotated[float, typer.Option(metavar="X", help="White noise of the gyro [deg/s/√Hz].")] = 0.005,
     accel_noise: Annotated[float, typer.Option(metavar="X", help="White noise of the accelerometer [µg/√Hz].")] = 150.0,
     turn_error: Annotated[float, typer.Option(metavar="DEG", help="Standard error of a turn's angle (wall).")] = 0.0,

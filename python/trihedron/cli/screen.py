@@ -47,7 +47,7 @@ def hemispheres(view: GuideView, width: int = 17, height: int = 9) -> list[str]:
     if view.up_now is not None:
         put(view.up_now, HERE)
     rows = ["".join(left) + "  " + "".join(right) for left, right in zip(*discs, strict=True)]
-    return [f"{'axis 3 up':^{width}}  {'axis 3 down':^{width}}", *rows]
+    return [f"{'+Z up':^{width}}  {'-Z up':^{width}}", *rows]
 
 
 def bar(share: float, width: int) -> str:
@@ -67,7 +67,7 @@ def screen(view: GuideView, width: int = 80, height: int = 24, *, lost: int = 0,
     state = Text("STILL " if view.is_still else "MOVING", style=f"{STRONG} {GOOD if view.is_still else DIM}")
     head = Text.assemble(state, "  ", Text(view.instruction, style=STRONG))
     full = bar(view.held_s / max(view.hold_s, 0.1), inner - 24)
-    hold = f"hold  [{full}] {min(view.held_s, 99.9):4.1f} of {view.hold_s:.0f} s"
+    hold = f"pose  [{full}] {min(view.held_s, 99.9):4.1f} of {view.hold_s:.0f} s"
     lines: list[Text] = [head, Text(view.detail, style=DIM), Text(hold)]
     angle = view.degrees_to_target
     if angle is not None and view.phase in (Phase.MOVE, Phase.CHECK):
@@ -107,11 +107,11 @@ def _to_go(known: Examination) -> str:
 
 
 def _parameters(known: Examination | None, *, tall: bool) -> Text:
-    """Error bars now, after the next pose and as wanted: all of them where there is room, else the worst of each."""
+    """Uncertainties now, after the next pose and as wanted: all of them where there is room, else the worst of each."""
     if known is None:
-        return Text("error bars come with the first poses", style=DIM)
+        return Text("after the first poses", style=DIM)
     room = 32 if tall else 14
-    out = Text(f"{'error bar, %':{room}s}{'now':>6}{'next':>7}{'goal':>6}\n", style=DIM)
+    out = Text(f"{'uncertainty, %':{room}s}{'now':>6}{'next':>7}{'goal':>6}\n", style=DIM)
     rows = list(known.uncertain) if tall else _groups(known.uncertain)
     for one in rows:
         name = f"{'acc' if one.sensor == 'accelerometer' else 'gyro'} {one.name}"[: room - 1]
@@ -125,13 +125,13 @@ def _groups(all_of_them: tuple[Uncertain, ...]) -> list[Uncertain]:
     """The worst of every kind, seven lines at most."""
     groups: dict[tuple[str, str], list[Uncertain]] = {}
     for one in all_of_them:
-        kind = "scale" if one.name.startswith("scale") else "zero" if one.name.startswith("zero") else "axes"
+        kind = "scale" if one.name.startswith("scale") else "bias" if one.name.startswith("bias") else "axes"
         groups.setdefault((one.sensor, kind), []).append(one)
     out = []
     for (sensor, kind), members in groups.items():
         worst = max(members, key=lambda one: math.inf if one.now is None else one.now)
         after = [one.after_next for one in members if one.after_next is not None]
-        words = {"scale": "scales", "zero": "zeros", "axes": "angles"}[kind]
+        words = {"scale": "scales", "bias": "biases", "axes": "angles"}[kind]
         out.append(Uncertain(sensor, words, worst.now, max(after) if after else None, worst.wanted))
     return out
 

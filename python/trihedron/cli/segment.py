@@ -16,7 +16,7 @@ def segment(
     json: Json = None,
     force: Force = False,
 ) -> None:
-    """Find the still poses and the moves between them."""
+    """Find the poses and the moves between them."""
     check_outputs(json, force=force, report=report, inputs=source.files)
     needs_stream(checkpoint, stream=stream)
     if stream:

@@ -25,7 +25,7 @@ Truth = Annotated[
 Seed = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Which accident of noise.")]
 Like = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option("--like", metavar="LOG", help="Twin: repeat this recording, with --calibration."),
+    typer.Option("--like", metavar="LOG", help="Digital twin: repeat this recording, with --calibration."),
 ]
 Calibration = Annotated[
     Optional[Path],  # noqa: UP045
@@ -76,7 +76,7 @@ def simulate(
     report: Report = None,
     force: Force = False,
 ) -> None:
-    """Simulate an instrument: a scenario, or the twin of a recording; the truth is kept apart from the log."""
+    """Simulate an instrument: a scenario, or the digital twin of a recording; the truth is kept apart from the log."""
     from trihedron.simulate import list_scenarios
 
     if list_them:
@@ -88,7 +88,7 @@ def simulate(
     if (like is None) != (calibration is None):
         raise typer.BadParameter("--like and --calibration go together")
     if with_effects is not None and scenario is None:
-        raise typer.BadParameter("--with-effects belongs to a SCENARIO; a twin repeats its recording as it is")
+        raise typer.BadParameter("--with-effects belongs to a SCENARIO; a digital twin repeats its recording as it is")
     if output is None and serve is None:
         raise typer.BadParameter("say where the log goes with -o LOG, or send it with --serve PTY")
     from trihedron.files.log import LOG_SUFFIXES, write_recording
@@ -124,7 +124,7 @@ def simulate(
         serve_recording(recording, known, serve, protocol, faults, speed=speed, baud=baud, link=link)
         return
     typer.echo(f"{output}: {recording.n_samples} samples, {recording.duration_s:.1f} s at {recording.rate_hz:.4g} Hz")
-    typer.echo(f"{len(known.holds)} holds, {len(known.moves)} moves, |g| {known.gravity_m_s2:.6g} m/s²")
+    typer.echo(f"{len(known.holds)} poses, {len(known.moves)} moves, |g| {known.gravity_m_s2:.6g} m/s²")
     for name, parameters in known.effects.items():
         from trihedron.report.simulation import in_rows
 
@@ -144,5 +144,5 @@ def _scenario(name: str, diagnosis: Path | None) -> Any:
 
     made = with_effects(name, read_diagnosis(diagnosis)["effects"])
     for effect_id, why in made.left_out.items():
-        say(f"effect {effect_id} was left out: {why}.")
+        say(f"effect {effect_id} was excluded: {why}.")
     return made.scenario

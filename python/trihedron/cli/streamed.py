@@ -71,7 +71,7 @@ def opened(source: LogSource) -> LogOnDisk:
 def segment_stream(
     source: LogSource, report: Path | None, json: Path | None, checkpoint: Path | None, *, force: bool
 ) -> None:
-    """Still poses of a log on disk."""
+    """Poses of a log on disk."""
     log = opened(source)
     from trihedron.pipeline.streaming import condensed, segment_file
     from trihedron.report import segments_report
@@ -79,7 +79,7 @@ def segment_stream(
 
     with progress("segmenting") as tell:
         segments = segment_file(log, checkpoint=checkpoint, progress=tell)
-    # Figures and times come from the rows of moves and of the ends of holds.
+    # Figures and times come from the rows of moves and of the ends of poses.
     recording, shown = condensed(log, segments)
     document, machine = segments_report(recording, shown), segments_record(recording, shown)
     show(document, json, sections=None)

@@ -24,12 +24,13 @@ def verify(
     limit_mg: Annotated[
         Optional[float],  # noqa: UP045 -- typer evaluates it at run time
         typer.Option(
-            metavar="MG", help="Largest rms error of gravity at rest that you accept; beyond it the exit status is 2."
+            metavar="MG",
+            help="Largest rms gravity error in static poses that you accept; beyond it the exit status is 2.",
         ),
     ] = None,
     limit_deg: Annotated[
         Optional[float],  # noqa: UP045
-        typer.Option(metavar="DEG", help="The same for gravity carried through the moves by the gyro."),
+        typer.Option(metavar="DEG", help="The same for the tilt error after a rotation."),
     ] = None,
     json: Json = None,
     report: Report = None,

@@ -102,7 +102,7 @@ def diagnose_recording(
         recording_sha256=recording.sha256,
         references=MappingProxyType(model.context.references),
         residuals=residuals_before_after(run.predicted, answer.judged, {one.effect.sensor for one in answer.biases}),
-        laws=laws,
+        relations=laws,
         stages=held_out_stages(run.bare, answer),
     )
     tell(1.0, "done")
@@ -118,13 +118,13 @@ def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
             "accelerometer_density": np.sqrt((twin.accel_S**2) @ obs.force_density**2).tolist(),
             "accelerometer_unit": "m/s^2/sqrt(Hz)",
             "accelerometer_corner_s": twin.strengths[0][0],
-            "accelerometer_zero": asdict(accel),
+            "accelerometer_bias": asdict(accel),
             "gyroscope_density": None
             if obs.rate_density is None
             else np.sqrt((twin.gyro_S**2) @ obs.rate_density**2).tolist(),
             "gyroscope_unit": "rad/s/sqrt(Hz)",
             "gyroscope_corner_s": twin.strengths[0][1],
-            "gyroscope_zero": None if gyro is None else asdict(gyro),
+            "gyroscope_bias": None if gyro is None else asdict(gyro),
         }
     )
 

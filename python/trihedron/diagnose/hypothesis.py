@@ -111,7 +111,7 @@ class Hypothesis:
         return [Asked(*one) for one in found]
 
     def looked_at(self, terms: Sequence[Term], scales: Sequence[float]) -> list[Look]:
-        """What each of some terms gains at the strengths found here and elsewhere, its sizes times each of ``scales``."""
+        """What each of some terms gains at the strengths found here and elsewhere, sizes times each of ``scales``."""
         found = self.fitted.line.core.looks(_columns(terms), list(scales), [self.strengths, *ELSEWHERE])
         return [Look(*one) for one in found]
 

@@ -36,7 +36,7 @@ def integrate_rate(
     Parameters
     ----------
     time_s : (n,)
-        Instants [s], rising, at any spacing; a stamp may repeat (nothing turns in between).
+        Instants [s], rising, at any spacing; a timestamp may repeat (nothing turns in between).
     rate : (n, 3)
         Angular rate [rad/s] along the axes of the body, zero and scale corrected (:func:`trihedron.apply`).
     form : "matrices", "quaternions" or "vectors"

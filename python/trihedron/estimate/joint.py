@@ -204,7 +204,7 @@ def _poses_above_noise(quality: FitQuality, solution: SessionSolution) -> tuple[
             floor_m_s2=quality.floor,
             chi2_per_dof=quality.chi2 / quality.dof,
             dof=quality.dof,
-            zero_scatter_m_s2=solution.accel_zero_rms,
+            bias_repeatability_m_s2=solution.accel_zero_rms,
         ),
     )
 

@@ -54,7 +54,7 @@ def verify_calibration(
     if recording.accelerometer is None or segments.accelerometer_mean is None:
         raise RefusedError("verification needs the accelerometer: gravity is what a calibration is tested against")
     if segments.n_holds == 0:
-        raise RefusedError("verification needs still poses, and none was found: hold the sensor still for some seconds")
+        raise RefusedError("verification needs poses, and none was found: keep the sensor still for some seconds")
     accelerometer = calibration.accelerometer
     noise = _variance(segments.norm_sigma, segments.n_holds)
     error, error_noise, error_sigma = norm_error(accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)

@@ -37,13 +37,13 @@ FORMAT_VERSION = 1
 EQUATION = "truth = S * raw + b"
 DIRECTION = (
     "raw to true: multiply the raw reading (column of three, in raw_unit) by S, row by row, then add b; the result "
-    "is in si_unit, in the instrument trihedron. S is not to be inverted and b is not to be subtracted. "
-    "One trihedron is shared by both sensors."
+    "is in si_unit, in the body frame. S is not to be inverted and b is not to be subtracted. Both sensors share one "
+    "body frame."
 )
 FRAME_MEANING = {
-    "lower": "axis 1 of the trihedron lies along accelerometer axis 1, axis 2 in the plane of accelerometer axes 1 "
-    "and 2; S of the accelerometer is lower triangular",
-    "symmetric": "the trihedron nearest to the accelerometer's axes; S of the accelerometer is symmetric",
+    "lower": "X of the body frame lies along accelerometer X, Y in the plane of accelerometer X and Y; S of the "
+    "accelerometer is lower-triangular",
+    "symmetric": "the body frame nearest to the accelerometer's axes; S of the accelerometer is symmetric",
     "case": "axes normal to three faces of the case; S is full",
 }
 

@@ -55,28 +55,16 @@ def read_diagnosis(path: str | os.PathLike[str]) -> dict[str, Any]:
             f"{path}: this JSON is not a diagnosis; name a file written by `trihedron diagnose --json`."
         )
     version = document.get("schema_version")
-    if isinstance(version, int) and version > SCHEMA_VERSION:
+    if isinstance(version, int) and version != SCHEMA_VERSION:
         raise DiagnosisFileError(
-            f"{path}: written in schema {version}, this version reads up to {SCHEMA_VERSION}; update trihedron."
+            f"{path}: written in schema {version}, this version reads {SCHEMA_VERSION}; diagnose the log again."
         )
-    document = _of_version_2(document)
     complaint = complaint_about(document)
     if complaint:
         raise DiagnosisFileError(
             f"{path}: does not follow the diagnosis schema ({complaint}); it was changed or damaged."
         )
     return document
-
-
-def _of_version_2(document: dict[str, Any]) -> dict[str, Any]:
-    """A diagnosis of schema 1 with what schema 2 added left empty; others as they are."""
-    if document.get("schema_version") != 1:
-        return document
-    added: dict[str, Any] = {"parameters": [], "noise": [], "laws": [], "stages": []}
-    effects = document.get("effects")
-    if isinstance(effects, list) and all(isinstance(effect, dict) for effect in effects):
-        added["effects"] = [{"in": "recording", "share": None, **effect} for effect in effects]
-    return {**document, "noise_model": document.get("noise", {}), **added, "schema_version": 2}
 
 
 def schema() -> dict[str, Any]:

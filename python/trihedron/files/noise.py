@@ -19,7 +19,7 @@ class NoiseFileError(RefusedError):
 
 
 def read_noise(path: str | os.PathLike[str]) -> tuple[dict[str, SensorNoise], float]:
-    """White density and random walk of each sensor (root mean square of its axes), and the rate [Hz] of the rest log.
+    """White density and random walk of each sensor (root mean square of its axes), and the rate [Hz] of the static log.
 
     An absent term comes as the limit that the log gives it.
 

@@ -90,7 +90,7 @@ def _merge(parent: Any, name: str, values: Mapping[str, Any]) -> None:
 
 
 def _item(value: Any) -> Item:
-    """Plain TOML of a number, text, or nested sequence of them; eight digits, as many as any error bar leaves."""
+    """Plain TOML of a number, text, or nested sequence of them; eight digits, as many as any uncertainty leaves."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
     item: Item = tomlkit.item(_rounded(value))

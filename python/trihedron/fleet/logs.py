@@ -49,7 +49,7 @@ def find_jobs(
     """Every log of a folder (and the folders in it), of a pattern or of a list, one job a device.
 
     ``serial`` is a regular expression whose first group, found in a log's path, names its device; without it devices
-    are those of an archive, or else the folder that the log lies in. ``apart_from`` is left out: our own output.
+    are those of an archive, or else the folder that the log lies in. ``apart_from`` is excluded: our own output.
 
     Raises
     ------

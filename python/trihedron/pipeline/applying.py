@@ -46,7 +46,7 @@ def calibration_of(given: AnyCalibration) -> Calibration:
         return given
     if isinstance(given, str | os.PathLike):
         return read_calibration(given)
-    # A check's is made with a standard gravity, for its error bars alone.
+    # A check's is made with a standard gravity, for its uncertainties alone.
     inside = None if isinstance(given, CheckResult) else getattr(given, "calibration", None)
     if isinstance(inside, Calibration):
         return inside
@@ -68,9 +68,9 @@ def write_calibration(calibration: AnyCalibration, path: str | os.PathLike[str],
 
 
 def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
-    """The recording in SI, in the calibration's instrument trihedron: ``S raw + b`` for every row.
+    """The recording in SI, in the calibration's body frame: ``S raw + b`` for every row.
 
-    Where the calibration is extended, its effects are taken off first; a finding names those that cannot be. Where it
+    Where the calibration is extended, its effects are compensated first; a finding names those that cannot be. Where it
     follows temperature, S and b are those of each sample's temperature; outside the range for which it was made the
     ends are held and a serious finding says so.
 

@@ -58,7 +58,7 @@ def beside(
     segments = segment(recording)
     try:
         if segments.n_holds < FEWEST_POSES:
-            raise RefusedError(f"{segments.n_holds} still poses are too few for a model of their own")
+            raise RefusedError(f"{segments.n_holds} poses are too few for a model of their own")
         result = ordinary()
     except REFUSALS as error:
         if found.kind == ANOTHER_UNIT:
@@ -104,7 +104,7 @@ def in_si(log: Recording, gravity: float | None) -> Recording:
         return log
     own = calibrate(log, gravity_m_s2=gravity).calibration
     if own.gyroscope is None or log.gyroscope is None or log.accelerometer is None:
-        raise RefusedError(f"{log.source}: counts whose scale nothing tells.")
+        raise RefusedError(f"{log.source}: counts of unknown scale.")
     return replace(
         log,
         gyroscope=correct(log.gyroscope, own.gyroscope.S, own.gyroscope.b),

@@ -1,4 +1,4 @@
-"""Calibrate: still poses and moves in, both sensors with their certainty out."""
+"""Calibrate: poses and moves in, both sensors with their certainty out."""
 
 from __future__ import annotations
 
@@ -184,7 +184,7 @@ def _as_they_weigh(segments: Segments) -> Found:
     """Findings of the segmentation; that holds creep is serious for a calibration where it is no exception."""
     return tuple(
         replace(finding, severity=Severity.SERIOUS)
-        if finding.code is FindingCode.HOLD_CREEPS and finding.numbers["holds"] > MOST_CREEPING * segments.n_holds
+        if finding.code is FindingCode.POSE_SETTLING and finding.numbers["holds"] > MOST_CREEPING * segments.n_holds
         else finding
         for finding in segments.findings
     )
@@ -197,8 +197,8 @@ def _require_poses(recording: Recording, segments: Segments) -> None:
             "or name its columns with --columns."
         )
     if segments.n_holds < 3:
-        found = {0: "no still pose was found", 1: "only one still pose was found"}.get(
-            segments.n_holds, f"only {segments.n_holds} still poses were found"
+        found = {0: "no pose was found", 1: "only one pose was found"}.get(
+            segments.n_holds, f"only {segments.n_holds} poses were found"
         )
         grave = [finding.seen for finding in segments.findings if finding.severity is not Severity.NOTE]
         why = grave[0] + " " if grave else ""
@@ -239,7 +239,7 @@ def _by_poses(
         shared = shared_errors(turns, accelerometer, gravity)
         return _together(alone, *calibrate_turns(recording, turns, resting_spans(segments), shared_errors=shared))
     try:
-        # An accelerometer that is not determined is not refined by the moves: it goes into the gyro's error bars.
+        # An accelerometer that is not determined is not refined by the moves: it goes into the gyro's uncertainties.
         if method == "joint" and alone.is_trustworthy:
             both = calibrate_joint(recording, segments, accelerometer, gravity, source, options)
             pull = pull_on_accelerometer(accelerometer, both.accelerometer)
@@ -260,7 +260,7 @@ def _still_said(found: Found, joint: SensorCalibration) -> Found:
 
 
 def _joint_fit_left(pull: float) -> Finding:
-    """Moves that contradict the still poses must not pull the accelerometer, which the poses show without them."""
+    """Moves that contradict the poses must not pull the accelerometer, which the poses show without them."""
     return Finding.of(FindingCode.JOINT_FIT_LEFT, chi2_increase=pull)
 
 

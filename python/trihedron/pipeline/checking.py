@@ -13,9 +13,9 @@ from trihedron.units import STANDARD_GRAVITY_M_S2
 
 
 def check(recording: AnyRecording, *, progress: Progress | None = None) -> CheckResult:
-    """Audit of the log, still poses, and the error bars that a calibration from it would have.
+    """Audit of the log, poses, and the uncertainties that a calibration from it would have.
 
-    The error bars come from the poses, the moves and the sensor's noise; gravity hardly matters for them and is not
+    The uncertainties come from the poses, the moves and the sensor's noise; gravity hardly matters for them and is not
     asked for.
 
     Returns
@@ -30,7 +30,7 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
     """
     recording = recording_of(recording)
     segments = segment(recording, progress=progress)
-    # A standard value: here only the size of the error bars is wanted, to which an error of 0.4 % means nothing.
+    # A standard value: here only the size of the uncertainties is wanted, to which an error of 0.4 % means nothing.
     try:
         result = calibrate(recording, segments=segments, gravity_m_s2=STANDARD_GRAVITY_M_S2)
     except REFUSALS as error:

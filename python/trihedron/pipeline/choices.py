@@ -31,7 +31,7 @@ def settle_gravity(
         value = normal_gravity(latitude_deg, height)
         return value, f"WGS 84 normal gravity at latitude {latitude_deg:g}°, height {height:g} m", ()
     if height_m is not None:
-        raise RefusedError("a height alone does not tell gravity: give --latitude with --height, or --gravity.")
+        raise RefusedError("a height alone does not determine gravity: give --latitude with --height, or --gravity.")
     return STANDARD_GRAVITY_M_S2, "not given, standard value", (_defaulted(),)
 
 

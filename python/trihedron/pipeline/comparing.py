@@ -105,7 +105,7 @@ def _without_walk(
 ) -> tuple[AcceptedEffect, ...]:
     """Effects of a simulation less a free curve through zeros of a sensor whose slow noise is larger: that draws it."""
     drawn = set()
-    for sensor, drift in (("gyroscope", "gyro-hidden-drift"), ("accelerometer", "accel-hidden-drift")):
+    for sensor, drift in (("gyroscope", "gyro-bias-drift"), ("accelerometer", "accel-bias-drift")):
         slow = [n.ratio for n in noise if n.significant and n.sensor == sensor and n.term in ("B", "K") and n.ratio]
         if slow and min(slow) >= 1.0:
             drawn.add(drift)
@@ -154,7 +154,7 @@ def _factor(one: CommonFactor) -> NoiseDifference:
 
 
 def _as_given(given: Calibration, recording: Recording, segments: Segments) -> Stage:
-    """The given numbers with one zero for the session, nothing fitted: what the recording looks like to them."""
+    """The given numbers with one bias for the session, nothing fitted: what the recording looks like to them."""
     checked = verify_calibration(given, recording, segments, given.gravity_m_s2, given.gravity_source)
     domains = [
         StageDomain(

@@ -22,9 +22,9 @@ def rates_of_world(recording: Recording, segments: Segments) -> NoiseDifference 
         return None
     body, world = degrees_from_radians(seen.body_rad), degrees_from_radians(seen.world_rad)
     remark = (
-        f"The gyro of the model reads rates along the axes of the world, not of the body: gravity after the moves is "
-        f"missed by {body:.0f}° if they are the body's and by {world:.1f}° if they are the world's. Turn them by the "
-        "transpose of the attitude; until then only its accelerometer is compared."
+        f"The gyro of the model reads rates along the axes of the world, not of the body: the tilt error "
+        f"after rotations is {body:.0f}° if they are the body's and {world:.1f}° if they are the world's. Turn them by "
+        "the transpose of the attitude; until then only its accelerometer is compared."
     )
     return NoiseDifference("gyroscope", "", "frame", None, None, None, None, "1", None, True, remark)
 
@@ -39,7 +39,7 @@ def sign_of_gravity(
     if float(np.mean(np.sum(ours * theirs, axis=1))) > OPPOSITE:
         return None
     remark = (
-        "Gravity has the opposite sign in the model, pose by pose: an accelerometer at rest reads +g along the axis "
+        "Gravity has the opposite sign in the model, pose by pose: a static accelerometer reads +g along the axis "
         "that points up (specific force), not −g."
     )
     return NoiseDifference("accelerometer", "", "frame", -1.0, 1.0, -1.0, None, "1", None, True, remark)

@@ -98,15 +98,15 @@ def _row(what: What, squares: list[float | None], seen: float | None, alpha: flo
 
 
 _CAUSE = {
-    ("poses", True): "noise inside the still poses (a tremor, a line) does not go on between them as the model's does",
-    ("poses", False): "the zero is another in every pose by more than the model's noise",
+    ("poses", True): "noise inside the poses (a tremor, a line) does not go on between them as the model's does",
+    ("poses", False): "the bias changes from pose to pose by more than the model's noise",
     ("moves", True): "the gyro of the model strays more in moves than this one",
-    ("moves", False): "the gyro's zero strays in moves, or motion is faster than the samples",
+    ("moves", False): "the gyro's bias changes during moves, or motion is faster than the samples",
 }
 
 
 def _remark(what: What, ratio: float, interval: tuple[float, float], k: int, alpha: float) -> str:
-    of = "The lengths of gravity in poses" if what == "poses" else "Gravity carried through the moves"
+    of = "The gravity errors in poses" if what == "poses" else "The tilt errors after rotations"
     verb = "miss" if what == "poses" else "misses"
     return (
         f"{of} of the model, moved as the log was, {verb} {ratio:.2f} times as far as the log's "

@@ -43,9 +43,9 @@ LEAST_RATE_RATIO = 1.02
 LEAST_OCTAVE_RATIO = 1.5
 """Octaves below the white floor hold a few periods a hold each: smaller differences belong to the day."""
 LEAST_JITTER = 0.05
-"""Scatter of the stamps, in steps, from which on it matters to a session (0.05 of 10 ms is 0.5 ms)."""
+"""Scatter of the timestamps, in steps, from which on it matters to a session (0.05 of 10 ms is 0.5 ms)."""
 PERFECT_CLOCK = 1e-6
-"""Scatter of the stamps, in steps, that only a clock without any has: what is left is rounding of the file."""
+"""Scatter of the timestamps, in steps, that only a clock without any has: what is left is rounding of the file."""
 SAME_ON_ALL_AXES = 1.05
 """Three axes of a real part agree within 5 % by chance in a few of a hundred parts."""
 UNLIKE_AXES = 1.1
@@ -76,7 +76,7 @@ class Sampled:
 
 
 def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> Sampled:
-    """Noise inside still poses of a recording, by the scale of its own fit."""
+    """Noise inside poses of a recording, by the scale of its own fit."""
     holds = [(pose.start, pose.stop) for pose in poses]
     noise: dict[Sensor, tuple[HoldNoise, ...]] = {}
     excess: dict[Sensor, FloatArray] = {}
@@ -108,7 +108,7 @@ def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> 
     jitter = float(np.std(away)) / math.sqrt(2.0) if len(away) else 0.0
     clock = recording.sampling
     if clock.is_even and clock.kind in _SCATTERED:
-        # Reading put the samples on the even clock behind their stamps: what these scattered by is in its report.
+        # Reading put the samples on the even clock behind their timestamps: what these scattered by is in its report.
         jitter = max(jitter, clock.stamp_error_s * recording.rate_hz)
     return Sampled(noise, excess, count, likeness, recording.rate_hz, jitter)
 
@@ -176,7 +176,7 @@ def _hidden(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, unit: str) ->
     assert loud.white is not None
     would_show = loud.reading_sigma > SHOWS * quiet.step
     name = "accelerometer" if sensor == "accelerometer" else "gyro"
-    remark = f"The converter of the {side} hides the noise of its {name}."
+    remark = f"The resolution (LSB) of the {side} hides the noise of its {name}."
     if would_show:
         remark = f"The {side} has no noise on the {name}; the {other} has."
     values = _value(m.white), _value(r.white)
@@ -252,7 +252,7 @@ def _step(
         coarse = m if m_shows else r
         matters = coarse.step > coarse.reading_sigma
         side = "recording" if m_shows else "model"
-        remark = f"The {side} has no converter steps on the {name}." if matters else ""
+        remark = f"The {side} has no resolution (LSB) on the {name}." if matters else ""
         yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, None, None, unit, None, matters, remark)
         return
     ratio = m.step / r.step
@@ -260,7 +260,7 @@ def _step(
     # Steps far below the noise are as likely the digits of a file as a converter's.
     is_seen = not levels or max(m.step, r.step) > DIGITS * min(levels)
     is_far = max(ratio, 1.0 / ratio) > LEAST_STEP_RATIO and is_seen
-    remark = f"The converter steps of the {name} are {ratio:.3g} times the recording's." if is_far else ""
+    remark = f"The resolution (LSB) of the {name} is {ratio:.3g} times the recording's." if is_far else ""
     yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, ratio, None, unit, None, is_far, remark)
 
 
@@ -328,14 +328,16 @@ def _sampling(model: Sampled, recording: Sampled) -> Iterator[NoiseDifference]:
         f"The model samples at {model.rate_hz:.5g} Hz, the recording at {recording.rate_hz:.5g} Hz." if is_far else ""
     )
     yield NoiseDifference("both", "", "rate", model.rate_hz, recording.rate_hz, ratio, None, "Hz", None, is_far, remark)
-    # Stamps on an even grid scatter by their rounding only.
+    # Timestamps on an even grid scatter by their rounding only.
     m, r = (0.0 if one.jitter_steps < PERFECT_CLOCK else one.jitter_steps / one.rate_hz for one in (model, recording))
     larger, smaller = max(model.jitter_steps, recording.jitter_steps), min(model.jitter_steps, recording.jitter_steps)
     is_far = larger > LEAST_JITTER and larger > 2.0 * smaller
     which = "model" if m > r else "recording"
-    remark = f"The stamps of the {which} scatter by {1e3 * max(m, r):.2g} ms, the other's by {1e3 * min(m, r):.2g} ms."
+    remark = (
+        f"The timestamps of the {which} scatter by {1e3 * max(m, r):.2g} ms, the other's by {1e3 * min(m, r):.2g} ms."
+    )
     if which == "recording" and model.jitter_steps < PERFECT_CLOCK:
-        remark = f"The clock of the model is perfect; the stamps of the recording scatter by {1e3 * r:.2g} ms."
+        remark = f"The clock of the model is perfect; the timestamps of the recording scatter by {1e3 * r:.2g} ms."
     yield NoiseDifference(
         "both", "", "jitter", m, r, m / r if r > 0.0 else None, None, "s", None, is_far, remark if is_far else ""
     )

@@ -1,4 +1,4 @@
-"""Bias instability and random walk of a given simulation against the recording's, by what their poses show of zeros."""
+"""Bias instability and random walk of a given simulation against the recording's, by the biases in their poses."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ RESEMBLES_SLOW = 1.5
 """A session tells a walk to some 30 %: a ratio this near to the root of the rate is taken for it."""
 TESTS = 24.0
 """Shares of alpha: a twelfth is spent on slow noise, half of it on either sensor."""
-NO_SHAPE = frozenset({"gyro-zero-scatter", "accel-zero-scatter", "disturbed-pose", "periodic-interference"})
-"""Effects that leave the course of a zero from pose to pose as it is."""
+NO_SHAPE = frozenset({"gyro-bias-repeatability", "accel-bias-repeatability", "disturbed-pose", "periodic-interference"})
+"""Effects that leave the course of a bias from pose to pose as it is."""
 DOMAINS: Mapping[str, Domain] = MappingProxyType({"gyroscope": "static-gyro", "accelerometer": "static-accel"})
 AXES = ("x", "y", "z")
 Side = tuple[Diagnosis, Recording, Segments]
@@ -37,7 +37,7 @@ Side = tuple[Diagnosis, Recording, Segments]
 def slow_noise(model: Side, recording: Side, *, alpha: float) -> tuple[NoiseDifference, ...]:
     """B and K of both sensors, axis by axis, where both logs have poses enough.
 
-    The gyro shows its zeros at rest, the accelerometer the part of its zeros along gravity. Significant where chance
+    The gyro shows its biases at rest, the accelerometer the part of its biases along gravity. Significant where chance
     makes such a difference in fewer than ``alpha``/24 and the ratio is beyond a factor of two; never where a drift of
     the recording has a name of its own, or disagrees and has none: a walk would be a second name for it.
     """
@@ -97,8 +97,8 @@ def _drifts(found: Diagnosis, sensor: Sensor, *, but_curve: bool = False) -> boo
 
 
 def _has_curve(found: Diagnosis, sensor: Sensor = "gyroscope") -> bool:
-    """Whether the one effect on a sensor's zeros, beside their scatter, is a drift along a curve of any shape."""
-    domain, drift = DOMAINS[sensor], f"{'gyro' if sensor == 'gyroscope' else 'accel'}-hidden-drift"
+    """Whether the one effect on a sensor's biases, beside their scatter, is a drift along a curve of any shape."""
+    domain, drift = DOMAINS[sensor], f"{'gyro' if sensor == 'gyroscope' else 'accel'}-bias-drift"
     of_zeros = [e for e in found.effects if any(h.domain == domain for h in e.held_out) and e.id not in NO_SHAPE]
     return len(of_zeros) == 1 and of_zeros[0].id == drift and of_zeros[0].model.get("variant") in FREE_CURVES
 
@@ -194,4 +194,4 @@ def _remark(sensor: Sensor, found: SlowDifference, common: float, rate_hz: float
 def _unseen(term: str, model: Measured, recording: Measured) -> str:
     unseen = [(side, one) for side, one in (("the model", model), ("the recording", recording)) if not one.lower > 0.0]
     bounds = " and ".join(f"{side} below {one.upper:.2g}" for side, one in unseen)
-    return f"Not long enough to show {term}: zero is not excluded, 97.5 % of {bounds}; the figure is a median."
+    return f"Not long enough to show {term}: 0 is not excluded, 97.5 % of {bounds}; the figure is a median."

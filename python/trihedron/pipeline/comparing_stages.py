@@ -15,7 +15,7 @@ DECIBEL = 20.0 / math.log(10.0)
 FEWEST_HOLDS = 4
 """Two holds for either half."""
 NOISE_IN_HOLDS = frozenset({"N", "B", "Q", "octave", "bandwidth", "resolution", "line"})
-"""Terms of the comparison that change what the octaves of a still pose show."""
+"""Terms of the comparison that change what the octaves of a pose show."""
 
 
 def with_noise_stage(
@@ -29,7 +29,7 @@ def with_noise_stage(
     """The stages with the misfit of the noise in each, and the stage ``noise`` after ``numbers``.
 
     Every second hold is predicted: by the given model until its noise is replaced, from then on by the recording's
-    other holds. A model whose noise differs nowhere in ``compared`` keeps it: half the holds know it less well. The
+    other poses. A model whose noise differs nowhere in ``compared`` keeps it: half the poses know it less well. The
     misfit is the rms over sensors, axes and octaves of 20 log10 of the ratio of densities [dB]; a stage has none where
     that is no number, as of a model without any noise.
     """

@@ -108,7 +108,7 @@ def demonstrate(folder: Path, *, overwrite: bool = False, say: Callable[[str], N
 
 
 def compare_with_truth(calibration: Calibration, truth: Truth) -> Comparison:
-    """Estimate, truth and error bars of every parameter that the frame leaves free.
+    """Estimate, truth and uncertainties of every parameter that the frame leaves free.
 
     The truth is turned into the calibration's frame first; the rotation that does so depends on the truth alone.
     """
@@ -133,9 +133,9 @@ def compare_with_truth(calibration: Calibration, truth: Truth) -> Comparison:
 
 
 def truth_of_the_day(scenario: Scenario, seed: int) -> Truth:
-    """The truth with the zeros as they were on average in this session.
+    """The truth with the biases as they were on average in this session.
 
-    Flicker and walk move a zero slowly; what a session can show is its mean of that day, and no calibration knows the
+    Flicker and walk move a bias slowly; what a session can show is its mean of that day, and no calibration knows the
     number the factory started from. The slow part is the difference to the same session without it: every other stage
     of the simulation draws what it drew before.
     """

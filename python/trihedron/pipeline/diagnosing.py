@@ -55,18 +55,18 @@ def diagnose(
     alpha: float = 0.01,
     progress: Progress | None = None,
 ) -> DiagnosisResult:
-    """Where a recording and its model differ, which physics was left out, how big it is, and how sure that is.
+    """Where a recording and its model differ, which physics was excluded, how big it is, and how sure that is.
 
     Parameters
     ----------
     recording : Recording, or what trihedron.read takes
-        Still poses and moves of one sensor.
+        Poses and moves of one sensor.
     gravity_m_s2 or latitude_deg, height_m : float
         |g| at the place; with a ``calibration`` that of the calibration unless said.
     segments : Segments, optional
-        Still poses and moves; found when not given.
+        Poses and moves; found when not given.
     calibration : calibration or path, optional
-        The model to be held against the recording, with its error bars. Without it one is fitted to the recording.
+        The model to be held against the recording, with its uncertainties. Without it one is fitted to the recording.
     against : Recording, Scenario or path, optional
         The user's simulation as the model: a simulated recording, with everything that it contains, or a scenario
         (``.toml``), whose instrument is moved as the recording was.
@@ -113,7 +113,7 @@ def _of_poses(
     alpha: float,
     tell: Progress,
 ) -> DiagnosisResult:
-    """What still poses and the moves between them say."""
+    """What poses and the moves between them say."""
     known = None if calibration is None else calibration_of(calibration)
     if known is None or place != (None, None, None):
         gravity, source, said = settle_gravity(*place)
@@ -125,13 +125,13 @@ def _of_poses(
         recording, more = without_effects(known, recording)
         findings += more
         segments = None if known.extensions.get("effects") else segments
-    tell(0.02, "finding still poses")
+    tell(0.02, "finding poses")
     segments = segments_of(segments, recording)
     findings += segments.findings
     calibrated = cache(lambda: calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration)
     resting = None if against is not None else at_rest(recording, segments, known, gravity, calibrated)
     if resting is not None:
-        tell(0.1, "looking at zeros and lines")
+        tell(0.1, "looking at biases and spectral lines")
         return diagnosed_at_rest(recording, segments, resting, (gravity, source), tuple(findings), alpha, known)
     simulated: _Free | None = None
     if against is not None:
@@ -211,8 +211,8 @@ def _start(
     """The model that the search begins from, and whether it is the recording's own.
 
     A given model is compared with what the recording says of itself. Where its poses are too few to say it, the numbers
-    of a calibration stay, with their error bars as knowledge. Those of a simulation are none: its errors say how well
-    its own log shows its numbers, and nothing of how far this unit lies from them.
+    of a calibration stay, with their uncertainties as knowledge. Those of a simulation are none: its errors say how
+    well its own log shows its numbers, and nothing of how far this unit lies from them.
     """
     if known is None:
         return calibrated(), True
@@ -239,8 +239,8 @@ def _simulated_log(
         against = read_scenario(Path(against))
     if recording.gyroscope is None:
         raise RefusedError(
-            "a scenario is moved as the recording was, and this recording has no gyro to tell how: log both sensors, "
-            "or simulate a log of your own and hold that against it"
+            "a scenario is moved as the recording was, and this recording has no gyro to show how: log both sensors, "
+            "or compare with a simulated log of your own"
         )
     own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
     return driven(against, recording, segments, own), against

@@ -34,9 +34,9 @@ from trihedron.simulate import (
 
 Draw = Callable[[np.random.Generator], dict[str, Any]]
 LATITUDE_DEG = 59.94
-SIMULATION = """# The simulation of an ordinary sensor: the data sheet's scales, no zeros, no faults.
+SIMULATION = """# The simulation of an ordinary sensor: the data sheet's scales, no biases, no faults.
 name = "simulation"
-profile = "mpu"        # noise and converter of the data sheet
+profile = "mpu"        # noise and resolution of the data sheet
 
 [environment]
 gravity_m_s2 = {gravity:.6f}   # at the desk
@@ -46,7 +46,7 @@ kind = "hand"
 
 [accelerometer]
 # 16384 counts per g
-b = [0.0, 0.0, 0.0]    # no zero error known
+b = [0.0, 0.0, 0.0]    # no bias known
 
 [gyroscope]
 S = [[{scale:.8g}, 0, 0], [0, {scale:.8g}, 0], [0, 0, {scale:.8g}]]   # 65.5 counts per deg/s
@@ -67,7 +67,7 @@ FLAWS: dict[str, Draw] = {
     "accel-size-effect": lambda rng: {"places_m": ((0.0, 0.0, 0.0), _signed(rng, 6e-3), _signed(rng, 6e-3))},
     "gyro-g-sensitivity": lambda rng: {"matrix": tuple(_signed(rng, 1.8e-4) for _ in range(3))},
     "accel-gyro-time-offset": lambda rng: {"offset_s": float(rng.choice((-1, 1)) * rng.uniform(3e-3, 6e-3))},
-    "gyro-hidden-drift": lambda rng: {"amplitude": _signed(rng, 3e-3), "tau_s": float(rng.uniform(40.0, 90.0))},
+    "gyro-bias-drift": lambda rng: {"amplitude": _signed(rng, 3e-3), "tau_s": float(rng.uniform(40.0, 90.0))},
 }
 
 
@@ -101,10 +101,10 @@ def disagree(
     scale = float(np.radians(1.0 / 65.5))
     write_whole(given, SIMULATION.format(gravity=gravity, scale=scale), overwrite=overwrite)
     taken = read(log)
-    tell("holding the simulation against the log")
+    tell("comparing the simulation with the log")
     found = diagnose(taken, gravity_m_s2=gravity, against=given)
     write_scenario(improve(given, found).text, better, overwrite=overwrite)
-    tell("holding the improved simulation against the log")
+    tell("comparing the improved simulation with the log")
     improved = diagnose(taken, gravity_m_s2=gravity, against=better)
     write_whole(folder / "disagreement.html", to_html(diagnosis_report(found)), overwrite=overwrite)
     tell("opening the seal")

@@ -54,7 +54,7 @@ def driven(
 
 
 def _sensed(scenario: Scenario, seed: int) -> Recording:
-    """What the instrument makes of its motion, stamps as a reader settles them."""
+    """What the instrument makes of its motion, timestamps as a reader settles them."""
     simulated, _ = simulate(scenario, seed)
     if scenario.clock.stamp_jitter_s > 0.0 or scenario.clock.jitter_s > 0.0:
         return _as_read(simulated)
@@ -62,7 +62,7 @@ def _sensed(scenario: Scenario, seed: int) -> Recording:
 
 
 def _as_read(simulated: Recording) -> Recording:
-    """A simulated log through a file: what its stamps are worth is settled as that of the recording was."""
+    """A simulated log through a file: what its timestamps are worth is settled as that of the recording was."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "simulated.csv"
         write_recording(simulated, path)
@@ -134,8 +134,8 @@ def flicker_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float
     return _scaled(part.noise.B, min(max((seen - none_of_it) / (all_of_it - none_of_it), 0.0), 1.0))
 
 
-def zero_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
-    """By how much the accelerometer's zero must be another in every pose [m/s²] for lengths of gravity to miss alike.
+def bias_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
+    """By how much the accelerometer's bias must be another in every pose [m/s²] for lengths of gravity to miss alike.
 
     The worst pose of either side is spared: one that was pushed makes no scatter for all of them. ``None`` where both
     miss alike, or the scenario misses more without any scatter to take out.
@@ -145,17 +145,17 @@ def zero_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, f
         return None
 
     def missed(square: float) -> float | None:
-        electronics = replace(part.electronics, zero_scatter=(math.sqrt(square),) * 3)
+        electronics = replace(part.electronics, bias_repeatability=(math.sqrt(square),) * 3)
         return beside.missed(replace(better, accelerometer=replace(part, electronics=electronics)))[0]
 
-    return _matched(part.electronics.zero_scatter, beside.poses, 1.0, missed)
+    return _matched(part.electronics.bias_repeatability, beside.poses, 1.0, missed)
 
 
-def zero_in_moves(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
-    """By how much the gyro's zero must stray in moves [rad/s] for an improved scenario to miss as the recording does.
+def bias_in_moves(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
+    """By how much the gyro's bias must stray in moves [rad/s] for an improved scenario to miss as the recording does.
 
     Gravity carried through the moves of the recording and of the scenario moved alike, the worst of either side spared:
-    what the recording misses more is put on the zero, the same on all axes. ``None`` where both miss alike, or the
+    what the recording misses more is put on the bias, the same on all axes. ``None`` where both miss alike, or the
     scenario misses more without any straying to take out.
     """
     part = better.gyroscope
@@ -163,11 +163,11 @@ def zero_in_moves(better: Scenario, beside: MovedAlike) -> tuple[float, float, f
         return None
 
     def missed(square: float) -> float | None:
-        electronics = replace(part.electronics, zero_in_moves=(math.sqrt(square),) * 3)
+        electronics = replace(part.electronics, bias_in_moves=(math.sqrt(square),) * 3)
         return beside.missed(replace(better, gyroscope=replace(part, electronics=electronics)))[1]
 
     # Straying σ at both ends and straight between turns by σT/√2 an axis, two axes of three of it across the vertical.
-    return _matched(part.electronics.zero_in_moves, beside.moves, 1.0 / float(np.mean(beside.duration_s**2)), missed)
+    return _matched(part.electronics.bias_in_moves, beside.moves, 1.0 / float(np.mean(beside.duration_s**2)), missed)
 
 
 def _scaled(terms: tuple[float, float, float], share: float) -> tuple[float, float, float]:

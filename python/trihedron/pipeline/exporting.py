@@ -40,7 +40,7 @@ def export(
         What ``trihedron.noise`` found, or the JSON of ``trihedron allan``: white density and walk, for targets that
         hold them.
     rate_hz : float, optional
-        Rate of the samples; that of the rest log when not given.
+        Rate of the samples; that of the static log when not given.
     topic : str
         Where the samples are published.
     accelerometer_lsb, gyroscope_lsb : str

@@ -1,4 +1,4 @@
-"""Extend: a calibration with the effects that its own recording demands, where they predict what was left out."""
+"""Extend: a calibration with the effects that its own recording demands, where they predict what was excluded."""
 
 from __future__ import annotations
 

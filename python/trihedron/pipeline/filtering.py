@@ -86,16 +86,16 @@ def kalman(
     Parameters
     ----------
     recording : Recording, or what trihedron.read takes
-        The log of still poses.
+        The log of poses.
     reference : PoseTable or file, optional
-        Attitudes of the still poses: pitch and roll, or directions. Without it the length of gravity must do.
+        Attitudes of the poses: pitch and roll, or directions. Without it the length of gravity must do.
     sigma_angle_deg : float
         Standard error of the angles in the file.
     noise : AxisNoise, three of them, Noise, or file
-        Noise of the raw readings: as written down (a JSON file), as identified, or a log of rest to identify it from.
-        Without it, what is seen inside the still poses.
+        Noise of the raw readings: as written down (a JSON file), as identified, or a static log to identify it from.
+        Without it, what is seen inside the poses.
     frame : "lower" or "symmetric"
-        Instrument trihedron where there is no reference; with one it is the frame of the reference.
+        Body frame where there is no reference; with one it is the frame of the reference.
 
     Returns
     -------
@@ -161,7 +161,7 @@ def _settle_noise(
 
 
 def _check_converter(given: Sequence[AxisNoise], recording: Recording, segments: Segments) -> None:
-    """Refuse the noise of a log of rest that another converter wrote."""
+    """Refuse the noise of a static log that another converter wrote."""
     readings = recording.accelerometer
     if readings is None or not segments.holds:
         return

@@ -46,14 +46,14 @@ HOLDS_PER_GOAL = 2.5
 """A pose's own error may be so many times the accuracy wanted: a dozen poses average the rest away."""
 
 GYRO_NAMES = tuple(
-    f"scale of axis {i + 1}" if i == j else f"axis {j + 1} into {i + 1}" for i in range(3) for j in range(3)
+    f"scale of {'XYZ'[i]}" if i == j else f"{'XYZ'[j]} into {'XYZ'[i]}" for i in range(3) for j in range(3)
 )
 
 
 def examine(
     recording: Recording, accuracy: Accuracy, *, gravity_m_s2: float = STANDARD_GRAVITY_M_S2, look_ahead: bool = True
 ) -> Examination:
-    """Poses so far, every parameter's error bar now and after the next pose, and which pose that should be.
+    """Poses so far, every parameter's uncertainty now and after the next pose, and which pose that should be.
 
     ``look_ahead`` also counts the poses that are still needed. Never raises for too few poses: what is unknown is None.
     """
@@ -286,7 +286,8 @@ def _why(uncertain: tuple[Uncertain, ...]) -> str:
     if worst.now is None:
         open_ones = [one for one in uncertain if one.now is None]
         after = max(open_ones, key=lambda one: (one.after_next or 0.0) / one.wanted)
-        return f"Not known yet: {len(open_ones)} of {len(uncertain)} numbers; among them {after.sensor} {after.name}."
+        count = f"{len(open_ones)} of {len(uncertain)} parameters"
+        return f"Not yet determined: {count}, {after.sensor} {after.name} the worst."
     then = "" if worst.after_next is None else f"; this pose brings it to {100 * worst.after_next:.2g} %"
     return f"Worst is {worst.sensor} {worst.name}: {100 * worst.now:.2g} %, wanted {100 * worst.wanted:.2g} %{then}."
 
@@ -299,7 +300,7 @@ def _hold_s(known: Known, accuracy: Accuracy, segments: Segments) -> float:
 
 
 def _warnings(recording: Recording, segments: Segments) -> tuple[str, ...]:
-    quiet = {"few-poses", "unit-detected", "no-initial-rest"}
+    quiet = {"few-poses", "unit-detected", "no-initial-pose"}
     found = [*recording.findings, *segments.findings]
     return tuple(f.seen for f in found if f.severity is not Severity.NOTE and f.code.value not in quiet)[:4]
 

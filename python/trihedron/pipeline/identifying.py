@@ -139,7 +139,9 @@ def noise_of_file(
             source=str(path),
         )
     if exclude_s:
-        raise RefusedError(f"{path}: nothing can be left out of a log that is read in one pass; cut the file instead.")
+        raise RefusedError(
+            f"{path}: nothing can be excluded from a log that is read in one pass; cut the file instead."
+        )
 
     kept = None
     if checkpoint is not None:

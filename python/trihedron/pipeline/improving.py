@@ -18,7 +18,7 @@ from trihedron.pipeline.comparing_moved import AIMED_AT
 from trihedron.pipeline.comparing_noise import Sampled, sampled
 from trihedron.pipeline.comparing_quantisation import white_and_quantisation
 from trihedron.pipeline.comparing_ranges import SENSOR
-from trihedron.pipeline.driving import MovedAlike, flicker_of_poses, zero_in_moves, zero_of_poses
+from trihedron.pipeline.driving import MovedAlike, bias_in_moves, bias_of_poses, flicker_of_poses
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records.diagnosis import AcceptedEffect
 from trihedron.records.hold_noise import HoldNoise
@@ -89,8 +89,8 @@ def improve(
         # pose also turns the gravity that moves are judged by.
         for sensor, table, key, of in (
             ("accelerometer", "noise", "B", flicker_of_poses),
-            ("accelerometer", "electronics", "zero_scatter", zero_of_poses),
-            ("gyroscope", "electronics", "zero_in_moves", zero_in_moves),
+            ("accelerometer", "electronics", "bias_repeatability", bias_of_poses),
+            ("gyroscope", "electronics", "bias_in_moves", bias_in_moves),
         ):
             found_value = of(scenario_from_table(tomllib.loads(text)), beside)
             if found_value is not None:
@@ -109,7 +109,7 @@ def _unlike(better: Scenario, beside: MovedAlike) -> dict[str, float]:
 
 
 def _of_holds(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
-    """Noise inside the recording's still poses as terms and a low-pass, sensor by sensor: what its octaves show."""
+    """Noise inside the recording's poses as terms and a low-pass, sensor by sensor: what its octaves show."""
     recording = found.recording
     seen = sampled(recording, found.segments.holds, model_of_diagnosis(found)).noise
     out = {}
@@ -183,7 +183,7 @@ def _numbers(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosi
     moved = {p.id for p in found.parameters if p.significant}
     fits = (("accelerometer", "accel", found.extended.accelerometer), ("gyroscope", "gyro", found.extended.gyroscope))
     for name, prefix, fit in fits:
-        groups = {f"{prefix}-zero", f"{prefix}-scale", f"{prefix}-misalignment", "triad-alignment"}
+        groups = {f"{prefix}-bias", f"{prefix}-scale", f"{prefix}-misalignment", "triad-alignment"}
         # S and b of both sensors are in one frame: where one of them is replaced, both are.
         scaled = {n.sensor for n in found.noise_compared if n.term in ("range", "unit") and n.significant}
         if fit is None or not (moved & (groups | {"accel-misalignment", "gravity"}) or scaled):

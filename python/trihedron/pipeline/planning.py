@@ -31,7 +31,7 @@ def plan(
     sigma_turn_rad: float = 0.0,
     gravity_m_s2: float = STANDARD_GRAVITY_M_S2,
 ) -> ExperimentPlan:
-    """Error bars to expect from known turns about each axis, from sets of poses, and from moves between poses.
+    """Uncertainties to expect from known turns about each axis, from sets of poses, and from moves between poses.
 
     Parameters
     ----------

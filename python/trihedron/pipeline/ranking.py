@@ -55,7 +55,7 @@ def rank(
     Raises
     ------
     ValueError
-        When fewer than two calibrations are given, units differ, or the recording has no still pose.
+        When fewer than two calibrations are given, units differ, or the recording has no pose.
     """
     if len(calibrations) < 2:
         raise RefusedError("a ranking needs two calibrations at least; one is judged by `trihedron verify`.")

@@ -1,4 +1,4 @@
-"""Log in, audited recording out; recording in, still poses out."""
+"""Log in, audited recording out; recording in, poses out."""
 
 from __future__ import annotations
 
@@ -169,7 +169,7 @@ def segments_of(given: Segments | None, recording: Recording, progress: Progress
 
 
 def segment(recording: AnyRecording, *, progress: Progress | None = None) -> Segments:
-    """Static poses and the moves between them, told apart by the sensor's own noise: nothing to set.
+    """Static poses and the moves between them, separated by the sensor's own noise: nothing to set.
 
     Returns
     -------

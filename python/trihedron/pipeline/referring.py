@@ -105,7 +105,7 @@ def calibration_by(
     if recording.accelerometer is None:
         raise RefusedError(
             f"{recording.source}: a calibration holds an accelerometer too, and this log has none; "
-            "`trihedron diagnose LOG --reference MOTION --json FILE` writes the gyro's numbers."
+            "`trihedron diagnose LOG --reference MOTION --json FILE` writes the gyro's parameters."
         )
     gyro = found.gyroscope
     method = f"reference ({found.kind})"
@@ -129,7 +129,7 @@ def calibration_by(
 
 
 def _without_rounding(calibration: Calibration) -> Calibration:
-    """Entries of S that the lower frame makes zero have no error bar: what is left of one is rounding."""
+    """Entries of S that the lower frame makes zero have no uncertainty: what is left of one is rounding."""
     if calibration.frame != "lower" or calibration.gyroscope is None:
         return calibration
     covariance = np.array(calibration.covariance)
@@ -143,7 +143,7 @@ def _without_rounding(calibration: Calibration) -> Calibration:
 
 
 def _nominal(recording: Recording, gravity: float) -> tuple[SensorCalibration, Finding]:
-    """The accelerometer as nobody calibrated it, with error bars that say so."""
+    """The accelerometer as nobody calibrated it, with uncertainties that say so."""
     raw = recording.accelerometer
     assert raw is not None
     scale = acceleration_to_si(recording.accelerometer_unit)

@@ -49,13 +49,13 @@ def guide(
     Parameters
     ----------
     recording : Recording, or what trihedron.read takes
-        Still poses and moves.
+        Poses and moves.
     accuracy : str
         When to stop: ``"accel 0.05 %, gyro 0.1 %"``.
     gravity_m_s2 : float, optional
         |g| where it was recorded.
     on_pose : callable, optional
-        Is given the guide's view (instruction, next pose, error bars) after every pose.
+        Is given the guide's view (instruction, next pose, uncertainties) after every pose.
 
     Raises
     ------

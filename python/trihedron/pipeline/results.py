@@ -43,9 +43,7 @@ class CalibrationResult(Presented):
 
     def __repr__(self) -> str:
         sensors = "accelerometer" if self.gyroscope is None else "accelerometer and gyroscope"
-        return (
-            f"<CalibrationResult of {one_line(self.recording.source)}: {sensors}, {self.segments.n_holds} still poses>"
-        )
+        return f"<CalibrationResult of {one_line(self.recording.source)}: {sensors}, {self.segments.n_holds} poses>"
 
     def __str__(self) -> str:
         from trihedron.report import calibration_report, to_text
@@ -83,7 +81,7 @@ class VerificationResult(Presented):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CheckResult(Presented):
-    """Is a log fit for calibration? ``calibration`` holds the error bars to expect, ``None`` where it cannot be
+    """Is a log fit for calibration? ``calibration`` holds the uncertainties to expect, ``None`` where it cannot be
     made."""
 
     recording: Recording

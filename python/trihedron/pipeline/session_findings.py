@@ -18,7 +18,7 @@ WIDE_RANGE_DEGC = 10.0
 """Temperatures further apart than this move the zeros of parts by more than their other repeatability (0.1 to 1 mg and
 0.01 to 0.05 °/s per °C)."""
 
-_KINDS = ("zero", "scale", "misalignment", "alignment")
+_KINDS = ("bias", "scale", "misalignment", "alignment")
 """Parameters whose change has a likely cause of its own, by the end of their names."""
 
 
@@ -50,7 +50,7 @@ def _changed(change: Change, model: SessionsModel) -> Finding:
     parameter = change.id.rsplit("-", 1)[-1]
     case = f"{parameter if parameter in _KINDS else 'other'}-{change.kind}"
     return Finding.of(
-        FindingCode.NUMBERS_CHANGED,
+        FindingCode.PARAMETERS_CHANGED,
         case,
         what=[change.id, change.group] if model.by == "device" else [change.id],
         amount=_amount(change),

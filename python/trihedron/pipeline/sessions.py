@@ -85,7 +85,7 @@ def calibrate_sessions(
     gravity_m_s2 or latitude_deg, height_m : float
         As for :func:`calibrate`.
     frame : "lower" or "symmetric"
-        Instrument trihedron of the common calibration.
+        Body frame of the common calibration.
     alpha : float
         Chance that any number of a unit that did not change is called changed.
 
@@ -254,7 +254,7 @@ def _shared(away: FloatArray, noise: FloatArray, alike: FloatArray) -> float:
 
 
 def _temperature(result: CalibrationResult) -> tuple[float, float, float, int]:
-    """Mean, least and largest temperature of the holds, and whether they rise (+1) or fall (-1)."""
+    """Mean, least and largest temperature of the poses, and whether they rise (+1) or fall (-1)."""
     T = result.recording.temperature_degc
     if T is None:
         return math.nan, math.nan, math.nan, 0

@@ -1,4 +1,4 @@
-"""Simulations on request: a scenario by file or name, or the twin of a recording."""
+"""Simulations on request: a scenario by file or name, or the digital twin of a recording."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def with_effects(scenario: str | os.PathLike[str] | Scenario, effects: Sequence[
 
 
 def twin(recording: AnyRecording, calibration: AnyCalibration, seed: int = 0) -> tuple[Recording, Truth]:
-    """Repeat a recording as a simulation: its poses, moves, timing, noise and converter.
+    """Repeat a recording as a simulation: its poses, moves, timing, noise and resolution.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def twin(recording: AnyRecording, calibration: AnyCalibration, seed: int = 0) ->
     Raises
     ------
     ValueError
-        When the recording has no still poses, or lacks a sensor.
+        When the recording has no poses, or lacks a sensor.
     """
     recording, known = recording_of(recording), calibration_of(calibration)
     return run(twin_scenario(recording, segment_recording(recording), known), seed)

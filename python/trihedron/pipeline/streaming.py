@@ -1,7 +1,7 @@
-"""Logs larger than memory: still poses, calibration and corrected readings, a piece of the log at a time.
+"""Logs larger than memory: poses, calibration and corrected readings, a piece of the log at a time.
 
 What stays in memory are the statistics of blocks of a tenth of a second (:func:`segment_file`), the rows of moves and
-of the ends of holds (:func:`calibrate_file`), or one piece (:func:`apply_file`). See docs/larger-than-memory.md.
+of the ends of poses (:func:`calibrate_file`), or one piece (:func:`apply_file`). See docs/larger-than-memory.md.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from trihedron.units import AccelerationUnit, RateUnit
 
 PIECE_ROWS = 1 << 18
 KEPT_S = 60.0
-"""Of a hold longer than twice this, a minute at either end goes into the fit: the mean and its error are those of the
-whole hold, and the zero next to a move is read off the readings next to it."""
+"""Of a pose longer than twice this, a minute at either end goes into the fit: the mean and its error are those of the
+whole hold, and the bias next to a move is read off the readings next to it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +136,7 @@ def log_on_disk(
 def segment_file(
     log: LogOnDisk, *, checkpoint: str | os.PathLike[str] | None = None, progress: Progress | None = None
 ) -> Segments:
-    """Still poses and moves of a log on disk: the same as :func:`trihedron.segment` finds in the whole of it.
+    """Poses and moves of a log on disk: the same as :func:`trihedron.segment` finds in the whole of it.
 
     With ``checkpoint`` a file keeps every half a minute how far the pass is; a run that was stopped goes on from it, to
     the same bits, and the end removes it.
@@ -190,7 +190,7 @@ def calibrate_file(
 
 
 def condensed(log: LogOnDisk, segments: Segments) -> tuple[Recording, Segments]:
-    """The rows of moves and of the ends of holds, at their own times, and the segments counted in them.
+    """The rows of moves and of the ends of poses, at their own times, and the segments counted in them.
 
     Means, errors and durations remain those of whole holds.
     """
@@ -282,7 +282,9 @@ def apply_file(
     if target.exists() and not overwrite:
         raise RefusedError(f"{target}: this exists and was left alone; choose another name or add --force.")
     if known.extensions.get("effects") or known.extensions.get("thermal"):
-        raise RefusedError("this calibration follows temperature or takes effects off: apply it to the log as a whole.")
+        raise RefusedError(
+            "this calibration follows temperature or compensates effects: apply it to the log as a whole."
+        )
     check_units(known, cast("Recording", log))
     sensors = [(log.accelerometer, known.accelerometer), (log.gyroscope, known.gyroscope)]
     used = [(triad, sensor) for triad, sensor in sensors if triad is not None and sensor is not None]

@@ -28,7 +28,7 @@ def verify(
     limit_deg: float | None = None,
     progress: Progress | None = None,
 ) -> VerificationResult:
-    """Norm of gravity at rest and gravity carried through moves, in a recording that the calibration has not seen.
+    """Gravity error in static poses and tilt error after rotations, in a recording that the calibration has not seen.
 
     Without ``gravity_m_s2`` or a place, gravity is that of the calibration. ``limit_mg`` and ``limit_deg`` are what the
     user can accept (rms): beyond them a serious finding says so. Where no limit is said, a miss of more than ten times
@@ -42,7 +42,7 @@ def verify(
     Raises
     ------
     ValueError
-        When units differ, or the recording has no accelerometer or no still pose.
+        When units differ, or the recording has no accelerometer or no pose.
 
     Examples
     --------

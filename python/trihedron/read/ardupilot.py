@@ -118,7 +118,7 @@ def _keep(
     if key not in names:
         stamp, unit = next(((s, u) for s, u in _STAMPS if s in fields), ("", ""))
         if not stamp:
-            raise RefusedError(f"{message.get_type()} has no time stamp")
+            raise RefusedError(f"{message.get_type()} has no timestamp")
         names[key] = [f"{stamp} [{unit}]", *(name for name in _FIELDS[word] if name in fields)]
         rows[key] = []
     plain = [names[key][0].split(" ")[0], *names[key][1:]]

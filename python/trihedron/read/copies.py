@@ -15,21 +15,21 @@ MOST_LOOKED_AT = 100_000
 LAGS = (2, 3, 4, 5)
 """How far back: past the row that may be a copy, near enough for the same pose."""
 BEYOND_CHANCE = 1e-6
-"""p-value below which equal readings under equal stamps are copies."""
+"""p-value below which equal readings under equal timestamps are copies."""
 BEYOND_COUNT = 2.0
 """And as many times what chance makes: neighbours are a little more alike than rows farther apart."""
 USUALLY = 0.5
-"""Share of rows with the stamp before that repeat its readings too, from which such rows are copies in this log."""
+"""Share of rows with the timestamp before that repeat its readings too, from which such rows are copies in this log."""
 
 
 def copied_rows(
     columns: Sequence[FloatArray], time_s: FloatArray, rows: npt.NDArray[np.signedinteger]
 ) -> npt.NDArray[np.signedinteger]:
-    """Samples (k,) whose stamp and readings are both those of the sample before, where that is no chance.
+    """Samples (k,) whose timestamp and readings are both those of the sample before, where that is no chance.
 
-    ``columns`` hold the readings (rows of the table), ``rows`` (n,) where each sample stands. Samples stamped on
-    arrival share stamps, and coarse codes of a sensor at rest share readings: both at once are two samples still. How
-    often readings agree by chance is seen where nothing can be a copy: two to five samples back.
+    ``columns`` hold the readings (rows of the table), ``rows`` (n,) where each sample stands. Samples timestamped on
+    arrival share timestamps, and coarse codes of a sensor at rest share readings: both at once are two samples still.
+    How often readings agree by chance is seen where nothing can be a copy: two to five samples back.
     """
     again = np.flatnonzero(np.diff(time_s) == 0) + 1
     is_alike = _alike(columns, rows, again, 1)

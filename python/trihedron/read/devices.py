@@ -90,7 +90,7 @@ def one_device(
     if column < 0:
         if choice.instance is not None:
             raise ReadError(
-                f"{table.path}: instance {choice.instance} was asked for, but no column tells devices apart; leave "
+                f"{table.path}: instance {choice.instance} was asked for, but no column identifies devices; leave "
                 "--instance out."
             )
         return table
@@ -98,7 +98,7 @@ def one_device(
     listed = phrase("devices", devices=list(zip(words, counts, strict=True)))
     if choice.instance is None:
         raise ReadError(
-            f"{table.path}: column {table.label(column)} tells {len(words)} devices apart: {listed}; read one of them "
+            f"{table.path}: column {table.label(column)} identifies {len(words)} devices: {listed}; read one of them "
             f"with --instance {words[0]}."
         )
     if choice.instance not in words:

@@ -16,7 +16,7 @@ _LOOKED_AT = 1000
 _USUALLY_BOTH = 0.9
 """Share of the first rows with both sensors above which nothing more is asked: missing readings are lost ones."""
 _SELDOM_BOTH = 0.5
-"""Share of a sensor's rows that the other one shares at most; stamps of two clocks coincide now and then."""
+"""Share of a sensor's rows that the other one shares at most; timestamps of two clocks coincide now and then."""
 _IN_STEP = 0.9
 """Share of a slower sensor's rows that follow each other by the same number of rows."""
 

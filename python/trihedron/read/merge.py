@@ -17,8 +17,8 @@ NEIGHBOUR_STEPS = 1.5
 """Two readings further apart than this have a gap between them, and nothing is made up inside a gap."""
 FASTER = 1.2
 QUIETER, WHOLE = 0.9, 0.99
-"""Interpolation that leaves less of the white noise's variance shows in error bars (a tenth), or at least in an Allan
-curve (a hundredth)."""
+"""Interpolation that leaves less of the white noise's variance shows in uncertainties (a tenth), or at least in an
+Allan curve (a hundredth)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ def resample(
     between = (alpha > 0) & (alpha < 1)
     out[between] = (1 - weight[between]) * values[left[between]] + weight[between] * values[right[between]]
     out[~usable] = np.nan
-    inside = np.clip(alpha, 0.0, 1.0)  # far outside two nearly equal stamps alpha has no square
+    inside = np.clip(alpha, 0.0, 1.0)  # far outside two nearly equal timestamps alpha has no square
     factor = inside**2 + (1 - inside) ** 2
     return out, factor
 

@@ -1,4 +1,4 @@
-"""A table of known attitudes: angles of a dividing head, or directions, one row per still pose (docs/kalman.md)."""
+"""A table of known attitudes: angles of a dividing head, or directions, one row per pose (docs/kalman.md)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def read_pose_table(path: str | os.PathLike[str], *, gravity_m_s2: float, sigma_
 
     Columns, in any order, units in brackets or after an underscore ignored: ``pitch`` and/or ``roll`` in degrees
     (``pitch_rad`` in radians), or ``fx, fy, fz``, the direction that points up in the body, of any length. Optional:
-    ``hold``, the number (from 1) of the still pose in the log; ``start`` and ``stop`` [s], when it was held.
+    ``hold``, the number (from 1) of the pose in the log; ``start`` and ``stop`` [s], when it was held.
 
     Parameters
     ----------
@@ -60,9 +60,7 @@ def read_pose_table(path: str | os.PathLike[str], *, gravity_m_s2: float, sigma_
         numbers = table.columns[found["hold"]]
         hold = np.round(numbers).astype(np.int64) - 1
         if np.any(hold < 0) or np.any(np.abs(numbers - hold - 1) > 1e-9):
-            raise ReadError(
-                f"{file}: column {table.label(found['hold'])} must count still poses from 1, in whole numbers."
-            )
+            raise ReadError(f"{file}: column {table.label(found['hold'])} must count poses from 1, in whole numbers.")
     start = table.columns[found["start"]] if "start" in found else None
     stop = table.columns[found["stop"]] if "stop" in found else None
     if (start is None) != (stop is None):

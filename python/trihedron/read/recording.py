@@ -34,8 +34,8 @@ from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
 
-STAMPS = "stamps as logged [s]"
-"""Name under which stamps that gave way to an even clock are kept."""
+STAMPS = "timestamps as logged [s]"
+"""Name under which timestamps that gave way to an even clock are kept."""
 
 
 # Absurd readings (1e300) overflow squares; they then fail every test of plausibility, which is what they should.
@@ -263,7 +263,7 @@ def _finite_extremes(triad: FloatArray) -> Extremes:
 
 
 def _rate_hz(sensors: Sensors) -> float:
-    """Samples per second: of the clock behind the stamps where losses can be told on it, else of the rows."""
+    """Samples per second: of the clock behind the timestamps where losses can be told on it, else of the rows."""
     sampling = sensors.sampling
     if sampling.period_s > 0.0 and (sampling.counts_losses or sampling.is_even):
         return 1.0 / sampling.period_s

@@ -10,8 +10,8 @@ from pathlib import Path
 from trihedron.read.errors import ReadError
 
 BYTES_PER_CELL_AT_PEAK = 16
-"""A number (8 bytes), its share of the clock's stamps and ticks, and of what one pass of the audit needs: 10^7 rows of
-7 columns take 0.97 GB, 12 bytes per cell beside the interpreter's."""
+"""A number (8 bytes), its share of the clock's timestamps and ticks, and of what one pass of the audit needs: 10^7 rows
+of 7 columns take 0.97 GB, 12 bytes per cell beside the interpreter's."""
 KEPT_FREE = 150_000_000
 """For a block of text that is being parsed, libraries not yet loaded, and threads."""
 MOST_RATIO = 500.0

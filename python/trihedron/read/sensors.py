@@ -52,7 +52,7 @@ class Options:
 class Sensors:
     """Both triads on one time base, and where each sample stood in the file.
 
-    ``sampling``, ``lost_behind`` (n - 1,) once the clock is settled, and ``stamps_s`` (n,), the stamps it replaced.
+    ``sampling``, ``lost_behind`` (n - 1,) once the clock is settled, and ``stamps_s`` (n,), the timestamps it replaced.
     """
 
     time_s: FloatArray
@@ -187,7 +187,7 @@ def _words_left_out(table: Table) -> list[Finding]:
 
 
 def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[Finding]) -> Clock:
-    """Rows written twice (same stamp, same readings) once; they are no samples."""
+    """Rows written twice (same timestamp, same readings) once; they are no samples."""
     if chosen.time is None or not steps_of(clock.time_s).same:
         return clock
     rows = np.arange(table.n_rows) if clock.rows is None else clock.rows
@@ -227,7 +227,7 @@ def _witness(table: Table, chosen: Columns) -> Witness:
 
 
 def settled(sensors: Sensors) -> Sensors:
-    """The same on the clock that its stamps, its counter and the motion speak for; as it is where that was done."""
+    """The same on the clock that its timestamps, its counter and the motion speak for; as it is where that was done."""
     if not sensors.has_clock or sensors.sampling is not UNJUDGED:
         return sensors
     triads = [x for x in (sensors.accelerometer, sensors.gyroscope) if x is not None]

@@ -19,8 +19,8 @@ from trihedron.records.words import Words, words
 class StatedClock:
     """What a format itself says of its clock; what it leaves open is found from the numbers.
 
-    ``time``: column of the stamps; ``unit``: theirs (``s``, ``ms``, ``us``, ``ns`` or ``100us``); ``counter``: column
-    that counts samples, lost ones included; ``rate_hz``: the nominal rate, used where there are no stamps.
+    ``time``: column of the timestamps; ``unit``: theirs (``s``, ``ms``, ``us``, ``ns`` or ``100us``); ``counter``:
+    column that counts samples, lost ones included; ``rate_hz``: the nominal rate, used where there are no timestamps.
     """
 
     time: int | None = None
@@ -37,7 +37,7 @@ class Table:
     break; both are zero/None for binary formats, where places are counted in rows. ``metadata`` holds key and value of
     preamble lines. ``words`` gives an example cell of each column of words, ``labels`` its different words and the word
     (n,) of each row where these are few. What a format knows of itself: ``sensor`` says whose ``x y z`` the columns
-    are, ``clock`` what it states of its stamps. ``onboard`` what a
+    are, ``clock`` what it states of its timestamps. ``onboard`` what a
     flight controller did to the readings. ``rows_in_file`` counts what the file holds, left-out rows
     included (0: as many as there are here); every row that is not here is in a finding's ``rows_left_out``.
     """

@@ -27,7 +27,7 @@ def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
     if not accelerometer.has_clock and len(accelerometer.time_s) != len(gyroscope.time_s):
         raise ReadError(
             f"{accelerometer.table.path}: {len(accelerometer.time_s)} rows here and {len(gyroscope.time_s)} in "
-            f"{gyroscope.table.path.name}, and no time column to match them by; log both with time stamps."
+            f"{gyroscope.table.path.name}, and no time column to match them by; log both with timestamps."
         )
     same_stamps = accelerometer.start_s == gyroscope.start_s and np.array_equal(accelerometer.time_s, gyroscope.time_s)
     if not same_stamps:

@@ -124,7 +124,7 @@ def _table(
     onboard: Onboard | None,
     findings: tuple[Finding, ...],
 ) -> Table:
-    # The sample's own stamp, where the log has it; `timestamp` is when the message was published.
+    # The sample's own timestamp, where the log has it; `timestamp` is when the message was published.
     stamp = _stamp(data)
     names, columns = ["timestamp [us]"], [np.asarray(data[stamp], dtype=np.float64)]
     for name, values in data.items():

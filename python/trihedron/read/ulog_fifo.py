@@ -1,7 +1,7 @@
 """PX4's batches of raw samples (sensor_accel_fifo, sensor_gyro_fifo), one row per sample.
 
-A message holds up to 32 samples of each axis as counts, the size of a count, the step between samples and the stamp of
-its last one: sample s of n was taken at t - (n - 1 - s) dt.
+A message holds up to 32 samples of each axis as counts, the size of a count, the step between samples and the timestamp
+of its last one: sample s of n was taken at t - (n - 1 - s) dt.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ _CLOCK = re.compile(r"\d[:.h]\d\d[:.m]\d\d")
 FEWEST_ROWS = 20
 """Rows below which readings may well grow from row to row."""
 NEARLY_ALL = 0.99
-"""Steps of a clock that go forward; a stamp written twice now and then is still a clock's."""
+"""Steps of a clock that go forward; a timestamp written twice now and then is still a clock's."""
 
 
 def refuse_unread_time(table: Table, chosen: Columns, mapping: str | None, rate_hz: float | None) -> None:

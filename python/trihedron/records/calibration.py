@@ -17,9 +17,9 @@ from trihedron.records.presented import Presented
 from trihedron.refused import RefusedError
 
 Frame = Literal["lower", "symmetric", "case"]
-"""Instrument trihedron Mz: ``lower`` (S_f lower triangular), ``symmetric`` (S_f symmetric), ``case`` (S_f full)."""
+"""Body frame Mz: ``lower`` (S_f lower triangular), ``symmetric`` (S_f symmetric), ``case`` (S_f full)."""
 
-PARAMETER_NAMES: tuple[str, ...] = (*(f"S{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)), "b1", "b2", "b3")
+PARAMETER_NAMES: tuple[str, ...] = (*(f"S_{i}{j}" for i in "xyz" for j in "xyz"), "b_x", "b_y", "b_z")
 """Order of a sensor's 12 parameters in every covariance: S row by row, then b."""
 
 
@@ -121,7 +121,7 @@ class SensorCalibration(Frozen):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Presented):
-    """Both sensors in one instrument trihedron, with what they were determined from.
+    """Both sensors in one body frame (instrument frame), with what they were determined from.
 
     ``covariance`` (24, 24): accelerometer's 12 parameters, then the gyro's, with cross terms; (12, 12) without.
     ``averaging``: 0 for a sensor that samples points, 1 for one that averages over its sample interval

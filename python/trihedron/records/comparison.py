@@ -21,7 +21,7 @@ class Comparison:
 
     @property
     def z(self) -> FloatArray:
-        """(k,) errors in standard errors: standard normal when the error bars are honest."""
+        """(k,) errors in standard errors: standard normal when the uncertainties are honest."""
         z: FloatArray = (self.estimate - self.truth) / self.sigma
         return z
 

@@ -1,4 +1,4 @@
-"""A diagnosis: where recording and twin differ, which physics explains it, and what remains."""
+"""A diagnosis: where recording and model differ, which physics explains it, and what remains."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.plain import Layout, Plain, as_plain
 
 Verdict = Literal["consistent", "parameters-differ", "missing-physics", "unexplained", "not-testable"]
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 
 @dataclass(frozen=True)
@@ -57,11 +57,11 @@ class AcceptedEffect(Frozen, Plain):
 
 @dataclass(frozen=True)
 class ParameterDifference(Plain):
-    """One number of a given model against the value that the recording has.
+    """One parameter of a given model against the value that the recording has.
 
-    ``id`` is the group (``gyro-zero``, ``accel-scale``, ...), ``name`` the component. ``difference`` is recording minus
-    model; ``p_value`` and ``significant`` are those of the group, the search over all groups paid for. ``remark`` says
-    in words what the numbers resemble (zeros that were drawn and never added).
+    ``id`` is the group (``gyro-bias``, ``accel-scale``, ...), ``name`` the component. ``difference`` is recording minus
+    model; ``p_value`` and ``significant`` are those of the group, corrected for multiple testing over all groups.
+    ``remark`` says in words what the parameters resemble (biases that were drawn and never applied).
     """
 
     id: str
@@ -90,8 +90,8 @@ class NoiseDifference(Plain):
     ``ratio`` is model over recording with its 95 % ``interval``; ``axis`` is empty for what all axes share; ``remark``
     says in words what the number resembles (a density scaled by the rate twice). ``term`` ``unit`` is a reading written
     in another unit than it says, ``frame`` one along other axes (gravity's sign, rates of the world).
-    ``band_hz`` is where an octave begins and ends. ``poses`` and ``moves``: what the lengths of gravity and gravity
-    carried through the moves miss, rms, of simulations moved as the recording was; their interval is of 1 − 2 alpha.
+    ``band_hz`` is where an octave begins and ends. ``poses`` and ``moves``: gravity error and tilt error, rms, of
+    simulations moved as the recording was; their interval is of 1 − 2 alpha.
     """
 
     sensor: Literal["accelerometer", "gyroscope", "both"]
@@ -109,8 +109,8 @@ class NoiseDifference(Plain):
 
 
 @dataclass(frozen=True)
-class Law(Plain):
-    """What a misfit without a known mechanism depends on, by which law, and how much of it that law predicts."""
+class Relation(Plain):
+    """An empirical relation: what a misfit without a known mechanism depends on, and how much of it that predicts."""
 
     sensor: Literal["accelerometer", "gyroscope"]
     depends_on: tuple[str, ...]
@@ -151,8 +151,8 @@ class Stage(Plain):
 class Candidate(Plain):
     """One catalogue effect that was tried, accepted or not, or why it does not apply.
 
-    ``score`` is twice the log-evidence that it gains beside what was accepted, the search paid for; ``size`` what its
-    parameters come to there, ``limit95`` what the largest of them is at most (95 %), in its unit; ``stands_against``
+    ``score`` is twice the log-evidence that it gains beside what was accepted, corrected for multiple testing; ``size``
+    its parameters there, ``limit95`` what the largest of them is at most (95 %), in its unit; ``stands_against``
     the accepted effect beside which it is needless, where it would stand without that one.
     """
 
@@ -180,7 +180,7 @@ class LinearModel(Frozen, Plain):
 
 @dataclass(frozen=True)
 class Diagnosis(Frozen, Plain):
-    """What came out when the digital twin was held against the recording (schema version 2)."""
+    """Where a recording and its model differ, which effects are missing, and what is unexplained (schema version 3)."""
 
     verdict: Verdict
     domains: tuple[DomainTest, ...]
@@ -198,13 +198,14 @@ class Diagnosis(Frozen, Plain):
     residuals: tuple[DomainResiduals, ...] = ()
     parameters: tuple[ParameterDifference, ...] = ()
     noise_compared: tuple[NoiseDifference, ...] = ()
-    laws: tuple[Law, ...] = ()
+    relations: tuple[Relation, ...] = ()
     stages: tuple[Stage, ...] = ()
     LAYOUT: ClassVar[Layout] = Layout(
         {"noise": "noise_model", "noise_compared": "noise"},
         (
             "schema_version", "verdict", "domains", "effects", "remaining", "candidates", "calibration", "parameters",
-            "noise", "noise_model", "laws", "stages", "gravity_m_s2", "alpha", "recording", "references", "residuals",
+            "noise", "noise_model", "relations", "stages", "gravity_m_s2", "alpha", "recording", "references",
+            "residuals",
         ),
         lambda _, made: {
             "schema_version": SCHEMA_VERSION,
@@ -231,7 +232,7 @@ class Diagnosis(Frozen, Plain):
         all_of("residuals", self.residuals, DomainResiduals)
         all_of("parameters", self.parameters, ParameterDifference)
         all_of("noise_compared", self.noise_compared, NoiseDifference)
-        all_of("laws", self.laws, Law)
+        all_of("relations", self.relations, Relation)
         all_of("stages", self.stages, Stage)
         freeze(self)
 

@@ -49,7 +49,7 @@ class DomainResiduals(Frozen, Plain):
     domain: Domain
     quantity: str
     unit: str
-    kind: Literal["hold", "move"]
+    kind: Literal["pose", "move"]
     channels: tuple[str, ...]
     time_before_s: FloatArray
     before: FloatArray

@@ -18,7 +18,7 @@ LEAST_POSES = 12
 @dataclass(frozen=True)
 class Accuracy:
     """Good enough: every scale and cross term of a sensor within this fraction of its scale (standard error), and the
-    accelerometer's zeros within the same fraction of gravity."""
+    accelerometer's biases within the same fraction of gravity."""
 
     accelerometer: float = 1e-3
     gyroscope: float = 2e-3

@@ -1,4 +1,4 @@
-"""Nouns of noise inside the still poses of a session: each figure with the interval that two logs are compared by."""
+"""Nouns of noise inside the poses of a session: each figure with the interval that two logs are compared by."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class OctaveNoise:
-    """Two-sided density [u²/Hz] between ``low_hz`` and ``high_hz``, as the mean over the holds."""
+    """Two-sided density [u²/Hz] between ``low_hz`` and ``high_hz``, as the mean over the poses."""
 
     low_hz: float
     high_hz: float
@@ -32,7 +32,7 @@ class OctaveNoise:
 
 @dataclass(frozen=True)
 class HoldLine:
-    """A line of ``amplitude`` [u] at ``frequency_hz`` that the holds have in common, over ``limit`` times its level."""
+    """A line of ``amplitude`` [u] at ``frequency_hz`` that the poses have in common, over ``limit`` times its level."""
 
     frequency_hz: float
     amplitude: Measured

@@ -17,7 +17,7 @@ from trihedron.refused import RefusedError
 from trihedron.units import radians_from_degrees
 
 CONSTANT_NAMES: tuple[str, ...] = ("kx", "ky", "kz", "U0")
-"""Order of an axis' constants: sensitivity to the three reference components [raw/(m/s²)], zero reading [raw]."""
+"""Order of an axis' constants: sensitivity to the three reference components [raw/(m/s²)], bias [raw]."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ class PoseTable:
     """Known attitudes: specific force (n, 3) [m/s²] along the reference axes while the sensor stands still.
 
     ``sigma_m_s2`` is the uncertainty of each component (angle errors of the head times g). ``source`` says where the
-    table came from. ``hold`` (n,) says which still pose of the log each row belongs to, ``start_s``, ``stop_s`` (n,)
-    when it was held; without either the rows are the still poses in order.
+    table came from. ``hold`` (n,) says which pose of the log each row belongs to, ``start_s``, ``stop_s`` (n,)
+    when it was held; without either the rows are the poses in order.
     """
 
     specific_force: FloatArray
@@ -91,7 +91,7 @@ class PoseTable:
         """Specific force in the body for known pitch and roll (docs/kalman.md, eq. 1).
 
         The body's z axis points up at zero angles; pitch θ turns about y, then roll φ about the new x:
-        ``f = g (−sin θ, cos θ sin φ, cos θ cos φ)``. A head with one axis gives one angle and zero for the other.
+        ``f = g (−sin θ, cos θ sin φ, cos θ cos φ)``. A head with one axis gives one angle and bias for the other.
         An angle is set with standard error ``sigma_angle_deg``, which makes the reference uncertain by ``g σ``.
 
         Parameters
@@ -151,7 +151,7 @@ class AxisKalmanResult:
 
     ``innovation``, ``innovation_sigma`` (n,) [raw] are one-step predictions; ``nis`` their squared ratio, which is
     chi-square with one degree of freedom when the noise model is right, where ``is_settled`` (n,) (elsewhere the
-    diffuse start predicted nothing). ``drift``, ``drift_sigma`` (n,) is the slow noise at the end of each hold given
+    diffuse start predicted nothing). ``drift``, ``drift_sigma`` (n,) is the slow noise at the end of each pose given
     the readings so far, ``smoothed_drift`` given all of them. ``batch`` holds the one-shot solutions as ``(constants,
     sigma)``.
     """
@@ -251,7 +251,7 @@ class LiveEstimate(Frozen):
     """What is known after a pose: constants (3, 4) with standard errors, and how far the goal is.
 
     ``relative_sigma`` (3, 4) are the standard errors divided by the axis' own sensitivity: dimensionless for the three
-    sensitivities, m/s² for the zero reading. ``poses_needed`` counts further poses predicted to reach the goal (0 when
+    sensitivities, m/s² for the bias. ``poses_needed`` counts further poses predicted to reach the goal (0 when
     reached, None when the predicted poses do not reach it); ``next_reference`` (3,) [m/s²] is the most useful next one.
     """
 

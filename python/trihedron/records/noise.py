@@ -251,8 +251,8 @@ class NoiseAxis(Frozen):
         """Variance of the mean of ``window_s`` seconds (docs/noise.md, eq. 11).
 
         Without ``session_s`` half the variance of the difference to the next such mean (the Allan variance): the
-        uncertainty when the zero reading is taken next to the window. With it the variance about the mean of a session
-        of that length: the weight of one hold when one bias is fitted to all of them.
+        uncertainty when the bias is taken next to the window. With it the variance about the mean of a session
+        of that length: the weight of one pose when one bias is fitted to all of them.
         """
         if not window_s > 0:
             raise RefusedError(f"a window must last longer than 0 s, got {window_s}")

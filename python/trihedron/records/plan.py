@@ -10,7 +10,7 @@ from trihedron.records.presented import Presented
 @dataclass(frozen=True)
 class TurnPlan:
     """Standard errors from known turns: relative ``scale`` of each turned axis, ``zero`` [rad/s]; all rows at once
-    (least squares), and the zero from the zero turn first. ``n_turns`` about every axis."""
+    (least squares), and the bias from the zero turn first. ``n_turns`` about every axis."""
 
     n_turns: int
     angles_deg: tuple[float, ...]

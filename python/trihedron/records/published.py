@@ -8,13 +8,13 @@ import numpy as np
 
 from trihedron.records.calibration import Calibration, FitQuality
 
-AT_REST = "with one zero for the session"
-AFTER_MOVES = "with a zero per pose"
-"""In words: what zero the saved S and b are given before the figure is taken."""
+AT_REST = "one bias for the session"
+AFTER_MOVES = "bias refitted per pose"
+"""In words: which bias the saved S and b are given before the figure is taken."""
 
 
 def counted_moves(quality: FitQuality) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """(m,) the moves that were not left out."""
+    """(m,) the moves that were not excluded."""
     assert quality.angle_deg is not None
     seen = np.isfinite(quality.angle_deg)
     if quality.weights is not None and len(quality.weights) == len(seen):
@@ -23,14 +23,15 @@ def counted_moves(quality: FitQuality) -> np.ndarray[tuple[int], np.dtype[np.boo
 
 
 def published_figures(calibration: Calibration) -> dict[str, dict[str, Any]]:
-    """Rms of gravity missed at rest [m/s²] and after moves [°], in sample and held out, as plain JSON types.
+    """Gravity error in static poses, rms [m/s²], and tilt error after rotations, rms [°], in sample and
+    held out, as plain JSON types.
 
     ``None`` stands for what could not be held out.
     """
     out: dict[str, dict[str, Any]] = {}
     at_rest = calibration.accelerometer.quality
     if at_rest is not None:
-        out["gravity_at_rest"] = {
+        out["gravity_error_in_static_poses"] = {
             "definition": f"| |S a' + b| - |g| | of the means of the poses, {AT_REST}",
             "unit": "m/s^2",
             "rms": float(at_rest.rms),
@@ -40,7 +41,7 @@ def published_figures(calibration: Calibration) -> dict[str, dict[str, Any]]:
     if moved is not None and moved.angle_deg is not None:
         counted = counted_moves(moved)
         held = moved.held_out_angle_deg
-        out["gravity_after_moves"] = {
+        out["tilt_error_after_rotations"] = {
             "definition": f"angle between gravity carried by the gyro and gravity measured after a move, {AFTER_MOVES}",
             "unit": "deg",
             "rms": _rms(moved.angle_deg[counted]),

@@ -45,11 +45,11 @@ def _readonly(array: npt.ArrayLike, name: str, shape: tuple[int | None, ...]) ->
 
 
 def spread_stamps(time_s: FloatArray, step_s: float) -> FloatArray:
-    """Strictly increasing stamps (n,) from non-decreasing ones: those that are shared, spread evenly to one side.
+    """Strictly increasing timestamps (n,) from non-decreasing ones: those that are shared, spread evenly to one side.
 
-    Samples that were stamped when they arrived together have a long step before their stamp and were taken in it;
-    stamps that were cut off to few digits, or repeated, have it behind. The side with more room in the log as a whole
-    is taken; no two samples are put further apart than a sampling step.
+    Samples that were timestamped when they arrived together have a long step before their timestamp and were taken in
+    it; timestamps that were cut off to few digits, or repeated, have it behind. The side with more room in the log as a
+    whole is taken; no two samples are put further apart than a sampling step.
     """
     if np.all(np.diff(time_s) > 0):
         return time_s
@@ -66,7 +66,7 @@ def spread_stamps(time_s: FloatArray, step_s: float) -> FloatArray:
     place = within - (np.repeat(size, size) - 1 if is_before else 0)
     out = np.repeat(stamp, size) + place * np.repeat(apart, size)
     out = np.asarray(out - out[0], dtype=np.float64)
-    # Stamps a rounding apart leave no room for what they share: the smallest number apart will do.
+    # Timestamps a rounding apart leave no room for what they share: the smallest number apart will do.
     for k in np.flatnonzero(np.diff(out) <= 0):
         out[k + 1] = np.nextafter(out[k], np.inf)
     return out
@@ -79,21 +79,21 @@ class Recording(Presented):
     Parameters
     ----------
     time_s : (n,)
-        Seconds since the first sample, non-decreasing: the stamps, or the even clock behind them where ``sampling``
+        Seconds since the first sample, non-decreasing: the timestamps, or the even clock behind them where ``sampling``
         says so. Gaps are kept.
     accelerometer, gyroscope : (n, 3) or None
         Raw readings in ``accelerometer_unit`` / ``gyroscope_unit``. At least one sensor is present. Rows that the log
         lost hold NaN in the sensor that lost them; stages skip them.
     rate_hz : float
-        Sampling rate: samples per second outside gaps (a median step would believe stamps rounded to a millisecond).
-    temperature_degc, supply_v : (n,) or None
+        Sampling rate: samples per second outside gaps (a median step would believe timestamps rounded to a
+    millisecond). temperature_degc, supply_v : (n,) or None
         Auxiliary channels where the log has them.
     source, sha256 : str
         Where it came from, for people; and the hash of the bytes that were read (of the arrays when made in memory).
     findings : tuple of Finding
         The audit of the log.
     sampling : Sampling
-        What the stamps are worth, as judged when the log was read.
+        What the timestamps are worth, as judged when the log was read.
     auxiliary : mapping of name to (n,) array
         Every other numeric column, untouched.
     onboard : Onboard, optional
@@ -160,7 +160,7 @@ class Recording(Presented):
         freeze(self)
 
     def with_distinct_stamps(self) -> Recording:
-        """This recording with no two samples at one instant: stamps that are shared, spread (:func:`spread_stamps`)."""
+        """This recording with no two samples at one instant: shared timestamps are spread (:func:`spread_stamps`)."""
         distinct = spread_stamps(self.time_s, 1.0 / self.rate_hz)
         return self if distinct is self.time_s else self.with_same_readings(time_s=distinct)
 

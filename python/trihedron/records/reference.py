@@ -179,7 +179,7 @@ class AgainstReference(Plain):
 
     ``clock_offset_s``: by how much the reference's clock is ahead at ``clock_middle_s`` of the log, and its σ.
     ``earth_rate``: along the axes of the reference's world, where the log tells where it points; else it is in the
-    error bars of the gyro's numbers.
+    uncertainties of the gyro's numbers.
     """
 
     kind: str

@@ -1,4 +1,4 @@
-"""How a recording was sampled: what its stamps are worth, as judged when the log was read."""
+"""How a recording was sampled: what its timestamps are worth, as judged when the log was read."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from enum import Enum
 
 
 class StampKind(str, Enum):
-    """What a log's stamps are.
+    """What a log's timestamps are.
 
-    ``NONE``: no stamps, or too few to tell. ``EXACT``: even. ``ROUNDED``: even, rounded to a grid. ``LATE``: even
-    samples stamped when they arrived. ``SCATTERED``: even but for a two-sided scatter. ``IRREGULAR``: no even clock
+    ``NONE``: no timestamps, or too few to tell. ``EXACT``: even. ``ROUNDED``: even, rounded to a grid. ``LATE``: even
+    samples timestamped when they arrived. ``SCATTERED``: even but for a two-sided scatter. ``IRREGULAR``: no even clock
     lies behind them.
     """
 
@@ -26,10 +26,10 @@ class StampKind(str, Enum):
 class Sampling:
     """The clock of a recording.
 
-    ``period_s`` with standard error ``sigma_period_s``; ``stamp_error_s`` rms of the stamps about the even clock;
-    ``is_even``: ``time_s`` is that even clock and not the stamps; ``n_lost`` samples and ``n_losses`` places, where
+    ``period_s`` with standard error ``sigma_period_s``; ``stamp_error_s`` rms of the timestamps about the even clock;
+    ``is_even``: ``time_s`` is that even clock and not the timestamps; ``n_lost`` samples and ``n_losses`` places, where
     ``counts_losses`` (else unknown); ``followed`` the share of the stamps' scatter that the readings follow (1: samples
-    were taken when stamped, 0: evenly) with ``sigma_followed`` (infinite without motion).
+    were taken when timestamped, 0: evenly) with ``sigma_followed`` (infinite without motion).
     """
 
     kind: StampKind = StampKind.NONE
@@ -45,4 +45,4 @@ class Sampling:
 
 
 UNJUDGED = Sampling()
-"""Nothing is known of the stamps: a recording made in memory, or without stamps."""
+"""Nothing is known of the timestamps: a recording made in memory, or without timestamps."""

@@ -16,12 +16,12 @@ from trihedron.records.presented import Presented
 
 @dataclass(frozen=True)
 class Hold:
-    """One still pose.
+    """One pose.
 
     ``[start, stop)`` are the samples that may be averaged: edges trimmed, so that no motion leaks in.
     ``[outer_start, outer_stop)`` is the stretch as detected, before trimming. ``disturbed`` are sub-ranges
-    ``(start, stop)`` inside ``[start, stop)`` that were bumped and are left out of means. ``is_unsteady`` says that the
-    hold nowhere comes down to the sensor's own noise: held in the hand, or on a support that shakes.
+    ``(start, stop)`` inside ``[start, stop)`` that were bumped and are excluded from means. ``is_unsteady`` says that
+    the hold nowhere comes down to the sensor's own noise: held in the hand, or on a support that shakes.
     """
 
     index: int
@@ -35,7 +35,7 @@ class Hold:
     def __post_init__(self) -> None:
         if not 0 <= self.outer_start <= self.start < self.stop <= self.outer_stop:
             raise ValueError(
-                f"hold {self.index} is not a range: {self.outer_start}..{self.start}..{self.stop}..{self.outer_stop}"
+                f"pose {self.index} is not a range: {self.outer_start}..{self.start}..{self.stop}..{self.outer_stop}"
             )
 
     def samples(self) -> npt.NDArray[np.intp]:
@@ -57,7 +57,7 @@ class Hold:
 
 @dataclass(frozen=True)
 class Move:
-    """The samples between two neighbouring holds: from the trimmed end of one to the trimmed start of the next.
+    """The samples between two neighbouring poses: from the trimmed end of one to the trimmed start of the next.
 
     Integration over ``[start, stop)`` therefore contains the whole motion whatever its duration; nothing is cut.
     """
@@ -74,9 +74,9 @@ class Segments(Presented):
     """Holds and moves of one recording, and the sensor noise that decided them.
 
     ``accelerometer_sigma`` and ``gyroscope_sigma`` (3,) are the white noise of one sample in raw units, measured inside
-    the holds; ``accelerometer_mean`` / ``gyroscope_mean`` (n_holds, 3) the mean raw reading of each hold, with
+    the poses; ``accelerometer_mean`` / ``gyroscope_mean`` (n_holds, 3) the mean raw reading of each pose, with
     ``accelerometer_sigma_mean`` / ``gyroscope_sigma_mean`` (n_holds, 3) the standard error of each mean (not assuming
-    whiteness: slow noise inside a hold raises it). ``n_averaged`` (n_holds,) counts the samples behind each mean,
+    whiteness: slow noise inside a pose raises it). ``n_averaged`` (n_holds,) counts the samples behind each mean,
     ``time_mid_s`` (n_holds,) and ``duration_s`` (n_holds,) say when and how long. ``whole`` are the poses before they
     were cut at bumps, each averaged over all of its samples; ``None`` where nothing was cut.
     ``accelerometer_up`` (n_holds, 3) is the vertical in raw units (unit vectors, by whose direction |f| grows fastest)
@@ -120,12 +120,12 @@ class Segments(Presented):
             raise ValueError(f"accelerometer_sigma_up must have shape ({n},), got {self.accelerometer_sigma_up.shape}")
         for move in self.moves:
             if not (0 <= move.hold_before < n and 0 <= move.hold_after < n and move.start <= move.stop):
-                raise ValueError(f"move {move.index} does not join two holds")
+                raise ValueError(f"move {move.index} does not join two poses")
         freeze(self)
 
     @property
     def n_holds(self) -> int:
-        """Number of still poses."""
+        """Number of poses."""
         return len(self.holds)
 
     @property
@@ -141,7 +141,7 @@ class Segments(Presented):
         return out
 
     def __repr__(self) -> str:
-        poses = f"{self.n_holds} still pose{'' if self.n_holds == 1 else 's'}"
+        poses = f"{self.n_holds} pose{'' if self.n_holds == 1 else 's'}"
         moves = f"{len(self.moves)} move{'' if len(self.moves) == 1 else 's'}"
         held = f" ({self.duration_s.sum():.1f} s still)" if self.n_holds else ""
         said = f", {len(self.findings)} findings" if self.findings else ""

@@ -21,7 +21,7 @@ session has its own."""
 
 @dataclass(frozen=True)
 class Parameter:
-    """One of the numbers that do not depend on a frame: ``id`` of the contract (``gyro-zero``), axis or pair ``name``,
+    """One of the numbers that do not depend on a frame: ``id`` of the contract (``gyro-bias``), axis or pair ``name``,
     ``unit`` of its value, ``sensor``."""
 
     id: str
@@ -36,7 +36,7 @@ _AXES, _PAIRS = ("x", "y", "z"), ("xy", "xz", "yz")
 def _of(prefix: Literal["accel", "gyro"], unit: str) -> tuple[Parameter, ...]:
     sensor: Literal["accelerometer", "gyroscope"] = "accelerometer" if prefix == "accel" else "gyroscope"
     return (
-        *(Parameter(f"{prefix}-zero", axis, unit, sensor) for axis in _AXES),
+        *(Parameter(f"{prefix}-bias", axis, unit, sensor) for axis in _AXES),
         *(Parameter(f"{prefix}-scale", axis, "1", sensor) for axis in _AXES),
         *(Parameter(f"{prefix}-misalignment", pair, "rad", sensor) for pair in _PAIRS),
     )
@@ -56,8 +56,8 @@ class Session(Frozen):
     """One calibrated recording as the comparison needs it.
 
     ``numbers`` (9,) or (21,) in the order of :data:`PARAMETERS`, ``covariance`` of the same size: the error of the
-    session's own estimate; ``wander`` (same size) variance by which a zero moves within a session like this one.
-    ``group`` is the day or the device. Temperatures are those of the holds, NaN where the log has none; ``branch`` is
+    session's own estimate; ``wander`` (same size) variance by which a bias moves within a session like this one.
+    ``group`` is the day or the device. Temperatures are those of the poses, NaN where the log has none; ``branch`` is
     +1 while it was heating, -1 while cooling, 0 where neither is told.
     """
 
@@ -89,7 +89,7 @@ class Repeated:
 
     ``value`` what is common, ``std`` its standard error with ``half_width`` that of its 95 % interval; ``within``
     spread from one session to the next of a group (turn-on to turn-on), ``between`` from group to group (day to day,
-    device to device), ``None`` without groups; ``own_std`` the typical error bar of one session.
+    device to device), ``None`` without groups; ``own_std`` the typical uncertainty of one session.
     """
 
     parameter: Parameter

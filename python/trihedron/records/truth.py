@@ -41,7 +41,7 @@ class Truth(Frozen):
     Parameters
     ----------
     accelerometer_time_s, gyroscope_time_s : (n,)
-        True instants of every row, on the motion's clock: the log's own stamps may lie.
+        True instants of every row, on the motion's clock: the log's own timestamps may lie.
     specific_force_m_s2, angular_rate_rad_s : (n, 3)
         At the body's reference point, in Mz, each at its own sensor's instants. The rate is inertial.
     attitude : (n, 4)
@@ -90,5 +90,5 @@ class Truth(Frozen):
 
     @property
     def moves(self) -> tuple[TrueSegment, ...]:
-        """Everything between holds."""
+        """Everything between poses."""
         return tuple(segment for segment in self.segments if segment.kind != "hold")

@@ -40,12 +40,12 @@ class JudgedParameter:
 class Verification(Presented):
     """What a calibration says about another recording, with what it should have said.
 
-    ``norm_error`` (n,) is ``|S a' + b| - |g|`` of every still pose [m/s²], ``norm_noise`` (n,) what the noise of the
+    ``norm_error`` (n,) is ``|S a' + b| - |g|`` of every pose [m/s²], ``norm_noise`` (n,) what the noise of the
     mean allows, ``norm_sigma`` (n,) that and the calibration's own uncertainty. ``angle_deg`` (m,) is the angle between
     gravity carried through a move by the gyro and gravity measured after it; ``angle_noise_deg`` and
     ``angle_sigma_deg`` (m,) the same two predictions for it, ``moves`` (m,) which moves these are: one whose readings
     stood at the gyro's limit for long carries nothing, and is in ``moves_left_out``. ``rest_rate`` (n, 3) is the
-    calibrated rate in every still pose [rad/s], where the truth is zero: how far the gyro's bias has moved.
+    calibrated rate in every pose [rad/s], where the truth is zero: how far the gyro's bias has moved.
     ``parameters`` says the same of every parameter that the log can judge, and names those that it cannot.
     """
 

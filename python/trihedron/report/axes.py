@@ -1,4 +1,4 @@
-"""What S and b mean for each sensor axis: sensitivity, zero reading, and how the axes stand to one another.
+"""What S and b mean for each sensor axis: sensitivity, bias, and how the axes stand to one another.
 
 All three are the same in every frame: they belong to the sensor, not to the choice of Mz.
 """

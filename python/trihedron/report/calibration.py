@@ -15,6 +15,7 @@ from trihedron.report.calibration_charts import (
     move_noise_deg,
     residual_chart,
     sphere_chart,
+    strong_correlations,
 )
 from trihedron.report.calibration_residuals import residual_tables
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
@@ -33,6 +34,8 @@ from trihedron.report.numbers import (
 from trihedron.report.segments import signals_picture
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
 
+MOST_PAIRS = 6
+"""Correlated pairs that one line names; the table of correlations holds them all."""
 SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
 
 
@@ -49,7 +52,7 @@ def calibration_report(
         sections.append(Section("Figures", figures))
     sections += [
         Section("Axes", _meaning(calibration)),
-        Section("Certainty", tuple(_certainty(calibration))),
+        Section("Uncertainty", tuple(_certainty(calibration))),
     ]
     residuals = tuple(residual_tables(calibration, segments))
     if residuals:
@@ -70,20 +73,27 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     out = []
     quality = calibration.accelerometer.quality
     if quality is not None:
-        rms, kind = (quality.rms, "in sample") if quality.held_out_rms is None else (quality.held_out_rms, "held out")
+        rms, kind = (
+            (quality.rms, "in sample") if quality.held_out_rms is None else (quality.held_out_rms, "cross-validated")
+        )
         beside = f"rms, {kind}, {AT_REST}; noise alone {plain_number(mm_s2_from_m_s2(quality.floor))}"
-        out.append(Headline("gravity at rest missed by", plain_number(mm_s2_from_m_s2(rms)), "mm/s²", beside))
+        out.append(Headline("gravity error in static poses", plain_number(mm_s2_from_m_s2(rms)), "mm/s²", beside))
     gyroscope = calibration.gyroscope
     if gyroscope is not None and gyroscope.quality is not None:
         seen = [(label, rms) for label, rms, _ in _angles(gyroscope.quality)]
         if seen:
             beside = f"rms, {seen[-1][0]}, {AFTER_MOVES}; noise alone {plain_number(_move_floor(gyroscope.quality))}°"
-            out.append(Headline("gravity after a move missed by", plain_number(seen[-1][1]), "°", beside))
+            out.append(Headline("tilt error after a rotation", plain_number(seen[-1][1]), "°", beside))
     for name, sensor in _sensors(calibration):
         relative = sensor.sigma_S.diagonal() / np.abs(sensor.S.diagonal())
-        words = f"{plain_number(1e6 * float(relative.max()), 2)}"
-        out.append(Headline(f"{name} scale known to", words, "ppm", "of the worst axis, one standard error"))
+        words, unit = _relative(float(relative.max()))
+        out.append(Headline(f"{name} scale uncertainty", words, unit, "1 σ, worst axis"))
     return out
+
+
+def _relative(sigma: float) -> tuple[str, str]:
+    """A relative uncertainty and its unit: ppm below a tenth of a percent, else %."""
+    return (plain_number(1e6 * sigma, 2), "ppm") if sigma < 1e-3 else (plain_number(100.0 * sigma, 2), "%")
 
 
 def _move_floor(quality: FitQuality) -> float:
@@ -96,7 +106,7 @@ def verdict(calibration: Calibration) -> str:
     """One sentence: may this be used?"""
     return verdict_of(
         calibration.findings,
-        "Good: nothing was noticed that speaks against it.",
+        "OK: no problems found.",
         "Usable",
         "NOT TO BE TRUSTED",
     )
@@ -107,12 +117,15 @@ def _result(calibration: Calibration, segments: Segments | None, recording: Reco
     if recording is not None:
         facts.append(("recording", f"{duration(recording.duration_s)} at {plain_number(recording.rate_hz, 4)} Hz"))
     if segments is not None:
-        facts.append(("motion", f"{how_many(segments.n_holds, 'still pose')}, {how_many(len(segments.moves), 'move')}"))
+        facts.append(("motion", f"{how_many(segments.n_holds, 'pose')}, {how_many(len(segments.moves), 'move')}"))
     facts.append(("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"))
     facts.append(("frame", calibration.frame))
     blocks: list[Block] = [Facts(tuple(facts))]
     for name, sensor in _sensors(calibration):
         blocks += [parameter_table(name, sensor), Facts(tuple(_fit_in_words(name, sensor)))]
+    strong = strong_correlations(calibration)
+    if strong:
+        blocks.append(Facts((("correlations above 0.5", _pairs(strong)),)))
     return tuple(blocks)
 
 
@@ -128,19 +141,19 @@ def parameter_table(name: str, sensor: SensorCalibration) -> Table:
     exponent = engineering_exponent(float(np.abs(sensor.S).max()))
     scale = 10.0**-exponent
     times = f" × {power_of_ten(exponent)}" if exponent else ""
-    head = ("", *(f"{raw}′{j}{times}" for j in (1, 2, 3)), f"b [{unit}]")
+    head = ("", *(f"{raw}′_{j}{times}" for j in "xyz"), f"b [{unit}]")
     rows = tuple(
         (
-            f"{true}{i + 1} =",
+            f"{true}_{'xyz'[i]} =",
             *(with_sigma(scale * sensor.S[i, j], scale * sensor.sigma_S[i, j]) for j in range(3)),
             with_sigma(sensor.b[i], sensor.sigma_b[i]),
         )
         for i in range(3)
     )
-    per = "" if sensor.raw_unit == sensor.si_unit else f" per {one_of(sensor.raw_unit)}"
+    of_S = "S dimensionless" if sensor.raw_unit == sensor.si_unit else f"S in {unit} per {one_of(sensor.raw_unit)}"
     caption = (
-        f"{name.capitalize()}: {true} = S {raw}′ + b, with {raw}′ in {unit_in_print(sensor.raw_unit)} "
-        f"and S in {unit}{per}"
+        f"{name.capitalize()}: {true} = S {raw}′ + b, with the reading {raw}′ in {unit_in_print(sensor.raw_unit)}, "
+        f"{of_S}; value ± standard uncertainty (1 σ)"
     )
     return Table(head, rows, caption)
 
@@ -151,12 +164,17 @@ def _fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]
     if quality is None:
         return rows
     if name == "accelerometer":
-        rows.append((f"gravity at rest, {AT_REST}", _norm_words(quality)))
+        rows.append(("gravity error in static poses", f"{_norm_words(quality)}; {AT_REST}"))
     elif _angles(quality):
-        rows.append((f"gravity after moves, {AFTER_MOVES}", _angle_words(quality)))
+        rows.append(("tilt error after a rotation", f"{_angle_words(quality)}; {AFTER_MOVES}"))
     else:
         rows.append(("residual", _angle_words(quality)))
     return rows
+
+
+def _pairs(strong: list[tuple[str, str, float]]) -> str:
+    more = f"; {len(strong) - MOST_PAIRS} more" if len(strong) > MOST_PAIRS else ""
+    return ", ".join(f"{a} and {b} {plain_number(r, 2)}" for a, b, r in strong[:MOST_PAIRS]) + more
 
 
 def figures_in_words(calibration: Calibration) -> tuple[tuple[str, str], ...]:
@@ -174,7 +192,7 @@ def _norm_words(quality: FitQuality) -> str:
     if quality.dof <= 0:
         parts = ["none in sample: as many parameters as poses, so the fit cannot be judged"]
     if quality.held_out_rms is not None:
-        parts.append(f"{words(quality.held_out_rms)} held out")
+        parts.append(f"{words(quality.held_out_rms)} cross-validated (held out)")
     parts.append(f"noise alone {words(quality.floor)}")
     return "; ".join(parts)
 
@@ -187,7 +205,7 @@ def _angles(quality: FitQuality) -> list[tuple[str, float, float]]:
     held = quality.held_out_angle_deg
     pairs = [("in sample", quality.angle_deg)]
     if held is not None and np.any(np.isfinite(held[counted])):
-        pairs.append(("held out", held))
+        pairs.append(("cross-validated (held out)", held))
     out = []
     for label, angles in pairs:
         known = angles[counted & np.isfinite(angles)]
@@ -203,13 +221,13 @@ def _angle_words(quality: FitQuality) -> str:
         assert quality.angle_deg is not None
         n_seen, n_counted = int(np.isfinite(quality.angle_deg).sum()), int(counted_moves(quality).sum())
         if n_counted < n_seen:
-            parts[0] += f" ({n_counted} of {n_seen} moves, the others left out)"
+            parts[0] += f" ({n_counted} of {n_seen} moves, the others excluded)"
         parts.append(f"noise alone {plain_number(_move_floor(quality))}° rms")
         return "; ".join(parts)
     if quality.dof <= 0:
         return "none: as many parameters as measured turns, so the fit cannot be judged"
     seen, noise = (plain_number(degrees_from_radians(value)) for value in (quality.rms, quality.floor))
-    return f"angle of a turn missed by {seen}° rms; noise alone {noise}°"
+    return f"error of a turn's angle {seen}° rms; noise alone {noise}°"
 
 
 def _meaning(calibration: Calibration) -> tuple[Block, ...]:
@@ -228,21 +246,21 @@ def _axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
     unit = "" if raw == si else f" [{raw} per {si}]"
     rows = [
         (
-            f"axis {i + 1}",
+            "XYZ"[i],
             with_sigma(axes.sensitivity[i], axes.sigma_sensitivity[i]),
-            plain_number(1e6 * axes.sigma_sensitivity[i] / axes.sensitivity[i], 2) + " ppm",
+            " ".join(_relative(float(axes.sigma_sensitivity[i] / axes.sensitivity[i]))),
             with_sigma(axes.zero[i], axes.sigma_zero[i]),
         )
         for i in range(3)
     ]
     skew = [
         f"{pair} {with_sigma(mrad_from_radians(axes.skew_rad[k]), mrad_from_radians(axes.sigma_skew_rad[k]))} mrad"
-        for k, pair in enumerate(("1-2", "1-3", "2-3"))
+        for k, pair in enumerate(("X-Y", "X-Z", "Y-Z"))
     ]
     return Table(
-        ("", f"sensitivity{unit}", "σ/value", f"zero reading [{raw}]"),
+        ("", f"sensitivity{unit}", "relative σ", f"raw reading at zero input [{raw}]"),
         tuple(rows),
-        f"{name.capitalize()}: angles between axes exceed 90° by {', '.join(skew)}",
+        f"{name.capitalize()} axes; angles between axes exceed 90° by {', '.join(skew)}",
     )
 
 
@@ -259,13 +277,12 @@ def _certainty(calibration: Calibration) -> list[Block]:
             )
         ]
         if seen.weakest:
-            rows.append(("weakest", seen.weakest))
+            rows.append(("least certain", seen.weakest))
         # One pose is enough where nothing is wrong; findings name all that are missing.
         if seen.advice:
-            rows.append(("gains most from", seen.advice[0]))
-        strong = sorted(seen.correlated, key=lambda pair: -abs(pair[2]))[:5]
-        if strong:
-            rows.append(("correlated", ", ".join(f"{a} and {b} ({plain_number(r, 2)})" for a, b, r in strong)))
+            rows.append(
+                ("most useful next pose" if name == "accelerometer" else "most useful next move", seen.advice[0])
+            )
         if sensor.quality is not None and sensor.quality.dof > 0:
             per_dof = sensor.quality.chi2 / sensor.quality.dof
             rows.append(("χ² per dof", f"{plain_number(per_dof)} over {sensor.quality.dof} degrees of freedom"))
@@ -283,8 +300,8 @@ def _figures(calibration: Calibration, segments: Segments | None, recording: Rec
         blocks.append(
             Picture(
                 "poses",
-                "Directions of 'up' in the sensor's trihedron, upper and lower hemisphere. Empty regions are poses "
-                "that were not recorded; triangles are the poses that the fit would gain most from, in that order.",
+                "Directions of 'up' in the body frame, upper and lower hemisphere. Empty regions are poses that were "
+                "not recorded; triangles are the most useful next poses, in that order.",
                 later("figures", "draw_poses", calibration.accelerometer, segments.accelerometer_mean),
                 partial(sphere_chart, calibration.accelerometer, segments.accelerometer_mean),
             )
@@ -294,7 +311,7 @@ def _figures(calibration: Calibration, segments: Segments | None, recording: Rec
         blocks.append(
             Picture(
                 "moves",
-                "Angle between predicted and measured gravity after every move, in sample and held out.",
+                "Tilt error after every rotation, in sample and cross-validated (held out).",
                 later("figures", "draw_moves", gyroscope.quality),
                 partial(move_chart, gyroscope.quality, segments),
             )
@@ -311,8 +328,8 @@ def _residual_picture(calibration: Calibration) -> Picture | None:
 
     return Picture(
         "residuals",
-        "Norm of gravity minus its true value in every still pose, against three standard errors of noise alone; "
-        "circles: predicted by a fit that did not see that pose.",
+        "Norm of gravity minus its true value in every pose, against 3 σ of noise alone; circles: cross-validated, "
+        "predicted by a fit that did not see that pose.",
         later("figures", "draw_residuals", quality),
         partial(residual_chart, quality),
     )

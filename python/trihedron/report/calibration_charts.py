@@ -14,6 +14,8 @@ from trihedron.report.disc import equal_area
 from trihedron.report.drawn import said
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
+STRONG = 0.5
+"""Correlation above which two parameters are named together."""
 LIMIT_SIGMAS = 3.0
 """A pose or move beyond it happens by chance once in 370."""
 
@@ -41,7 +43,7 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
         )
     told = [said(name, "", v, "mm/s²", s) for name, v, s in zip(label, residual, sigma, strict=True)]
     marks.append(Points(pose - 0.17, residual, told, None, "in sample", "c1"))
-    x = Scale("still pose", limits=(-0.7, len(pose) - 0.3), whole=True)
+    x = Scale("pose", limits=(-0.7, len(pose) - 0.3), whole=True)
     return Chart((Panel(x, Scale("|f| − |g|  [mm/s²]", "mm/s²"), tuple(marks)),))
 
 
@@ -51,7 +53,7 @@ def mm_s2(values: FloatArray) -> FloatArray:
 
 
 def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
-    """Angle missed after every move, in and out of sample, and what noise alone gives (rms)."""
+    """Tilt error after every rotation, in and out of sample, and what noise alone gives (rms)."""
     assert quality.angle_deg is not None
     n = len(quality.angle_deg)
     move = np.arange(n, dtype=np.float64)
@@ -64,7 +66,7 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
         for k in range(n)
     ]
     told = [
-        f"{said(w, '', v, '°')}{', left out' if out else ''}"
+        f"{said(w, '', v, '°')}{', excluded' if out else ''}"
         for w, v, out in zip(names, quality.angle_deg, is_out, strict=True)
     ]
     noise = move_noise_deg(quality)
@@ -75,7 +77,7 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     inside = np.where(is_out, np.nan, quality.angle_deg)
     marks.append(Bars(move - shift, inside, width, told, "in sample", "c1"))
     if np.any(is_out):
-        marks.append(Bars(move - shift, np.where(is_out, quality.angle_deg, np.nan), width, told, "left out", "soft"))
+        marks.append(Bars(move - shift, np.where(is_out, quality.angle_deg, np.nan), width, told, "excluded", "soft"))
     if held is not None:
         told_held = [said(f"{w}, held out", "", v, "°") for w, v in zip(names, held, strict=True)]
         marks.append(Bars(move + shift, np.where(is_out, np.nan, held), width, told_held, "held out", "accent"))
@@ -83,9 +85,9 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     marks.append(Points(move, noise, told_noise, None, "noise alone (rms)", "ink"))
     shown = np.concatenate([quality.angle_deg[~is_out], [] if held is None else held[~is_out]])
     shown = shown[np.isfinite(shown)]
-    # A move that was left out may be a hundred times as wrong: the rest must stay readable.
+    # A move that was excluded may be a hundred times as wrong: the rest must stay readable.
     top = 1.1 * float(max(shown.max(initial=0.0), np.nanmax(noise, initial=0.0))) or 1.0
-    y = Scale("gravity missed by  [°]", "°", limits=(0.0, top))
+    y = Scale("tilt error  [°]", "°", limits=(0.0, top))
     return Chart((Panel(Scale("move", limits=(-0.7, n - 0.3), whole=True), y, tuple(marks), height_px=200),))
 
 
@@ -96,16 +98,16 @@ def move_noise_deg(quality: FitQuality) -> FloatArray:
 
 
 def sphere_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
-    """Directions of "up", with those that the fit gains most from."""
+    """Directions of "up", with the most useful next poses."""
     force = means @ sensor.S.T + sensor.b
     up = force / np.linalg.norm(force, axis=1)[:, None]
     advice = sensor.observability.advice if sensor.observability is not None else ()
     wanted = [(words, direction) for words in advice if (direction := direction_in_words(words)) is not None]
     discs = []
-    for sign, title in ((1.0, "axis 3 above the horizon"), (-1.0, "axis 3 below the horizon")):
+    for sign, title in ((1.0, "+Z above the horizon"), (-1.0, "+Z below the horizon")):
         points = []
         for k, u in enumerate(up):
-            # A pose with level axis 3 lies on the rim of both.
+            # A pose with level Z lies on the rim of both.
             if sign * u[2] >= -1e-2:
                 words = " ".join(f"{c:+.2f}" for c in u).replace("-", "−")
                 points.append((*equal_area((u[0], u[1], u[2])), str(k), f"pose {k}: up is {words}", "taken"))
@@ -117,29 +119,40 @@ def sphere_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
 
 
 def direction_in_words(words: str) -> FloatArray | None:
-    """The unit vector (3,) of 'axis 1 up, then tilted 45° so that axis 2 points half up'; None where there is none."""
-    first = re.match(r"axis (\d) (up|down)", words)
-    if first is None:
+    """The unit vector (3,) of '+X/-Z edge up'; None where there is none."""
+    if re.match(r"[+-][XYZ](/[+-][XYZ])*( edge| corner)? up", words) is None:
         return None
     up = np.zeros(3)
-    for axis, side in [first.groups(), *re.findall(r"axis (\d) points half (up|down)", words)]:
-        up[int(axis) - 1] = 1.0 if side == "up" else -1.0
+    for side, axis in re.findall(r"([+-])([XYZ])", words.partition(" ")[0]):
+        up["XYZ".index(axis)] = 1.0 if side == "+" else -1.0
     out: FloatArray = up / np.linalg.norm(up)
     return out
 
 
-def correlation_table(calibration: Calibration) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]] | None:
-    """Head and rows of the correlations of all free parameters, two decimals."""
+def strong_correlations(calibration: Calibration) -> list[tuple[str, str, float]]:
+    """Pairs of free parameters whose correlation is above :data:`STRONG`, the strongest first."""
+    names, r = _correlations(calibration)
+    pairs = [(names[i], names[j], float(r[i, j])) for i in range(len(names)) for j in range(i + 1, len(names))]
+    return sorted((pair for pair in pairs if abs(pair[2]) > STRONG), key=lambda pair: -abs(pair[2]))
+
+
+def _correlations(calibration: Calibration) -> tuple[list[str], FloatArray]:
+    """Names (k,) and correlations (k, k) of all free parameters of both sensors."""
     both = (("a", calibration.accelerometer), ("w", calibration.gyroscope))
     names = [f"{sign}.{name}" for sign, sensor in both if sensor is not None for name in PARAMETER_NAMES]
     sigma = np.sqrt(np.maximum(np.diag(calibration.covariance), 0.0))
     free = np.flatnonzero(sigma > 0.0)
-    if not len(free):
-        return None
     r = calibration.covariance[np.ix_(free, free)] / np.outer(sigma[free], sigma[free])
-    kept = [names[k] for k in free]
+    return [names[k] for k in free], r
+
+
+def correlation_table(calibration: Calibration) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]] | None:
+    """Head and rows of the correlations of all free parameters, two decimals."""
+    kept, r = _correlations(calibration)
+    if not kept:
+        return None
     rows = tuple(
-        (kept[i], *("" if j > i else "1" if j == i else f"{r[i, j]:.2f}".replace("-", "−") for j in range(len(free))))
-        for i in range(len(free))
+        (kept[i], *("" if j > i else "1" if j == i else f"{r[i, j]:.2f}".replace("-", "−") for j in range(len(kept))))
+        for i in range(len(kept))
     )
     return ("", *kept), rows

@@ -39,8 +39,13 @@ def _pose_table(sensor: SensorCalibration, quality: FitQuality, segments: Segmen
         row.append(with_sigma(mm_s2_from_m_s2(float(residual)), mm_s2_from_m_s2(float(sigma))))
         row.append(_held_out_cell(quality, k))
         rows.append(tuple(row))
-    head = ("pose", *(("mid [s]", "hold [s]", "up, in Mz") if is_known else ()), "residual [mm/s²]", "held out [mm/s²]")
-    return Table(head, tuple(rows), "Accelerometer: |f| − |g| of every still pose ± what noise alone allows")
+    head = (
+        "pose",
+        *(("mid [s]", "length [s]", "up (body frame)") if is_known else ()),
+        "residual [mm/s²]",
+        "held out [mm/s²]",
+    )
+    return Table(head, tuple(rows), "Accelerometer: |f| − |g| of every pose ± what noise alone allows")
 
 
 def _held_out_cell(quality: FitQuality, k: int) -> str:
@@ -71,8 +76,8 @@ def _move_table(quality: FitQuality, segments: Segments | None) -> Table:
             plain_number(float(angle), 2),
             "–" if held is None else plain_number(float(held[k]), 2),
             plain_number(float(noise[k]), 2),
-            "left out" if is_out else "",
+            "excluded" if is_out else "",
         ]
         rows.append(tuple(row))
     head = ("move", *(("poses",) if moves is not None else ()), "in sample [°]", "held out [°]", "noise alone [°]", "")
-    return Table(head, tuple(rows), "Gyroscope: angle between predicted and measured gravity after every move")
+    return Table(head, tuple(rows), "Gyroscope: tilt error after every rotation, predicted against measured gravity")

@@ -1,4 +1,4 @@
-"""What a log says of the parts behind its channels: the converter's step, the range met, the filter."""
+"""What a log says of the parts behind its channels: resolution, range limits met, bandwidth."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def channels_table(recording: Recording) -> Table:
         facts, filters = recording.facts.of(name), recording.low_passes.get(name)
         cells = [
             (
-                f"{plain_number(float(facts.step[k]))} {unit}" if facts.step[k] else "none to be seen",
+                f"{plain_number(float(facts.step[k]))} {unit}" if facts.step[k] else "not visible",
                 _ends([limit for limit in facts.limits if limit.axis == k], unit),
                 UNKNOWN if filters is None else _filter(filters[k]),
             )
@@ -31,7 +31,7 @@ def channels_table(recording: Recording) -> Table:
             rows.append((name, *cells[0]))
         else:
             rows += [(f"{name} {axis}", *cell) for axis, cell in zip(AXES, cells, strict=True)]
-    return Table(("", "step", "ends of its range met", "low-pass, half power at"), tuple(rows), "The channels")
+    return Table(("", "resolution (LSB)", "range limits met", "-3 dB bandwidth"), tuple(rows), "The channels")
 
 
 def channels_record(recording: Recording) -> dict[str, Any]:

@@ -45,7 +45,7 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Dots with ``sigma`` as error bars; ``said`` is what a reader who points at one is told."""
+    """Dots with ``sigma`` as uncertainties; ``said`` is what a reader who points at one is told."""
 
     x: FloatArray
     y: FloatArray

@@ -43,7 +43,7 @@ def draw_onto(chart: Callable[[], Chart], axes: Sequence[Axes]) -> Figure:
 
 
 def draw_chart(chart: Callable[[], Chart]) -> Figure:
-    """Lines, points with error bars, bands and levels of every panel."""
+    """Lines, points with uncertainties, bands and levels of every panel."""
     laid_out = chart()
     columns = laid_out.columns
     rows = -(-len(laid_out.panels) // columns)

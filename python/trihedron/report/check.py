@@ -17,7 +17,7 @@ from trihedron.units import mrad_from_radians
 def check_report(
     recording: Recording, segments: Segments, calibration: Calibration | None, findings: tuple[Finding, ...]
 ) -> Document:
-    """Lay out the audit; ``calibration`` gives the error bars to expect."""
+    """Lay out the audit; ``calibration`` gives the uncertainties to expect."""
     blocks: list[Block] = [channels_table(recording)]
     if calibration is not None:
         blocks.append(_expected(calibration))
@@ -42,11 +42,11 @@ def _headlines(segments: Segments, calibration: Calibration | None) -> list[Head
         (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope)) if calibration else ()
     ):
         if sensor is None:
-            out.append(Headline(f"{name} scale", "none", "", "this log cannot tell it"))
+            out.append(Headline(f"{name} scale", "none", "", "this log does not determine it"))
             continue
         scale = _expected_cells(sensor)[0]
-        out.append(Headline(f"{name} scale to expect to", scale, "", "standard error of the worst axis"))
-    out.append(Headline("still poses", str(segments.n_holds), "", how_many(len(segments.moves), "move")))
+        out.append(Headline(f"expected {name} scale uncertainty", scale, "", "1 σ, worst axis"))
+    out.append(Headline("poses", str(segments.n_holds), "", how_many(len(segments.moves), "move")))
     return out
 
 
@@ -57,8 +57,8 @@ def _expected(calibration: Calibration) -> Table:
             rows.append((name, "–", "–", "–"))
             continue
         rows.append((name, *_expected_cells(sensor)))
-    head = ("", "scale", "zero", "angles between axes")
-    return Table(head, tuple(rows), "Error bars to expect: standard error, the largest of the axes")
+    head = ("", "scale", "bias", "angles between axes")
+    return Table(head, tuple(rows), "Expected standard uncertainty (1 σ), worst axis")
 
 
 def _expected_cells(sensor: SensorCalibration) -> tuple[str, str, str]:
@@ -79,5 +79,10 @@ def _advice(calibration: Calibration) -> list[Block]:
     rows = []
     for name, sensor in (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope)):
         if sensor is not None and sensor.observability is not None and sensor.observability.advice:
-            rows.append((f"{name} gains most from", sensor.observability.advice[0]))
+            rows.append(
+                (
+                    f"most useful next pose, {name}" if name == "accelerometer" else f"most useful next move, {name}",
+                    sensor.observability.advice[0],
+                )
+            )
     return [Facts(tuple(rows))] if rows else []

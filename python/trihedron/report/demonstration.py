@@ -27,7 +27,7 @@ def demonstration_report(
     """The whole story."""
     return Document(
         title="A complete session, on a simulated sensor",
-        subtitle="Everything below was computed from the CSV log; only section 4 knows the truth.",
+        subtitle="Everything below was computed from the CSV log; only section 4 uses the truth.",
         verdict=_verdict(comparison, verification, uncalibrated_rms_m_s2),
         is_trustworthy=calibration.is_trustworthy,
         sections=(
@@ -48,8 +48,8 @@ def _acceleration(value: float) -> str:
 def _verdict(comparison: Comparison, verification: Verification, before: float) -> str:
     within = int(np.sum(np.abs(comparison.z) < 2.0))
     return (
-        f"Gravity at rest, in a session that the calibration has not seen: {_acceleration(before)} rms wrong before, "
-        f"{_acceleration(verification.norm_rms)} after. {within} of {len(comparison.names)} parameters lie "
+        f"Gravity error in static poses of a session that the calibration has not seen: {_acceleration(before)} rms "
+        f"before, {_acceleration(verification.norm_rms)} after. {within} of {len(comparison.names)} parameters lie "
         "within 2σ of the truth."
     )
 
@@ -57,22 +57,19 @@ def _verdict(comparison: Comparison, verification: Verification, before: float) 
 def _session(segments: Segments, recording: Recording) -> str:
     still = float(np.sum(segments.duration_s))
     return (
-        "A person picks up a 16-bit MEMS IMU, sets it down in one pose after another by hand, faces and edges "
-        "of its case "
-        f"and some tilts between, and never looks at an angle. After {duration(recording.duration_s)} the log holds "
+        "A person picks up a 16-bit MEMS IMU and sets it down by hand in one pose after another: faces and edges of "
+        f"its case and some tilts between, no angle measured. After {duration(recording.duration_s)} the log holds "
         f"{recording.n_samples} rows of raw counts at {plain_number(recording.rate_hz, 4)} Hz; the sensor's own "
-        f"noise tells {segments.n_holds} still poses ({duration(still)} in all) from {len(segments.moves)} "
-        "moves. Nothing was set."
+        f"noise separates {segments.n_holds} poses ({duration(still)} in all) from {len(segments.moves)} moves; no "
+        "threshold was set."
     )
 
 
 def _calibrated(calibration: Calibration, latitude_deg: float) -> tuple[Block, ...]:
     said = (
-        f"Only gravity had to be said: latitude {latitude_deg:g}° gives {calibration.gravity_m_s2:.5f} m/s². In "
-        "every still pose the calibrated accelerometer must read that much, whatever the pose; through "
-        "every move the "
-        "calibrated gyro "
-        "must carry gravity from one pose into the next. One fit of both gives:"
+        f"Only gravity had to be given: latitude {latitude_deg:g}° means {calibration.gravity_m_s2:.5f} m/s². The "
+        "calibrated accelerometer must read that length in every pose, and the calibrated gyro must predict the "
+        "direction of gravity after every rotation. One fit of both gives:"
     )
     blocks: list[Block] = [Paragraph(said), parameter_table("accelerometer", calibration.accelerometer)]
     if calibration.gyroscope is not None:
@@ -83,17 +80,20 @@ def _calibrated(calibration: Calibration, latitude_deg: float) -> tuple[Block, .
 def _verified(verification: Verification, before: float) -> tuple[Block, ...]:
     expected = float(np.sqrt(np.mean(verification.norm_sigma**2)))
     rows = [
-        ("before", f"{_acceleration(before)} rms norm error with the data sheet's scale"),
-        ("after", f"{_acceleration(verification.norm_rms)} rms over {len(verification.norm_error)} still poses"),
-        ("to be expected", f"{_acceleration(expected)} rms from noise and the calibration's error bars"),
+        ("gravity error before", f"{_acceleration(before)} rms with the data sheet's scale"),
+        (
+            "gravity error after",
+            f"{_acceleration(verification.norm_rms)} rms over {len(verification.norm_error)} poses",
+        ),
+        ("  expected", f"{_acceleration(expected)} rms from noise and the calibration's uncertainty"),
     ]
     if len(verification.angle_deg):
         rows += [
             (
-                "gravity carried",
-                f"to {plain_number(verification.angle_rms_deg)}° rms through {len(verification.angle_deg)} moves",
+                "tilt error after a rotation",
+                f"{plain_number(verification.angle_rms_deg)}° rms over {len(verification.angle_deg)} moves",
             ),
-            ("to be expected", f"{plain_number(verification.angle_expected_deg)}° rms"),
+            ("  expected", f"{plain_number(verification.angle_expected_deg)}° rms"),
         ]
     return (Facts(tuple(rows)), *_warnings(verification.findings))
 
@@ -133,10 +133,10 @@ def _coverage(comparison: Comparison) -> str:
     z = np.abs(comparison.z)
     n = len(z)
     return (
-        f"Within 1σ: {int(np.sum(z < 1.0))} of {n} (honest error bars: about {round(0.683 * n)}); within 2σ: "
+        f"Within 1σ: {int(np.sum(z < 1.0))} of {n} (expected: {round(0.683 * n)}); within 2σ: "
         f"{int(np.sum(z < 2.0))} of {n} (about {round(0.954 * n)}). With all correlations χ² is "
         f"{plain_number(comparison.chi2)} for {n} parameters. One session proves little: the same count over 200 "
-        "sessions is benches/confidence. (The zeros of a real sensor wander; truth is their mean in this session.)"
+        "sessions is benches/confidence. (The biases of a sensor drift; the truth is their mean in this session.)"
     )
 
 

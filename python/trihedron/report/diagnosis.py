@@ -1,4 +1,4 @@
-"""A diagnosis as a report: what disagrees, what was left out, how the fit improves, what remains."""
+"""A diagnosis as a report: what disagrees, which effects are missing, how the fit improves, what is unexplained."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration import figures_in_words
 from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pictures
 from trihedron.report.diagnosis_charts import before_after_chart, effect_chart
-from trihedron.report.diagnosis_laws import laws_blocks
 from trihedron.report.diagnosis_models import models_blocks
 from trihedron.report.diagnosis_numbers import (
     differing_noise,
@@ -21,6 +20,7 @@ from trihedron.report.diagnosis_numbers import (
     numbers_blocks,
     stages_blocks,
 )
+from trihedron.report.diagnosis_relations import relations_blocks
 from trihedron.report.diagnosis_words import (
     MEANING,
     p_in_words,
@@ -44,10 +44,10 @@ from trihedron.report.numbers import (
 from trihedron.report.reference import reference_blocks
 
 _CAPTIONS = {
-    "static-accel": "Length of gravity in every still pose.",
-    "static-gyro": "Rate that the gyro reads in every still pose, about its mean.",
-    "moves": "Angle between gravity carried through a move by the gyro and gravity measured after it.",
-    "dynamics": "Velocity over a move that the two poses at its ends do not allow.",
+    "static-accel": "Gravity error in every static pose.",
+    "static-gyro": "Mean gyro rate in every static pose, about its mean.",
+    "moves": "Tilt error after every rotation: gravity predicted with the gyro against gravity measured.",
+    "dynamics": "Velocity error over a rotation: integral of acceleration between two poses; should be 0.",
 }
 _LEVELS: dict[str, Level] = {
     "consistent": "good",
@@ -61,7 +61,7 @@ MOST_PARAMETERS = 9
 
 
 def first_screen(diagnosis: Diagnosis) -> int:
-    """Sections that fit one screen: where it disagrees, numbers of a given model, what was left out, what remains."""
+    """Sections that fit one screen: where it disagrees, parameters that differ, missing effects, the rest."""
     return 4 if diagnosis.parameters else 3
 
 
@@ -70,19 +70,19 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
     sections = [Section("Result", _located(diagnosis))]
     if diagnosis.parameters:
         numbers = [*differing_numbers(diagnosis), *differing_noise(diagnosis)]
-        words = tuple(("", word) for word in numbers) or (("", "None of the given numbers differs."),)
-        sections.append(Section("Numbers that differ (recording minus model)", (Facts(words),)))
+        words = tuple(("", word) for word in numbers) or (("", "None of the given parameters differs."),)
+        sections.append(Section("Parameters that differ (recording minus model)", (Facts(words),)))
     sections += [
-        Section("What was left out", effects_blocks(diagnosis)),
-        Section("What remains", (Paragraph(_remaining(diagnosis)), *laws_blocks(diagnosis))),
-        Section("Held out: before and after", _held_out(diagnosis)),
+        Section("Missing effects", effects_blocks(diagnosis)),
+        Section("Unexplained", (Paragraph(_remaining(diagnosis)), *relations_blocks(diagnosis))),
+        Section("Cross-validation: before and after", _held_out(diagnosis)),
         Section("Candidates", (_candidates(diagnosis),)),
         Section("Calibration and noise", models_blocks(diagnosis)),
     ]
     if diagnosis.parameters:
         stages = (*stages_blocks(diagnosis, MEANING), *stages_pictures(diagnosis))
         sections.append(Section("Stage by stage", stages))
-        sections.append(Section("All numbers of the model", numbers_blocks(diagnosis)))
+        sections.append(Section("All parameters of the model", numbers_blocks(diagnosis)))
     if diagnosis.noise_compared:
         noise = (*noise_blocks(diagnosis), *noise_pictures(diagnosis))
         sections.append(Section("Noise and sampling of the model", noise))
@@ -121,11 +121,19 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
         )
         for d in diagnosis.domains
     )
-    head: tuple[str, ...] = ("what", "domain", "residual, a zero per pose", "χ²/dof", "p", "model", "with the effects")
+    head: tuple[str, ...] = (
+        "what",
+        "domain",
+        "residual of the session fit",
+        "χ²/dof",
+        "p",
+        "model",
+        "with the effects",
+    )
     if not diagnosis.effects:
         head, rows = head[:-1], tuple(row[:-1] for row in rows)
     blocks: list[Block] = [Table(head, rows)]
-    # Which numbers differ has a section of its own.
+    # Which parameters differ has a section of its own.
     places = tuple(
         (d.domain, place)
         for d in diagnosis.domains
@@ -135,7 +143,9 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
         blocks.append(Facts(places))
     own = getattr(diagnosis, "calibration", None)
     if own is not None and not getattr(diagnosis, "model_is_given", False):
-        blocks.append(Facts(figures_in_words(own)))
+        figures = figures_in_words(own)
+        named = ((("saved S and b" if not k else ""), f"{name} {said}") for k, (name, said) in enumerate(figures))
+        blocks.append(Facts(tuple(named)))
     return tuple(blocks)
 
 
@@ -144,13 +154,13 @@ def _after(before: DomainTest, test: DomainTest | None) -> str:
         return "–"
     if before.disagrees and not test.disagrees and test.chi2_per_dof == before.chi2_per_dof:
         # An effect explains it without changing the residual: poses that were not still, a line of interference.
-        return "accounted for"
+        return "explained"
     return f"{plain_number(test.chi2_per_dof)} {'disagrees' if test.disagrees else 'agrees'}"
 
 
 def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if not diagnosis.effects:
-        return (Paragraph("No effect of the catalogue earns its place in the model."),)
+        return (Paragraph("No effect of the catalogue is accepted."),)
     blocks: list[Block] = []
     for k, effect in enumerate(diagnosis.effects):
         rows = [
@@ -160,7 +170,7 @@ def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         ]
         if effect.confounded_with:
             rows.append(
-                ("", f"This recording cannot tell it from {listed(list(effect.confounded_with))}. To separate them: ")
+                ("", f"Confounded with {listed(list(effect.confounded_with))} in this recording. To separate them: ")
             )
             rows[-1] = ("", rows[-1][1] + (effect.separating_experiment or "record other poses and moves") + ".")
         blocks.append(Facts(tuple(row for row in rows if row[1])))
@@ -168,7 +178,7 @@ def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 
 def _without_strongest(statement: str) -> str:
-    """The sentence without its strongest term, which stands below it with the digits that its error bar allows."""
+    """The sentence without its strongest term, which stands below it with the digits that its uncertainty allows."""
     return _capital(re.sub(r"\s*\(strongest term [^:]*: [^;]*?\)(?=\.|$|;)", "", statement))
 
 
@@ -195,9 +205,9 @@ def _parameters(effect: AcceptedEffect) -> str:
 
 
 def _evidence(effect: AcceptedEffect) -> str:
-    words = f"p {p_in_words(effect.p_adjusted)} after paying for the search, ΔBIC {plain_number(effect.delta_bic)}"
+    words = f"p {p_in_words(effect.p_adjusted)} corrected for multiple testing, ΔBIC {plain_number(effect.delta_bic)}"
     if effect.held_out:
-        words += "; held out, " + _improvement(effect.held_out[0])
+        words += "; cross-validated, " + _improvement(effect.held_out[0])
     return words + "."
 
 
@@ -216,13 +226,13 @@ def _improvement(held: HeldOut) -> str:
 def _remaining(diagnosis: Diagnosis) -> str:
     left = [d for d in diagnosis.remaining if d.disagrees]
     if not left:
-        return "Nothing that this recording could show."
+        return "Unexplained: nothing detectable in this recording."
     said = [
         f"{d.domain} ({MEANING[d.domain]}): χ²/dof {plain_number(d.chi2_per_dof)}"
         + (f", {place}" if (place := where_in_words(d)) else "")
         for d in left
     ]
-    return "Still unexplained: " + "; ".join(said) + "."
+    return "Unexplained: " + "; ".join(said) + "."
 
 
 def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -243,7 +253,7 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if not rows:
         return (Paragraph("No effect was added, so there is no before and after."),)
     head = ("effect", "domain", "rms before", "rms after", "χ²/dof before", "after")
-    caption = "Poses and moves predicted by fits that did not see them; noise alone gives χ²/dof 1"
+    caption = "Poses and moves predicted by fits that did not see them (held out); noise alone gives χ²/dof 1"
     return (Table(head, rows, caption),)
 
 
@@ -283,7 +293,7 @@ def _physics(diagnosis: Diagnosis) -> list[Picture]:
     for effect in diagnosis.effects:
         chart = effect_chart(effect, diagnosis.residuals, *made)  # type: ignore[arg-type]
         if chart is not None:
-            caption = f"{effect.id}: data (dots) against what drives it, with the model. "
+            caption = f"{effect.id}: data (dots) against the driving variable, with the model. "
             caption += _without_strongest(effect.statement)
             out.append(Picture(f"effect-{effect.id}", caption, None, lambda drawn=chart: drawn))  # type: ignore[misc]
     return out
@@ -294,8 +304,8 @@ def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
 
     draw = later("diagnosis_figures", "draw_before_after", residuals, has_effects=has_effects)
     n = len(residuals.before)
-    caption = f"{_CAPTIONS[residuals.domain]} {how_many(n, 'pose' if residuals.kind == 'hold' else 'move')}; "
-    caption += "bars: twice the noise predicted for one number."
+    caption = f"{_CAPTIONS[residuals.domain]} {how_many(n, 'pose' if residuals.kind == 'pose' else 'move')}; "
+    caption += "error bars: ± 2 σ of the predicted noise."
     if residuals.domain == "dynamics":
         caption += " Velocity and angle of one move share most of their noise: χ² compares what is left of it."
     chart = partial(before_after_chart, residuals, has_effects=has_effects)
@@ -313,9 +323,9 @@ def _headlines(diagnosis: Diagnosis) -> list[Headline]:
                 words = f"{plain_number(100.0 * effect.share, 2)}"
                 return [
                     Headline(f"{effect.id} explains", words, "%", "of the misfit"),
-                    Headline(MEANING[held.domain], after, unit, f"held out, with it; {before} without"),
+                    Headline(MEANING[held.domain], after, unit, f"cross-validated, with it; {before} without"),
                 ]
-            return [Headline(MEANING[held.domain], after, unit, f"held out, with {effect.id}; {before} without")]
+            return [Headline(MEANING[held.domain], after, unit, f"cross-validated, with {effect.id}; {before} without")]
     tests = [d for d in diagnosis.domains if d.dof > 0]
     if not tests:
         return []

@@ -1,4 +1,4 @@
-"""A given simulation beside the recording in pictures: stage by stage, spectra of the holds, their Allan curves."""
+"""A given simulation beside the recording in pictures: stage by stage, spectra of the poses, their Allan curves."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from trihedron.report.drawing import later
 from trihedron.report.numbers import plain_number
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
-STAGES = {"as-given": "as given", "numbers": "numbers", "noise": "noise", "effects": "effects"}
+STAGES = {"as-given": "as given", "numbers": "parameters", "noise": "noise", "effects": "effects"}
 PRINTED = {
     "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
     "rad/s": (degrees_from_radians(1.0), "°/s"),
@@ -23,9 +23,9 @@ PRINTED = {
     "dB": (1.0, "dB"),
 }
 WORDS = {
-    "static-accel": "gravity at rest",
-    "static-gyro": "rate at rest",
-    "moves": "gravity after moves",
+    "static-accel": "gravity error in static poses",
+    "static-gyro": "gyro rate in static poses",
+    "moves": "tilt error after rotations",
     "noise": "noise, octave by octave",
 }
 FEWEST_OCTAVES = 2
@@ -40,7 +40,7 @@ def stages_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
     """Misfit of the held-out part after every stage."""
     if len(diagnosis.stages) < len(STAGES) - 1:
         return ()
-    caption = "What is left of the held-out part, stage by stage: as given, with its own numbers, noise, effects."
+    caption = "Cross-validated residual, stage by stage: as given, with its own parameters, noise, effects."
     return (_picture("stages", caption, partial(stages_chart, diagnosis)),)
 
 
@@ -49,7 +49,7 @@ def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
     seen = _spectra(diagnosis.noise_compared)
     if not seen:
         return ()
-    first = "Noise inside still poses, model (dashed) and recording, in octaves that both logs show."
+    first = "Noise inside poses, model (dashed) and recording, in octaves that both logs show."
     second = "Allan deviation of that noise, model (dashed) and recording: what the octaves above make of it."
     spectra = _picture("spectra-both", first, partial(spectra_chart, diagnosis))
     if not any(len(_without_gaps(*one)[0]) >= FEWEST_OCTAVES for one in seen.values()):

@@ -71,7 +71,7 @@ def _domain_marks(
     residuals: DomainResiduals, time_s: FloatArray, value: FloatArray, sigma: FloatArray, unit: str
 ) -> tuple[Mark, ...]:
     is_angle = residuals.channels == ("angle",)
-    kind = "pose" if residuals.kind == "hold" else "move"
+    kind = "pose" if residuals.kind == "pose" else "move"
     marks: list[Mark] = [Level(y=0.0), _bars_of_noise(time_s, sigma, is_angle=is_angle)]
     for k, channel in enumerate(residuals.channels):
         colour: Colour = AXIS_COLOURS[k] if len(residuals.channels) > 1 else "accent"
@@ -147,9 +147,9 @@ def _drivers(
                 fastest_rate(seen.time_before_s, recording, segments, calibration),
             )
         ]
-    if effect_id in _FORCE and seen.kind == "hold" and recording.accelerometer is not None:
+    if effect_id in _FORCE and seen.kind == "pose" and recording.accelerometer is not None:
         force = force_at(seen.time_before_s, recording, calibration)
-        return [(f"f{'xyz'[j]} [m/s²]", "m/s²", force[:, j]) for j in range(3)]
+        return [(f"f_{'xyz'[j]} [m/s²]", "m/s²", force[:, j]) for j in range(3)]
     return [("time [s]", "s", seen.time_before_s)]
 
 
@@ -184,9 +184,9 @@ def fastest_rate(time_s: FloatArray, recording: Recording, segments: Segments, c
 
 
 def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> Panel:
-    """Residuals without the effects as dots; what the effects account for as circles, where poses are the same."""
+    """Residuals without the effects as dots; explained by the effects as circles, where poses are the same."""
     factor, unit = PRINTED[seen.unit]
-    kind = "pose" if seen.kind == "hold" else "move"
+    kind = "pose" if seen.kind == "pose" else "move"
     marks: list[Mark] = [Level(y=0.0)]
     is_same = seen.before.shape == seen.after.shape and np.allclose(seen.time_before_s, seen.time_after_s, atol=1e-6)
     for k, channel in enumerate(seen.channels):
@@ -205,7 +205,7 @@ def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> P
             marks.append(Points(x, after, told, None, f"{channel}: with the effects", "accent", True))
         elif is_same:
             told = [said(f"{kind} {n}, model", "", float(v), unit) for n, v in enumerate(data - after)]
-            marks.append(Points(x, data - after, told, None, f"{channel}: what the effects account for", colour, True))
+            marks.append(Points(x, data - after, told, None, f"{channel}: explained by the effects", colour, True))
     return Panel(Scale(label, unit_x), Scale(f"{seen.quantity} [{unit}]", unit), tuple(marks), height_px=220)
 
 
@@ -237,9 +237,7 @@ def _g_sensitivity(
                 f"pose {n}, gyro {'xyz'[i]}: {plain_number(float(v))} °/s at f{'xyz'[j]} {plain_number(float(f))} m/s²"
                 for n, (v, f) in enumerate(zip(part[:, i], force[:, j], strict=True))
             ]
-            marks.append(Points(force[:, j], part[:, i], told, None, f"gyro {'xyz'[i]} at rest", colour))
-        x = Scale(f"f{'xyz'[j]} [m/s²]", "m/s²", limits=(-10.6, 10.6))
-        panels.append(
-            Panel(x, Scale("zero of the gyro [°/s]", "°/s"), tuple(marks), title=f"along {'xyz'[j]}", height_px=220)
-        )
+            marks.append(Points(force[:, j], part[:, i], told, None, f"static gyro {'XYZ'[i]}", colour))
+        x = Scale(f"f_{'xyz'[j]} [m/s²]", "m/s²", limits=(-10.6, 10.6))
+        panels.append(Panel(x, Scale("gyro bias [°/s]", "°/s"), tuple(marks), title=f"along {'XYZ'[j]}", height_px=220))
     return Chart(tuple(panels), columns=3)

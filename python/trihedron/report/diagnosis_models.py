@@ -23,15 +23,19 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         if before is None or after is None or before["raw_unit"] == "none":
             continue
         rows = [
-            (f"S{i + 1}{j + 1}", _both(before, "S", (i, j)), _both(after, "S", (i, j)))
+            (f"S_{'xyz'[i]}{'xyz'[j]}", _both(before, "S", (i, j)), _both(after, "S", (i, j)))
             for i in range(3)
             for j in range(3)
             if before["sigma_S"][i][j] > 0.0
         ]
-        rows += [(f"b{i + 1}", _both(before, "b", (i,)), _both(after, "b", (i,))) for i in range(3)]
+        rows += [(f"b_{'xyz'[i]}", _both(before, "b", (i,)), _both(after, "b", (i,))) for i in range(3)]
         unit = before["raw_unit"]
         blocks.append(
-            Table(("", "linear", "with the effects"), tuple(rows), f"{name.capitalize()}, raw in {unit_in_print(unit)}")
+            Table(
+                ("", "linear model", "with the effects"),
+                tuple(rows),
+                f"{name.capitalize()}, raw in {unit_in_print(unit)}",
+            )
         )
     gravity = getattr(diagnosis, "gravity_source", "")
     facts = [("gravity", f"{diagnosis.gravity_m_s2:.5f} m/s²" + (f", {gravity}" if gravity else ""))]
@@ -43,17 +47,17 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
             words += f" {unit_in_print(unit)}"
             corner = diagnosis.noise[f"{name}_corner_s"]
             if corner is not None:
-                words += f"; bias walk from {plain_number(float(corner))} s on"
+                words += f"; bias random walk beyond {plain_number(float(corner))} s"
             facts.append((f"{name} noise", words))
-        hidden = diagnosis.noise.get(f"{name}_zero")
+        hidden = diagnosis.noise.get(f"{name}_bias")
         if hidden:
             unit = "m/s^2" if name == "accelerometer" else "rad/s"
-            words = f"{size_in_words(hidden['rms'], unit)} rms from pose to pose taken up by its walk"
-            words += f"; a pose's mean is good to {size_in_words(hidden['noise'], unit)}"
+            bound = ", at its upper bound" if hidden["is_at_edge"] else ""
+            words = f"changes {size_in_words(hidden['rms'], unit)} RMS between poses (random walk{bound})"
+            words += f"; uncertainty of a pose's mean {size_in_words(hidden['noise'], unit)}"
             if "flicker" in hidden:
-                words += f", {size_in_words(hidden['flicker'], unit)} of it by flicker, which shows inside poses"
-            words += "; the walk is as strong as the model allows" if hidden["is_at_edge"] else ""
-            facts.append((f"{name} zero", words))
+                words += f", {size_in_words(hidden['flicker'], unit)} of it flicker noise seen inside poses"
+            facts.append((f"{name} bias", words))
     blocks.append(Facts(tuple(facts)))
     return tuple(blocks)
 

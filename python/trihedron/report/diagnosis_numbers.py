@@ -10,20 +10,20 @@ from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_rad
 NAMED_SIGMAS = 3.0
 """Components of a group that differs are named from here on; the largest always is."""
 _WORDS = {
-    "accel-zero": "accelerometer {} zero",
+    "accel-bias": "accelerometer {} bias",
     "accel-scale": "accelerometer {} scale",
     "accel-misalignment": "accelerometer angle {}",
-    "gyro-zero": "gyro {} zero",
+    "gyro-bias": "gyro {} bias",
     "gyro-scale": "gyro {} scale",
     "gyro-misalignment": "gyro angle {}",
     "triad-alignment": "gyro triad turned about {}",
     "gravity": "gravity (or all three accelerometer scales)",
 }
 _GROUPS = {
-    "accel-zero": "accelerometer zeros",
+    "accel-bias": "accelerometer biases",
     "accel-scale": "accelerometer scales",
     "accel-misalignment": "accelerometer angles",
-    "gyro-zero": "gyro zeros",
+    "gyro-bias": "gyro biases",
     "gyro-scale": "gyro scales",
     "gyro-misalignment": "gyro angles",
     "triad-alignment": "the gyro triad's alignment",
@@ -35,14 +35,14 @@ _SENTENCES_FIRST = ("unit", "frame", "range", "rate")
 """What is wrong with every reading of a sensor is said before its noise."""
 _STAGES = {
     "as-given": "as given",
-    "numbers": "numbers re-estimated",
+    "numbers": "parameters re-estimated",
     "noise": "with the recording's noise",
     "effects": "with the effects",
 }
 
 
 def differing_numbers(diagnosis: Diagnosis) -> list[str]:
-    """``gyro z zero +0.31 ± 0.01 °/s`` for every number that differs."""
+    """``gyro Z bias +0.31 ± 0.01 °/s`` for every parameter that differs."""
     said = []
     groups: dict[str, list[ParameterDifference]] = {}
     for p in diagnosis.parameters:
@@ -119,14 +119,14 @@ def differing_noise(diagnosis: Diagnosis) -> list[str]:
 
 
 def numbers_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """Every number of the model beside the recording's, groups that differ first."""
+    """Every parameter of the model beside the recording's, groups that differ first."""
     shown = sorted(diagnosis.parameters, key=lambda p: (not p.significant, p.p_value, p.id))
     rows = tuple(
         (p.id, p.name, _value(p, p.model), _value(p, p.recording), _difference(p), plain_number(p.p_value, 2), _mark(p))
         for p in shown
     )
-    head = ("number", "", "model", "recording", "recording − model", "p of the group", "")
-    return (Table(head, rows, "Numbers of the given model against those that the recording has"),)
+    head = ("parameter", "", "model", "recording", "recording − model", "p of the group", "")
+    return (Table(head, rows, "Parameters of the given model and of the recording"),)
 
 
 def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -183,7 +183,7 @@ def _si(value: float, unit: str) -> str:
 
 
 def _named(p: ParameterDifference) -> str:
-    return _WORDS[p.id].format(p.name) if p.id in _WORDS else f"{p.id} {p.name}"
+    return _WORDS[p.id].format(p.name.upper()) if p.id in _WORDS else f"{p.id} {p.name}"
 
 
 def _difference(p: ParameterDifference) -> str:

@@ -10,13 +10,13 @@ from trihedron.report.numbers import listed, plain_number, unit_in_print, with_s
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 MEANING = {
-    "static-accel": "gravity at rest",
-    "static-gyro": "gyro at rest",
-    "moves": "gravity after a move",
-    "dynamics": "velocity over a move",
-    "within-static": "inside still poses",
-    "timing": "sampling instants",
-    "numbers": "numbers of the model",
+    "static-accel": "gravity error in static poses",
+    "static-gyro": "gyro rate in static poses",
+    "moves": "tilt error after a rotation",
+    "dynamics": "velocity error over a rotation",
+    "within-static": "noise within static poses",
+    "timing": "sampling times",
+    "numbers": "parameters of the model",
     "noise": "noise and sampling",
 }
 MOST_NAMED = 4
@@ -29,28 +29,28 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     numbers = differing_in_short(diagnosis)
     if diagnosis.verdict == "consistent":
         return (
-            "CONSISTENT: the model and its noise account for this recording; nothing is missing that it could show"
+            "CONSISTENT: the model and its noise explain this recording; no missing effect is detectable"
             f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}."
         )
     if diagnosis.verdict == "unexplained":
         named = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "recording"))
         off = left if named else off
-        verbs = "are there too, and explain" if len(named) > 1 else "is there too, and explains"
+        verbs = "are present, and explain" if len(named) > 1 else "is present, and explains"
         beside = f" ({listed(named)} {verbs} little)" if named else ""
         return (
             f"UNEXPLAINED: {listed(off) if off else 'the recording'} "
-            f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect accounts for it{beside}"
-            + (f"; numbers differ too ({listed(numbers)})." if numbers else ".")
+            f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect explains it{beside}"
+            + (f"; parameters differ too ({listed(numbers)})." if numbers else ".")
         )
     if diagnosis.verdict == "not-testable":
         tested = listed([d.domain for d in diagnosis.domains]) if diagnosis.domains else "nothing"
         return (
-            f"NOT TESTABLE: this recording does not carry the question ({tested} looked at, nothing named); hold 18 or "
-            "more poses of 3 to 5 s in different directions."
+            f"NOT TESTABLE: this recording has too few poses for a diagnosis (tested: {tested}, no effect found); "
+            "record 18 or more poses of 3 to 5 s in different orientations."
         )
     if diagnosis.verdict == "parameters-differ":
         beside = _footnotes(diagnosis) + _not_compared(diagnosis)
-        return f"PARAMETERS DIFFER: {listed(numbers)}; nothing else, no physics is missing{beside}."
+        return f"PARAMETERS DIFFER: {listed(numbers)}; no effect is missing{beside}."
     missing = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "recording"))
     surplus = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "model"))
     tail = (
@@ -60,11 +60,11 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     )
     said = []
     if missing:
-        said.append(f"{listed(missing)} {'was' if len(missing) == 1 else 'were'} left out of the model")
+        said.append(f"{listed(missing)} {'is' if len(missing) == 1 else 'are'} missing from the model")
     if surplus:
         said.append(f"the model has {listed(surplus)}, which the recording lacks")
     if numbers:
-        said.append(f"numbers differ ({listed(numbers)})")
+        said.append(f"parameters differ ({listed(numbers)})")
     return f"MISSING PHYSICS: {'; '.join(said)}{tail}"
 
 
@@ -76,9 +76,9 @@ def _not_compared(diagnosis: Diagnosis) -> str:
 
 
 def _footnotes(diagnosis: Diagnosis) -> str:
-    """What was found and is no physics of the model: a pose that was pushed, a faint line."""
+    """What was found and is no physics of the model: a disturbed pose, a weak spectral line."""
     named = list(dict.fromkeys(effect.id for effect in diagnosis.effects))
-    return f" (beside: {listed(named)})" if named else ""
+    return f" (also found: {listed(named)})" if named else ""
 
 
 def rms_in_words(test: DomainTest) -> str:
@@ -111,12 +111,11 @@ def where_in_words(test: DomainTest) -> str:
     if where.channels:
         parts.append("channel " + ", ".join(where.channels))
     if where.segments:
+        segments = list(where.segments)
         spans = [f"{plain_number(a, 4)}–{plain_number(b, 4)} s" for a, b in where.times_s]
         named = [
-            f"{name} ({span})"
-            for name, span in zip(where.segments, spans + [""] * len(where.segments), strict=False)
-            if span
-        ] or list(where.segments)
+            f"{name} ({span})" for name, span in zip(segments, spans + [""] * len(segments), strict=False) if span
+        ] or segments
         parts.append("most in " + ", ".join(named[:MOST_NAMED]))
     elif where.times_s:
         spans = [f"{plain_number(a, 4)}–{plain_number(b, 4)} s" for a, b in where.times_s]

@@ -34,15 +34,15 @@ def disagreement_report(
     beside = any(sealed["effect"] in e.confounded_with for e in found.effects[:1])
     answer = "The first answer is right." if is_right else "The first answer is not what was drawn."
     if beside:
-        answer = "The recording cannot tell what was drawn from the first answer, and the report says so."
+        answer = "The drawn effect is confounded with the first answer in this recording, and the report says so."
     return Document(
         title="A simulation and a log that disagree",
         subtitle=f"One flaw was drawn (--seed {seed} repeats it) and sealed in a file before anything was computed.",
         verdict=verdict_in_words(found),
         is_trustworthy=True,
         sections=(
-            Section("Numbers: this unit is not the data sheet", (Facts(told or (("", "none differs"),)),)),
-            Section("Physics: what the simulation left out", effects_blocks(found)),
+            Section("Parameters: this unit differs from the data sheet", (Facts(told or (("", "none differs"),)),)),
+            Section("Physics: effects missing from the simulation", effects_blocks(found)),
             Section("Stage by stage", stages_blocks(found, MEANING)),
             Section("The improved simulation, held against the same log", (Paragraph(verdict_in_words(improved)),)),
             Section("The seal, opened now", (*_opened(sealed, sizes), Paragraph(answer))),

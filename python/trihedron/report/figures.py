@@ -37,7 +37,7 @@ def draw_signals(recording: Recording, segments: Segments | None = None) -> Figu
             _shade_holds(axis, recording, segments)
         for k in range(3):
             time, values = _envelope(recording.time_s, readings[:, k])
-            axis.plot(time, values, color=AXIS_COLOURS[k], linewidth=0.7, label=f"axis {k + 1}")
+            axis.plot(time, values, color=AXIS_COLOURS[k], linewidth=0.7, label="XYZ"[k])
         axis.set_ylabel(label)
         axis.margins(x=0.0)
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
@@ -48,13 +48,13 @@ def draw_signals(recording: Recording, segments: Segments | None = None) -> Figu
 
 
 def draw_holds(segments: Segments) -> Figure:
-    """Mean readings of every still pose over time, in the unit of the log."""
+    """Mean readings of every pose over time, in the unit of the log."""
     pairs = [("accelerometer", segments.accelerometer_mean), ("gyroscope", segments.gyroscope_mean)]
     present = [(name, means) for name, means in pairs if means is not None]
     figure, axes = panels(len(present), 1, (9.5, 1.0 + 1.9 * len(present)), share_x=True)
     for axis, (name, means) in zip(axes, present, strict=True):
         for k in range(3):
-            axis.plot(segments.time_mid_s, means[:, k], "o", color=AXIS_COLOURS[k], markersize=4, label=f"axis {k + 1}")
+            axis.plot(segments.time_mid_s, means[:, k], "o", color=AXIS_COLOURS[k], markersize=4, label="XYZ"[k])
         axis.set_ylabel(name)
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
     axes[-1].set_xlabel("time [s]")
@@ -88,7 +88,7 @@ def draw_residuals(quality: FitQuality) -> Figure:
         elinewidth=1.0,
         label="in sample",
     )
-    axis.set_xlabel("still pose")
+    axis.set_xlabel("pose")
     axis.set_ylabel("|f| − |g|  [mm/s²]")
     axis.set_xlim(-0.8, len(pose) - 0.2)
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
@@ -105,7 +105,7 @@ def draw_poses(sensor: SensorCalibration, means: FloatArray) -> Figure:
     force = means @ sensor.S.T + sensor.b
     up = force / np.linalg.norm(force, axis=1)[:, None]
     figure, axes = panels(1, 2, (7.6, 4.1))
-    for axis, sign, title in ((axes[0], 1.0, "axis 3 above the horizon"), (axes[1], -1.0, "axis 3 below the horizon")):
+    for axis, sign, title in ((axes[0], 1.0, "+Z above the horizon"), (axes[1], -1.0, "+Z below the horizon")):
         _hemisphere(axis, title)
         for k, direction in enumerate(up):
             # A pose with level axis 3 lies on the rim of both.
@@ -126,7 +126,7 @@ def draw_moves(quality: FitQuality) -> Figure:
     if quality.held_out_angle_deg is not None:
         axis.bar(move + 0.2, quality.held_out_angle_deg, 0.38, color=ACCENT, label="held out")
     axis.set_xlabel("move")
-    axis.set_ylabel("gravity missed by [°]")
+    axis.set_ylabel("tilt error [°]")
     axis.set_xlim(-0.8, len(move) - 0.2)
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     return figure
@@ -221,13 +221,13 @@ def draw_verification(verification: Verification) -> Figure:
         color=AXIS_COLOURS[0],
         elinewidth=1.0,
     )
-    axes[0].set_xlabel("still pose")
+    axes[0].set_xlabel("pose")
     axes[0].set_ylabel("|f| − |g|  [mm/s²]")
     if has_moves:
         move = verification.moves
-        axes[1].bar(move, verification.angle_deg, 0.7, color=AXIS_COLOURS[0], label="missed by")
+        axes[1].bar(move, verification.angle_deg, 0.7, color=AXIS_COLOURS[0], label="tilt error")
         axes[1].plot(move, verification.angle_sigma_deg, "_", markersize=14, color=ACCENT, label="to be expected (rms)")
         axes[1].set_xlabel("move")
-        axes[1].set_ylabel("gravity missed by [°]")
+        axes[1].set_ylabel("tilt error [°]")
         axes[1].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     return figure

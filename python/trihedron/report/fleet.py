@@ -18,7 +18,7 @@ VERDICTS = {
     "missing-physics": "physics beyond the linear model",
     "unexplained": "a misfit that no mechanism explains",
     "not-testable": "cannot be tested",
-    "parameters-differ": "other numbers",
+    "parameters-differ": "other parameters",
 }
 
 
@@ -80,7 +80,7 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
     if doubtful:
         facts.append(("of these", f"{doubtful} not to be trusted by their own findings"))
     if status["refused"]:
-        facts.append(("refused", f"{how_many(status['refused'], 'log')}: they do not allow a calibration"))
+        facts.append(("not calibrated", f"{how_many(status['refused'], 'log')}: they do not allow a calibration"))
     if status["crashed"]:
         facts.append(("failed", f"{how_many(status['crashed'], 'log')}: tried again by the next run"))
     if summary.n_before:
@@ -161,7 +161,7 @@ def _spread_row(one: Repeated, is_grouped: bool) -> list[str]:
 
 def _outliers(summary: FleetSummary) -> list[Block]:
     if not summary.outliers:
-        return [Paragraph("No device lies outside what the others make likely (1 % over all devices and numbers).")]
+        return [Paragraph("No device lies outside what the others make likely (1 % over all devices and parameters).")]
     rows = []
     for one in summary.outliers:
         factor, unit = shown(one.parameter.unit)
@@ -174,9 +174,11 @@ def _outliers(summary: FleetSummary) -> list[Block]:
 def _drift(summary: FleetSummary) -> list[Block]:
     moved = [change for change in summary.changes if change.significant]
     n_devices = len({change.group for change in summary.changes})
-    tested = f"{how_many(n_devices, 'device')} with two sessions or more, seven groups of numbers each, 1 % over all."
+    tested = (
+        f"{how_many(n_devices, 'device')} with two sessions or more, seven groups of parameters each, 1 % over all."
+    )
     if not moved:
-        return [Paragraph(f"No number of any device changed beyond its error and wander: {tested}")]
+        return [Paragraph(f"No calibration shift between sessions beyond uncertainty and drift: {tested}")]
     rows = tuple((change.group, change.id, *_drift_cells(change)) for change in moved)
     return [Paragraph(f"Tested: {tested}"), Table(("device", "number", "how", "by", "p"), rows)]
 

@@ -71,7 +71,7 @@ def recording_columns(recording: Recording) -> Columns:
 
 
 def segments_columns(segments: Segments) -> Columns:
-    """A row per still pose: samples, duration, mean readings with standard errors in the unit of the log."""
+    """A row per pose: samples, duration, mean readings with standard errors in the unit of the log."""
     columns: Columns = {
         "pose": [hold.index for hold in segments.holds],
         "start": [hold.start for hold in segments.holds],
@@ -104,7 +104,7 @@ def calibration_columns(calibration: Calibration) -> Columns:
 
 
 def verification_columns(verification: Verification) -> Columns:
-    """A row per still pose [m/s²] and per move [deg]: error, what noise allows, that and the calibration's own."""
+    """A row per pose [m/s²] and per move [deg]: error, what noise allows, that and the calibration's own."""
     v = verification
     rows = []
     poses = range(len(v.norm_error))

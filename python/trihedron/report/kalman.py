@@ -42,7 +42,7 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         sections = _with_references(outcome, calibration)
     else:
         sections = _without_references(outcome, calibration)
-    # What decides whether the error bars hold stands beside the verdict; the rest of the pictures below.
+    # What decides whether the uncertainties hold stands beside the verdict; the rest of the pictures below.
     pictures = [b for section in sections for b in section.blocks if isinstance(b, Picture)]
     lead = next(picture for picture in pictures if picture.name == "innovations")
     sections = [Section(s.heading, tuple(b for b in s.blocks if b is not lead)) for s in sections]
@@ -51,7 +51,7 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         subtitle=calibration.recording_source or "no recording named",
         verdict=verdict_of(
             calibration.findings,
-            "Good: the innovations are as large and as white as the noise model says.",
+            "OK: the innovations are as large and as white as the noise model predicts.",
             "Usable",
             "NOT TO BE TRUSTED",
         ),
@@ -69,7 +69,7 @@ def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headl
     beside = (
         f"innovations² over predicted variance; 1 when right, {_limits(worst)} in 99 % of cases; {worst.n} of {n} poses"
     )
-    of = "" if len(seen) == 1 else f", axis {name}"
+    of = "" if len(seen) == 1 else f", {name.upper()}"
     rms = float(np.sqrt(np.mean(outcome.residual_m_s2**2)))
     return [
         Headline(f"mean NIS{of}", plain_number(worst.nis_mean), "", beside),
@@ -98,8 +98,8 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
     pictures: list[Block] = [
         Picture(
             f"convergence-{AXES[axis.axis]}",
-            f"Constants of axis {AXES[axis.axis]} after every pose by every method, with the filter's 3σ band around "
-            "its last value.",
+            f"Constants of {AXES[axis.axis].upper()} after every pose by every method, with the filter's 3σ band "
+            "around its last value.",
             later("kalman_figures", "draw_convergence", axis),
             partial(convergence_chart, axis, outcome.accelerometer.raw_unit),
         )
@@ -186,8 +186,8 @@ def _constants_table(axis: AxisKalmanResult, raw_unit: str) -> Table:
     last = [track for track in axis.tracks if track.method == "recursive least squares"]
     rows += [("Recursive least squares, as it says", *_row(t.constants[-1], t.sigma[-1])) for t in last]
     name = AXES[axis.axis]
-    head = ("", *(f"k{name}{other}{per}" for other in AXES), f"zero [{unit}]")
-    return Table(head, tuple(rows), f"Axis {name}: reading = k · f + zero + noise")
+    head = ("", *(f"k{name}{other}{per}" for other in AXES), f"bias [{unit}]")
+    return Table(head, tuple(rows), f"{name.upper()}: reading = k · f + bias + noise")
 
 
 def _row(constants: FloatArray, sigma: FloatArray) -> tuple[str, ...]:
@@ -226,7 +226,7 @@ def _arrival_table(outcome: KalmanCalibration) -> Table | Paragraph:
         for method in methods
     )
     return Table(
-        ("", *(f"axis {name}" for name in AXES)),
+        ("", *(name.upper() for name in AXES)),
         rows,
         "Poses until all sensitivities stay within 1 % of their last values",
     )

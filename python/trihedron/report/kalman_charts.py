@@ -47,7 +47,7 @@ def convergence_chart(axis: AxisKalmanResult, raw_unit: str) -> Chart:
 
 
 def norm_convergence_chart(outcome: NormKalmanCalibration) -> Chart:
-    """S and b after every pose with their 3σ bands; what the frame fixes at zero is left out."""
+    """S and b after every pose with their 3σ bands; what the frame fixes at zero is excluded."""
     n = len(outcome.parameters)
     pose = np.arange(1, n + 1, dtype=np.float64)
     panels = []
@@ -91,7 +91,7 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
         window = max(1, min(WINDOW, len(pose) // 2))
         n = max(n, len(result.is_settled))
         mean = np.convolve(nis, np.ones(window) / window, mode="valid")
-        name = f"axis {'xyz'[result.axis]}" if isinstance(result, AxisKalmanResult) else "norm of gravity"
+        name = "XYZ"[result.axis] if isinstance(result, AxisKalmanResult) else "norm of gravity"
         told = [
             said(f"pose {p:.0f}, {name}", "", float(v), "times its predicted variance")
             for p, v in zip(pose, nis, strict=True)
@@ -117,7 +117,7 @@ def drift_chart(results: Sequence[AxisKalmanResult], raw_unit: str) -> Chart:
             Line(pose, smooth, "smoothed", "c1"),
         )
         unit = unit_in_print(raw_unit)
-        y = Scale(f"axis {'xyz'[result.axis]} [{unit}]", unit)
+        y = Scale(f"{'XYZ'[result.axis]} [{unit}]", unit)
         panels.append(Panel(Scale("pose", whole=True, limits=(0, max(1, len(pose) - 1))), y, marks, height_px=140))
     return Chart(tuple(panels), is_linked=True)
 

@@ -67,7 +67,7 @@ def draw_innovations(results: Sequence[AxisKalmanResult | NormKalmanCalibration]
         pose = np.flatnonzero(np.isfinite(nis))
         window = max(1, min(WINDOW, len(pose) // 2))
         mean = np.convolve(nis[pose], np.ones(window) / window, mode="valid")
-        name = f"axis {'xyz'[result.axis]}" if isinstance(result, AxisKalmanResult) else "norm of gravity"
+        name = "XYZ"[result.axis] if isinstance(result, AxisKalmanResult) else "norm of gravity"
         panel.plot(pose[window - 1 :] + 1, mean, color=AXIS_COLOURS[k], linewidth=1.1, label=name)
     low, high = (float(stats.chi2.ppf(p, window)) / window for p in (0.005, 0.995))
     panel.axhspan(low, high, color=SHADE, zorder=0)

@@ -39,7 +39,7 @@ def curve_record(curve: AllanCurve) -> dict[str, Any]:
 
 
 def holds_record(segments: Segments) -> dict[str, Any]:
-    """Still poses, moves and noise without the recording that they were found in."""
+    """Poses, moves and noise without the recording that they were found in."""
     holds = [
         {
             "start": hold.start,
@@ -130,7 +130,7 @@ def verification_record(verification: Verification) -> dict[str, Any]:
 def check_record(
     recording: Recording, segments: Segments, calibration: Calibration | None, findings: tuple[Finding, ...]
 ) -> dict[str, Any]:
-    """The audit, and the error bars to expect."""
+    """The audit, and the uncertainties to expect."""
     expected: dict[str, Any] = {}
     if calibration is not None:
         for name, sensor in (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope)):

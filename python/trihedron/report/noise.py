@@ -34,7 +34,7 @@ def noise_report(
     ]
     if noise.excluded_s:
         total = sum(stop - start for start, stop in noise.excluded_s)
-        facts.append(("left out", f"{how_many(len(noise.excluded_s), 'piece')}, {duration(total)}"))
+        facts.append(("excluded", f"{how_many(len(noise.excluded_s), 'piece')}, {duration(total)}"))
     facts += _coloured(noise)
     groups = _groups(noise)
     tables: list[Block] = [Facts(tuple(facts))]
@@ -45,7 +45,7 @@ def noise_report(
         subtitle=noise.source,
         verdict=verdict_of(
             findings,
-            "Good: the spectrum is a sum of noise terms from end to end.",
+            "OK: a sum of noise terms fits the whole spectrum.",
             "Usable",
             "NOT TO BE TRUSTED",
         ),
@@ -124,7 +124,7 @@ def _coloured(noise: Noise) -> list[tuple[str, str]]:
     ]
     if not limits:
         return []
-    return [("coloured", f"a filter or resampling shapes what lies above {', '.join(limits)}; all terms are of below.")]
+    return [("low-pass filtered", f"above {', '.join(limits)}; terms fitted below")]
 
 
 def _groups(noise: Noise) -> list[tuple[str, list[NoiseAxis]]]:
@@ -178,7 +178,7 @@ def _intervals_table(axes: list[NoiseAxis], unit: str) -> Table:
     if any(axis.is_slow_noise_unresolved for axis in axes):
         words = ("not both zero" if axis.is_slow_noise_unresolved else "" for axis in axes)
         rows.append(("   B and K together", *words))
-    caption = "95 % intervals, every other term free: they hold whether a term is named or not"
+    caption = "95 % intervals with every other term free; they are valid whether a term is named or not"
     return Table(("", *(axis.name for axis in axes)), tuple(rows), caption)
 
 
@@ -211,7 +211,7 @@ def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
     printed = unit_in_print(unit)
     rows = (
         ("best averaging time [s]", *(best(axis, 0) for axis in axes)),
-        (f"bias known then to [{printed}]", *(best(axis, 1) for axis in axes)),
+        (f"bias uncertainty then [{printed}]", *(best(axis, 1) for axis in axes)),
         *(
             (
                 f"σ of a mean of {window:g} s [{printed}]",
@@ -222,9 +222,9 @@ def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
             )
             for window in (1.0, 10.0)
         ),
-        ("longest averaging time known to 25 % [s]", *(plain_number(axis.longest_tau_s, 3) for axis in axes)),
+        ("longest averaging time with 25 % uncertainty [s]", *(plain_number(axis.longest_tau_s, 3) for axis in axes)),
         (
-            "described from … to [Hz]",
+            "fit band [Hz]",
             *(f"{plain_number(a.lowest_hz, 2)} … {plain_number(a.highest_hz, 3)}" for a in axes),
         ),
     )
@@ -243,7 +243,7 @@ def _lengths_table(noise: Noise, lengths: Mapping[str, Mapping[TermName, float |
         for term in TermName
         if any(axis.terms[term].is_present for axis in noise.axes)
     )
-    caption = f"Recording after which a term is known to {100 * accuracy:g} % (1σ)"
+    caption = f"Recording length for an uncertainty of {100 * accuracy:g} % (1 σ)"
     return Table(("", *(axis.name for axis in noise.axes)), rows, caption)
 
 
@@ -290,7 +290,7 @@ def kalibr_rows(noise: Noise) -> dict[str, str]:
                 words = f"{math.sqrt(float(np.mean(np.square(values)))):.4g}"
             else:
                 limit = math.sqrt(float(np.mean([max(a.terms[term].limit, a.value(term)) ** 2 for a in axes])))
-                words = f"{limit:.2g}  (upper limit: not seen in every axis)"
+                words = f"{limit:.2g}  (upper limit: not detected on every axis)"
             rows[f"{sensor}_{key}"] = f"{words}  # {square}{per}"
     rows["update_rate"] = f"{noise.curve.rate_hz:.6g}  # Hz"
     return rows

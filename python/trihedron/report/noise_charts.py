@@ -42,7 +42,7 @@ def _marks(curve: AllanCurve, c: int, axis: NoiseAxis, k: int, last_s: float) ->
     name = f"{100 * curve.confidence:g} % interval"
     marks: list[Mark] = []
     if 0 < axis.longest_tau_s < last_s:
-        marks.append(Span(axis.longest_tau_s, last_s, "known worse than to 25 %", "grey"))
+        marks.append(Span(axis.longest_tau_s, last_s, "uncertainty above 25 %", "grey"))
     marks.append(Band(tau, curve.lower[good, c], curve.upper[good, c], name))
     if axis.sample_sigma > 0:
         marks += _terms(axis, _times(curve))
@@ -63,6 +63,6 @@ def _terms(axis: NoiseAxis, tau: FloatArray) -> list[Mark]:
     best = axis.optimal_averaging()
     if best is not None:
         told = f"best averaging time {plain_number(best[0])} s: {plain_number(best[1])} {unit_in_print(axis.unit)}"
-        marks.append(Points(np.array([best[0]]), np.array([best[1]]), [told], None, "least deviation", "accent"))
+        marks.append(Points(np.array([best[0]]), np.array([best[1]]), [told], None, "smallest deviation", "accent"))
         marks.append(Note(*best, f"{plain_number(best[0], 2)} s", "accent", "above"))
     return marks

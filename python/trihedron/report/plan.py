@@ -38,14 +38,14 @@ def plan_report(plan: ExperimentPlan) -> Document:
                 "Moves between poses (method 2)",
                 (
                     Table(
-                        ("moves", "how many", "of 9 numbers", "scale known to"),
+                        ("moves", "how many", "of 9 parameters", "scale uncertainty (1 σ)"),
                         tuple(
                             (move.name, f"{move.n_moves}", f"{move.rank}", _percent(move.scale)) for move in plan.moves
                         ),
                     ),
                     Paragraph(
-                        "A move shows two numbers, for a turn about the vertical leaves gravity where it was: three "
-                        "turns about level axes show six of nine, and all nine if each stops once on the way."
+                        "A move determines two parameters, for a turn about the vertical leaves gravity where it was: "
+                        "three turns about level axes show six of nine, and all nine if each stops once on the way."
                     ),
                 ),
             ),
@@ -70,11 +70,11 @@ def _plain(value: Any) -> Any:
 def _turns(plan: ExperimentPlan) -> Table:
     turns = plan.turns
     rows = (
-        ("turns and zero turn at once", turns.scale, turns.zero),
-        ("zero turn first, then the turns", turns.scale_zero_first, turns.zero_zero_first),
+        ("turns and bias together", turns.scale, turns.zero),
+        ("bias first, then the turns", turns.scale_zero_first, turns.zero_zero_first),
     )
     return Table(
-        ("standard error", "gyro scale", "gyro zero"),
+        ("standard uncertainty (1 σ)", "gyro scale", "gyro bias"),
         tuple(
             (name, _percent(scale), f"{plain_number(degrees_from_radians(zero), 2)} °/s") for name, scale, zero in rows
         ),
@@ -96,19 +96,21 @@ def _poses(poses: tuple[PosePlan, ...]) -> Table:
                 f"{plain_number(mm_s2_from_m_s2(pose.zero), 2)} mm/s²",
             )
         )
-    return Table(("standard error (largest)", "of 9 numbers", "scale", "angle between axes", "zero"), tuple(rows))
+    return Table(
+        ("largest standard uncertainty (1 σ)", "of 9 parameters", "scale", "angle between axes", "bias"), tuple(rows)
+    )
 
 
 def _worth(pose: PosePlan) -> str:
     best = pose.worth[0]
     if math.isinf(best.loss):
         n = sum(math.isinf(one.loss) for one in pose.worth)
-        return f"{n} of {pose.n_poses} poses may not be missing: without one of them something is not determined"
+        return f"none of {n} of the {pose.n_poses} poses may be missing: each determines a parameter"
     # To a thousandth of a per cent: beyond that only rounding of the arithmetic is left.
     share, least = (round(100.0 * (loss - 1.0), 3) for loss in (best.loss, pose.worth[-1].loss))
     return (
-        f"worth most: {best.pose} (without it the worst standard error grows by {plain_number(share, 2)} %); the least "
-        f"one {plain_number(least, 2)} %"
+        f"most useful pose: {best.pose}, +{plain_number(share, 2)} % uncertainty without it; least useful pose: "
+        f"+{plain_number(least, 2)} %"
     )
 
 

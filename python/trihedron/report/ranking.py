@@ -81,7 +81,7 @@ def _judged_on(one: Ranked) -> str:
 
 
 def _order(ranking: Ranking) -> Table:
-    head = ("", "file", "of", "gravity error [mm/s²]", "tilt error [°]", "rate at rest [°/s]", "behind the best", "")
+    head = ("", "file", "of", "gravity error [mm/s²]", "tilt error [°]", "static rate [°/s]", "behind the best", "")
     rows = tuple(
         (
             str(k + 1),

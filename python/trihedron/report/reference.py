@@ -20,7 +20,7 @@ from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 SECONDS_PER_HOUR = 3600.0
 _EFFECTS = {"gyro-g-sensitivity": "g-sensitivity", "gyro-scale-nonlinearity": "nonlinearity of the scale"}
 _SIGNS = {
-    "quieter-than-gyro": "the difference between the two is quieter than the gyro at rest",
+    "quieter-than-gyro": "the difference between the two is quieter than the static gyro",
     "mounted-without-error": "it lies along the gyro's own axes",
     "S-depends-on-duration": "S changes with the time over which attitude is carried",
 }
@@ -121,13 +121,13 @@ def _error(found: AgainstReference) -> str:
     error = found.error
     size, low, high = (plain_number(degrees_from_radians(v), 2) for v in error.slow_rad)
     where = "with the body" if error.is_of_body else "in the room"
-    text = f"wanders by {size}° ({low} to {high}) within {plain_number(error.slow_s, 2)} s, mostly {where}"
+    text = f"drifts by {size}° ({low} to {high}) within {plain_number(error.slow_s, 2)} s, mostly {where}"
     text += f"; {plain_number(degrees_from_radians(error.white_rad), 2)}° white (means of a second)"
     if error.gaps_s:
         longest = max(end - start for start, end in error.gaps_s)
         text += f"; {len(error.gaps_s)} gap{'s' * (len(error.gaps_s) > 1)}, the longest {plain_number(longest, 2)} s"
     if error.rows_left_out:
-        text += f"; {error.rows_left_out} of {error.rows + error.rows_left_out} rows left out as outliers"
+        text += f"; {error.rows_left_out} of {error.rows + error.rows_left_out} rows excluded as outliers"
     return text
 
 
@@ -151,7 +151,9 @@ def _clock(found: AgainstReference) -> str:
     way = "ahead of" if offset >= 0.0 else "behind"
     size = abs(offset)
     if not np.isfinite(sigma):
-        return f"the reference's is {size:.2f} s {way} the log's, to about a sample: commands tell no more"
+        return (
+            f"the reference's is {size:.2f} s {way} the log's, to about a sample: commands do not determine it better"
+        )
     far = size > 100.0
     digits = f"{size:.4f} s" if far else f"{with_sigma(ms_from_s(size), ms_from_s(sigma))} ms"
     text = f"the reference's is {digits} {way} the log's {where}"
@@ -170,7 +172,7 @@ def _left(fit: FitToReference, scale: float, unit: str) -> str:
     text = f"{plain_number(scale * fit.rms)} {unit} rms left up to {plain_number(fit.band_hz, 2)} Hz"
     text += f", {plain_number(scale * fit.rms_held_out)} {unit} held out in sixteenths"
     if fit.n_left_out:
-        text += f"; {fit.n_left_out} of {fit.n_rows} windows left out"
+        text += f"; {fit.n_left_out} of {fit.n_rows} windows excluded"
     return text
 
 
@@ -189,14 +191,14 @@ def _matrix(name: str, symbol: str, unit: str, fit: FitToReference) -> Table:
     raw = "w" if symbol == "ω" else "a"
     rows = tuple(
         (
-            f"{symbol}{i + 1} =",
+            f"{symbol}_{'xyz'[i]} =",
             *(with_sigma(scale * fit.S[i, j], scale * sigma[3 * i + j]) for j in range(3)),
             with_sigma(fit.b[i], sigma[9 + i]),
         )
         for i in range(3)
     )
     return Table(
-        ("", *(f"{raw}′{j}{times}" for j in (1, 2, 3)), f"b [{unit}]"), rows,
+        ("", *(f"{raw}′_{j}{times}" for j in "xyz"), f"b [{unit}]"), rows,
         f"{name} in the reference's body   {symbol} = S {raw}′ + b",
     )  # fmt: skip
 

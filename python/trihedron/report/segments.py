@@ -1,4 +1,4 @@
-"""What was found in a recording: still poses, moves, noise."""
+"""What was found in a recording: poses, moves, noise."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ def segments_report(recording: Recording, segments: Segments) -> Document:
     """Lay out the segments of one recording."""
     findings = (*recording.findings, *segments.findings)
     return Document(
-        title="Still poses and moves",
+        title="Poses and moves",
         subtitle=recording.source,
         verdict=verdict_of(
             findings,
-            f"{how_many(segments.n_holds, 'still pose')}, {how_many(len(segments.moves), 'move')}.",
-            f"{how_many(segments.n_holds, 'still pose')}, {how_many(len(segments.moves), 'move')}",
+            f"{how_many(segments.n_holds, 'pose')}, {how_many(len(segments.moves), 'move')}.",
+            f"{how_many(segments.n_holds, 'pose')}, {how_many(len(segments.moves), 'move')}",
             "NOT FIT",
         ),
         is_trustworthy=not any(finding.severity.value == "serious" for finding in findings),
         sections=(
             Section("Result", (Facts(recording_facts(recording, segments)),)),
             Section("Findings", (findings_block(findings),)),
-            Section("Still poses", (hold_table(recording, segments),)),
+            Section("Poses", (hold_table(recording, segments),)),
         ),
         headlines=(
-            Headline("still poses", str(segments.n_holds), "", f"{duration(_still_s(segments))} in all"),
+            Headline("poses", str(segments.n_holds), "", f"{duration(_still_s(segments))} in all"),
             Headline("moves between them", str(len(segments.moves))),
         ),
         lead=signals_picture(recording, segments),
@@ -58,7 +58,7 @@ def recording_facts(recording: Recording, segments: Segments) -> tuple[tuple[str
             )
         facts.append((name, words))
     still_s = _still_s(segments)
-    poses, moves = how_many(segments.n_holds, "still pose"), how_many(len(segments.moves), "move")
+    poses, moves = how_many(segments.n_holds, "pose"), how_many(len(segments.moves), "move")
     facts.append(("found", f"{poses} ({duration(still_s)} in all), {moves}"))
     return tuple(facts)
 
@@ -68,7 +68,7 @@ def _still_s(segments: Segments) -> float:
 
 
 def hold_table(recording: Recording, segments: Segments) -> Table:
-    """Every still pose with its means."""
+    """Every pose with its means."""
     head = ["pose", "from [s]", "to [s]"]
     columns: list[tuple[list[str], str]] = []
     for label, mean, sigma, unit in (
@@ -82,7 +82,7 @@ def hold_table(recording: Recording, segments: Segments) -> Table:
                 with_sigma(float(mean[k, axis]), float("nan") if sigma is None else float(sigma[k, axis]))
                 for k in range(segments.n_holds)
             ]
-            columns.append((cells, f"{label}{axis + 1} [{unit_in_print(unit)}]"))
+            columns.append((cells, f"{label}_{'xyz'[axis]} [{unit_in_print(unit)}]"))
     head += [title for _, title in columns]
     rows = tuple(
         (
@@ -93,15 +93,15 @@ def hold_table(recording: Recording, segments: Segments) -> Table:
         )
         for k, hold in enumerate(segments.holds)
     )
-    return Table(tuple(head), rows, "Mean readings ± their standard error; disturbed stretches left out")
+    return Table(tuple(head), rows, "Mean readings ± their standard error; disturbed stretches excluded")
 
 
 def signals_picture(recording: Recording, segments: Segments) -> Picture:
-    """The signals with the holds shaded."""
+    """The signals with the poses shaded."""
     draw = later("figures", "draw_signals", recording, segments)
     return Picture(
         "signals",
-        "The recording; shaded where the sensor stood still, orange where a still pose was bumped.",
+        "The recording; shaded where the sensor stood still, orange where a pose was disturbed.",
         draw,
         partial(signals_chart, recording, segments),
     )

@@ -14,10 +14,10 @@ from trihedron.report.numbers import unit_in_print
 def signals_chart(recording: Recording, segments: Segments) -> Chart:
     """Both sensors over time, holds shaded, bumps marked."""
     time_s = recording.time_s
-    spans = [Span(float(time_s[h.start]), float(time_s[h.stop - 1]), "still pose") for h in segments.holds]
+    spans = [Span(float(time_s[h.start]), float(time_s[h.stop - 1]), "pose") for h in segments.holds]
     last = recording.n_samples - 1
     bumps = [
-        Span(float(time_s[a]), float(time_s[min(b, last)]), "disturbed, left out", "warn")
+        Span(float(time_s[a]), float(time_s[min(b, last)]), "disturbed, excluded", "warn")
         for hold in segments.holds
         for a, b in hold.disturbed
     ]
@@ -41,8 +41,7 @@ def _signals(recording: Recording, spans: tuple[Span, ...]) -> Chart:
         if readings is None:
             continue
         lines = [
-            Line(*envelope(recording.time_s, readings[:, k]), f"axis {k + 1}", AXIS_COLOURS[k], is_thin=True)
-            for k in range(3)
+            Line(*envelope(recording.time_s, readings[:, k]), "XYZ"[k], AXIS_COLOURS[k], is_thin=True) for k in range(3)
         ]
         printed = unit_in_print(unit)
         y = Scale(f"{name}  [{printed}]", printed)
@@ -62,7 +61,7 @@ def verification_chart(verification: Verification) -> Chart:
         for k, (e, s) in enumerate(zip(error, sigma, strict=True))
     ]
     norm = Panel(
-        Scale("still pose", limits=(-0.7, len(pose) - 0.3), whole=True),
+        Scale("pose", limits=(-0.7, len(pose) - 0.3), whole=True),
         Scale("|f| − |g|  [mm/s²]", "mm/s²"),
         (
             Band(edge, -limit, limit, "3σ of noise and of the calibration's own error"),
@@ -79,9 +78,9 @@ def verification_chart(verification: Verification) -> Chart:
     ]
     moves = Panel(
         Scale("move", limits=(-0.7, move[-1] + 0.7), whole=True),
-        Scale("gravity missed by  [°]", "°", includes=(0.0,)),
+        Scale("tilt error  [°]", "°", includes=(0.0,)),
         (
-            Bars(move, v.angle_deg, 0.7, told, "missed after the move", "c3"),
+            Bars(move, v.angle_deg, 0.7, told, "tilt error", "c3"),
             Points(move, v.angle_sigma_deg, expected, None, "to be expected (rms)", "ink"),
         ),
         height_px=180,

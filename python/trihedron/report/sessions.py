@@ -67,14 +67,12 @@ def _facts(model: SessionsModel) -> tuple[tuple[str, str], ...]:
     }[model.by]
     facts = [("recordings", f"{len(model.sessions)}, {how}")]
     if model.left_out:
-        facts.append(("left out", how_many(len(model.left_out), "recording")))
+        facts.append(("excluded", how_many(len(model.left_out), "recording")))
     calibration = model.calibration
     facts.append(("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"))
     if model.thermal is not None:
         facts.append(("valid", f"{_range(model.thermal)}, counted from {model.thermal.reference_degc:.1f} °C"))
-    facts.append(
-        ("calibration", "the common numbers; its error bars are those of the next recording, repeatability included")
-    )
+    facts.append(("calibration", "the common parameters; their uncertainty includes session-to-session repeatability"))
     return tuple(facts)
 
 
@@ -91,8 +89,9 @@ def _repeatability(model: SessionsModel) -> list[Block]:
         Table(
             tuple(head),
             tuple(rows),
-            "Standard deviation from one recording to the next, beyond each one's own error. Scales are raw counts per "
-            "unit, relative to the common value; misalignments are departures from 90°.",
+            "Standard deviation from one recording to the next, beyond each one's own uncertainty. Biases are raw "
+            "readings at zero input (−S⁻¹ b) in SI units; scales are raw counts per unit, relative to the common "
+            "value; misalignments are departures from 90°.",
         )
     ]
 
@@ -132,8 +131,8 @@ def _changes(model: SessionsModel) -> list[Block]:
     head = ("number", *(["device"] if with_group else []), "p", "changed", "how")
     return [
         Paragraph(
-            "Each number of all recordings against one common value, by each recording's own error and the wander of "
-            "its zeros; p after Holm's procedure over all lines."
+            "Each parameter of all recordings against one common value, by each recording's uncertainty and the drift "
+            "of its biases; p corrected for multiple testing (Holm)."
         ),
         Table(head, tuple(rows)),
     ]
@@ -181,7 +180,7 @@ def _thermal(thermal: ThermalModel) -> list[Block]:
 
 
 def _unit(name: str) -> str:
-    return {"accel-zero": "m/s^2", "gyro-zero": "rad/s"}.get(name, "rad")
+    return {"accel-bias": "m/s^2", "gyro-bias": "rad/s"}.get(name, "rad")
 
 
 def _sessions(model: SessionsModel) -> Table:
@@ -198,7 +197,7 @@ def _sessions(model: SessionsModel) -> Table:
 def _picture(model: SessionsModel) -> Picture:
     return Picture(
         "sessions",
-        "Every number in every recording with its own error (bars), about the common value.",
+        "Every parameter in every recording with its uncertainty (error bars), about the common value.",
         later("chart_figures", "draw_chart", partial(sessions_chart, model)),
         partial(sessions_chart, model),
     )

@@ -23,18 +23,18 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
         ("length", f"{duration(recording.duration_s)}, {how_many(recording.n_samples, 'sample')}"),
         ("rate", f"{plain_number(recording.rate_hz, 5)} Hz"),
         ("gravity", f"{truth.gravity_m_s2:.5f} m/s²"),
-        ("motion", f"{how_many(len(truth.holds), 'hold')}, {how_many(len(truth.moves), 'move')}"),
+        ("motion", f"{how_many(len(truth.holds), 'pose')}, {how_many(len(truth.moves), 'move')}"),
     )
     return Document(
         title="Simulation",
         subtitle=recording.source,
-        verdict=f"{how_many(len(truth.holds), 'hold')} and {how_many(len(truth.moves), 'move')} of an instrument with "
-        f"{effects}; the log knows none of what follows.",
+        verdict=f"{how_many(len(truth.holds), 'pose')} and {how_many(len(truth.moves), 'move')} of an instrument with "
+        f"{effects}; the log contains none of what follows.",
         is_trustworthy=True,
         sections=(
             Section("Result", (Facts(facts),)),
             Section("Effects", (_effects(truth.effects),)),
-            Section("True numbers", (_linear(recording, truth), *_noise(truth))),
+            Section("True parameters", (_linear(recording, truth), *_noise(truth))),
         ),
         headlines=(
             Headline("holds", str(len(truth.holds)), "", how_many(len(truth.moves), "move")),

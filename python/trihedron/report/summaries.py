@@ -29,7 +29,7 @@ def recording_summary(recording: Recording) -> Document:
     return Document(
         title="Recording",
         subtitle=recording.source,
-        verdict=verdict_of(recording.findings, "Nothing was noticed that speaks against it.", "Read", "DOUBTFUL"),
+        verdict=verdict_of(recording.findings, "OK: no problems found.", "Read", "DOUBTFUL"),
         is_trustworthy=not any(finding.severity is Severity.SERIOUS for finding in recording.findings),
         sections=(
             Section("Recording", (Facts(tuple(facts)),)),
@@ -41,15 +41,15 @@ def recording_summary(recording: Recording) -> Document:
 
 def segments_summary(segments: Segments) -> Document:
     """Holds and moves without the recording: how many, how long, their mean readings."""
-    found = f"{how_many(segments.n_holds, 'still pose')}, {how_many(len(segments.moves), 'move')}."
+    found = f"{how_many(segments.n_holds, 'pose')}, {how_many(len(segments.moves), 'move')}."
     still_s = float(np.sum(segments.duration_s)) if segments.n_holds else 0.0
     return Document(
-        title="Still poses and moves",
+        title="Poses and moves",
         subtitle=f"{duration(still_s)} still in all",
         verdict=verdict_of(segments.findings, found, found.removesuffix("."), "NOT FIT"),
         is_trustworthy=not any(finding.severity is Severity.SERIOUS for finding in segments.findings),
         sections=(
-            Section("Still poses", (_holds(segments),)),
+            Section("Poses", (_holds(segments),)),
             Section("Findings", (findings_block(segments.findings),)),
             Section("Figures", (Picture("holds", "Mean readings.", later("figures", "draw_holds", segments)),)),
         ),
@@ -57,13 +57,13 @@ def segments_summary(segments: Segments) -> Document:
 
 
 def _holds(segments: Segments) -> Table:
-    head, columns = ["pose", "middle [s]", "held [s]"], []
+    head, columns = ["pose", "middle [s]", "length [s]"], []
     for letter, mean, sigma in (
         ("a", segments.accelerometer_mean, segments.accelerometer_sigma_mean),
         ("w", segments.gyroscope_mean, segments.gyroscope_sigma_mean),
     ):
         if mean is not None and sigma is not None:
-            head += [f"{letter}′{axis}" for axis in (1, 2, 3)]
+            head += [f"{letter}′_{axis}" for axis in "xyz"]
             columns += [
                 [with_sigma(float(m), float(s)) for m, s in zip(mean[:, k], sigma[:, k], strict=True)] for k in range(3)
             ]

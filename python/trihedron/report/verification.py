@@ -33,9 +33,9 @@ def verification_report(
         subtitle=verification.source,
         verdict=verdict_of(
             verification.findings,
-            "The calibration holds here: errors are what noise and its own error bars allow.",
-            "The calibration was tested",
-            "NOT PASSED",
+            "Verified: errors are within noise and uncertainty.",
+            "Verified",
+            "NOT VERIFIED",
         ),
         is_trustworthy=verification.is_passed,
         sections=tuple(sections),
@@ -47,12 +47,12 @@ def verification_report(
 def _headlines(v: Verification) -> list[Headline]:
     expected = plain_number(mm_s2_from_m_s2(float(np.sqrt(np.mean(v.norm_sigma**2)))))
     norm = plain_number(mm_s2_from_m_s2(v.norm_rms))
-    beside = f"rms over {how_many(len(v.norm_error), 'pose')}; to be expected {expected}"
-    out = [Headline("gravity at rest missed by", norm, "mm/s²", beside)]
+    beside = f"rms over {how_many(len(v.norm_error), 'pose')}; expected {expected}"
+    out = [Headline("gravity error in static poses", norm, "mm/s²", beside)]
     if len(v.angle_deg):
         expected = plain_number(v.angle_expected_deg)
-        beside = f"rms over {how_many(len(v.angle_deg), 'move')}; to be expected {expected}"
-        out.append(Headline("gravity after a move missed by", plain_number(v.angle_rms_deg), "°", beside))
+        beside = f"rms over {how_many(len(v.angle_deg), 'move')}; expected {expected}"
+        out.append(Headline("tilt error after a rotation", plain_number(v.angle_rms_deg), "°", beside))
     return out
 
 
@@ -63,27 +63,25 @@ def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:
     facts = [
         ("gravity", f"{v.gravity_m_s2:.5f} m/s², {v.gravity_source}"),
         (
-            "norm error",
-            f"{_acceleration(v.norm_rms)} rms over {len(v.norm_error)} still poses, worst "
+            "gravity error in static poses",
+            f"{_acceleration(v.norm_rms)} rms over {len(v.norm_error)} poses, worst "
             f"{_acceleration(float(v.norm_error[worst]))} in pose {worst}",
         ),
-        ("to be expected", f"{_acceleration(expected)} rms from noise and the calibration's own error bars"),
+        ("  expected", f"{_acceleration(expected)} rms from noise and the calibration's uncertainty"),
     ]
     if len(v.angle_deg):
         worst = int(np.argmax(v.angle_deg))
         facts += [
             (
-                "gravity predicted",
-                f"to {plain_number(v.angle_rms_deg)}° rms over {len(v.angle_deg)} moves, worst "
+                "tilt error after a rotation",
+                f"{plain_number(v.angle_rms_deg)}° rms over {how_many(len(v.angle_deg), 'move')}, worst "
                 f"{plain_number(float(v.angle_deg[worst]))}° in move {v.moves[worst]}{_without(v)}",
             ),
-            ("to be expected", f"{plain_number(v.angle_expected_deg)}° rms"),
+            ("  expected", f"{plain_number(v.angle_expected_deg)}° rms from noise and the calibration's uncertainty"),
         ]
     if len(v.rest_rate):
         shift = [plain_number(degrees_from_radians(float(r)), 2) for r in np.mean(v.rest_rate, axis=0)]
-        facts.append(
-            ("gyro's zero", f"moved by {', '.join(shift)} °/s since the calibration (taken from each still pose)")
-        )
+        facts.append(("gyro bias", f"changed by {', '.join(shift)} °/s (X, Y, Z) since the calibration"))
     return tuple(facts)
 
 
@@ -135,7 +133,7 @@ def _tables(verification: Verification, segments: Segments | None) -> list[Block
         Table(
             ("pose", "mid [s]", "|f| − |g| [mm/s²]", "in σ"),
             rows,
-            "Norm of gravity ± noise and the calibration's error",
+            "Gravity error of every pose ± noise and the calibration's uncertainty",
         )
     ]
     if len(v.angle_deg):
@@ -148,8 +146,12 @@ def _tables(verification: Verification, segments: Segments | None) -> list[Block
             )
             for k in range(len(v.angle_deg))
         )
-        head = ("move", "missed by [°]", "noise alone [°]", "with calibration's error [°]")
-        blocks.append(Table(head, rows, "Gravity carried through every move by the gyro"))
+        head = ("move", "tilt error [°]", "noise alone [°]", "noise and uncertainty [°]")
+        blocks.append(
+            Table(
+                head, rows, "Tilt error after every rotation: gravity predicted with the gyro against gravity measured"
+            )
+        )
     return blocks
 
 
@@ -157,7 +159,7 @@ def _errors_picture(verification: Verification) -> Picture:
     draw = later("figures", "draw_verification", verification)
     return Picture(
         "errors",
-        "Error in every still pose and after every move, with what was to be expected.",
+        "Gravity error in every pose and tilt error after every rotation, beside what noise and uncertainty allow.",
         draw,
         partial(verification_chart, verification),
     )

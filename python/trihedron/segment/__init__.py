@@ -1,4 +1,4 @@
-"""Still poses and moves, told apart by the sensor's own noise."""
+"""Poses and moves, separated by the sensor's own noise."""
 
 from trihedron.segment.channels import BlockSums
 from trihedron.segment.recording import segment_blocks, segment_recording

@@ -36,7 +36,7 @@ def judge_runs(
         worst, k = max(creeping)
         found.append(
             Finding.of(
-                FindingCode.HOLD_CREEPS,
+                FindingCode.POSE_SETTLING,
                 holds=len(creeping),
                 worst_hold=k + 1,
                 worst_s=_start_s(recording, holds[k]),
@@ -51,7 +51,7 @@ def judge_runs(
         first = holds[bumped[0]]
         found.append(
             Finding.of(
-                FindingCode.HOLD_BUMPED,
+                FindingCode.POSE_DISTURBED,
                 disturbances=n,
                 holds=len(bumped),
                 which=_named(bumped),
@@ -63,7 +63,7 @@ def judge_runs(
     if unsteady:
         found.append(
             Finding.of(
-                FindingCode.HOLD_UNSTEADY,
+                FindingCode.POSE_UNSTEADY,
                 holds=len(unsteady),
                 which=_named(unsteady),
                 first_s=_start_s(recording, holds[unsteady[0]]),
@@ -122,7 +122,9 @@ def without_cut(
     if first is None:
         return runs, []
     start_s = float(recording.time_s[first[0].first * channels.length])
-    said = Finding.of(FindingCode.HOLD_AT_LIMIT, holds=len(runs) - len(kept), first_s=start_s, reading=first[1].reading)
+    said = Finding.of(
+        FindingCode.POSE_AT_RANGE_LIMIT, holds=len(runs) - len(kept), first_s=start_s, reading=first[1].reading
+    )
     return kept, [said]
 
 
@@ -147,7 +149,7 @@ def judge_log(
             Finding.of(FindingCode.SLOW_TURN, turning_s=total, first_s=recording.time_s[turns[0][0] * channels.length])
         )
     if holds[0].start / recording.rate_hz > 1.0 and recording.n_samples:
-        found.append(Finding.of(FindingCode.NO_INITIAL_REST, first_hold_s=_start_s(recording, holds[0])))
+        found.append(Finding.of(FindingCode.NO_INITIAL_POSE, first_hold_s=_start_s(recording, holds[0])))
     if len(holds) < POSES_FOR_NINE:
         found.append(Finding.of(FindingCode.FEW_POSES, holds=len(holds), duration_s=duration, needed=POSES_FOR_NINE))
     return found

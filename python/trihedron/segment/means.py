@@ -1,4 +1,4 @@
-"""The mean reading of every hold, and its standard error without the assumption of whiteness."""
+"""The mean reading of every pose, and its standard error without the assumption of whiteness."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ class HoldMeans:
 def average_holds(
     recording: Recording, channels: Channels, runs: list[Run], holds: tuple[Hold, ...], noise: MeanNoise
 ) -> HoldMeans:
-    """Means over the samples of each hold; their variances are the pooled law times the hold's own excess.
+    """Means over the samples of each pose; their variances are the pooled law times the pose's own excess.
 
-    The excess of a hold is the ratio of its own two-sample variances to the pooled law over the four coarsest octaves;
+    The excess of a pose is the ratio of its own two-sample variances to the pooled law over the four coarsest octaves;
     being uncertain, it is drawn towards 1 by as many degrees of freedom as the ratios' scatter over holds leaves room
     for (empirical Bayes). An unsteady hold is taken at its own word, axis by axis.
     """
@@ -85,7 +85,7 @@ def _shrunk(ratio: FloatArray, freedom: FloatArray, steady: npt.NDArray[np.bool_
 
 
 def _sample_means(triads: list[FloatArray], holds: tuple[Hold, ...]) -> tuple[FloatArray, IntArray]:
-    """(h, c) means over the samples of each hold, and (h,) how many of them are finite in every sensor."""
+    """(h, c) means over the samples of each pose, and (h,) how many of them are finite in every sensor."""
     parts = [(k, a, b) for k, hold in enumerate(holds) for a, b in hold.undisturbed()]
     owner, begins, ends = np.array(parts, dtype=np.int64).reshape(-1, 3).T.copy()
     spans = np.column_stack([begins, ends])
@@ -148,7 +148,7 @@ def _excess(channels: Channels, runs: list[Run], noise: MeanNoise) -> tuple[Floa
 
 
 def _prior_freedom(ratio: FloatArray, freedom: FloatArray) -> float:
-    """Degrees of freedom of the holds' common law: few when holds truly differ, many when sampling explains it all."""
+    """Degrees of freedom of the poses' common law: few when holds truly differ, many when sampling explains it all."""
     seen = freedom > 0.0
     if seen.sum() < 2:
         return 1e3
@@ -188,7 +188,7 @@ def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
 
     The mean of a rounded Gaussian of deviation σ is off by the sum over k of (q/πk) exp(-2π²k²σ²/q²) sin(2πkx/q): q/√12
     rms without noise, a fifth of it at σ = 0.28 q (Widrow and Kollár 2008, ch. 4). σ follows from what the readings
-    scatter by, which depends on the place in a step as well: many holds apart have all places, a zero reading has one.
+    scatter by, which depends on the place in a step as well: many holds apart have all places, a bias has one.
     """
     if not runs:
         return np.zeros(channels.mean.shape[1])

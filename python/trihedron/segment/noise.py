@@ -1,4 +1,4 @@
-"""How far the mean of a stretch is from the next stretch's: noise over time, pooled over all holds."""
+"""How far the mean of a stretch is from the next stretch's: noise over time, pooled over all poses."""
 
 from __future__ import annotations
 

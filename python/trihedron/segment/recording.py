@@ -45,7 +45,7 @@ LONG_S = 4.0
 
 
 def segment_recording(recording: Recording, *, progress: Progress | None = None) -> Segments:
-    """Find still poses and the moves between them; no threshold is asked for, the sensor's own noise sets it.
+    """Find poses and the moves between them; no threshold is asked for, the sensor's own noise sets it.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ RESTING = 1e-3
 def resegment(recording: Recording, segments: Segments, shortest_s: float = 0.3) -> Segments:
     """Poses as a model of the whole session needs them: cut where they were bumped, found where only shaken.
 
-    A bump inside a hold turns the body; averaged over, it contradicts the moves on both sides. Cut there, the gyro
+    A bump inside a pose turns the body; averaged over, it contradicts the moves on both sides. Cut there, the gyro
     carries the attitude across it like across any move. A pose that vibrates is no rest, but its slow part stands
     still: it becomes a hold of its own, so that a bias that follows the vibration can be seen.
 

@@ -43,7 +43,7 @@ a tremor of several swings."""
 
 @dataclass(frozen=True)
 class Run:
-    """Blocks ``[first, last)`` of one hold; ``bumps`` are block ranges inside it that are left out."""
+    """Blocks ``[first, last)`` of one pose; ``bumps`` are block ranges inside it that are excluded."""
 
     first: int
     last: int
@@ -105,7 +105,7 @@ def widen(quiet: BoolArray, is_valid: BoolArray) -> BoolArray:
 
 
 def speed_of_moves(channels: Channels, quiet: BoolArray) -> float:
-    """Gyro reading of the log's faster moves about its zero, raw unit; infinite in a log without moves."""
+    """Gyro reading of the log's faster moves about its bias, raw unit; infinite in a log without moves."""
     moving = ~quiet & channels.is_valid
     gyro = channels.is_gyroscope
     if not moving.any() or not quiet.any() or not gyro.any():
@@ -256,7 +256,7 @@ def _sway(attitude: FloatArray, runs: list[Run]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class EdgeNoise:
-    """What an end of a hold is compared by: the ``law`` (3, c) of a mean's noise, its ``variance`` (k, c) over
+    """What an end of a pose is compared by: the ``law`` (3, c) of a mean's noise, its ``variance`` (k, c) over
     ``EDGE_BLOCKS``, and the ``limit`` of χ² of the channels that are ``live`` (c,)."""
 
     law: FloatArray
@@ -274,7 +274,7 @@ class EdgeNoise:
 
 
 def trim_edges(channels: Channels, run: Run, edges: EdgeNoise) -> Run:
-    """Take blocks off both ends until no stretch at an end departs from the middle of the hold.
+    """Take blocks off both ends until no stretch at an end departs from the middle of the pose.
 
     Stretches of 1, 2, 4 ... blocks at each end are compared with the central half; at most a third is taken off.
     """

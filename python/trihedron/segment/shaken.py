@@ -55,7 +55,7 @@ def find_shaken(
     both cases the way turned by the gyro and the smoothed attitude of the accelerometer stay where they are.
 
     ``scales`` are the reading of |g| and radians per second per reading of the gyro, to a factor of two; without
-    either, or without a steady hold that tells the gyro's zero, none is added. ``free`` (m,) are blocks to look in.
+    either, or without a steady hold that tells the gyro's bias, none is added. ``free`` (m,) are blocks to look in.
     """
     gyro = channels.is_gyroscope
     steady = [part for run in taken if not run.is_unsteady for part in run.quiet_ranges()]
@@ -114,7 +114,7 @@ def _poses(channels: Channels, seen: _Seen, calm: BoolArray, taken: list[Run], s
     """Calm stretches (m,) that keep their place, last ``shortest_s``, and are no part of a ``taken`` one."""
     calm = calm.copy()
     for run in taken:
-        # A calm fringe of a hold is its settling, not another pose.
+        # A calm fringe of a pose is its settling, not another pose.
         calm[slice(*grown(calm, (run.outer_first, run.outer_last)))] = False
     found: list[Run] = []
     shortest = max(channels.blocks(shortest_s), WINDOW_BLOCKS)
@@ -162,7 +162,7 @@ def _is_no_hand(readings: FloatArray, white_variance: FloatArray, hand: float, i
     """
     part = np.asarray(readings)[np.isfinite(readings).all(axis=1)]
     weight = np.hanning(len(part))
-    # A straight line in time is drift of the zero.
+    # A straight line in time is drift of the bias.
     time = np.linspace(-1.0, 1.0, len(part))
     part = part - part.mean(axis=0)
     part = part - np.outer(time, time @ part / (time @ time))
@@ -191,7 +191,7 @@ def _is_one_pose(channels: Channels, attitude: FloatArray, run: Run, near: Run) 
 
 
 def _own_noise(channels: Channels, run: Run, steady: list[Range]) -> MeanNoise:
-    """The noise of still poses, or that of the middle of this one where it is larger."""
+    """The noise of poses, or that of the middle of this one where it is larger."""
     quarter = (run.last - run.first) // 4
     own = pool_mean_noise(channels, [(run.first + quarter, run.last - quarter)])
     still = pool_mean_noise(channels, steady)

@@ -13,7 +13,7 @@ from trihedron.ranges import Range
 from trihedron.segment.channels import Channels
 
 HALVES_S = (0.5, 1.0, 2.0)
-"""Half lengths of the windows compared: a turn's trace grows with time as its noise falls, and a hold may be this
+"""Half lengths of the windows compared: a turn's trace grows with time as its noise falls, and a pose may be this
 short on either side of where it is cut."""
 FALSE_ALARM = 1e-5
 """Chance that the halves of a still window are called different; of a hundred overlapping ones, once in some hours."""
@@ -130,7 +130,7 @@ def cut_slow_motion(
     """Quiet blocks without the slow motion in them.
 
     The stretch of a range that drifts is motion if it runs on to the end of the range, where a move begins, or changes
-    the reading by more than ``limit_raw`` (a hand's sway). What is left inside a range is a hold where it lasts
+    the reading by more than ``limit_raw`` (a hand's sway). What is left inside a range is a pose where it lasts
     ``shortest`` blocks; a range of which nothing is left, and that keeps within ``limit_raw``, is a hold that creeps.
     """
     out = quiet.copy()

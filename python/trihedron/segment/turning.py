@@ -1,4 +1,4 @@
-"""Quiet blocks that turn: a slow steady turn is as quiet as a hold, and only the gyro's mean shows it."""
+"""Quiet blocks that turn: a slow steady turn is as quiet as a pose, and only the gyro's mean shows it."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def turning_blocks(
     """Quiet blocks in which the gyro reads far from its common zero: a slow steady turn, gravity says nothing of.
 
     The zero is where the windows of one second are densest, for turns may take most of the time; its scatter is theirs,
-    or that of the holds' nearest windows where that is larger: a zero that depends on the pose is no turn. Where the
-    accelerometer sees the tilt too, and the whole turn stays within ``SWAY_RAD`` by both sensors, the hold creeps and
-    remains a hold: a table that leans a little shows as small a tilt, but the gyro tells how far it turns.
+    or that of the poses' nearest windows where that is larger: a bias that depends on the pose is no turn. Where the
+    accelerometer sees the tilt too, and the whole turn stays within ``SWAY_RAD`` by both sensors, the pose creeps and
+    remains a pose: a table that leans a little shows as small a tilt, but the gyro tells how far it turns.
     """
     out = np.zeros(len(quiet), dtype=bool)
     gyro = np.flatnonzero(channels.is_gyroscope)
@@ -41,7 +41,7 @@ def turning_blocks(
     if len(long) > 2:
         nearest = np.minimum.reduceat(np.abs(second[: long[-1]] - zero), long[:-1], axis=0)[::2]
         scatter = np.maximum(scatter, 1.4826 * medians(nearest))
-    # A few short holds hold a few independent seconds: the shortest interval among them flatters. No window is known
+    # A few short poses hold a few independent seconds: the shortest interval among them flatters. No window is known
     # better than the white noise of its blocks.
     inner = _edges([(a, b - 1) for a, b in ranges if b - a >= 2])
     if len(inner):

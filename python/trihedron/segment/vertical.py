@@ -45,7 +45,7 @@ def _unit(rows: FloatArray) -> FloatArray:
 
 
 def along(channels: Channels, runs: list[Run], up: FloatArray) -> Channels:
-    """The accelerometer's blocks along each hold's own direction ``up`` (h, 3), as the first axis of a triad.
+    """The accelerometer's blocks along each pose's own direction ``up`` (h, 3), as the first axis of a triad.
 
     A support that gives, a tremor and a body that goes on settling turn gravity across itself: readings across the
     vertical differ by the angle, that along it by half its square.

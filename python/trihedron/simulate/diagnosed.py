@@ -23,7 +23,7 @@ def with_diagnosed_effects(
 ) -> tuple[Scenario, tuple[str, ...], dict[str, str]]:
     """The scenario with the accepted effects of a diagnosis (``effects`` of its JSON).
 
-    Returns the scenario, the ids switched on, and for every other id why it was left out.
+    Returns the scenario, the ids switched on, and for every other id why it was excluded.
     """
     sizes, left_out = diagnosed_sizes(effects)
     done: list[str] = []
@@ -40,7 +40,7 @@ LENGTH = "length of the session"
 def diagnosed_sizes(
     effects: Sequence[Mapping[str, Any]], length_s: float | None = None
 ) -> tuple[list[tuple[str, Size]], dict[str, str]]:
-    """Accepted effects as ids and sizes of mechanisms (keys of :func:`with_effect`), and why others were left out.
+    """Accepted effects as ids and sizes of mechanisms (keys of :func:`with_effect`), and why others were excluded.
 
     ``length_s`` is that of the recording they were found in.
     """
@@ -158,17 +158,17 @@ _SIZES: dict[str, Callable[[Parameters, str], Size | list[Size]]] = {
     "accel-thermal-scale": _thermal("scale"),
     "gyro-thermal-bias": _thermal("bias"),
     "gyro-thermal-scale": _thermal("scale"),
-    "accel-hidden-drift": _drift,
-    "gyro-hidden-drift": _drift,
-    "accel-zero-scatter": lambda v, _: {"sigma": (v["sigma"],) * 3},
-    "gyro-zero-scatter": lambda v, _: {"sigma": _axis(v, "sigma")},
+    "accel-bias-drift": _drift,
+    "gyro-bias-drift": _drift,
+    "accel-bias-repeatability": lambda v, _: {"sigma": (v["sigma"],) * 3},
+    "gyro-bias-repeatability": lambda v, _: {"sigma": _axis(v, "sigma")},
     "gyro-g-sensitivity": _g_sensitivity,
     "gyro-scale-nonlinearity": lambda v, _: {"c2": _axis(v, "quadratic"), "c3": _axis(v, "cubic")},
     "gyro-saturation": _limit,
     "accel-saturation": _limit,
     "lever-arm": lambda v, _: {"arm_m": _axis(v, "r")},
     "accel-size-effect": _places,
-    # A gyro that samples later under the same stamp is an accelerometer that reads an earlier instant.
+    # A gyro that samples later under the same timestamp is an accelerometer that reads an earlier instant.
     "accel-gyro-time-offset": lambda v, _: {"offset_s": v["accelerometer_delay"]},
     "sensor-lag": _lag,
     "dropped-samples": _losses,

@@ -73,7 +73,7 @@ def _table_turns() -> Scenario:
 
 
 def _manual() -> Scenario:
-    """The laboratory manual's example: 18 poses, then turns by ±8π on three faces, 10-bit converter, 50 Hz."""
+    """The laboratory manual's example: 18 poses, then turns by ±8π on three faces, 10-bit ADC, 50 Hz."""
     poses = poses_in_order([*FACES, *EDGES], hold_s=6.0, move_s=3.0, wobble_deg=4.0)
     steps = list(poses.steps)
     for face in FACES[::2]:
@@ -104,7 +104,7 @@ def _rest_industrial() -> Scenario:
 
 
 def _dividing_head() -> Scenario:
-    """324 poses of an optical dividing head, industrial part on a 12-bit converter."""
+    """324 poses of an optical dividing head, industrial part on a 12-bit ADC."""
     scenario = _of(ADIS, dividing_head(), "dividing-head")
     step = 0.11 * math.sqrt(12.0)  # the published converter's own noise of 0.11 m/s² as the rms of its rounding
     accel = scenario.accelerometer
@@ -127,7 +127,7 @@ def _imperfect() -> Scenario:
 
 
 def _lossy() -> Scenario:
-    """The hand session with lost samples whose stamps were made anew, and jitter."""
+    """The hand session with lost samples whose timestamps were made anew, and jitter."""
     scenario = with_effect(_of(MPU, hand_session(), "lossy-log"), "dropped-samples", losses=[(30.0, 7), (60.0, 25)])
     return with_effect(scenario, "timing-jitter", jitter_s=3e-4)
 

@@ -70,7 +70,7 @@ def _all(value: float) -> Triple:
     return (value, value, value)
 
 
-# SparkFun 6DOF with a 10-bit converter at 3.3 V: Freescale MMA7260Q (800 mV/g at ±1.5 g, 350 µg/√Hz, one pole at
+# SparkFun 6DOF with a 10-bit ADC at 3.3 V: Freescale MMA7260Q (800 mV/g at ±1.5 g, 350 µg/√Hz, one pole at
 # 350 Hz) and InvenSense IDG-300 (2 mV/(°/s), ±500 °/s, 0.014 °/s/√Hz, 140 Hz); ratiometric to the board's supply.
 # Matrices: the published example of the laboratory manual. Its S_ω [rad/s per count] goes with offsets in counts
 # (457.68 counts are 1.48 V, the IDG-300's zero-rate level is 1.5 V), so b_ω = -S_ω·offset here.
@@ -82,7 +82,7 @@ _b_w = -np.asarray(_MANUAL_S_W) @ np.asarray(_MANUAL_OFFSET_COUNTS)
 
 ANALOG_6DOF = Profile(
     name="analog-6dof",
-    about="analog 6-DOF board with a 10-bit converter, 50 Hz: the laboratory manual's unit",
+    about="analog 6-DOF board with a 10-bit ADC, 50 Hz: the laboratory manual's unit",
     accelerometer=Accelerometer(
         S=_MANUAL_S_F,
         b=_MANUAL_B_F,
@@ -172,7 +172,7 @@ TACTICAL = Profile(
 )
 
 # A perfect instrument, to which effects can be added one at a time.
-IDEAL = Profile("ideal", "no noise, no converter, SI output, 100 Hz", Accelerometer(), Gyroscope(), Clock(100.0))
+IDEAL = Profile("ideal", "no noise, no quantisation, SI output, 100 Hz", Accelerometer(), Gyroscope(), Clock(100.0))
 
 PROFILES: dict[str, Profile] = {p.name: p for p in (ANALOG_6DOF, MPU, ADIS, TACTICAL, IDEAL)}
 

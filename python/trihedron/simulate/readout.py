@@ -25,7 +25,7 @@ NO_MATRIX: Matrix = (NONE, NONE, NONE)
 class Adc:
     """Converter, raw units: step ``lsb`` (0: none), range ``[low, high]``.
 
-    ``dead_band`` is the half-width around the zero reading inside which nothing moves; of every ``missing_every`` codes
+    ``dead_band`` is the half-width around the bias inside which nothing moves; of every ``missing_every`` codes
     one is never given (0: none is missing).
     """
 
@@ -152,8 +152,8 @@ class Electronics:
 
     ``asymmetry`` δ: gain 1+δ for positive and 1-δ for negative signals. ``ratiometric`` 1: the reading follows the
     supply; 0: not at all. ``saturation`` [SI] clips in front of the filter. ``lag_s`` first-order lag per channel.
-    ``zero_scatter`` [SI] standard deviation of a zero that is drawn anew in every pose, and goes over during the move.
-    ``zero_in_moves`` [SI] how far a zero leaves, at the beginning and at the end of a move, the line between its poses.
+    ``bias_repeatability`` [SI] σ of a bias that is drawn anew in every pose, and changes during the move.
+    ``bias_in_moves`` [SI] how far a bias leaves, at the beginning and at the end of a move, the line between its poses.
     """
 
     asymmetry: Triple = NONE
@@ -164,8 +164,8 @@ class Electronics:
     lag_s: Triple = NONE
     filter: Filter = field(default_factory=Filter)
     ratiometric: float = 0.0
-    zero_scatter: Triple = NONE
-    zero_in_moves: Triple = NONE
+    bias_repeatability: Triple = NONE
+    bias_in_moves: Triple = NONE
 
     @property
     def is_dynamic(self) -> bool:

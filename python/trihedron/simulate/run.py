@@ -14,13 +14,13 @@ from trihedron.records.recording import Recording
 from trihedron.records.truth import TrueSegment, Truth
 from trihedron.refused import RefusedError
 from trihedron.simulate.accelerometer import Accelerometer
+from trihedron.simulate.bias_repeatability import bias_in_moves, bias_of_poses
 from trihedron.simulate.effects import effects_of
 from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.motion import Plan, plan_motion
 from trihedron.simulate.noise import NoiseTerms, make_noise, stream
 from trihedron.simulate.readout import Triple, sense_axes
 from trihedron.simulate.scenario import Clock, Environment, Scenario
-from trihedron.simulate.zero_scatter import zero_in_moves, zero_of_poses
 
 Sensor = Accelerometer | Gyroscope
 
@@ -126,12 +126,12 @@ def _read(
     noise = sensor.noise
     if any(any(getattr(noise, term)) for term in "QNBKR"):
         signal += sensor.noise_filter.apply(make_noise(noise, len(time_s), dt, seed, name), dt)
-    if any(sensor.electronics.zero_scatter):
+    if any(sensor.electronics.bias_repeatability):
         rng = stream(seed, f"{name}/zero scatter")
-        signal = signal + zero_of_poses(plan.labels, time_s, sensor.electronics.zero_scatter, rng)
-    if any(sensor.electronics.zero_in_moves):
+        signal = signal + bias_of_poses(plan.labels, time_s, sensor.electronics.bias_repeatability, rng)
+    if any(sensor.electronics.bias_in_moves):
         rng = stream(seed, f"{name}/zero in moves")
-        signal = signal + zero_in_moves(plan.labels, time_s, sensor.electronics.zero_in_moves, rng)
+        signal = signal + bias_in_moves(plan.labels, time_s, sensor.electronics.bias_in_moves, rng)
     _, gain = sense_axes(sensor.S, name)
     offset = -np.linalg.solve(np.asarray(sensor.S), np.asarray(sensor.b))
     raw = signal  # in place: ten million samples are 240 MB

@@ -119,14 +119,14 @@ class Loss:
 
 @dataclass(frozen=True)
 class Clock:
-    """When samples are taken and what the stamps say.
+    """When samples are taken and what the timestamps say.
 
-    ``rate_error``: the true rate is ``rate_hz (1 + rate_error)`` while the stamps believe in ``rate_hz``. ``jitter_s``:
-    rms of the true instants about the grid; ``stamps_show_jitter`` writes it into the stamps. ``stamp_jitter_s``: rms
-    error of the stamps alone. ``gyroscope_offset_s``: the gyro samples that much later under the same stamp. Samples
-    are lost as listed in ``losses`` and at random with ``loss_probability``; ``restamped`` then counts on as if
-    nothing were missing. ``instants_s`` gives every true instant, from 0, instead of a grid: stamps and gaps of a
-    real log. ``oversample`` fine steps per sample where a sensor has dynamics (0: 8).
+    ``rate_error``: the true rate is ``rate_hz (1 + rate_error)`` while the timestamps believe in ``rate_hz``.
+    ``jitter_s``: rms of the true instants about the grid; ``stamps_show_jitter`` writes it into the timestamps.
+    ``stamp_jitter_s``: rms error of the timestamps alone. ``gyroscope_offset_s``: the gyro samples that much later
+    under the same stamp. Samples are lost as listed in ``losses`` and at random with ``loss_probability``;
+    ``restamped`` then counts on as if nothing were missing. ``instants_s`` gives every true instant, from 0, instead of
+    a grid: timestamps and gaps of a real log. ``oversample`` fine steps per sample where a sensor has dynamics (0: 8).
     """
 
     rate_hz: float = 100.0

@@ -41,7 +41,7 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
     if recording.accelerometer is None or recording.gyroscope is None or calibration.gyroscope is None:
         raise RefusedError("a twin needs both sensors in the recording and in the calibration")
     if not segments.holds:
-        raise RefusedError("a twin needs at least one still pose; the recording has none")
+        raise RefusedError("a twin needs at least one pose; the recording has none")
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     time_s = recording.time_s
     readings = (_filled(recording.accelerometer), _filled(recording.gyroscope))

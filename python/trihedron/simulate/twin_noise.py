@@ -1,6 +1,6 @@
 """Noise of a recording's holds for its twin: N, B and the low-pass that coloured them.
 
-A non-negative fit to the pooled Allan variance of the holds, for each of a list of filters; the best is kept.
+A non-negative fit to the pooled Allan variance of the poses, for each of a list of filters; the best is kept.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ SHAPES = 0.1
 def noise_of_holds(
     signal: FloatArray, holds: Sequence[tuple[int, int]], dt: float, step: FloatArray | float = 0.0
 ) -> tuple[NoiseTerms, Smoother]:
-    """Terms per axis of (n, 3) readings inside the holds ``[start, stop)``, and the low-pass all axes share.
+    """Terms per axis of (n, 3) readings inside the poses ``[start, stop)``, and the low-pass all axes share.
 
-    ``step`` of the converter is taken off. What is longer than a third of a hold cannot be told and is left out.
+    ``step`` of the converter is taken off. What is longer than a third of a pose cannot be told and is excluded.
     """
     steps = np.broadcast_to(np.asarray(step, dtype=np.float64), (3,))
     measured = [_pooled(signal[:, k], holds, float(steps[k])) for k in range(3)]
@@ -156,7 +156,7 @@ def _non_negative(design: FloatArray, density: FloatArray, relative: FloatArray)
 
 
 def _pooled(x: FloatArray, holds: Sequence[tuple[int, int]], step: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Cluster sizes, Allan variances over all holds, and their degrees of freedom."""
+    """Cluster sizes, Allan variances over all poses, and their degrees of freedom."""
     longest = max(stop - start for start, stop in holds)
     clusters, variances, freedom = [], [], []
     m = 1

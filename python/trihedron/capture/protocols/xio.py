@@ -1,4 +1,4 @@
-"""xio x-IMU3: messages that end in a line feed, text or binary, with a time stamp in microseconds.
+"""xio x-IMU3: messages that end in a line feed, text or binary, with a timestamp in microseconds.
 
 Layout after the maker's user manual: text ``I,time,gx,gy,gz,ax,ay,az``; binary 0x80 + "I", 64-bit time, six floats,
 little-endian, line feeds and escapes inside replaced as in SLIP (0xDB 0xDC, 0xDB 0xDD). There is no checksum.

@@ -33,7 +33,7 @@ CODE = "raw_"
 FAINT = 1.0 - 1.0 / 1.05**2
 """Of the variance inside still poses: a line of this share raises their scatter by 5 %, as 30 K raise white noise."""
 
-LARGEST_READ: Mapping[str, float] = MappingProxyType({"accel-zero": STANDARD_GRAVITY_M_S2, "gyro-zero": 1.0})
+LARGEST_READ: Mapping[str, float] = MappingProxyType({"accel-bias": STANDARD_GRAVITY_M_S2, "gyro-bias": 1.0})
 """What a scale that follows temperature is a share of where it is taken for a zero: gravity; a turn by hand [rad/s]."""
 
 
@@ -50,7 +50,7 @@ def left_open_by(effects: Iterable[AcceptedEffect], span_k: float | None = None)
     by_effect: dict[tuple[str, str], float] = {}
     for effect in effects:
         for number in named.get(effect.id, ()):
-            unit = {"accel-zero": "m/s^2", "gyro-zero": "rad/s"}.get(number, "1")
+            unit = {"accel-bias": "m/s^2", "gyro-bias": "rad/s"}.get(number, "1")
             by_axis: dict[str, float] = {}
             for parameter in effect.parameters:
                 moved = _moved(parameter, number, unit, span_k)

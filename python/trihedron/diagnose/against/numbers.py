@@ -240,7 +240,7 @@ def _sensor(
     assert len(names) == len(PAIRS)
     # S is SI per raw unit: what reads a larger count for the same truth has the smaller S, so a scale is -ln k.
     groups = [
-        _Group(f"{prefix}-zero", sensor, _AXES, a.zero, r.zero, r.zero - a.zero, covariance[:3, :3], unit, WANDER_DOF,
+        _Group(f"{prefix}-bias", sensor, _AXES, a.zero, r.zero, r.zero - a.zero, covariance[:3, :3], unit, WANDER_DOF,
                _never_added(prefix, a.zero, r.zero, J_m @ covariances[0] @ J_m.T, wander_model)),
         _Group(
             f"{prefix}-scale", sensor, _AXES, np.exp(log_m), np.exp(log_r), change, scale_covariance, "1",

@@ -18,8 +18,8 @@ cosine, and some that are left to judge it by."""
 class AccelHiddenDrift(HiddenDrift):
     """Of the accelerometer: what the length of gravity shows from pose to pose."""
 
-    id = "accel-hidden-drift"
-    leaves_open = ("accel-zero",)
+    id = "accel-bias-drift"
+    leaves_open = ("accel-bias",)
     sensor, unit, domain = 0, "m/s^2", "static-accel"
     typical = 0.05
 

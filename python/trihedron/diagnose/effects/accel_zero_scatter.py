@@ -12,7 +12,7 @@ class AccelZeroScatter(BiasProcess):
     """Biases drawn anew in every pose, one size for three axes: the length of gravity does not tell axes apart."""
 
     is_spread = True
-    id = "accel-zero-scatter"
+    id = "accel-bias-repeatability"
     sensor, walks, unit, domain = 0, False, "m/s^2", "static-accel"
 
     def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:

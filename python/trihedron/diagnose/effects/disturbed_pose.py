@@ -185,7 +185,7 @@ class DisturbedPose(DirectEffect):
         parameters = tuple(EffectParameter("pose_at", 0.5 * (a + b), 0.5 * max(b - a, 0.1), "s") for a, b in spans[:6])
         return Evidence(
             1e-30, strength, parameters, told, "within-static",
-            Where((), tuple(f"hold {i}" for i in restless), spans), held, share=min(len(spans) / obs.n_holds, 1.0),
+            Where((), tuple(f"pose {i}" for i in restless), spans), held, share=min(len(spans) / obs.n_holds, 1.0),
         )  # fmt: skip
 
     def variants(self, context: Context) -> list[Variant]:

@@ -14,8 +14,8 @@ from trihedron.diagnose.session.twin import Distortion
 class GyroHiddenDrift(HiddenDrift):
     """Of the gyro: what its readings at rest show from pose to pose."""
 
-    id = "gyro-hidden-drift"
-    leaves_open = ("gyro-zero",)
+    id = "gyro-bias-drift"
+    leaves_open = ("gyro-bias",)
     sensor, unit, domain = 1, "rad/s", "static-gyro"
     typical = 4e-3
 

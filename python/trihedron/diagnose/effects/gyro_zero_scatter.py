@@ -12,7 +12,7 @@ class GyroZeroScatter(BiasProcess):
     """The bias of every axis is drawn anew in every pose, beyond noise and drift."""
 
     is_spread = True
-    id = "gyro-zero-scatter"
+    id = "gyro-bias-repeatability"
     sensor, walks, unit, domain = 1, False, "rad/s", "static-gyro"
 
     def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:

@@ -47,8 +47,8 @@ class AccelThermalScale(ThermalScale):
     """Of the accelerometer."""
 
     id = "accel-thermal-scale"
-    leaves_open = ("accel-zero", "accel-scale")
-    drifts_as = "accel-hidden-drift"
+    leaves_open = ("accel-bias", "accel-scale")
+    drifts_as = "accel-bias-drift"
 
 
 class GyroThermalScale(ThermalScale):
@@ -56,8 +56,8 @@ class GyroThermalScale(ThermalScale):
 
     id = "gyro-thermal-scale"
     is_gyro = True
-    leaves_open = ("gyro-zero", "gyro-scale")
-    drifts_as = "gyro-hidden-drift"
+    leaves_open = ("gyro-bias", "gyro-scale")
+    drifts_as = "gyro-bias-drift"
 
 
 class ThermalBias(Thermal):
@@ -80,8 +80,8 @@ class AccelThermalBias(ThermalBias):
     """Of the accelerometer: half a mg per kelvin."""
 
     id = "accel-thermal-bias"
-    leaves_open = ("accel-zero",)
-    drifts_as = "accel-hidden-drift"
+    leaves_open = ("accel-bias",)
+    drifts_as = "accel-bias-drift"
     per_kelvin = 0.005
 
 
@@ -90,6 +90,6 @@ class GyroThermalBias(ThermalBias):
 
     id = "gyro-thermal-bias"
     is_gyro = True
-    leaves_open = ("gyro-zero",)
-    drifts_as = "gyro-hidden-drift"
+    leaves_open = ("gyro-bias",)
+    drifts_as = "gyro-bias-drift"
     per_kelvin = 4e-4

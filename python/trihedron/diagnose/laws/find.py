@@ -15,7 +15,7 @@ from trihedron.diagnose.laws.moves import move_misfit
 from trihedron.diagnose.laws.poses import Zeros, accel_misfits, gyro_misfits
 from trihedron.diagnose.laws.room import RoomLaw, search_room
 from trihedron.diagnose.laws.search import Accepted, search
-from trihedron.records.diagnosis import EffectParameter, Law
+from trihedron.records.diagnosis import EffectParameter, Relation
 from trihedron.records.domains import Domain, HeldOut
 from trihedron.records.words import law_experiment, law_resembles, words
 
@@ -33,13 +33,13 @@ CLEARER = 5.0
 class ZeroLaws:
     """Laws of one sensor's zeros; ``share`` of the held-out sum of squares of all its axes that they remove."""
 
-    laws: tuple[Law, ...]
+    laws: tuple[Relation, ...]
     share: float
 
 
-def find_laws(context: Context, domains: Collection[Domain]) -> tuple[Law, ...]:
+def find_laws(context: Context, domains: Collection[Domain]) -> tuple[Relation, ...]:
     """Laws of the misfit in ``domains``, the largest share first; empty where nothing predicts."""
-    out: list[Law] = []
+    out: list[Relation] = []
     if "static-gyro" in domains:
         out += gyro_zero_laws(context).laws
     if "static-accel" in domains:
@@ -83,7 +83,7 @@ def _squares_before(misfit: Misfit) -> float:
     return misfit.variance * total / n
 
 
-def _laws_of(sensor: Sensor, domain: Domain, found: list[Accepted], before: float) -> tuple[Law, ...]:
+def _laws_of(sensor: Sensor, domain: Domain, found: list[Accepted], before: float) -> tuple[Relation, ...]:
     """One law per family of variables; axes that follow the same family share it."""
     families: dict[str, list[tuple[str, tuple[str, ...], str, np.ndarray, np.ndarray, Judged]]] = {}
     for one in found:
@@ -111,7 +111,7 @@ def _laws_of(sensor: Sensor, domain: Domain, found: list[Accepted], before: floa
         rms = [float(np.sqrt(sum(getattr(j, side) for j in judged))) for side in ("held_before", "held_after")]
         held = HeldOut(domain, 1.0, (rms[1] / max(rms[0], 1e-300)) ** 2, rms[0], rms[1], _unit_of_misfit(domain))
         out.append(
-            Law(
+            Relation(
                 sensor, depends, _form(axes, depends), coefficients, share, held, law_resembles(family),
                 law_experiment(family), said,
             )
@@ -133,7 +133,7 @@ def _unit_of(sensor: Sensor, unit: str, name: str) -> str:
     return OUT[sensor] if unit == "1" else f"({OUT[sensor]})/({unit})"
 
 
-def _room_law(room: RoomLaw) -> Law:
+def _room_law(room: RoomLaw) -> Relation:
     axes = ("x", "y", "z")
     coefficients = [
         EffectParameter(f"{axes[a]}: m_{axes[k]}", float(room.coupling[a, k]), float(room.sigma[a, k]), "rad/s")
@@ -147,7 +147,7 @@ def _room_law(room: RoomLaw) -> Law:
     after = sum(j.held_after for j in room.judged)
     held = HeldOut("static-gyro", 1.0, after / before, before**0.5, after**0.5, "rad/s")
     family = "earth" if _is_rotation(room) else "room"
-    return Law(
+    return Relation(
         "gyroscope", (ROOM_VECTOR,), words("law-form-room"),
         tuple(coefficients), room.share, held, law_resembles(family), law_experiment(family),
         words(
@@ -166,7 +166,7 @@ def _is_rotation(room: RoomLaw) -> bool:
     return False
 
 
-def _motion_laws(context: Context, *, is_gyro_only: bool) -> list[Law]:
+def _motion_laws(context: Context, *, is_gyro_only: bool) -> list[Relation]:
     motion = move_misfit(context)
     if motion is None:
         return []

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from trihedron.records.diagnosis import Law
+from trihedron.records.diagnosis import Relation
 
 AXES = ("x", "y", "z")
 
 
-def effect_file(law: Law, effect_id: str = "named-law") -> str | None:
+def effect_file(law: Relation, effect_id: str = "named-law") -> str | None:
     """Source of an effect with the law's terms (docs/adding-an-effect.md); ``None`` where a term needs the past.
 
     Laws of force, rate, temperature, supply and vibration follow from every sample; a previous pose, a last turn or a

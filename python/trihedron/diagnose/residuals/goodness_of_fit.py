@@ -96,7 +96,7 @@ def _inside_poses(fitted: Fit, label: int) -> tuple[float, float, Where]:
     holds, t = found.holds[k], fitted.line.obs.time_s
     parts = [fitted.line.obs.segments.holds[i] for i in holds]
     spans = tuple((float(t[hold.start]), float(t[hold.stop - 1])) for hold in parts)
-    return found.p_value[k], found.ratio[k], Where((), tuple(f"hold {i}" for i in holds), spans)
+    return found.p_value[k], found.ratio[k], Where((), tuple(f"pose {i}" for i in holds), spans)
 
 
 AT_END = 1.01
@@ -172,7 +172,7 @@ def locate(fitted: Fit, label: int, n_most: int = 5) -> Where:
     for s in heavy:
         first, last = (obs.segments.holds[s].start, obs.segments.holds[s].stop) if is_hold else obs.move_ranges[s]
         spans.append((float(t[first]), float(t[last - 1])))
-    kind = "hold" if is_hold else "move"
+    kind = "pose" if is_hold else "move"
     return Where(channels, tuple(f"{kind} {s}" for s in heavy), tuple(spans))
 
 

@@ -150,7 +150,7 @@ def _zeros(
         left = curve.rest * size
     else:
         drift, p, is_smooth = _drift(pieces, sensor)
-        candidates.append(Candidate(f"{prefix}-hidden-drift", p, True))
+        candidates.append(Candidate(f"{prefix}-bias-drift", p, True))
         span = float(pieces.time_s[-1] - pieces.time_s[0])
         walk = np.sqrt(3.0) * size * sigma * np.sqrt(float(np.median(pieces.length_s / pieces.count)))
         walk = walk / NOISE_CORNER_S * np.sqrt(span / 6.0)
@@ -274,7 +274,7 @@ def _drifting(
 ) -> AcceptedEffect:
     spans = curve.range * size
     errors = [float(np.hypot(s[v.argmax()], s[v.argmin()])) for v, s in zip(curve.values, curve.sigma, strict=True)]
-    effect_id = f"{PREFIX[sensor]}-hidden-drift"
+    effect_id = f"{PREFIX[sensor]}-bias-drift"
     share = float(np.clip(((curve.rms * size) ** 2).sum() / max(float(raw.var(axis=0).sum()), 1e-300), 0.0, 1.0))
     series = {"time_s": curve.time_s.tolist(), "value": (curve.values * size[:, None]).tolist(),
               "sigma": (curve.sigma * size[:, None]).tolist(), "unit": unit}  # fmt: skip

@@ -20,7 +20,7 @@ FACES: tuple[int, ...] = (1, -1, 2, -2, 3, -3)
 
 
 def face_in_words(face: int) -> Words:
-    """``axis 2 down`` for -2."""
+    """``-Y up`` for -2."""
     return words("face", axis=abs(face), is_up=face > 0)
 
 
@@ -52,7 +52,7 @@ def identify(means: FloatArray, raw_unit: AccelerationUnit) -> IntArray:
         centred = means
     else:
         raise RefusedError(
-            f"{len(means)} still poses in counts are too few to tell faces apart: record all six faces, or say which "
+            f"{len(means)} poses in counts are too few to identify the faces: record all six faces, or say which "
             "face is up in each pose"
         )
     norm = np.linalg.norm(centred, axis=1)
@@ -72,7 +72,7 @@ def faces_up(means: FloatArray, raw_unit: AccelerationUnit, up: Sequence[int] | 
         When there are no poses, or as :func:`identify` and :func:`given`.
     """
     if len(means) == 0:
-        raise RefusedError("there are no still poses: hold each of the six faces still for some seconds")
+        raise RefusedError("no pose was found: keep each of the six faces up and still for some seconds")
     return identify(means, raw_unit) if up is None else given(up, len(means))
 
 

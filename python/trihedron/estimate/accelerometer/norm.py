@@ -28,7 +28,7 @@ _LOSSES: dict[str, tuple[int, float]] = {
     "cauchy": (3, 2.385),
 }
 
-METHOD = "method 2: norm of gravity in still poses"
+METHOD = "method 2: norm of gravity in static poses"
 
 LEAVE_ONE_OUT_LIMIT = 200
 """Up to this many poses each is held out alone; beyond, poses are held out in this many folds of neighbours in time."""
@@ -62,7 +62,7 @@ def calibrate_norm(
     raw_unit : AccelerationUnit
         Unit of ``means``; only kept in the result and used to question implausible scales.
     frame : "lower" or "symmetric"
-        Instrument trihedron. (``case`` needs method 1: still poses do not know the case.)
+        Body frame. (``case`` needs method 1: still poses do not know the case.)
     loss, loss_scale
         Robust loss and its scale in standard errors; the default scales keep 95 % efficiency on Gaussian noise.
     objective : "norm" or "squared"
@@ -156,8 +156,8 @@ def calibrate_norm_samples(
 def _settings(g: float, frame: str, loss: str, loss_scale: float | None, objective: str) -> _core.NormSettings:
     if frame not in ("lower", "symmetric"):
         raise RefusedError(
-            f"still poses of any orientation give the frame 'lower' or 'symmetric', not {frame!r}: "
-            "they do not know the case"
+            f"poses of any orientation give the frame 'lower' or 'symmetric', not {frame!r}: "
+            "they do not determine the case"
         )
     if loss not in _LOSSES:
         raise RefusedError(f"loss must be one of {', '.join(_LOSSES)}, got {loss!r}")
@@ -176,7 +176,7 @@ def _settings(g: float, frame: str, loss: str, loss_scale: float | None, objecti
 def _enough(values: FloatArray) -> None:
     if len(values) < 3:
         raise RefusedError(
-            f"{len(values)} still poses are too few for an accelerometer: record at least nine different orientations, "
+            f"{len(values)} poses are too few for an accelerometer: record at least nine different orientations, "
             "better eighteen (six faces and twelve edges of a cube)"
         )
 

@@ -56,7 +56,7 @@ def pose_in_words(direction: FloatArray) -> Words:
     Examples
     --------
     >>> pose_in_words(np.array([0.7071, 0.0, -0.7071]))
-    'axis 1 up, then tilted 45° so that axis 3 points half down'
+    '+X/-Z edge up'
     """
     u = np.asarray(direction, dtype=np.float64)
     order = np.argsort(-np.abs(u), kind="stable")
@@ -65,9 +65,8 @@ def pose_in_words(direction: FloatArray) -> Words:
     others = [j for j in order[1:] if abs(u[j]) > 0.2]
     if not others:
         return words("face", **face)
-    tilt = np.degrees(np.arccos(min(abs(u[first]) / np.linalg.norm(u), 1.0)))
-    towards = [(j + 1, "up" if u[j] > 0 else "down") for j in others]
-    return words("pose", **face, tilt_deg=tilt, towards=towards)
+    towards = [(j + 1, "+" if u[j] > 0 else "-") for j in others]
+    return words("pose", **face, towards=towards, is_edge=len(others) == 1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -120,7 +120,7 @@ def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
     elif count:
         variance = sums / count
     else:
-        raise RefusedError("the holds are too short to tell the gyro's noise: hold each pose for at least a second")
+        raise RefusedError("the poses are too short to measure the gyro's noise: keep each pose for at least a second")
     converter = recording.facts.of("gyroscope").step ** 2 / 12.0 * step_s
     density: FloatArray = np.sqrt(np.maximum(variance, converter))
     return density
@@ -211,8 +211,7 @@ def _moves_of(recording: Recording, segments: Segments) -> list[Move]:
     moves = [move for move in segments.moves if move.stop - move.start >= 2]
     if not moves:
         raise RefusedError(
-            "no move between two still poses was found: turn the sensor by hand between poses and hold each for some "
-            "seconds"
+            "no move between two poses was found: turn the sensor by hand between poses and keep each for some seconds"
         )
     if moves[-1].stop > recording.n_samples or segments.holds[-1].stop > recording.n_samples:
         raise RefusedError("the segments reach beyond the recording: they belong to another log")
@@ -306,7 +305,7 @@ def _undithered(quantum: FloatArray, sigma: FloatArray | None) -> BoolArray:
 
 def _both_means(segments: Segments) -> tuple[FloatArray, FloatArray]:
     if segments.accelerometer_mean is None or segments.gyroscope_mean is None:
-        raise RefusedError("method 2 needs the hold means of both sensors: segment a recording that has both")
+        raise RefusedError("method 2 needs the pose means of both sensors: segment a recording that has both")
     return segments.accelerometer_mean, segments.gyroscope_mean
 
 
@@ -324,7 +323,7 @@ def _required(readings: FloatArray | None, name: str) -> FloatArray:
 def _mean_variance(sigma_mean: FloatArray | None) -> FloatArray:
     """Variance of the hold means, (n, 3); what rounding leaves in them is in it (docs/segmentation.md)."""
     if sigma_mean is None:
-        raise RefusedError("the segments do not say how certain their hold means are")
+        raise RefusedError("the segments do not say the uncertainty of their pose means")
     return np.ascontiguousarray(np.asarray(sigma_mean, dtype=np.float64) ** 2)
 
 

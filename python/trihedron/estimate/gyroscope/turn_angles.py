@@ -129,9 +129,7 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], zeros: Sequence[t
     if not turns:
         raise RefusedError("method 1 needs turns: none were given and none were found")
     if not zeros:
-        raise RefusedError(
-            "method 1 needs a stretch without rotation (a zero turn): hold the sensor still for some seconds"
-        )
+        raise RefusedError("method 1 needs a stretch without rotation: keep the sensor still for some seconds")
     gyroscope = recording.gyroscope
     edges = np.array([[turn.start, turn.stop] for turn in turns], dtype=np.int64)
     raw_angle, duration = integrate_raw_rate(recording.time_s, gyroscope, edges, 3)
@@ -149,7 +147,9 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], zeros: Sequence[t
         sums += 0.5 * np.sum(np.diff(means, axis=0) ** 2, axis=0) * length * step_s
         count += len(means) - 1
     if count < 4:
-        raise RefusedError("the zero turns are too short to tell the gyro's noise: hold still for some seconds")
+        raise RefusedError(
+            "the stretches without rotation are too short to measure the gyro's noise: keep still for some seconds"
+        )
     var_rate = np.maximum(sums / count, recording.facts.of("gyroscope").step ** 2 / 12.0 * step_s)
     zero_s = np.array(zero_duration)
     rates = zero_angle / zero_s[:, None]

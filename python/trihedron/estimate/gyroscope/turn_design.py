@@ -44,7 +44,7 @@ def design_least_squares(
     q, p, t = _sums(axes, angles_rad, durations_s, noise_density, sigma_turn_rad)
     information = t + zero_s / noise_density**2 - float(np.sum(p**2 / q))
     if not information > 1e-12 * (t + zero_s / noise_density**2):
-        raise RefusedError("nothing tells the zero: turn there and back, or hold still for some seconds")
+        raise RefusedError("nothing determines the bias: turn there and back, or keep still for some seconds")
     var_zero = 1.0 / information
     return TurnDesign(np.sqrt(1.0 / q + (p / q) ** 2 * var_zero), math.sqrt(var_zero))
 
@@ -68,7 +68,7 @@ def design_zero_first(
     """
     q, p, _ = _sums(axes, angles_rad, durations_s, noise_density, sigma_turn_rad)
     if not zero_s > 0.0:
-        raise RefusedError("this route needs a zero turn: hold still for some seconds")
+        raise RefusedError("this route needs a stretch without rotation: keep still for some seconds")
     var_zero = noise_density**2 / zero_s
     return TurnDesign(np.sqrt(1.0 / q + (p / q) ** 2 * var_zero), math.sqrt(var_zero))
 
@@ -87,8 +87,8 @@ def _sums(
     q = np.array([float(np.sum((weight * angle**2)[which == axis])) for axis in range(3)])
     p = np.array([float(np.sum((weight * angle * time)[which == axis])) for axis in range(3)])
     if np.any(q <= 0.0):
-        missing = " and ".join(str(axis + 1) for axis in np.flatnonzero(q <= 0.0))
-        raise RefusedError(f"no turn about axis {missing}: each axis needs one of its own")
+        missing = " and ".join("XYZ"[axis] for axis in np.flatnonzero(q <= 0.0))
+        raise RefusedError(f"no turn about {missing}: each axis needs one of its own")
     return q, p, float(np.sum(weight * time**2))
 
 

@@ -131,7 +131,7 @@ def calibrate_turns(
         covariance=_covariance(fit, inflation, shared),
         raw_unit=recording.gyroscope_unit.value,
         si_unit="rad/s",
-        method="turns" if route == "least-squares" else "turns, zero turn first",
+        method="turns" if route == "least-squares" else "turns, bias first",
         quality=_quality(system, used, fit, S),
         observability=_observability(system, used, fit),
     )
@@ -183,9 +183,9 @@ def _require_every_axis(known: Sequence[KnownTurn], used: npt.NDArray[np.bool_],
     if missing and recording_is_counts and any(turn.is_ambiguous for turn in known):
         raise RefusedError(AMBIGUOUS)
     if missing:
-        names = " and ".join(str(axis + 1) for axis in missing)
+        names = " and ".join("XYZ"[axis] for axis in missing)
         raise RefusedError(
-            f"no usable turn about body axis {names} was found among {len(known)}: turn the sensor about it by a known "
+            f"no usable turn about {names} was found among {len(known)}: turn the sensor about it by a known "
             "angle, there and back, or give the angle of each turn"
         )
 

@@ -101,15 +101,15 @@ def check_same_gravity(axes: Sequence[IdentifiedAxis], accelerometer: SensorCali
     Raises
     ------
     ValueError
-        With what the log of rest reads, and the remedy.
+        With what the static log reads, and the remedy.
     """
     raw_unit = AccelerationUnit(accelerometer.raw_unit)
     mean = np.array([axis.mean * _factor(axis, raw_unit) for axis in _accelerometer_axes(axes)])
     seen = float(np.linalg.norm(accelerometer.S @ mean + accelerometer.b))
     if abs(seen - gravity_m_s2) > LARGEST_MISS_OF_GRAVITY * gravity_m_s2:
         raise RefusedError(
-            f"the log of rest reads {seen:.3g} m/s² of gravity ({gravity_m_s2:.4g}) as this session is calibrated: "
-            "another converter, range or unit; record the rest with the range, rate and output of the session"
+            f"the static log reads {seen:.3g} m/s² of gravity ({gravity_m_s2:.4g}) as this session is calibrated: "
+            "another ADC, range or unit; record the static log with the range, rate and output of the session"
         )
 
 
@@ -166,14 +166,14 @@ def check_same_converter(
     ValueError
         Naming the axis, both figures and the remedy.
     """
-    remedy = "record the rest with the range, rate and output of the session"
+    remedy = "record the static log with the range, rate and output of the session"
     for axis, noise, step, seen in zip("xyz", given, steps, octaves, strict=True):
         fast = noise.sample_sigma
         if step > COARSER * noise.resolution and step > fast > 0.0:
             raise RefusedError(
-                f"the log of rest is of another converter than {source}: accelerometer {axis} has steps of {step:.3g} "
-                f"there, and the noise of the rest, {fast:.3g} a sample in steps of {noise.resolution:.3g}, would have "
-                f"shown them; {remedy}"
+                f"the static log is of another ADC than {source}: accelerometer {axis} has a resolution of {step:.3g} "
+                f"there, and the noise of the static log, {fast:.3g} a sample at a resolution of "
+                f"{noise.resolution:.3g}, would have shown it; {remedy}"
             )
         ratios = [
             (octave.density.lower / expected, octave.density.upper / expected, octave.density.value / expected)
@@ -188,8 +188,8 @@ def check_same_converter(
             middle = math.sqrt(sorted(r[2] for r in ratios)[len(ratios) // 2])
             words = f"{middle:.2g} times that" if middle > 1.0 else f"1/{1.0 / middle:.2g} of that"
             raise RefusedError(
-                f"the noise of accelerometer {axis} inside the still poses of {source} is {words} of the log of rest, "
-                f"at every frequency: another converter, range or unit; {remedy}"
+                f"the noise of accelerometer {axis} inside the poses of {source} is {words} of the static log, "
+                f"at every frequency: another ADC, range or unit; {remedy}"
             )
 
 

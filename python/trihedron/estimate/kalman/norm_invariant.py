@@ -277,7 +277,7 @@ def _mean_readings(readings: npt.ArrayLike) -> FloatArray:
         raise RefusedError(f"readings must have shape (n, 3), got {a.shape}")
     n = len(a)
     if n < N_PARAMETERS:
-        raise RefusedError(f"{n} poses give {n} equations for nine unknowns: hold at least nine, better eighteen")
+        raise RefusedError(f"{n} poses give {n} equations for nine unknowns: record at least nine, better eighteen")
     if not np.all(np.isfinite(a)):
         raise RefusedError(f"pose {int(np.flatnonzero(~np.isfinite(a).all(axis=1))[0]) + 1}: the reading is not finite")
     return a
@@ -310,7 +310,7 @@ def _observability(live: LiveNormCalibration) -> tuple[Observability, list[Findi
     singular = 1.0 / np.sqrt(np.maximum(values, 1e-300))
     condition = float(singular[0] / singular[-1])
     direction = np.linalg.eigh(scale[:, None] * covariance * scale)[1][:, -1]
-    names = (*(f"S{i + 1}{j + 1}" for i, j in ENTRIES), "b1", "b2", "b3")
+    names = (*(f"S_{'xyz'[i]}{'xyz'[j]}" for i, j in ENTRIES), "b_x", "b_y", "b_z")
     weakest = names[int(np.argmax(np.abs(direction)))]
     findings: list[Finding] = []
     if condition > 100.0:

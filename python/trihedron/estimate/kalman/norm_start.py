@@ -13,7 +13,7 @@ from trihedron.refused import RefusedError
 
 @dataclass(frozen=True, eq=False)
 class NormStart:
-    """Where the filter starts: ``f = S (raw − zero)`` with S (3, 3) and zero (3,).
+    """Where the filter starts: ``f = S (raw − zero)`` with S (3, 3) and bias (3,).
 
     S is good to ``sigma_relative`` of its size, the zero reading to ``sigma_zero_m_s2``. The signs of S decide
     the signs of the result: the length of a vector cannot.
@@ -27,7 +27,7 @@ class NormStart:
     def __post_init__(self) -> None:
         S, zero = np.array(self.S, dtype=np.float64), np.array(self.zero, dtype=np.float64)
         if S.shape != (3, 3) or zero.shape != (3,) or not (np.all(np.isfinite(S)) and np.all(np.isfinite(zero))):
-            raise RefusedError(f"a start needs finite S (3, 3) and zero (3,), got shapes {S.shape} and {zero.shape}")
+            raise RefusedError(f"a start needs finite S (3, 3) and bias (3,), got shapes {S.shape} and {zero.shape}")
         if np.linalg.matrix_rank(S) < 3:
             raise RefusedError(
                 "a start needs three independent axes: S = 0 is no calibration, but the filter would stay there"
@@ -54,8 +54,6 @@ class NormStart:
         a = np.asarray(readings, dtype=np.float64)
         half = (a.max(axis=0) - a.min(axis=0)) / 2.0
         if np.any(half <= 0):
-            raise RefusedError(
-                f"axis {'xyz'[int(np.argmin(half))]} never changed: turn it both ways up, or give a start"
-            )
+            raise RefusedError(f"{'XYZ'[int(np.argmin(half))]} never changed: turn it both ways up, or give a start")
         zero = (a.max(axis=0) + a.min(axis=0)) / 2.0
         return cls(np.diag(gravity_m_s2 / half), zero, sigma_relative=0.3, sigma_zero_m_s2=3.0)

@@ -53,7 +53,7 @@ def pose_readings(recording: Recording, segments: Segments, table: PoseTable | N
         return _timed_means(recording, segments, a, table.start_s, table.stop_s)
     mean, sigma = segments.accelerometer_mean, segments.norm_sigma
     if mean is None or sigma is None or segments.n_holds == 0:
-        raise RefusedError(f"{recording.source}: no still pose was found, so there is nothing to calibrate from")
+        raise RefusedError(f"{recording.source}: no pose was found, so there is nothing to calibrate from")
     step = 1.0 / recording.rate_hz
     start = np.array([recording.time_s[hold.start] for hold in segments.holds])
     length = np.array([recording.time_s[hold.stop - 1] + step for hold in segments.holds]) - start
@@ -63,14 +63,14 @@ def pose_readings(recording: Recording, segments: Segments, table: PoseTable | N
         if np.any(chosen >= segments.n_holds):
             worst = int(np.max(chosen)) + 1
             raise RefusedError(
-                f"{table.source}: pose {worst} is asked for, but {recording.source} has {segments.n_holds} still poses"
+                f"{table.source}: pose {worst} is asked for, but {recording.source} has {segments.n_holds} poses"
             )
         if np.any(np.diff(chosen) <= 0):
-            raise RefusedError(f"{table.source}: give the poses in the order in which they were held, each once")
+            raise RefusedError(f"{table.source}: give the poses in the order in which they were recorded, each once")
     elif table is not None and len(table) != segments.n_holds:
         raise RefusedError(
-            f"{table.source} lists {len(table)} poses, but {recording.source} has {segments.n_holds} still poses: add "
-            "a column 'hold' with the number of the still pose (`trihedron segment` lists them), or 'start' and 'stop'"
+            f"{table.source} lists {len(table)} poses, but {recording.source} has {segments.n_holds} poses: add "
+            "a column 'hold' with the number of the pose (`trihedron segment` lists them), or 'start' and 'stop'"
         )
     return PoseReadings(mean[chosen], start[chosen], length[chosen], sigma[chosen])
 

@@ -141,7 +141,7 @@ def _usable(curve: AllanCurve, channel: int) -> CurvePoints:
             chosen.append(i)
     if len(chosen) < FEWEST_POINTS:
         raise RefusedError(
-            f"{curve.names[channel]}: {len(chosen)} points about an octave apart are too few to tell noise terms "
+            f"{curve.names[channel]}: {len(chosen)} points about an octave apart are too few to separate noise terms "
             f"apart; at least {FEWEST_POINTS} are needed"
         )
     return CurvePoints.of(

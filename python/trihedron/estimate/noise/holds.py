@@ -71,7 +71,7 @@ def noise_of_holds(
         raise RefusedError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
     for start, stop in holds:
         if not 0 <= start < stop <= len(x):
-            raise RefusedError(f"a hold runs from an earlier to a later of {len(x)} readings, got {start} to {stop}")
+            raise RefusedError(f"a pose runs from an earlier to a later of {len(x)} readings, got {start} to {stop}")
     channels = x.shape[1]
     names = tuple(names) or tuple(f"channel {c + 1}" for c in range(channels))
     units = tuple(units) or ("",) * channels

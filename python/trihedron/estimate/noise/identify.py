@@ -80,7 +80,7 @@ def identify_noise(
         raise RefusedError(f"{channels} channels need as many names and units, got {len(names)} and {len(units)}")
     if n < SHORTEST:
         raise RefusedError(
-            f"{n} readings ({n / rate_hz:.3g} s) are too few to tell noise terms apart: at least {SHORTEST} are "
+            f"{n} readings ({n / rate_hz:.3g} s) are too few to separate noise terms: at least {SHORTEST} are "
             "needed, an hour or more is useful"
         )
     excluded = [_checked_stretch(stretch, n, rate_hz) for stretch in exclude_s]

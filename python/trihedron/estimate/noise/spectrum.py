@@ -121,7 +121,7 @@ def ordinates(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]
         bands += _segments(x, rate_hz, stretches, block)
     if not bands:
         raise RefusedError(
-            f"no stretch of the log is long enough to tell noise terms apart: the longest has "
+            f"no stretch of the log is long enough to separate noise terms: the longest has "
             f"{max((b - a for a, b in stretches), default=0)} readings; record longer or exclude less"
         )
     return bands

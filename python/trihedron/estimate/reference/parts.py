@@ -70,7 +70,7 @@ def refuse_parts_elsewhere(grid: Grid, reference: Reference, gyro: GyroFit) -> N
         off = step * float(np.median([lag for _, lag in run]))
         raise RefusedError(
             f"{reference.motion.source}: the reference's clock jumps: from {first:.0f} to {last:.0f} s of the log it "
-            f"is {off:+.2g} s off the rest; cut the reference there and use the parts one by one."
+            f"is {off:+.2g} s off the remaining parts; cut the reference there and use the parts one by one."
         )
 
 

@@ -43,7 +43,7 @@ def held_out(
         return ()
     time = grid.time_s * (1.0 + taught.rate) + taught.offset_s
     stages: list[tuple[str, FloatArray]] = [
-        ("one scale, bias from rest", _nominal(grid, taught, reference.rate(time), first))
+        ("one scale, bias from static poses", _nominal(grid, taught, reference.rate(time), first))
     ]
     if given is not None:
         # The given numbers lie in a frame of their own: the turn between the two is the mounting, no fault of theirs.

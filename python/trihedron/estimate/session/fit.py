@@ -63,9 +63,9 @@ class SessionSolution:
 def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray) -> SessionSolution:
     """Fit a session from a start on raw readings (``S_a`` lower triangular).
 
-    How strong the noise of the session is, poses and gravity after moves say. A velocity that they do not expect is left
-    out: what makes it miss (arms between the accelerometers, a delay) follows the motion and is no noise. Widened to its
-    size it still pulled a real accelerometer by five of its standard errors.
+    How strong the noise of the session is, poses and gravity after moves say. A velocity that they do not expect is
+    left out: what makes it miss (arms between the accelerometers, a delay) follows the motion and is no noise. Widened
+    to its size it still pulled a real accelerometer by five of its standard errors.
     """
     core = fitted(observed, S_a, b_a + S_a @ observed.force_origin, S_w)
     corner, scatter, between, (gravity, _) = core.strengths

@@ -95,7 +95,7 @@ def _weight(session: Session, picked: list[int], wander: FloatArray) -> FloatArr
 
 
 def _dof(name: str, n_sessions: int) -> float:
-    return n_sessions * (WANDER_DOF if name.endswith("zero") else SPREAD_DOF)
+    return n_sessions * (WANDER_DOF if name.endswith("bias") else SPREAD_DOF)
 
 
 def _left(values: FloatArray, weights: FloatArray, column: FloatArray | None) -> float:

@@ -64,7 +64,7 @@ class Thermal:
 class ExportOptions:
     """What a file of another program holds besides S and b.
 
-    ``accelerometer_noise``, ``gyroscope_noise`` from a rest log; ``rate_hz`` of the samples; ``topic`` where they are
+    ``accelerometer_noise``, ``gyroscope_noise`` from a static log; ``rate_hz`` of the samples; ``topic`` where they are
     published; ``accel_lsb``, ``gyro_lsb`` the size of a count that the target's driver assumes (``3.33 mg``);
     ``current_parameters`` the text of a file of the parameters that a flight controller held while the log was made.
     """
@@ -143,7 +143,7 @@ def heading(calibration: Calibration, equation: str, held: tuple[str, ...] = ())
         rows.append("One of the triads is mirrored against the other: check the signs of the axes before use.")
     effects = [effect for effect in effect_ids(calibration) if effect not in held]
     if effects:
-        rows.append(f"Left out, since this file cannot hold it: {', '.join(effects)}.")
+        rows.append(f"Not in this file, which has no field for it: {', '.join(effects)}.")
     if "thermal" not in held:
         rows += lost_temperature(calibration)
     return [row.replace("\n", " ").replace("\r", " ") for row in rows]
@@ -165,11 +165,11 @@ def effect_parameters(calibration: Calibration, effect_id: str) -> dict[str, flo
 
 
 def lost_to_a_diagonal(calibration: Calibration) -> list[str]:
-    """What a model of scales and zeros alone leaves of this calibration, in words with sizes."""
+    """What a model of scales and biases alone leaves of this calibration, in words with sizes."""
     said = []
     u, _, vt = np.linalg.svd(_unit_columns(calibration.accelerometer))
     for name, sensor in named_sensors(calibration):
-        # How the accelerometer's triad as a whole is turned is a choice of frame, which no still pose knows.
+        # How the accelerometer's triad as a whole is turned is a choice of frame, which no pose knows.
         unit = (u @ vt).T @ _unit_columns(sensor)
         off = np.abs(unit - np.diag(np.diag(unit)))
         half_width = 1.96 * sensor.sigma_S * np.linalg.norm(np.linalg.inv(sensor.S), axis=1)

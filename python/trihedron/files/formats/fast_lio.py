@@ -15,7 +15,9 @@ def to_fast_lio(calibration: Calibration, options: ExportOptions) -> str:
     """Keys of the IMU for its configuration's ``mapping``."""
     _, figures, lines = noise_alone(calibration, options, "FAST-LIO", ": variances of one sample")
     lines += [
-        f"# {name} is an upper limit: it was not seen in the rest log." for name, one in figures.named() if one.is_limit
+        f"# {name} is an upper limit: it was not seen in the static log."
+        for name, one in figures.named()
+        if one.is_limit
     ]
     lines += ["common:", f'  imu_topic: "{options.topic}"', "mapping:"]
     for key, one in (

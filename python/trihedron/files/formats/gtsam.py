@@ -16,7 +16,9 @@ def to_gtsam(calibration: Calibration, options: ExportOptions) -> str:
     figures = required(known, options, "GTSAM")
     lines = [f"# {line}" for line in heading(known, "true = S @ raw + b; preintegrate what is true.")]
     lines += [
-        f"# {name} is an upper limit: it was not seen in the rest log." for name, one in figures.named() if one.is_limit
+        f"# {name} is an upper limit: it was not seen in the static log."
+        for name, one in figures.named()
+        if one.is_limit
     ]
     lines += ["import numpy as np", ""]
     for name, sensor in named_sensors(known):

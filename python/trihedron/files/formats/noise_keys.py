@@ -49,7 +49,7 @@ def required(calibration: Calibration, options: ExportOptions, target: str) -> F
 
 def noise_row(name: str, figure: NoiseFigure, unit: str) -> list[str]:
     """A comment with the unit, then ``name: value``."""
-    said = f"# {unit}" + (", an upper limit: this walk was not seen in the rest log" if figure.is_limit else "")
+    said = f"# {unit}" + (", an upper limit: this walk was not seen in the static log" if figure.is_limit else "")
     return [said, f"{name}: {number(figure.value)}"]
 
 
@@ -67,7 +67,7 @@ def si_rows(figures: Figures, names: tuple[str, str, str, str]) -> list[str]:
 def limits(options: ExportOptions) -> list[str]:
     """Which figures are upper limits, in words."""
     return [
-        f"{name} {term} is an upper limit: it was not seen in the rest log."
+        f"{name} {term} is an upper limit: it was not seen in the static log."
         for name, noise in (("accelerometer", options.accelerometer_noise), ("gyroscope", options.gyroscope_noise))
         if noise is not None
         for term, figure in (("N", noise.N), ("K", noise.K))

@@ -55,5 +55,5 @@ def said_of(
     lines += lost
     for name, noise in (("accelerometer", options.accelerometer_noise), ("gyroscope", options.gyroscope_noise)):
         if noise is not None and noise.K.is_limit:
-            lines.append(f"The {name}'s walk is an upper limit: it was not seen in the rest log.")
+            lines.append(f"The {name}'s walk is an upper limit: it was not seen in the static log.")
     return lines

@@ -24,7 +24,7 @@ _SURE, _SCALES_DIFFER = 4.0, 0.01
 
 
 def audit_pace(time_s: FloatArray, sensors: Sensors) -> list[Finding]:
-    """A finding where stamps (n,) run at one rate up to a row and at another from there on, unless gravity turned
+    """A finding where timestamps (n,) run at one rate up to a row and at another from there on, unless gravity turned
     so."""
     accelerometer, gyroscope = sensors.accelerometer, sensors.gyroscope
     if gyroscope is None:
@@ -41,7 +41,7 @@ def audit_pace(time_s: FloatArray, sensors: Sensors) -> list[Finding]:
             sides.append(turning_of(accelerometer[part], gyroscope[part], rate))
         before, after = sides
         if before is not None and after is not None and before.is_clear and after.is_clear:
-            # Stamps that lie change the scale at which gravity turns by their ratio; true ones leave it.
+            # Timestamps that lie change the scale at which gravity turns by their ratio; true ones leave it.
             change = math.log(after.scale / before.scale)
             sigma = math.hypot(before.sigma / before.scale, after.sigma / after.scale, _SCALES_DIFFER)
             may_be_true, may_lie = (abs(change + x) < _SURE * sigma for x in (0.0, math.log(ratio)))
@@ -56,7 +56,7 @@ def audit_pace(time_s: FloatArray, sensors: Sensors) -> list[Finding]:
 
 
 def usual_mean(time_s: FloatArray) -> float:
-    """Mean step [s] of stamps (n,) but for gaps."""
+    """Mean step [s] of timestamps (n,) but for gaps."""
     step = np.diff(time_s)
     return float(step[step < GAP_STEPS * usual_step(time_s)].mean())
 

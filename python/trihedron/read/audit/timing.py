@@ -1,4 +1,4 @@
-"""Rate, jitter, gaps, duplicate stamps, lost packets."""
+"""Rate, jitter, gaps, duplicate timestamps, lost packets."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ def audit_timing(
     lost_behind: npt.NDArray[np.int64] | None = None,
     stamps_s: FloatArray | None = None,
 ) -> list[Finding]:
-    """Findings on time stamps that were in the log. ``place(i)`` names sample i for people.
+    """Findings on timestamps that were in the log. ``place(i)`` names sample i for people.
 
     ``lost_behind`` (n - 1,) are the samples lost behind each, where the clock tells them; else long steps count.
-    ``stamps_s`` (n,) are the stamps as logged where an even clock took their place.
+    ``stamps_s`` (n,) are the timestamps as logged where an even clock took their place.
     """
     if len(time_s) < 3:
         return []
@@ -51,7 +51,7 @@ def audit_timing(
     if lost_behind is not None:
         findings += _lost(np.diff(time_s), lost_behind, place) if lost_behind.any() else []
     elif sampling.kind in (StampKind.LATE, StampKind.SCATTERED):
-        pass  # a late stamp looks like a loss: how many are lost is not told
+        pass  # a late timestamp looks like a loss: how many are lost is not told
     else:
         batched = bool(findings) and steps_of(time_s).same > 0.2 * (len(time_s) - 1)
         gaps = _core.steps_above(time_s, (5.0 if batched else GAP_STEPS) * usual)

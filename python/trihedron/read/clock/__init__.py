@@ -1,4 +1,4 @@
-"""The time base of a log: its unit, its order, its rate, and whether its stamps are when the samples were taken."""
+"""The time base of a log: its unit, its order, its rate, and whether its timestamps are when the samples were taken."""
 
 from trihedron.read.clock.base import Clock, build_clock
 from trihedron.read.clock.rate import mean_rate_hz

@@ -1,4 +1,4 @@
-"""The even clock behind a log's stamps, if there is one, and the samples lost on it (docs/reading.md, section 4)."""
+"""The even clock behind a log's timestamps, if any, and the samples lost on it (docs/reading.md, section 4)."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from trihedron.read.clock.rounded import numbers_of_rounded
 from trihedron.records.sampling import StampKind
 
 FEWEST_ROWS = 100
-"""Fewer stamps tell no kind of clock."""
+"""Fewer timestamps tell no kind of clock."""
 UNSEEN = 0.02
-"""Part of a period by which stamps may stray from an even clock before anybody asks how it grows."""
+"""Part of a period by which timestamps may stray from an even clock before anybody asks how it grows."""
 EXACT = 0.005
 """Stamps this part of a period about an even clock (rms) are even."""
 GROWTH = 4.0
 """Growth of the variance of a lag's elapsed time over sixteen times the lag, above which no even clock lies behind the
-stamps: 16 for steps drawn anew, 1 for an even clock."""
+timestamps: 16 for steps drawn anew, 1 for an even clock."""
 TAKEN_BACK = 0.02
-"""Share of blocks whose earliest stamp may move back by a whole period: an even clock's never do."""
+"""Share of blocks whose earliest timestamp may move back by a whole period: an even clock's never do."""
 MOST_BLOCKS = 1 << 18
-"""Blocks of a stretch whose earliest stamps the clock is laid under."""
+"""Blocks of a stretch whose earliest timestamps the clock is laid under."""
 CLOSE_PIECES = 60
 """Pieces of a log over which a wandering rate is followed: a thermal drift takes minutes."""
 
@@ -36,8 +36,8 @@ CLOSE_PIECES = 60
 @dataclass(frozen=True, eq=False)
 class EvenClock:
     """``tick`` (n,) number of each sample, lost ones counted; ``even_s`` (n,) when the even clock took it, relative to
-    the stamps; ``kind``; ``counts_losses``: whether ``tick`` says what was lost; ``pauses`` (m,) rows behind which the
-    logger paused; ``wanders``: the rate changes over the log."""
+    the timestamps; ``kind``; ``counts_losses``: whether ``tick`` says what was lost; ``pauses`` (m,) rows behind which
+    the logger paused; ``wanders``: the rate changes over the log."""
 
     kind: StampKind
     period_s: float
@@ -62,10 +62,10 @@ class EvenClock:
 
 
 def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> EvenClock | None:
-    """The even clock behind stamps (n,) in order, or ``None`` for fewer than 100 rows.
+    """The even clock behind timestamps (n,) in order, or ``None`` for fewer than 100 rows.
 
     ``counter`` (n,) numbers the samples, lost ones too, from 0 (already continued where it wraps): then it tells the
-    losses and the stamps only the rate.
+    losses and the timestamps only the rate.
     """
     n = len(time_s)
     if n < FEWEST_ROWS or not time_s[-1] > time_s[0]:
@@ -80,7 +80,7 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
 
 
 def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> EvenClock:
-    """The clock of stamps (n,) whose period was ``found``."""
+    """The clock of timestamps (n,) whose period was ``found``."""
     n, period, sees = len(time_s), found.period_s, found.is_seen
     # Lateness, clock and error one after the other: a long log has no room for two, and asking for it anew takes time.
     room = _core.room(n, 1).reshape(-1)
@@ -124,13 +124,13 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
 
 
 def _error(time_s: FloatArray, even: FloatArray) -> FloatArray:
-    """``time_s - even`` in the place of ``even``, which is the stamps less their error again when it is wanted."""
+    """``time_s - even`` in the place of ``even``, which is the timestamps less their error again when it is wanted."""
     _core.stamp_errors(time_s, even)
     return even
 
 
 def _long_run(time_s: FloatArray, tick: IntArray) -> float:
-    """Period from stamps and their numbers: a line through the earliest stamps of some hundred blocks, thrice."""
+    """Period from timestamps and their numbers: a line through the earliest of some hundred blocks, thrice."""
     period = float((time_s[-1] - time_s[0]) / max(tick[-1] - tick[0], 1))
     width = max(len(time_s) // 300, 8)
     for _ in range(3):
@@ -151,7 +151,7 @@ def _lay(
     room: FloatArray,
     pieces: int = 12,
 ) -> tuple[FloatArray, float, float, bool]:
-    """The even clock (n,) under the earliest stamps, or through the middle of all; its mean period over the
+    """The even clock (n,) under the earliest timestamps, or through the middle of all; its mean period over the
     longest stretch and the standard error of that; whether its rate wanders, followed in so many ``pieces``.
 
     ``least`` rows make a block at least; ``room`` (n,) takes the clock."""
@@ -229,7 +229,7 @@ def _range(error: FloatArray) -> float:
 
 
 def _kind(error: FloatArray, period: float, grid: float) -> StampKind:
-    """Kind of stamps from their errors (n,) about the even clock."""
+    """Kind of timestamps from their errors (n,) about the even clock."""
     probe = error[:: max(len(error) // 100_000, 1)]
     low, middle, high = quantiles(probe[:, None], [0.002, 0.5, 0.998])[:, 0]
     rms = float(np.std(probe))

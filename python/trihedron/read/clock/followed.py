@@ -1,4 +1,4 @@
-"""Whether readings follow the scatter of their stamps: motion tells when a sample was taken (docs/reading.md, 4)."""
+"""Whether readings follow the scatter of their timestamps: motion shows it (docs/reading.md, 4)."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def followed(time_s: FloatArray, even_s: FloatArray, tick: IntArray, triads: lis
     """Share s of the stamps' scatter about an even clock that the readings (n, 3) follow, and its standard error.
 
     A sample taken δ late reads x' δ more, and stands out from the cubic through its neighbours by the contrast of that:
-    s is the slope of one against the other over all channels in motion. 1: samples were taken when stamped; 0: evenly.
-    The error is that of blocks (infinite without motion).
+    s is the slope of one against the other over all channels in motion. 1: samples were taken when timestamped; 0:
+    evenly. The error is that of blocks (infinite without motion).
     """
     step_s = float((even_s[-1] - even_s[0]) / max(int(tick[-1] - tick[0]), 1))
     top = np.zeros(0)
@@ -59,7 +59,7 @@ def _spread(x: FloatArray) -> float:
 
 def _sums(late: FloatArray, step_s: float, tick: IntArray, triads: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Blocks' sums of misfit times prediction and of squared prediction."""
-    from scipy.ndimage import uniform_filter1d  # here: most logs have stamps that need no such question
+    from scipy.ndimage import uniform_filter1d  # here: most logs have timestamps that need no such question
 
     n = len(late)
     margin = REACH + 2

@@ -1,4 +1,4 @@
-"""Samples lost on a clock of known period, by which the earliest stamps move and stay moved (docs/reading.md, 4)."""
+"""Samples lost on a clock of known period, by which the earliest timestamps shift (docs/reading.md, 4)."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from trihedron.ranges import ranges_of
 from trihedron.read.clock.period import PAUSE_STEPS
 
 LOST = 0.6
-"""Part of a period by which the earliest stamps must move, and stay moved, for a sample to be lost."""
+"""Part of a period by which the earliest timestamps must move, and stay moved, for a sample to be lost."""
 MISS = 1e-2
-"""Chance that no stamp of a whole log's blocks is nearly undelayed."""
+"""Chance that no timestamp of a whole log's blocks is nearly undelayed."""
 SETTLED_OVER = 5
-"""Blocks over which the level of the earliest stamps is looked at on either side of a place."""
+"""Blocks over which the level of the earliest timestamps is looked at on either side of a place."""
 UNMOVED = LOST / (2.0 * SETTLED_OVER)
 """Moves from block to block, in periods, of which so many together are no loss."""
 STALL_STEPS = 120
@@ -25,7 +25,7 @@ STALL_STEPS = 120
 
 
 def block_rows(time_s: FloatArray, period: float, coherence: float) -> int:
-    """Rows among which one is all but certainly stamped without delay, 2 (θ/T) ln(n/α), and more than a packet."""
+    """Rows among which one is all but certainly timestamped without delay, 2 (θ/T) ln(n/α), and more than a packet."""
     n = len(time_s)
     mean_delay = np.sqrt(float(np.clip(coherence, 0.05, 1.0)) ** -2 - 1.0) / (
         2.0 * np.pi
@@ -40,7 +40,7 @@ def block_rows(time_s: FloatArray, period: float, coherence: float) -> int:
 
 
 def earliest(late: FloatArray, width: int) -> IntArray:
-    """Row of the earliest stamp of every block of ``width`` rows (the last one may be longer)."""
+    """Row of the earliest timestamp of every block of ``width`` rows (the last one may be longer)."""
     return _core.earliest_stamps(late, width)
 
 
@@ -66,8 +66,8 @@ def track(
 ) -> tuple[float, IntArray, IntArray, float]:
     """Period, tick of every row, pauses, and the share of blocks that moved back by a period; works in ``room`` (n,).
 
-    The earliest stamp of every block, a stall of the link looked past, moves by whole periods where samples are lost
-    and by a little where the period is not quite right; a period that was not seen comes from first and last stamp.
+    The earliest timestamp of every block, a stall of the link looked past, moves by whole periods where samples are
+    lost and by a little where the period is not quite right; a period not seen comes from first and last timestamp.
     """
     n = len(time_s)
     pauses = _core.steps_above(time_s, PAUSE_STEPS * period)
@@ -109,7 +109,7 @@ def track(
 def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost: IntArray) -> tuple[int, int]:
     """Write the samples lost in front of each row of one stretch into ``lost``; ``late`` in periods.
 
-    Behind the last block a loss is counted only where every stamp is nearly right (``is_sharp``).
+    Behind the last block a loss is counted only where every timestamp is nearly right (``is_sharp``).
 
     Returns the number of blocks that moved back by a period, and of all blocks.
     """
@@ -141,7 +141,7 @@ def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost
 
 
 def _is_unmoved(first: FloatArray) -> bool:
-    """Whether no earliest stamp (m,), in periods, is further from the one before than noise is."""
+    """Whether no earliest timestamp (m,), in periods, is further from the one before than noise is."""
     count, _, _, least, most = _core.inside_steps(first, -np.inf, np.inf)
     return 0 < count == len(first) - 1 and max(-least, most) <= UNMOVED
 
@@ -155,9 +155,9 @@ def _behind_last(late: FloatArray, at: int, level: float, is_sharp: bool, lost: 
 
 
 def _settle(first: FloatArray, count: IntArray) -> None:
-    """Correct ``count`` (m - 1,) where the level of the earliest stamps (m,), losses taken off, stays a period away.
+    """Correct ``count`` (m - 1,) where the level of the earliest timestamps (m,), losses removed, stays a period off.
 
-    A block without an early stamp hides the move to the next level in two halves; a chance early one invents a move.
+    A block without an early timestamp hides the move to the next level in two halves; a chance early one makes one up.
     """
     m = SETTLED_OVER
     for _ in range(3):
@@ -182,10 +182,10 @@ def _settle(first: FloatArray, count: IntArray) -> None:
 
 
 def behind_late_rows(tick: IntArray, error: FloatArray, period: float) -> IntArray:
-    """Ticks with every loss put behind the rows that it would have stamped before they were taken.
+    """Ticks with every loss put behind the rows that it would have timestamped before they were taken.
 
     A row late by most of a period in front of a loss looks like one behind it; counted so its ``error`` (n,) about the
-    earliest stamps is negative.
+    earliest timestamps is negative.
     """
     parts = range(1, len(tick), 1 << 18)
     at = np.concatenate([a + np.flatnonzero(np.diff(tick[a - 1 : a + (1 << 18)]) > 1) for a in parts])

@@ -61,7 +61,7 @@ def in_order(values: FloatArray, rows: npt.NDArray[np.signedinteger], out: Float
 
 
 def _overlapping(raw: FloatArray) -> Iterator[tuple[int, FloatArray]]:
-    """Parts of the stamps, each with the first of the next one, and where they begin."""
+    """Parts of the timestamps, each with the first of the next one, and where they begin."""
     for start in range(0, max(len(raw) - 1, 1), PART):
         yield start, raw[start : start + PART + 1]
 
@@ -69,7 +69,7 @@ def _overlapping(raw: FloatArray) -> Iterator[tuple[int, FloatArray]]:
 def order_of_rows(
     raw: FloatArray, table: Table, column: int, rows: npt.NDArray[np.signedinteger] | None, findings: list[Finding]
 ) -> npt.NDArray[np.signedinteger] | None:
-    """Rows in order of their stamps; ``None`` where they are.
+    """Rows in order of their timestamps; ``None`` where they are.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The sampling period from stamps alone, before any loss is counted: the peak of a phase sum (docs/reading.md, 4)."""
+"""The sampling period from timestamps alone, before losses are counted: a peak of a phase sum (docs/reading.md, 4)."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ MOST_WINDOWS = 10
 LOWEST, HIGHEST = 0.8, 1.9
 """Periods looked for, as parts of the rows' mean distance: up to 45 % of all samples may be lost."""
 GRID_HIGHEST = 16.0
-"""A grid of stamps finer than this part of a period is no matter."""
+"""A grid of timestamps finer than this part of a period is no matter."""
 LINE, LINE_HELD = 0.98, 0.9
-"""Power of a phase sum, and of that of its eighth multiple, above which all stamps lie on multiples of one step."""
+"""Power of a phase sum, and of that of its eighth multiple, above which all timestamps lie on multiples of one step."""
 LEAST = 1e-4
 """Power below which nothing is a peak."""
 CHANCE = 1e-7
@@ -34,7 +34,7 @@ itself if its phase sum is shorter than the second."""
 MANY, PLAIN = 0.15, 0.25
 """A period by which more than this share of samples is lost needs a power of its phase sum above the second."""
 FEWEST_STAMPS = 100
-"""Distinct stamps that a period needs."""
+"""Distinct timestamps that a period needs."""
 WHOLE = 0.005
 """A packet holds a whole number of samples if the rows come this near to it."""
 POLLED = 0.55
@@ -47,8 +47,8 @@ PAUSE_STEPS = 50.0
 
 @dataclass(frozen=True)
 class Period:
-    """``period_s``; ``coherence`` the length of its phase sum (1: stamps exactly even, 0: none seen); ``grid_s`` the
-    step on whose multiples all stamps lie, or 0. ``is_seen``: the period stands out, so that losses can be counted."""
+    """``period_s``; ``coherence`` the length of its phase sum (1: timestamps exactly even, 0: none seen); ``grid_s``
+    the step on whose multiples all timestamps lie, or 0. ``is_seen``: the period stands out: losses can be counted."""
 
     period_s: float
     coherence: float
@@ -57,11 +57,11 @@ class Period:
 
 
 def find_period(time_s: FloatArray) -> Period:
-    """Period of stamps (n,) in order; at least 64 rows.
+    """Period of timestamps (n,) in order; at least 64 rows.
 
     ``|mean exp(2πi t/T)|²`` is averaged over windows of 2048 rows. Samples lost by whole periods leave its peak where
-    it is; a delay d lowers it to ``|E exp(2πi d/T)|²``. Where several periods explain the stamps alike (batches, coarse
-    grids) the one that loses fewest samples is taken.
+    it is; a delay d lowers it to ``|E exp(2πi d/T)|²``. Where several periods explain the timestamps alike (batches,
+    coarse grids) the one that loses fewest samples is taken.
     """
     windows, mean_step = _windows(time_s)
     cell = mean_step / (2.0 * GRID_HIGHEST)
@@ -112,7 +112,7 @@ class _Spectrum:
 
 
 def _first_line(windows: list[FloatArray], mean_step: float, spectrum: _Spectrum) -> float:
-    """Lowest frequency (per mean distance of rows) on whose multiples all stamps lie; 0 where there is none."""
+    """Lowest frequency (per mean distance of rows) on whose multiples all timestamps lie; 0 where there is none."""
     per_step = spectrum.per_step
     high = np.flatnonzero((spectrum.power > 0.9 * LINE) & (per_step >= 0.05) & (per_step <= GRID_HIGHEST))
     while len(high):
@@ -137,7 +137,7 @@ def _mean_power(windows: list[FloatArray], frequency_hz: FloatArray) -> FloatArr
 
 
 def _direct(time_s: FloatArray, frequency_hz: FloatArray) -> FloatArray:
-    """Power of the phase sum of the first stamps at every frequency (k,), evenly spaced."""
+    """Power of the phase sum of the first timestamps at every frequency (k,), evenly spaced."""
     first, step = float(frequency_hz[0]), float(frequency_hz[1] - frequency_hz[0])
     return _core.direct_power(time_s[:512], first, step, len(frequency_hz))
 
@@ -165,7 +165,7 @@ def _windows(time_s: FloatArray) -> tuple[list[FloatArray], float]:
 
 
 def _poll(spectrum: _Spectrum) -> float:
-    """Lowest frequency of a beat slower than the rows that most stamps keep to; 0 where there is none."""
+    """Lowest frequency of a beat slower than the rows that most timestamps keep to; 0 where there is none."""
     a, b = int(POLLED / spectrum.width), int(SLOWER / spectrum.width) - spectrum.lobe
     inside = spectrum.power[int(SLOWER / spectrum.width) : int(HIGHEST / spectrum.width)]
     strong = np.flatnonzero(spectrum.power[a:b] > max(0.5, 0.9 * float(inside.max()))) if b > a else np.zeros(0)

@@ -1,4 +1,4 @@
-"""Samples per second of stamps that nobody has judged yet."""
+"""Samples per second of timestamps that nobody has judged yet."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from trihedron.read.clock.steps import steps_of
 
 
 def usual_step(time_s: FloatArray) -> float:
-    """Median of the steps forward of stamps (n,); NaN where there is none."""
+    """Median of the steps forward of timestamps (n,); NaN where there is none."""
     return _core.usual_step(np.asarray(time_s, dtype=np.float64))
 
 
 def mean_rate_hz(time_s: FloatArray) -> float:
-    """Samples per second outside gaps: stamps rounded to a millisecond or batched do not bias it."""
+    """Samples per second outside gaps: timestamps rounded to a millisecond or batched do not bias it."""
     usual = usual_step(time_s)
     if steps_of(time_s).same > 0.2 * (len(time_s) - 1):
         step = np.diff(time_s)
-        # Stamped in batches: samples before the last stamp, over the time they took.
+        # Stamped in batches: samples before the last timestamp, over the time they took.
         before_last = int(np.searchsorted(time_s, time_s[-1]))
         return before_last / float(step[step <= 5.0 * usual].sum())
     count, total, *_ = _core.inside_steps(np.asarray(time_s, dtype=np.float64), -np.inf, 1.5 * usual)

@@ -1,4 +1,4 @@
-"""Samples numbered by their stamps' own steps, where rounding to a grid is all that is wrong with the stamps."""
+"""Samples numbered by their stamps' own steps, where rounding to a grid is all that is wrong with the timestamps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which clock a recording gets: its stamps, or the even clock behind them (docs/reading.md, section 4)."""
+"""Which clock a recording gets: its timestamps, or the even clock behind them (docs/reading.md, section 4)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ WORTH = 0.03
 """Stamps this part of a step (rms) about an even clock are as good as even (those rounded to a tenth of a step are):
 a turn integrated over them errs by less than a thirtieth of what one sample adds."""
 SHARED = 0.005
-"""Share of samples with the stamp of the one before, above which stamps cannot be when samples were taken."""
+"""Share of samples with the timestamp of the one before, above which timestamps cannot be when samples were taken."""
 STANDARD_ERRORS, SYSTEMATIC = 4.0, 0.15
 """A share of 0 or 1 is refused beyond four standard errors and what a filter, or a bent course, makes of it."""
 VAGUE = 0.2
@@ -41,10 +41,10 @@ class Settled:
 def settle_clock(
     time_s: FloatArray, start_s: float, triads: list[FloatArray], counter: FloatArray | None = None
 ) -> Settled:
-    """The clock of samples with stamps (n,) and readings (n, 3) in every one of ``triads``.
+    """The clock of samples with timestamps (n,) and readings (n, 3) in every one of ``triads``.
 
-    Stamps that two samples share, and those that are an even clock's but for rounding, give way to it; others if motion
-    says that the samples were taken evenly. A ``counter`` (n,) that counts samples tells which were lost.
+    Timestamps that two samples share, and those that are an even clock's but for rounding, give way to it; others if
+    motion says that the samples were taken evenly. A ``counter`` (n,) that counts samples tells which were lost.
     """
     clock = find_even_clock(time_s)
     numbers = None if counter is None else sample_numbers(counter)
@@ -83,7 +83,7 @@ def settle_clock(
 
 
 def _worth(kind: StampKind) -> float:
-    # Rounding is the file's, not the sensor's, however small: left in the stamps it would be found as jitter.
+    # Rounding is the file's, not the sensor's, however small: left in the timestamps it would be found as jitter.
     return EXACT if kind is StampKind.ROUNDED else WORTH
 
 
@@ -115,7 +115,7 @@ def _findings(sampling: Sampling, clock: EvenClock, shared: float) -> tuple[Find
         Finding.of(
             FindingCode.EVEN_CLOCK
             if sampling.is_even
-            else FindingCode.STAMPS_KEPT
+            else FindingCode.TIMESTAMPS_KEPT
             if follows_wholly
             else FindingCode.CLOCK_UNDECIDED,
             period_s=sampling.period_s,

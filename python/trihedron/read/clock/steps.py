@@ -1,4 +1,4 @@
-"""What the steps from stamp to stamp are, in one pass: most logs have no odd one, and need not be looked at again."""
+"""What the steps from timestamp to timestamp are, in one pass: most logs have no odd one and are done."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from trihedron.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Steps:
-    """Numbers of steps ``back``, of zero (``same``) and ``forward``, and of stamps that are not finite."""
+    """Numbers of steps ``back``, of zero (``same``) and ``forward``, and of timestamps that are not finite."""
 
     back: int
     same: int
@@ -21,5 +21,5 @@ class Steps:
 
 
 def steps_of(time_s: FloatArray) -> Steps:
-    """Steps of stamps (n,)."""
+    """Steps of timestamps (n,)."""
     return Steps(*_core.stamp_steps(np.asarray(time_s, dtype=np.float64)))

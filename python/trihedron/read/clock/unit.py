@@ -90,7 +90,7 @@ def seconds_of(unit: str) -> float:
 def time_unit(
     raw: FloatArray, named: str, given: str | None, wraps: bool, witness: Witness, findings: list[Finding]
 ) -> str:
-    """Unit of stamps (n,) in order: as given, as named, by their date, or the likeliest; a doubt becomes a finding."""
+    """Unit of timestamps (n,) in order: given, named, by their date, or the likeliest; a doubt becomes a finding."""
     if given is not None:
         return parse_time_unit(given)
     if named and named != TICKS:
@@ -98,7 +98,7 @@ def time_unit(
     n_steps, n_forward = len(raw) - 1, steps_of(raw).forward
     if not n_forward:
         return "s"
-    # Stamps that several rows share: a row lasts the span over the rows, not the step between stamps.
+    # Timestamps that several rows share: a row lasts the span over the rows, not the step between timestamps.
     shared = n_forward < 0.8 * n_steps
     usual = float((raw[-1] - raw[0]) / n_steps) if shared else usual_step(raw)
     start = float(raw[0])

@@ -25,7 +25,7 @@ from trihedron.units import acceleration_to_si, rate_to_si
 LONG_ROW_S = 0.5
 """Rows of rate further apart than this are commands that hold until the next: no logger of a table is so slow."""
 SHORTEST_STEP = 0.1
-"""Rows nearer than a tenth of the usual step share an arrival: one of them is left out."""
+"""Rows nearer than a tenth of the usual step share an arrival: one of them is excluded."""
 
 
 def read_reference(path: str | os.PathLike[str], columns: str | None = None) -> ReferenceMotion:
@@ -48,7 +48,7 @@ def read_reference(path: str | os.PathLike[str], columns: str | None = None) -> 
     used = [role for role in roles if role.what != "time"]
     whole = np.all([np.isfinite(table.columns[role.column][rows]) for role in used], axis=0) if used else None
     if whole is None or whole.sum() < 2:
-        raise ReadError(f"{table.path}: this reference tells neither attitude nor rate: its columns are {WAYS}.")
+        raise ReadError(f"{table.path}: this reference has neither attitude nor rate: its columns are {WAYS}.")
     if not np.all(whole):
         rows = rows[whole]
     time_s = clock.time_s[whole]
@@ -56,7 +56,7 @@ def read_reference(path: str | os.PathLike[str], columns: str | None = None) -> 
     rate = None if attitude is not None else _triad(table, used, "w", rows, "rate")
     position = None if attitude is None else _triad(table, used, "p", rows, "position")
     if attitude is None and rate is None:
-        raise ReadError(f"{table.path}: this reference tells neither attitude nor rate: its columns are {WAYS}.")
+        raise ReadError(f"{table.path}: this reference has neither attitude nor rate: its columns are {WAYS}.")
     return _settled(table, time_s, clock.start_s, attitude, rate, position, (*table.findings, *clock.findings))
 
 
@@ -109,7 +109,7 @@ def _settled(
     table: Table, time_s: FloatArray, start_s: float, attitude: FloatArray | None, rate: FloatArray | None,
     position: FloatArray | None, findings: tuple[Finding, ...],
 ) -> ReferenceMotion:  # fmt: skip
-    """With the even clock behind its stamps, where there is one."""
+    """With the even clock behind its timestamps, where there is one."""
     stepwise = rate is not None and float(np.median(np.diff(time_s))) > LONG_ROW_S
     if not stepwise:
         # Rows of a matrix move as vectors do: two of them are witnesses of when a row was taken.

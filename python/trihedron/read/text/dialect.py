@@ -1,4 +1,4 @@
-"""Texts that are no tables yet: a monitor's stamps before each line, and values behind their labels.
+"""Texts that are no tables yet: a monitor's timestamps before each line, and values behind their labels.
 
 A dialect is told by the first lines, and only where nearly all of them speak it. Lines that do not fit are left as they
 are, so that the reader of tables refuses them by their number.
@@ -17,7 +17,8 @@ NEARLY_ALL = 0.9
 _SAMPLE_LINES = 400
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _CLOCK = r"\d{1,2}:\d\d:\d\d[.,]\d{1,6}"
-# Arduino IDE and PlatformIO's time filter; dated stamps of CoolTerm and others; minicom's and Tera Term's in brackets.
+# Arduino IDE and PlatformIO's time filter; dated timestamps of CoolTerm and others; minicom's and Tera Term's in
+# brackets.
 _PREFIXES = (
     re.compile(rf"({_CLOCK}) ?(?:->|>)[ \t]*"),
     re.compile(rf"(\d{{4}}-\d\d-\d\d {_CLOCK})(?: ?(?:->|>|:))[ \t]*"),

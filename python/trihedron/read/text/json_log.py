@@ -2,7 +2,7 @@
 
 What nests is named by its path (``imu.acc.x``); arrays of objects inside a packet (Movesense) are its samples, spread
 evenly to the next
-packet's stamp; ``sensors`` and ``values`` are Edge Impulse's.
+packet's timestamp; ``sensors`` and ``values`` are Edge Impulse's.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def _edge_impulse(payload: Mapping[str, Any]) -> list[Row]:
 
 
 def _spread(packets: list[Any]) -> list[list[Row]]:
-    """Rows of every packet; several samples in one have stamps that run evenly to the next packet's."""
+    """Rows of every packet; several samples in one have timestamps that run evenly to the next packet's."""
     flat = [_flat(packet) if isinstance(packet, Mapping) else {} for packet in packets]
     samples = [
         {k: v for k, v in row.items() if isinstance(v, list) and v and isinstance(v[0], Mapping)} for row in flat

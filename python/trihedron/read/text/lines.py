@@ -26,7 +26,7 @@ class Lines:
 
 
 class RowLines:
-    """The line of every row; one number is enough as long as no line is left out."""
+    """The line of every row; one number is enough as long as no line is excluded."""
 
     def __init__(self) -> None:
         self.first = 0

@@ -85,7 +85,7 @@ def _of_records(
     taken = sum(table.n_in_file for table in tables.values())
     left = sum(counts.values()) - taken
     if left < 0:
-        raise ReadError(f"{path}: the records of this file cannot be told apart; split it by sensor.")
+        raise ReadError(f"{path}: the records of this file cannot be separated; split it by sensor.")
     note = Finding.of(
         FindingCode.DEVICE_CHOSEN,
         "records",

@@ -19,22 +19,22 @@ from trihedron.report.effects.shared import (
 ENTRIES = (
     EffectWords(
         "accel-cubic",
-        "accelerometers respond to the cube of specific force, as a differential capacitive bridge does",
+        "the accelerometers have a cubic nonlinearity, as a differential capacitive bridge does",
         "add tilts between the faces (20° steps): an odd curve bends between level and 1 g",
     ),
     EffectWords(
         "accel-quadratic",
-        "accelerometers respond to the square of specific force",
+        "the accelerometers have a quadratic nonlinearity",
         BOTH_SIDES_OF_LEVEL,
     ),
     EffectWords(
         "accel-scale-asymmetry",
-        "accelerometers scale positive and negative force differently",
+        "the accelerometer scale differs between positive and negative force",
         BOTH_SIDES_OF_LEVEL,
     ),
     EffectWords(
         "accel-hysteresis",
-        "accelerometer offsets remember the previous orientation",
+        "the accelerometer bias depends on the previous orientation",
         "reach the same pose from opposite directions, twice each",
     ),
     EffectWords(
@@ -44,30 +44,30 @@ ENTRIES = (
     ),
     EffectWords(
         "accel-thermal-bias",
-        "accelerometer bias follows the temperature",
+        "the accelerometer bias depends on temperature",
         UP_AND_DOWN,
         follows_temperature("accelerometer", "mm/s²"),
         "repeat the cycle with the sensor turned over",
     ),
     EffectWords(
         "accel-thermal-scale",
-        "accelerometer scale follows the temperature",
+        "the accelerometer scale depends on temperature",
         TWO_TEMPERATURES,
     ),
     EffectWords(
-        "accel-hidden-drift",
-        "accelerometer bias drifts smoothly in time though no logged channel explains it",
+        "accel-bias-drift",
+        "the accelerometer bias drifts smoothly in time; no logged channel explains it",
         LOG_TEMPERATURE,
-        drifts("accelerometer", "mm/s²", "as a walk", " A support that settles does the same across gravity."),
+        drifts("accelerometer", "mm/s²", "as a random walk", " A settling support has the same effect across gravity."),
     ),
     EffectWords(
-        "accel-zero-scatter",
-        "the accelerometer's zero is another in every pose",
+        "accel-bias-repeatability",
+        "the accelerometer bias changes from pose to pose",
         COME_BACK,
         MappingProxyType(
             {
-                "scatter": "The accelerometer's zero is another in every pose, by {sigma:.2g mm/s²} per axis (one "
-                "standard deviation), beyond noise and drift; no pose or temperature accounts for it."
+                "scatter": "The accelerometer bias repeats only to {sigma:.2g mm/s²} per axis (1 σ) from pose to pose, "
+                "beyond noise and drift; neither orientation nor temperature explains it."
             }
         ),
     ),
@@ -75,11 +75,11 @@ ENTRIES = (
     EffectWords(
         "lever-arm",
         "the accelerometers sit away from the centre of rotation",
-        "turn about another point: an arm follows the centre of rotation, a displacement inside the case does not",
+        "turn about another point: a lever arm changes with the centre of rotation, a displacement does not",
         MappingProxyType(
             {
                 "arm": "The accelerometers sit {arm_m:.1f cm} from the centre of rotation: one arm predicts "
-                "{share:.0f %} of the acceleration in moves it was not fitted to (what hands do most weighs least)."
+                "{share:.0f %} of the acceleration in cross-validated moves."
             }
         ),
     ),

@@ -18,52 +18,52 @@ from trihedron.report.effects.shared import (
 ENTRIES = (
     EffectWords(
         "gyro-g-sensitivity",
-        "gyro bias depends on specific force: the rate read at rest changes with the pose",
-        "hold each of the six faces for a minute; turn the table by 180° under a level sensor to rule out Earth rate",
+        "the gyro bias depends on specific force: the static rate changes with the pose",
+        "keep each of the six faces up for a minute; turn the table by 180° to rule out Earth rate",
     ),
     EffectWords(
         "gyro-scale-nonlinearity",
-        "gyro scale depends on the rate",
+        "the gyro scale depends on rate",
         "turn by the same angle slowly and fast, both ways, about each axis",
     ),
     EffectWords(
         "gyro-thermal-bias",
-        "gyro bias follows the temperature",
+        "the gyro bias depends on temperature",
         UP_AND_DOWN,
         follows_temperature("gyro", "°/s"),
     ),
     EffectWords(
         "gyro-thermal-scale",
-        "gyro scale follows the temperature",
+        "the gyro scale depends on temperature",
         TWO_TEMPERATURES,
     ),
     EffectWords(
-        "gyro-hidden-drift",
-        "gyro bias drifts smoothly in time though no logged channel explains it",
+        "gyro-bias-drift",
+        "the gyro bias drifts smoothly in time; no logged channel explains it",
         LOG_TEMPERATURE,
-        drifts("gyro", "°/s", "as a walk, beyond its noise"),
+        drifts("gyro", "°/s", "as a random walk, beyond its noise"),
     ),
     EffectWords(
-        "gyro-zero-scatter",
-        "the gyro's zero is another in every pose",
+        "gyro-bias-repeatability",
+        "the gyro bias changes from pose to pose",
         COME_BACK,
         MappingProxyType(
             {
-                "scatter": "The gyro's zero is another in every pose, by {sigma:all .2g °/s} (x, y, z; one standard "
-                "deviation), beyond noise and drift; it follows neither gravity nor a logged temperature."
+                "scatter": "The gyro bias repeats only to {sigma:all .2g °/s} (X, Y, Z; 1 σ) from pose to pose, beyond "
+                "noise and drift; it follows neither gravity nor a logged temperature."
             }
         ),
     ),
     saturates("gyro-saturation", "gyro"),
     EffectWords(
         "earth-rate",
-        "the gyros see the Earth turn",
+        "the gyros measure the rotation of the Earth",
         "turn the level sensor by 180° on the table: Earth rate changes its horizontal part, g-sensitivity does not",
         MappingProxyType(
             {
-                "latitude": "the gyros see the Earth turn (at its one rate that is a latitude of "
+                "latitude": "the gyros measure the rotation of the Earth (at its rate that is a latitude of "
                 "{latitude_deg:abs .0f}° ± {latitude_std_deg:.1g}°; north lies {azimuth_deg:.0f}° ± "
-                "{azimuth_std_deg:.1g}° from the first pose's x)."
+                "{azimuth_std_deg:.1g}° from X of the first pose)."
             }
         ),
     ),

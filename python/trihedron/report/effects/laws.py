@@ -9,22 +9,24 @@ from types import MappingProxyType
 
 @dataclass(frozen=True)
 class FamilyWords:
-    """``experiment`` that would prove a law of this family; ``resembles``: mechanisms that follow such variables."""
+    """``experiment`` that would prove a relation of this family; ``resembles``: mechanisms with such variables."""
 
     experiment: str
     resembles: tuple[str, ...] = ()
 
 
 _TURNED_TABLE = (
-    "hold the same poses with the table turned by 90° about the vertical, and once more with a magnet near by"
+    "record the same poses with the table turned by 90° about the vertical, and once more with a magnet nearby"
 )
 FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
     {
         "room": FamilyWords(_TURNED_TABLE, ("a magnetic field",)),
         "earth": FamilyWords(_TURNED_TABLE, ("the Earth's turn",)),
-        "force": FamilyWords("hold poses on edges and corners as well as on faces, each twice", ("unequal stiffness",)),
+        "force": FamilyWords(
+            "record poses on edges and corners as well as on faces, each twice", ("unequal stiffness",)
+        ),
         "previous pose": FamilyWords(
-            "reach one pose from six different ones, twice each", ("hysteresis", "creep after a turn")
+            "reach one pose from six different ones, twice each", ("hysteresis", "settling after a rotation")
         ),
         "last turn": FamilyWords(
             "reach one pose by turns of either sign, small and large, waiting unlike times",
@@ -35,7 +37,7 @@ FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
             ("a thermal bias of another shape",),
         ),
         "supply": FamilyWords("repeat one pose at three supply voltages", ("a ratiometric readout",)),
-        "vibration": FamilyWords("hold one pose with the shaking on and off", ("rectification",)),
+        "vibration": FamilyWords("record one pose with the vibration on and off", ("rectification",)),
         "rate products": FamilyWords(
             "turn about one axis at a time, then about two at once, at three rates; pivot about a fixed point",
             ("coupled drive modes", "displaced accelerometers"),

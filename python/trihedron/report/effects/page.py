@@ -9,8 +9,8 @@ from trihedron.report.findings.page import shown
 _HEAD = """# Effects
 
 What a diagnosis can name is a closed list of mechanisms, each with an id that keeps its meaning. What it says of one is
-its mechanism with the strongest term, or the sentence that stands here, with values of the recording in *italics*; *to
-tell it apart* is printed where a recording cannot tell two effects from each other.
+its mechanism with the strongest term, or the sentence that stands here, with values of the recording in *italics*; the
+*separating experiment* is printed where a recording cannot separate two effects.
 [A new effect](../adding-an-effect.md) is one file.
 
 This page is made from the catalogue (`python/trihedron/report/effects/`).
@@ -25,7 +25,7 @@ def page() -> str:
 def _told(entry: EffectWords) -> str:
     lines = [f"\n## {entry.id}\n\n{entry.mechanism[:1].upper()}{entry.mechanism[1:]}."]
     lines += [f"*Said:* {shown(text)}" for text in entry.said.values()]
-    lines.append(f"*To tell it apart:* {entry.experiment}.")
+    lines.append(f"*Separating experiment:* {entry.experiment}.")
     if entry.experiment_at_rest:
         lines.append(f"*In a log of one or two orientations:* {entry.experiment_at_rest}.")
     return "<br>\n".join(lines) + "\n"

@@ -16,7 +16,7 @@ REASONS: Mapping[str, str] = MappingProxyType(
         "steady-supply": "the supply voltage does not change",
         "even-vibration": "no pose vibrates more than the others",
         "no-table-turns": "the session has no turns on a table against a wall",
-        "six-poses": "fewer than six still poses",
-        "few-orientations": "the log holds too few orientations",
+        "six-poses": "fewer than six poses",
+        "few-orientations": "the log has too few orientations",
     }
 )

@@ -10,7 +10,7 @@ from trihedron.report.effects.shared import SHAKE
 ENTRIES = (
     EffectWords(
         "accel-gyro-time-offset",
-        "accelerometer and gyro samples with the same time stamp belong to different instants",
+        "accelerometer and gyro samples with the same timestamp were taken at different times",
         SHAKE,
     ),
     EffectWords(
@@ -25,8 +25,8 @@ ENTRIES = (
         MappingProxyType(
             {
                 "reversed": "The documented axes of accelerometer and gyro do not fit one right-handed triad: reversed "
-                "is {is_one:?gyro axis {reversed:&, }, or both other gyro axes and that accelerometer axis|"
-                "{is_two:?accelerometer axis {kept:&, }, or gyro axes {reversed:and}|"
+                "is {is_one:?gyro {reversed:axes}, or both other gyro axes and that accelerometer axis|"
+                "{is_two:?accelerometer {kept:axes}, or gyro {reversed:axes and}|"
                 "{is_three:?all accelerometer axes (the log holds gravity instead of specific force), or all gyro axes|"
                 "the order of the axes}}}."
             }
@@ -34,66 +34,63 @@ ENTRIES = (
     ),
     EffectWords(
         "supply-sensitivity",
-        "readings follow the supply voltage",
+        "the readings depend on the supply voltage",
         "repeat one pose at two supply voltages",
     ),
     EffectWords(
         "vibration-rectification",
-        "bias follows the power of vibration",
-        "hold one pose with the vibration on and off",
+        "the bias depends on the power of vibration",
+        "record one pose with the vibration on and off",
     ),
     EffectWords(
         "quantisation",
-        "the resolution is too coarse for the noise: means of still poses sit on steps",
+        "the resolution (LSB) is too coarse for the noise: means of poses are quantised",
         "choose a finer range, or add a little motion or noise (dither) while averaging",
         MappingProxyType(
             {
-                "steps": "Readings of {channels:&, } {is_dead:?do not move within {dead:.4g} raw units of zero|move in "
-                "steps of {step:.4g} raw units, {times:.2g} times their noise}: averaging does not resolve between "
-                "steps."
+                "steps": "Readings of {channels:&, } {is_dead:?do not change within {dead:.4g} raw units of zero|have "
+                "a resolution of {step:.4g} raw units (LSB), {times:.2g} times their noise}: averaging does not "
+                "resolve less."
             }
         ),
     ),
     EffectWords(
         "periodic-interference",
-        "a sinusoid stands in the readings while the sensor is still",
-        "record at rest at another sampling rate: an aliased line moves, a true one stays",
-        MappingProxyType(
-            {"line": "A line at {frequency_hz:.3f} Hz stands in {channels:&, } while the sensor is still."}
-        ),
+        "a spectral line in the static readings",
+        "record a static log at another sampling rate: an aliased line moves, a true one stays",
+        MappingProxyType({"line": "A spectral line at {frequency_hz:.3f} Hz is in {channels:&, } of static poses."}),
     ),
     EffectWords(
         "dropped-samples",
-        "samples are missing though the time stamps run on evenly",
+        "samples are missing while the timestamps are even",
         "log the sensor's own sample counter",
         MappingProxyType(
-            {"losses": "Samples are missing though the time stamps run on: {losses:each}{has_more:? and {more} more|}."}
+            {"losses": "Samples are missing while the timestamps are even: {losses:each}{has_more:? and {more} more|}."}
         ),
         lines=MappingProxyType({"losses": "{v0} at {v1:.2f} s"}),
     ),
     EffectWords(
         "timing-jitter",
-        "samples are taken at other instants than their time stamps say",
+        "samples were not taken at their timestamps",
         "let the sensor's own clock trigger the sampling, or log its data-ready times",
         MappingProxyType(
             {
-                "stamps": "The time stamps scatter by {rms_s:.2g ms} about an even clock, but the readings do not "
-                "follow them (share {followed:.2f} ± {sigma:.1g}): the samples were taken evenly.",
-                "samples": "Every sample is off its time stamp by about {jitter_s:.2g ms}: both sensors' steps scatter "
-                "together, with the slope of the signal.",
+                "stamps": "The timestamps scatter by {rms_s:.2g ms} about an even clock, the readings do not (share "
+                "that follows {followed:.2f} ± {sigma:.1g}): the samples were taken evenly.",
+                "samples": "Samples are off their timestamps by {jitter_s:.2g ms} rms: both sensors scatter together, "
+                "in proportion to the slope of the signal.",
             }
         ),
     ),
     EffectWords(
         "disturbed-pose",
-        "one pose was not still or was pushed",
+        "a disturbed pose: it was not still, or was pushed",
         "repeat that pose",
         MappingProxyType(
             {
-                "pushed": "Pose {pose:.0f} was not still or was pushed: its mean is off by {off:.2g} m/s²; repeat or "
-                "leave it out.",
-                "not-still": "Not every pose was still ({is_bumped:?bumped at {bumped_s:each}|}{are_both:?; |}"
-                "{is_restless:?restless: pose {restless:&, }|}).",
+                "pushed": "Pose {pose:.0f} was disturbed: its mean is off by {off:.2g} m/s²; repeat it or exclude it.",
+                "not-still": "Disturbed poses ({is_bumped:?at {bumped_s:each}|}{are_both:?; |}"
+                "{is_restless:?not still: pose {restless:&, }|}).",
             }
         ),
         lines=MappingProxyType({"bumped_s": "{v0:.2f} s"}),
@@ -104,15 +101,15 @@ ENTRIES = (
         "repeat the turns against a stop; turn back by the same angle",
         MappingProxyType(
             {
-                "turns": "{wrong} of {turns} table turns miss their multiple of 90° (up to {most_rad:.1f !deg}°, "
-                "others within {near_deg:.0f}°)."
+                "turns": "{wrong} of {turns} table turns are not a multiple of 90° (off by up to {most_rad:.1f "
+                "!deg}°, others within {near_deg:.0f}°)."
             }
         ),
     ),
     EffectWords(
         "table-tilt",
         "the table is not level",
-        "level the table, or hold every face in two headings 180° apart and average",
+        "level the table, or record every face in two headings 180° apart and average",
         MappingProxyType(
             {"tilt": "The table is tilted by {tilt_deg:.2f}°: turning the sensor on it moves the vertical in the body."}
         ),

@@ -8,9 +8,11 @@ from types import MappingProxyType
 from trihedron.report.effects.entry import EffectWords
 
 LOG_TEMPERATURE = "log the temperature, or let the sensor warm up and repeat the first poses at the end"
-UP_AND_DOWN = "repeat one pose while the temperature both rises and falls: drift in time does not turn back, this does"
+UP_AND_DOWN = "repeat one pose while the temperature both rises and falls: drift in time does not reverse"
 TWO_TEMPERATURES = "repeat the same faces and turns at two temperatures"
-COME_BACK = "hold one pose, turn away and come back to it ten times: what differs is scatter, what repeats is not"
+COME_BACK = (
+    "turn away from one pose and back to it ten times: what differs is repeatability, what returns depends on the pose"
+)
 BOTH_SIDES_OF_LEVEL = (
     "add tilts of 30°, 45° and 60° on both sides of level: a square and a modulus differ between the faces"
 )
@@ -18,15 +20,15 @@ SHAKE = "shake the sensor about one axis at several frequencies: a delay grows w
 
 
 def drifts(sensor: str, unit: str, walk: str, at_rest: str = "") -> Mapping[str, str]:
-    """A zero that drifts from pose to pose, by its kind; in a log of one orientation ``at_rest`` is said beside it."""
-    whole = f"The {sensor}'s zero drifts {{how}} through {{sizes}} (x, y, z); no logged channel explains it."
+    """Bias drift from pose to pose, by its kind; in a log of one orientation ``at_rest`` is added."""
+    whole = f"The {sensor} bias drifts {{how}} by {{sizes}} (X, Y, Z); no logged channel explains it."
     sizes = f"{{range:all .2g {unit}}}"
     rest = {case: whole.format(how="smoothly", sizes=_at_rest("range", own)) + at_rest for case, own in _units(unit)}
     return MappingProxyType({"walk": whole.format(how=walk, sizes=sizes)} | rest)
 
 
 def follows_temperature(sensor: str, unit: str) -> Mapping[str, str]:
-    """A zero in a log of one or two orientations that the temperature explains, and how one would tell it apart."""
+    """Bias against temperature in a log of one or two orientations, and what it could be confounded with."""
     return MappingProxyType({case: _thermal(sensor, own) for case, own in _units(unit)})
 
 
@@ -44,19 +46,19 @@ def _at_rest(place: str, unit: str) -> str:
 def _thermal(sensor: str, unit: str) -> str:
     swing, left, raw, gap = (_at_rest(place, unit) for place in ("swing", "left", "raw", "gap"))
     return (
-        f"The {sensor}'s zero follows the temperature from {{low_degc:.0f}} to {{high_degc:.0f}} °C by "
+        f"The {sensor} bias follows the temperature from {{low_degc:.0f}} to {{high_degc:.0f}} °C by "
         "{is_straight:?a straight line|{is_parabola:?a parabola|a curve of third order}}"
-        "{has_rate:?, and its rate of change|}{has_branches:?, on two branches|}: it runs through "
-        f"{swing} (x, y, z); {left} rms stay of {raw}."
-        f"{{has_gap:? At one temperature heating and cooling differ by {gap}: hysteresis, or a drift in time, which "
-        "one cycle does not tell.|}{is_one_pose:? One orientation does not tell zero from scale, nor the fixture's own "
-        "tilt across gravity.|}"
+        "{has_rate:?, and its rate of change|}{has_branches:?, on two branches|}: it changes by "
+        f"{swing} (X, Y, Z); {left} rms remain of {raw}."
+        f"{{has_gap:? At one temperature heating and cooling differ by {gap}: hysteresis or drift in time; "
+        "one cycle does not separate them.|}{is_one_pose:? One orientation does not separate bias, scale and a tilt of "
+        "the fixture.|}"
     )
 
 
 def saturates(effect_id: str, sensor: str) -> EffectWords:
-    """A range that ends."""
-    end = f"the {sensor} reaches the end of its range"
+    """A range limit."""
+    end = f"the {sensor} reaches its range limit"
     return EffectWords(
         effect_id,
         end,
@@ -64,7 +66,7 @@ def saturates(effect_id: str, sensor: str) -> EffectWords:
         MappingProxyType(
             {
                 "plateaus": f"T{end[1:]}: {{plateaus}} plateaus, {{samples}} samples, in {{touched}} of {{moves}} "
-                "moves; what those moves read is false and is left out of the fit."
+                "moves; clipped readings are excluded from the fit."
             }
         ),
     )

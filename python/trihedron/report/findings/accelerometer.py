@@ -7,18 +7,18 @@ from trihedron.records.finding import Severity
 from trihedron.report.findings.entry import Entry
 
 NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
-_UNQUIET = "Poses not quite still, a zero that drifts between poses, nonlinearity, or noise of the means underrated."
+_UNQUIET = "Poses not quite still, bias drift between poses, nonlinearity, or noise of the means underestimated."
 _LOOK = "Look at the residual per pose; `trihedron diagnose` names the effect."
-_ADD_POSES = "Add still poses with {advice:numbered}."
+_ADD_POSES = "Add poses with {advice:numbered}."
 
 ENTRIES = (
     Entry(
         Code.RESIDUAL_ABOVE_NOISE,
         "poses",
         WARNING,
-        "The residual of the still poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
-        "{floor_m_s2:.3g mm/s²} (χ² per degree of freedom {chi2_per_dof:.3g}, {dof:.0f} degrees); all standard errors "
-        "of the accelerometer are multiplied by {widening:.3g}.",
+        "The residual of the poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
+        "{floor_m_s2:.3g mm/s²} (χ² per degree of freedom {chi2_per_dof:.3g}, {dof:.0f} degrees); all standard "
+        "uncertainties of the accelerometer are multiplied by {widening:.3g}.",
         _UNQUIET,
         _LOOK,
     ),
@@ -26,10 +26,10 @@ ENTRIES = (
         Code.RESIDUAL_ABOVE_NOISE,
         "poses-joint",
         WARNING,
-        "The residual of the still poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
-        "{floor_m_s2:.3g mm/s²} (χ² per degree of freedom {chi2_per_dof:.3g}, {dof:.0f} degrees); the fit lets the "
-        "zero differ from pose to pose, here by {zero_scatter_m_s2:.2g mm/s²} rms, and the standard errors contain "
-        "that.",
+        "The residual of the poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
+        "{floor_m_s2:.3g mm/s²} (χ² per degree of freedom {chi2_per_dof:.3g}, {dof:.0f} degrees); the fit "
+        "includes a bias repeatability of {bias_repeatability_m_s2:.2g mm/s²} rms between poses, and so do the "
+        "standard uncertainties.",
         _UNQUIET,
         _LOOK,
     ),
@@ -37,8 +37,8 @@ ENTRIES = (
         Code.NOT_OBSERVABLE,
         "poses-rank",
         SERIOUS,
-        "The still poses determine {rank:.0f} of the {n_parameters:.0f} parameters of the accelerometer; unseen is the "
-        "{unseen:&, the }, held within {anchor:.0f %} of a perfect triad.",
+        "The poses determine {rank:.0f} of the {n_parameters:.0f} parameters of the accelerometer; not observable: "
+        "{unseen:&, }, held within {anchor:.0f %} of a perfect triad.",
         "Too few different orientations: six faces alone are six equations for nine parameters.",
         _ADD_POSES,
     ),
@@ -46,8 +46,8 @@ ENTRIES = (
         Code.NOT_OBSERVABLE,
         "poses-weak",
         SERIOUS,
-        "The still poses determine the accelerometer so weakly that some pose could be wrong by {at_worst:.2g %} of "
-        "gravity; worst is {weakest}. All parameters were held within {anchor:.0f %} of a perfect triad.",
+        "The poses determine the accelerometer so weakly that some pose could be wrong by {at_worst:.2g %} of "
+        "gravity; least certain is the {weakest}. All parameters were held within {anchor:.0f %} of a perfect triad.",
         "The orientations are too much alike.",
         _ADD_POSES,
         numbers=("rank", "n_parameters", "worst_prediction_g"),
@@ -56,7 +56,7 @@ ENTRIES = (
         Code.WEAKLY_OBSERVABLE,
         "poses",
         WARNING,
-        "Some orientations are predicted {times_worse:.2g} times worse than one pose is measured; worst is {weakest}.",
+        "Some orientations are predicted {times_worse:.2g} times worse than one pose; least certain: {weakest}.",
         "No pose lies near those orientations.",
         _ADD_POSES,
         numbers=("rank", "n_parameters", "worst_prediction_g"),
@@ -65,38 +65,37 @@ ENTRIES = (
         Code.OUTLIER_POSE,
         "",
         WARNING,
-        "Still pose {pose} differs from what all other poses predict by {held_out_m_s2:.3g mm/s²} ({z:abs .1f} "
-        "standard errors, limit {limit:.1f}).",
+        "Pose {pose} differs from what all other poses predict by {held_out_m_s2:.3g mm/s²} ({z:abs .1f} "
+        "σ, limit {limit:.1f}).",
         "The sensor was touched or not still in this pose, or a reading clipped.",
-        "Leave the pose out, or use a robust loss.",
+        "Exclude the pose, or use a robust loss (--loss).",
     ),
     Entry(
         Code.HELD_OUT_WORSE,
         "poses",
         WARNING,
-        "Poses that the fit did not see are missed by {held_out_z_rms:.2g} times their predicted error.",
-        "The fit bends to its own poses: too few of them, or an effect that a linear model does not have.",
+        "Cross-validated poses have {held_out_z_rms:.2g} times their predicted error.",
+        "The fit follows its own poses too closely: too few of them, or an effect that a linear model does not have.",
         "Record more poses; see `trihedron diagnose`.",
     ),
     Entry(
         Code.NONLINEAR_RESIDUAL,
         "poses",
         SERIOUS,
-        "What the still poses miss of |g| has the shape of {is_cubic:?an axis whose reading bends with the cube of the "
-        "force|{is_quadratic:?an axis whose reading bends with the square of the force|an axis with another scale in "
-        "each direction}} (p = {p:.1g} by chance): S and b are off by up to {shift_m_s2:.2g mm/s²} at 1 g from it, "
-        "{shift_sigma:.2g} of the standard errors that scatter alone would leave.",
-        "An accelerometer that is not linear, or one driven near the end of its range.",
-        "Run `trihedron diagnose`: it says which, and calibrates without it.",
+        "The gravity error in static poses has the shape of {is_cubic:?a cubic nonlinearity|{is_quadratic:?a quadratic "
+        "nonlinearity|a scale that differs between + and -}} (p = {p:.1g}): S and b are off by up to "
+        "{shift_m_s2:.2g mm/s²} at 1 g, {shift_sigma:.2g} σ of what noise alone would leave.",
+        "An accelerometer that is not linear, or one driven near its range limit.",
+        "Run `trihedron diagnose`: it names the effect and calibrates with it.",
     ),
     Entry(
         Code.NONLINEAR_RESIDUAL,
         "not-excluded",
         WARNING,
-        "Poses miss |g| beyond their noise: biases that differ from pose to pose, or axes that are not linear. The "
-        "latter may put the scale off by {scale_part:.2g %} (1 σ); it makes uncertainties of S and b up to "
-        "{widening:.2g} times as large.",
-        "Too few poses to tell one from the other, or an accelerometer that is not linear.",
+        "The gravity error in static poses exceeds noise: bias repeatability or nonlinearity. Nonlinearity may put the "
+        "scale off by {scale_part:.2g %} (1 σ); the uncertainties of S and b include it and are up to {widening:.2g} "
+        "times as large.",
+        "Too few poses to separate the two, or an accelerometer that is not linear.",
         "Log more poses (24 or more), spread over all directions; `trihedron diagnose` looks for the cause.",
     ),
     Entry(
@@ -113,8 +112,8 @@ ENTRIES = (
         "accelerometer-signs-asked",
         WARNING,
         "The accelerometer's axes form a left-handed triad: det S < 0 (signs of the diagonal {signs}).",
-        "The documented direction of one axis (or of all three) is wrong, or two axes are swapped. Still poses alone "
-        "cannot tell signs; these are the ones asked for.",
+        "The documented direction of one axis (or of all three) is wrong, or two axes are swapped. Poses alone "
+        "do not determine signs; these are the ones given.",
         "Check the axis directions printed on the board against a pose with one axis up.",
         numbers=("det_S_sign",),
     ),
@@ -122,7 +121,7 @@ ENTRIES = (
         Code.SCALE_NOT_NOMINAL,
         "accelerometer",
         WARNING,
-        "Axis {axis} needs a factor {scale_ratio:.4g} although the log is in {unit}.",
+        "The scale of {axis:axis} is {scale_ratio:.4g} although the log is in {unit}.",
         "The log is in another unit than stated, or |g| is wrong.",
         "State the unit of the log and |g|.",
     ),
@@ -138,7 +137,7 @@ ENTRIES = (
         Code.POSE_NOT_A_FACE,
         "",
         NOTE,
-        "{n_left_out} of {n_poses} still poses have no axis within {largest_tilt_deg:.0f}° of the vertical and are not "
+        "{n_left_out} of {n_poses} poses have no axis within {largest_tilt_deg:.0f}° of the vertical and are not "
         "used by method 1 (poses {poses:&, }).",
         "They are edges, corners or leaning poses.",
         "Method 2 uses them all.",
@@ -148,16 +147,16 @@ ENTRIES = (
         "",
         WARNING,
         "The faces contradict each other (χ² per degree of freedom {chi2_per_dof:.3g}) as if each pose were tilted by "
-        "{tilt_deg:.2g}° rms; most in pose {pose} ({face}). The standard errors include this tilt.",
-        "The table is not level, the case is not square or did not lie flat; a drifting zero looks the same.",
+        "{tilt_deg:.2g}° rms; most in pose {pose} ({face}). The standard uncertainties include this tilt.",
+        "The table is not level, the case is not square or did not lie flat; bias drift looks the same.",
         "Level the table, press the case flat, or use method 2, which needs neither.",
     ),
     Entry(
         Code.RESIDUAL_ABOVE_NOISE,
         "verify-rest",
         WARNING,
-        "Gravity at rest is missed by {norm_rms_m_s2:.3g} m/s² rms ({norm_rms_m_s2:.2g mg}), {times_expected:.1f} "
-        "times what noise and the stated errors of the calibration allow.",
+        "The gravity error in static poses is {norm_rms_m_s2:.3g} m/s² rms ({norm_rms_m_s2:.2g mg}), on "
+        "average {times_expected:.1f} times the noise and uncertainty of a pose.",
         "The sensor has changed since (temperature, shock, supply), gravity is another here, or poses were not still.",
         "Calibrate again near the conditions of use; compare the two calibrations.",
         numbers=("chi2_per_pose",),

@@ -1,4 +1,4 @@
-"""What is said about time: stamps, rates, gaps, and the clock that a recording gets."""
+"""What is said about time: timestamps, rates, gaps, and the clock that a recording gets."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _STAMPS = (
         Code.TIME_JITTER,
         "",
         NOTE,
-        "Steps between stamps vary by {jitter_s:.3g ms} rms (median {median_step_s:.5g ms} = {median_rate_hz:.5g} Hz, "
-        "mean {mean_step_s:.5g ms} = {mean_rate_hz:.5g} Hz, {least_s:.3g !ms} to {largest_s:.3g ms})"
+        "Steps between timestamps vary by {jitter_s:.3g ms} rms (median {median_step_s:.5g ms} = {median_rate_hz:.5g} "
+        "Hz, mean {mean_step_s:.5g ms} = {mean_rate_hz:.5g} Hz, {least_s:.3g !ms} to {largest_s:.3g ms})"
         "{is_irregular:?, and no even clock lies behind them|}; the rate used is {rate_hz:.5g} Hz.",
-        "{is_irregular:?A program that samples in its own time: its stamps were kept.|Stamps taken when the data "
-        "arrived, or rounded.}",
-        "Stamp in the sensor's own interrupt if turns matter.",
+        "{is_irregular:?A program that samples in its own time: its timestamps were kept.|Timestamps taken when the "
+        "data arrived, or rounded.}",
+        "Take timestamps in the sensor's own interrupt if turns matter.",
         or_severity=WARNING,
     ),
     Entry(
@@ -29,8 +29,8 @@ _STAMPS = (
         "",
         WARNING,
         "{count} samples ({fraction:.3g %}) carry the same time as the one before (first: {where}).",
-        "Several samples stamped in one go, a stamp of too few digits, or rows written twice.",
-        "With samples stamped in batches, read with --columns time=none and --rate.",
+        "Several samples with one timestamp, timestamps of too few digits, or rows written twice.",
+        "With samples timestamped in batches, read with --columns time=none and --rate.",
         numbers=("sample",),
     ),
     Entry(
@@ -38,7 +38,7 @@ _STAMPS = (
         "mended",
         NOTE,
         "{count} samples ({fraction:.3g %}) carry the same time as the one before (first: {where}).",
-        "Several samples stamped in one go, a stamp of too few digits, or rows written twice.",
+        "Several samples with one timestamp, timestamps of too few digits, or rows written twice.",
         numbers=("sample",),
     ),
     Entry(
@@ -68,14 +68,14 @@ _STAMPS = (
         "Time runs backward at {count} places (first: {where}); the rows were sorted by time, none moved further than "
         "{displaced_rows} rows.",
         "Packets that overtook each other.",
-        "If the rows stand in the right order and the stamps are wrong, read with --columns time=none and --rate.",
+        "If the rows stand in the right order and the timestamps are wrong, read with --columns time=none and --rate.",
         numbers=("sample",),
     ),
     Entry(
         Code.NON_FINITE,
         "time",
         WARNING,
-        "{count} rows have no time (first: {where}) and were left out.",
+        "{count} rows have no time (first: {where}) and were excluded.",
         "Damaged rows.",
         "Check the logger.",
         numbers=("row",),
@@ -93,7 +93,7 @@ _STAMPS = (
         WARNING,
         "The time column steps by {step:.6g}, so its unit is {unit} ({rate_hz:.5g} Hz){has_others:?; {others:&, } "
         "would be possible too|}.",
-        "The step alone does not tell the unit; every rate and every noise density depends on it.",
+        "The step alone does not determine the unit; every rate and every noise density depends on it.",
         "Say it with --time-unit s, ms, us or ns if this is wrong.",
     ),
     Entry(
@@ -117,7 +117,7 @@ _RATES = (
         "",
         SERIOUS,
         "The clock's rate changes by {percent:.2g} % {where}, and gravity {decided:?turns as if it had "
-        "not|does not tell which part is right}.",
+        "not|does not show which part is right}.",
         "A clock that was set or switched in the middle of the log.",
         "Split the log there and calibrate the parts one by one: gyro scale is inversely proportional to the rate.",
         numbers=("sample",),
@@ -134,7 +134,7 @@ _RATES = (
         Code.RATE_STATED,
         "",
         NOTE,
-        "No time column; the rate is {rate_hz:.6g} Hz {is_given:?as you said|as the file states above its numbers or "
+        "No time column; the rate is {rate_hz:.6g} Hz {is_given:?as you said|as the file states above its data or "
         "beside them}.",
     ),
     Entry(
@@ -158,10 +158,10 @@ _RATES = (
 _EVEN = "T = {period_s:.6g !ms} ± {sigma_period_s:.1g ms} ({rate_hz:.6g} Hz)"
 _HOW = (
     "{is_rounded:?rounded to {grid_s:.3g ms}|{is_late:?late by {stamp_error_s:.2g ms} rms, as they are when samples "
-    "are stamped on arrival|scattered by {stamp_error_s:.2g ms} rms}}"
+    "are timestamped on arrival|scattered by {stamp_error_s:.2g ms} rms}}"
 )
 _BY_MOTION = (
-    "{motion_tells:?the readings follow {followed:.2f} ± {sigma_followed:.2g} of it|no motion tells when the samples "
+    "{motion_tells:?the readings follow {followed:.2f} ± {sigma_followed:.2g} of it|no motion shows when the samples "
     "were taken}"
 )
 _WITH_THEM = ("stamp_error_s", "shared_fraction", "followed", "sigma_followed", "grid_s", "is_partly")
@@ -172,24 +172,24 @@ _CLOCKS = (
         Code.EVEN_CLOCK,
         "",
         NOTE,
-        f"The stamps are those of an even clock, {_EVEN}, {_HOW} ({_BY_MOTION}); the even clock was taken.",
+        f"The timestamps are those of an even clock, {_EVEN}, {_HOW} ({_BY_MOTION}); the even clock was taken.",
         numbers=_WITH_THEM,
     ),
     Entry(
-        Code.STAMPS_KEPT,
+        Code.TIMESTAMPS_KEPT,
         "",
         NOTE,
-        f"The stamps leave an even clock ({_EVEN}) by {{stamp_error_s:.2g ms}} rms and {_BY_MOTION}: they were kept.",
+        f"The timestamps differ from an even clock ({_EVEN}) by {{stamp_error_s:.2g ms}} rms, {_BY_MOTION}: kept.",
         numbers=(*_WITH_THEM, "is_rounded", "is_late"),
     ),
     Entry(
         Code.CLOCK_UNDECIDED,
         "",
         WARNING,
-        f"The stamps are {_HOW} about an even clock ({_EVEN}) and {_BY_MOTION}: {{is_partly:?both are partly right, |}}"
-        "the stamps were kept.",
-        "{is_partly:?Samples taken unevenly and stamped inexactly.|A sensor that is sampled evenly and stamped on "
-        "arrival, or one that is sampled unevenly.}",
+        f"The timestamps are {_HOW} about an even clock ({_EVEN}) and {_BY_MOTION}: {{is_partly:?both partly right, |}}"
+        "the timestamps were kept.",
+        "{is_partly:?Samples taken unevenly and timestamped inexactly.|A sensor that is sampled evenly and timestamped "
+        "on arrival, or one that is sampled unevenly.}",
         _LOG_COUNTER,
         numbers=_WITH_THEM,
     ),
@@ -197,7 +197,7 @@ _CLOCKS = (
         Code.CLOCKS_MERGED,
         "same-stamps",
         NOTE,
-        "Both sensors carry the same time stamps.",
+        "Both sensors carry the same timestamps.",
     ),
     Entry(
         Code.CLOCKS_MERGED,
@@ -205,10 +205,10 @@ _CLOCKS = (
         NOTE,
         "Two clocks merged: accelerometer {accelerometer_rate_hz:.5g} Hz, gyro {gyroscope_rate_hz:.5g} Hz, gyro starts "
         "{offset_s:+.3g ms} after; the {base} keeps its samples, the {other} was taken at the same tick in "
-        "{same_tick_fraction:.3g %} of rows and interpolated between neighbours in the rest, which leaves "
+        "{same_tick_fraction:.3g %} of rows and interpolated between neighbours elsewhere, which leaves "
         "{variance_factor:.3g %} of its white-noise variance; {cut_rows} rows outside the overlap were cut, and "
         "{beyond_rows} of the {other}'s, {lost_rows} rows in gaps of the {other} hold no reading.",
-        "Each sensor was logged with its own time stamps.",
+        "Each sensor was logged with its own timestamps.",
         "{is_coloured:?For the {other}'s noise (Allan variance) read its file alone, where nothing is interpolated.|}",
         numbers=("rate_ratio", "rows_left_out"),
         or_severity=WARNING,

@@ -7,12 +7,12 @@ from trihedron.records.finding import Severity
 from trihedron.report.findings.entry import Entry
 
 NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
-_CONTRADICTING = "moves that contradict each other, or a start far from the truth"
+_CONTRADICTING = "rotations that contradict each other, or a start far from the truth"
 _LOOK_AT_MOVES = "Look at the residual per move; give the nominal scale."
 _OUTSIDE_THE_MODEL = (
     "an effect outside the linear model: g-sensitivity, a time offset between the sensors, nonlinearity"
 )
-_ZERO_MOVES = "warm-up, slow noise, or a zero reading that depends on attitude (g-sensitivity)"
+_BIAS_CHANGES = "warm-up, slow noise, or a bias that depends on attitude (g-sensitivity)"
 _SAME_GRAVITY = "turns about the vertical leave gravity where it was, and a whole turn brings it back"
 
 _MOVES = (
@@ -20,7 +20,7 @@ _MOVES = (
         Code.NOT_CONVERGED,
         "gyro",
         SERIOUS,
-        "the gyro fit did not settle ({stopped_because}).",
+        "the gyro fit did not converge ({stopped_because}).",
         _CONTRADICTING,
         _LOOK_AT_MOVES,
     ),
@@ -28,7 +28,7 @@ _MOVES = (
         Code.NOT_CONVERGED,
         "session",
         SERIOUS,
-        "the fit of the session did not settle ({stopped_because}).",
+        "the fit of the session did not converge ({stopped_because}).",
         _CONTRADICTING,
         _LOOK_AT_MOVES,
     ),
@@ -36,8 +36,8 @@ _MOVES = (
         Code.RESIDUAL_ABOVE_NOISE,
         "moves",
         WARNING,
-        "gravity after the moves is missed by more than the noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} "
-        "degrees of freedom; the error bars are widened by its root.",
+        "the tilt error after rotations exceeds what noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} "
+        "degrees of freedom; the standard uncertainties are multiplied by its root.",
         _OUTSIDE_THE_MODEL,
         "Run trihedron diagnose to see which.",
         or_severity=SERIOUS,
@@ -46,8 +46,8 @@ _MOVES = (
         Code.RESIDUAL_ABOVE_NOISE,
         "moves-joint",
         WARNING,
-        "gravity after the moves is missed by more than the noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} "
-        "degrees of freedom; the moves count with the noise that they show.",
+        "the tilt error after rotations exceeds what noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} "
+        "degrees of freedom; the rotations are weighted by the noise that they show.",
         _OUTSIDE_THE_MODEL,
         "Run trihedron diagnose to see which.",
     ),
@@ -55,7 +55,7 @@ _MOVES = (
         Code.SCALE_NOT_NOMINAL,
         "gyro",
         SERIOUS,
-        "The gyro needs a factor {scale_ratio:.4g} although the log is in {unit}.",
+        "The gyro scale is {scale_ratio:.4g} although the log is in {unit}.",
         "The log's time base or rate is wrong by that factor, or its unit is another one.",
         "Check --time-unit, --rate and --gyro-unit.",
     ),
@@ -72,7 +72,7 @@ _MOVES = (
         Code.LEFT_HANDED,
         "gyro-against-accelerometer",
         WARNING,
-        "gyro axes {axes:& and } run against the accelerometer's axes of the same name.",
+        "gyro {axes:axes and} point against the accelerometer's axes of the same name.",
         "the accelerometer's axes as logged are left-handed, or one sensor's signs or order were changed",
         "Check the axis directions of the board against both data sheets.",
     ),
@@ -88,16 +88,16 @@ _MOVES = (
         Code.OUTLIER_MOVE,
         "",
         WARNING,
-        "move {move} (hold {before} to hold {after}) misses gravity by {residual_m_s2:.3g} m/s², {times:.0f} times its "
-        "noise, and is left out.",
-        "one of its holds was not still, samples were lost, or the gyro was driven beyond its range",
+        "move {move} (pose {before} to pose {after}) has a gravity error of {residual_m_s2:.3g} m/s², {times:.0f} "
+        "times its noise, and is excluded.",
+        "one of its poses was not still, samples were lost, or the gyro was driven beyond its range limit",
         "Look at this move; repeat it.",
     ),
     Entry(
         Code.HELD_OUT_WORSE,
         "moves",
         WARNING,
-        "moves that the fit did not see are predicted {times:.1f} times worse than the error bars say.",
+        "cross-validated moves have {times:.1f} times the error that the uncertainties allow.",
         "too few moves for the number of parameters, or an effect that differs from move to move",
         "Record more moves, about all axes, both ways.",
         numbers=("chi2_per_dof",),
@@ -106,9 +106,9 @@ _MOVES = (
         Code.GYRO_G_SENSITIVITY,
         "",
         NOTE,
-        "the gyro's zero reading follows gravity, by up to {per_g_rad_s:.2g deg/s} per g (axis {rate_axis} for force "
-        "along axis {force_axis}), {scatter_left:.0f %} of its scatter between holds is left without it. The moves "
-        "were fitted without it, but S and b alone cannot correct it.",
+        "the gyro's bias depends on gravity, by up to {per_g_rad_s:.2g deg/s} per g ({rate_axis:axis} for force along "
+        "{force_axis:axis}); with it, {scatter_left:.0f %} of the bias changes between poses remain. The moves were "
+        "fitted without it; S and b alone cannot correct it.",
         "g-sensitivity of the gyro",
         "Run trihedron diagnose for the extended model.",
         numbers=("largest_rad_s_per_m_s2",),
@@ -118,16 +118,16 @@ _MOVES = (
         Code.GYRO_BIAS_DRIFT,
         "holds",
         NOTE,
-        "the gyro's zero reading differs between holds by up to {change_rad_s:.2g deg/s} (axis {axis}), {times:.1f} "
-        "times its noise; each move uses the holds next to it.",
-        _ZERO_MOVES,
-        "Let the sensor warm up; use the stated zero only near this temperature.",
+        "the gyro's bias changes between poses by up to {change_rad_s:.2g deg/s} ({axis:axis}), {times:.1f} times its "
+        "noise; each move uses the biases of the two poses next to it.",
+        _BIAS_CHANGES,
+        "Let the sensor warm up; use the stated bias only near this temperature.",
     ),
     Entry(
         Code.NOT_OBSERVABLE,
         "moves-rank",
         SERIOUS,
-        "the moves determine {rank} of {n_parameters} gyro parameters; least known: {weakest}.",
+        "the moves determine {rank} of {n_parameters} gyro parameters; least certain: {weakest}.",
         _SAME_GRAVITY,
         "{advice:sentences}",
     ),
@@ -135,7 +135,7 @@ _MOVES = (
         Code.NOT_OBSERVABLE,
         "moves-weak",
         SERIOUS,
-        "the moves hardly show {weakest}.",
+        "the moves hardly determine the {weakest}.",
         _SAME_GRAVITY,
         "{advice:sentences}",
     ),
@@ -143,7 +143,7 @@ _MOVES = (
         Code.WEAKLY_OBSERVABLE,
         "moves",
         WARNING,
-        "the moves hardly show {weakest}.",
+        "the moves hardly determine the {weakest}.",
         _SAME_GRAVITY,
         "{advice:sentences}",
     ),
@@ -151,11 +151,11 @@ _MOVES = (
         Code.SAMPLES_LOST,
         "seen-in-motion",
         WARNING,
-        "Samples are missing though the stamps run on evenly: {long_steps} of {steps} steps in motion are one sample "
-        "too long, {short_steps} too short (first at {first_s:.2f} s): about {lost_share:.2g !%} ± "
+        "Samples are missing though the timestamps run on evenly: {long_steps} of {steps} steps in motion are one "
+        "sample too long, {short_steps} too short (first at {first_s:.2f} s): about {lost_share:.2g !%} ± "
         "{sigma_lost_share:.1g %} of the samples, and of every turn, are lost. The gyro's scale factors are too large "
         "by about that.",
-        "A link or a logger that drops samples and stamps, or numbers, what is left anew.",
+        "A link or a logger that drops samples and renumbers, or timestamps anew, what is left.",
         "Do not use this gyro calibration: log the sensor's own sample counter or time and record again; "
         "`trihedron diagnose` puts single losses back.",
         or_severity=SERIOUS,
@@ -164,20 +164,20 @@ _MOVES = (
         Code.SAMPLES_LOST,
         "possible",
         SERIOUS,
-        "Gravity after the moves is missed by more than noise, and the stamps are so even that they may have been "
-        "made anew: {lost_share:.2g %} of the samples could be missing without a trace. Every turn, and the gyro's "
+        "The tilt error after rotations exceeds noise, and the timestamps are so even that they may have been "
+        "regenerated: {lost_share:.2g %} of the samples could be missing without a trace. Every turn, and the gyro's "
         "scale factors, would be wrong by as much; its standard error without that is {sigma_scale:.2g %}.",
-        "A link or a logger that drops samples and stamps, or numbers, what is left anew; or another cause of "
-        "the misses.",
+        "A link or a logger that drops samples and renumbers, or timestamps anew, what is left; or another cause of "
+        "the error.",
         "Log the sensor's own sample counter or time, and record again; `trihedron diagnose` looks for other causes.",
     ),
     Entry(
         Code.CLIPPING,
         "moves",
         WARNING,
-        "the gyro met its limit in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.0f ms} at most; "
-        "{bridged} of them are bridged and weigh less, {left_out} left out.",
-        "the sensor was turned faster than its range",
+        "the gyro clipped in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.0f ms} at most; "
+        "{bridged} of them are interpolated and weigh less, {left_out} excluded.",
+        "the sensor was turned faster than its range limit",
         "Turn more slowly, or set a wider range.",
     ),
     Entry(
@@ -193,8 +193,8 @@ _MOVES = (
         Code.HELD_OUT_WORSE,
         "verify-moves",
         WARNING,
-        "Gravity carried through the moves by the gyro is missed by {angle_rms_deg:.3g}° rms (worst move {worst_move}: "
-        "{worst_deg:.3g}°), {times_expected:.1f} times what noise and the stated errors allow.",
+        "The tilt error after rotations is {angle_rms_deg:.3g}° rms (worst move {worst_move}: {worst_deg:.3g}°), "
+        "on average {times_expected:.1f} times the noise and uncertainty of a move.",
         "The gyro's scale has changed since, it clipped, samples were lost, or a pose was not still.",
         "Look at the worst moves; calibrate again near the conditions of use.",
         or_severity=SERIOUS,
@@ -206,8 +206,8 @@ _TURNS = (
         Code.TURN_NOT_A_MULTIPLE,
         "left-out",
         WARNING,
-        "turn {turn}, taken for {angle_rad:.0f deg} about axis {axis}, is off by {deviation_rad:.2g deg} against the "
-        "others; it is left out.",
+        "turn {turn}, taken as {angle_rad:.0f deg} about {axis:axis}, is off by {deviation_rad:.2g deg} against the "
+        "others; it is excluded.",
         "the case was not pushed home against the wall, or the turn was another one",
         "Repeat this turn.",
     ),
@@ -215,8 +215,8 @@ _TURNS = (
         Code.TURN_NOT_A_MULTIPLE,
         "contradicted",
         SERIOUS,
-        "turn {turn}, taken for {angle_rad:.0f deg} about axis {axis}, is off by {deviation_rad:.2g deg} against the "
-        "others; no third turn tells which of them is wrong.",
+        "turn {turn}, taken as {angle_rad:.0f deg} about {axis:axis}, is off by {deviation_rad:.2g deg} against the "
+        "others; no third turn shows which of them is wrong.",
         "the case was not pushed home against the wall, or the turn was another one",
         "Repeat this turn.",
     ),
@@ -224,8 +224,7 @@ _TURNS = (
         Code.TURN_NOT_A_MULTIPLE,
         "scatter",
         WARNING,
-        "the turns scatter by {sigma_turn_rad:.2g deg} about the multiples they were taken for; the error bars contain "
-        "it.",
+        "the turns scatter by {sigma_turn_rad:.2g deg} about their nominal multiples; the uncertainties include it.",
         "turned by eye, without a wall",
         "Push the case against a wall before and after each turn.",
     ),
@@ -233,8 +232,8 @@ _TURNS = (
         Code.TURN_NOT_A_MULTIPLE,
         "not-the-stated",
         WARNING,
-        "turn {turn} about axis {axis} is {seen_rad:.1f deg}, far from the stated {wanted_rad:.0f deg}; it is left "
-        "out.",
+        "turn {turn} about {axis:axis} is {seen_rad:.1f deg}, far from the stated {wanted_rad:.0f deg}; it is "
+        "excluded.",
         "turned without a wall, or the nominal scale is far off",
         "Repeat it against a wall, or give its angle.",
     ),
@@ -242,8 +241,8 @@ _TURNS = (
         Code.TURN_NOT_A_MULTIPLE,
         "no-multiple",
         WARNING,
-        "turn {turn} about axis {axis} is {seen_rad:.1f deg}, far from any multiple of {wanted_rad:.0f deg}; it is "
-        "left out.",
+        "turn {turn} about {axis:axis} is {seen_rad:.1f deg}, far from any multiple of {wanted_rad:.0f deg}; it is "
+        "excluded.",
         "turned without a wall, or the nominal scale is far off",
         "Repeat it against a wall, or give its angle.",
     ),
@@ -251,25 +250,25 @@ _TURNS = (
         Code.TURN_UNCHECKED,
         "",
         WARNING,
-        "only one turn about axis {axes:& and }: nothing would show if its angle was wrong.",
-        "a wrong angle goes into the scale unseen",
+        "only one turn about {axes:axes and}: a wrong angle would not show.",
+        "a wrong angle goes into the scale unnoticed",
         "Turn there and back at least once about every axis.",
     ),
     Entry(
         Code.RESIDUAL_ABOVE_NOISE,
         "turns",
         WARNING,
-        "the turns are missed by more than their noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} degrees of "
-        "freedom; the error bars are widened by its root.",
-        "turns that were not the stated angle, a table that is not level, or a drifting zero",
+        "the error of the turns exceeds what noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} degrees of "
+        "freedom; the standard uncertainties are multiplied by its root.",
+        "turns that were not the stated angle, a table that is not level, or bias drift",
         "Repeat the turns against a wall.",
     ),
     Entry(
         Code.GYRO_BIAS_DRIFT,
         "turns",
         NOTE,
-        "the gyro's zero reading differs between still stretches by {times:.1f} times its noise (axis {axis}).",
-        _ZERO_MOVES,
+        "the gyro's bias changes between poses by {times:.1f} times its noise ({axis:axis}).",
+        _BIAS_CHANGES,
         "Let the sensor warm up; keep still before and after every turn.",
         numbers=("chi2_per_dof",),
     ),

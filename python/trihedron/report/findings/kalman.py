@@ -11,7 +11,7 @@ NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 _OF_AXES = tuple(
     entry
     for case, name, error in (
-        ("axis", "Axis {axis}", "a reference attitude is wrong"),
+        ("axis", "Accelerometer {axis:axis}", "a reference attitude is wrong"),
         ("norm", "Norm of gravity", "the axes are not linear"),
     )
     for entry in (
@@ -22,7 +22,7 @@ _OF_AXES = tuple(
             f"{name}: squared innovations are {{nis_mean:.2f}} times what the noise model predicts (99 % limit "
             "{nis_high:.2f}).",
             f"The noise is larger than the model says, or {error}.",
-            "Multiply the error bars by {widening:.2f}, or identify the noise anew.",
+            "Multiply the uncertainties by {widening:.2f}, or identify the noise anew.",
             numbers=("axis", "nis_low"),
         ),
         Entry(
@@ -32,7 +32,7 @@ _OF_AXES = tuple(
             f"{name}: squared innovations are only {{nis_mean:.2f}} times what the noise model predicts (99 % limit "
             "{nis_low:.2f}).",
             "The noise is smaller than the model says.",
-            "The error bars are too wide; identify the noise anew if that matters.",
+            "The uncertainties are too wide; identify the noise anew if that matters.",
             numbers=("axis", "nis_high"),
         ),
         Entry(
@@ -70,25 +70,25 @@ ENTRIES = (
         Code.WEAKLY_OBSERVABLE,
         "kalman-sensitivity",
         WARNING,
-        "The attitudes determine the sensitivity to {axis} {condition:.0f} times worse than the best-seen constant.",
+        "The attitudes determine the sensitivity to {axis:axis} {condition:.0f} times worse than the best one.",
         "The poses do not turn every axis towards the vertical, both ways up.",
-        "Add poses that tilt {axis} towards the vertical.",
+        "Add poses that tilt {axis:axis} towards the vertical.",
     ),
     Entry(
         Code.WEAKLY_OBSERVABLE,
         "kalman-zero",
         WARNING,
-        "The attitudes determine the zero reading {condition:.0f} times worse than the best-seen constant.",
+        "The attitudes determine the bias {condition:.0f} times worse than the best one.",
         "The poses do not turn every axis towards the vertical, both ways up.",
-        "Add poses that turn the zero reading's axis both ways up.",
+        "Add poses with the axis of this bias up and down.",
         numbers=("axis",),
     ),
     Entry(
         Code.NOISE_ASSUMED,
         "",
         NOTE,
-        "Noise was taken from the scatter inside the still poses; slow noise from pose to pose is not known.",
+        "Noise was taken from the scatter inside the poses; slow noise from pose to pose is not known.",
         "No noise description was given.",
-        "Identify the noise from an hour of rest and give it, or heed what the innovations say.",
+        "Identify the noise from a static log of an hour and give it, or check the innovations.",
     ),
 )

@@ -34,30 +34,30 @@ _LOG = (
         NOTE,
         "{n_knocks:# short excursion} of up to {knock:abs .3g} {unit}, the largest at {time_s:.1f} s.",
         "a knock at the table, a door, a lost or damaged reading",
-        "They raise N and Q; these stretches are left out.",
+        "They raise N and Q; these stretches are excluded.",
     ),
     Entry(
         Code.LOG_MOTION,
         "",
         WARNING,
-        "For {shaken_s:.3g} s the readings scatter up to {times:.2g} times as much as in the rest, first at "
+        "For {shaken_s:.3g} s the readings scatter up to {times:.2g} times as much as elsewhere, first at "
         "{first_s:.1f} s.",
         "motion, vibration or handling during a log that should be still",
-        "It raises N; these stretches are left out.",
+        "They raise N; these stretches are excluded.",
     ),
     Entry(
         Code.LOG_MOTION,
         "throughout",
         SERIOUS,
-        "Events cover {share:.0f %} of the log: it is disturbed throughout, and nothing was left out.",
-        "the sensor was not at rest",
-        "The terms describe the disturbance as much as the sensor; record at rest.",
+        "Events cover {share:.0f %} of the log: it is disturbed throughout, and nothing was excluded.",
+        "the sensor was not static",
+        "The terms describe the disturbance as much as the sensor; record a static log.",
     ),
     Entry(
         Code.STRETCHES_EXCLUDED,
         "",
         NOTE,
-        "{n_stretches:# stretch} of together {excluded_s:.3g} s ({share:.2g %} of the log) left out.",
+        "{n_stretches:# stretch} of together {excluded_s:.3g} s ({share:.2g %} of the log) excluded.",
         "",
         "Clusters there are means of the readings that remain, weighted by their number; nothing is interpolated.",
     ),
@@ -66,14 +66,14 @@ _LOG = (
         "at-rest",
         SERIOUS,
         "{share:.2g %} of the readings lie on the same extreme value.",
-        "the sensor or the converter is at the end of its range",
+        "the sensor or the ADC is at its range limit",
         "Every term comes out too small; use a wider range or another orientation.",
     ),
     Entry(
         Code.QUANTISATION_DEAD,
         "",
         SERIOUS,
-        "One reading's noise ({sigma:.3g} {unit}) is below half a step of the converter ({resolution:.3g} {unit}): "
+        "One reading's noise ({sigma:.3g} {unit}) is below half the resolution (LSB {resolution:.3g} {unit}): "
         "{repeated:.0f %} of the readings repeat the one before.",
         "the resolution is coarser than the noise",
         "N is that of the rounding, and slow terms may hide inside one step; use a narrower range or a finer output.",
@@ -87,7 +87,7 @@ _SPECTRUM = (
         NOTE,
         "{n_lines:# periodic line}: {strongest:each}{has_more:? and {n_more} more|}.",
         "mains, a fan, vibration of the building, or a clock inside the sensor",
-        "A line makes waves in the Allan curve near half its period; its frequencies were left out of the fit.",
+        "A line makes waves in the Allan curve near half its period; its frequencies were excluded from the fit.",
         numbers=("frequency_hz", "amplitude"),
         lines=MappingProxyType({"strongest": "{v0:.4g} Hz ({v1:.2g} {v2})"}),
     ),
@@ -107,7 +107,7 @@ _SPECTRUM = (
         "{nyquist_hz:.3g} Hz.",
         "a low-pass filter in the sensor or the logger, or averaging by a resampler",
         "All terms are quoted from below; averaging times under half a period of that frequency show the filter, and Q "
-        "cannot be told from it.",
+        "cannot be separated from it.",
     ),
     Entry(
         Code.SPECTRUM_COLOURED,
@@ -117,7 +117,7 @@ _SPECTRUM = (
         "{nyquist_hz:.3g} Hz.",
         "aliasing, resampling, a resonance or vibration",
         "All terms are quoted from below; averaging times under half a period of that frequency show the filter, and Q "
-        "cannot be told from it.",
+        "cannot be separated from it.",
     ),
     Entry(
         Code.SPECTRUM_COLOURED,
@@ -125,7 +125,7 @@ _SPECTRUM = (
         WARNING,
         "Below {first_s:.3g} s the curve is not a sum of noise terms.",
         "a low-pass filter in the sensor or the logger, resampling, or a periodic disturbance",
-        "All terms are quoted from longer averaging times; a Q may be the tail of what was left out.",
+        "All terms are quoted from longer averaging times; a Q may be the tail of what was excluded.",
     ),
     Entry(
         Code.SPECTRUM_UNEXPLAINED,
@@ -152,13 +152,13 @@ _TERMS = (
         NOTE,
         "The terms come from Allan deviations alone, taken as overlapping ones of an undisturbed log.",
         "",
-        "Steps, knocks, lines and gaps cannot be told from noise in a curve; identify from the log where there is one.",
+        "Steps, knocks, lines and gaps cannot be separated from noise in a curve; use the log if there is one.",
     ),
     Entry(
         Code.RAMP_OR_WALK,
         "",
         WARNING,
-        "R and K are hard to tell apart in a curve: a random walk that happened to go one way has the curve of a ramp.",
+        "R and K are hard to separate in a curve: a random walk that happened to go one way has the curve of a ramp.",
         "the curve keeps the squares of differences and loses their order",
         "Identify from the log where there is one.",
     ),
@@ -169,7 +169,7 @@ _TERMS = (
         "Slow noise is there; B and K are not separable here: B {flicker_lower:.2g} … {flicker_upper:.2g} {unit}, "
         "K {walk_lower:.2g} … {walk_upper:.2g} {unit}/√s, not both zero.",
         "the log is short compared with the times over which flicker and walk differ",
-        "Variances of means use the most likely sum of both; record longer to tell them apart.",
+        "Variances of means use the most likely sum of both; record longer to separate them.",
         numbers=("evidence",),
     ),
     Entry(
@@ -184,7 +184,7 @@ _TERMS = (
         Code.LOG_TOO_SHORT,
         "",
         NOTE,
-        "No minimum before the log's end: K is below {limit:.2g} {unit}/√s, more is not known.",
+        "No minimum before the log's end: K is below {limit:.2g} {unit}/√s (upper limit).",
         "the log is short compared with the sensor's stability",
         "Record longer to find the best averaging time.",
     ),

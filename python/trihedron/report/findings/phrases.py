@@ -10,7 +10,7 @@ from trihedron.report.findings.wording import filled
 
 LINES: Mapping[str, str] = MappingProxyType(
     {
-        "towards": "axis {v0} points half {v1}",
+        "towards": "/{v1}{v0:axis}",
         "devices": "{v0} ({v1} rows)",
         "words": "{v0} ({v1})",
         "streams": "{v0} ({v1} messages)",
@@ -21,30 +21,31 @@ LINES: Mapping[str, str] = MappingProxyType(
 PHRASES: Mapping[str, str] = MappingProxyType(
     {
         # parameters of a triad
-        "scale-of-axis": "scale of axis {axis}",
-        "angle-between-axes": "angle between axes {one} and {other}",
-        "zero-of-axis": "zero of axis {axis}",
+        "scale-of-axis": "scale of {axis:axis}",
+        "angle-between-axes": "angle between {one:axis} and {other:axis}",
+        "zero-of-axis": "bias of {axis:axis}",
         # poses
-        "face": "axis {axis} {is_up:?up|down}",
-        "pose": "axis {axis} {is_up:?up|down}, then tilted {tilt_deg:.0f}° so that {towards:each and }",
-        "poses-unseen": "{names:together}: not seen at all ({rank} of 9 parameters are determined)",
-        "poses-weakest": "{names:together}: seen {times:.3g} times worse than the best",
+        "face": "{is_up:?+|-}{axis:axis} up",
+        "pose": "{is_up:?+|-}{axis:axis}{towards:run} {is_edge:?edge|corner} up",
+        "poses-unseen": "{names:together}, not observable ({rank} of 9 parameters are determined)",
+        "poses-weakest": "{names:together}, {times:.3g} times worse determined than the best combination",
         "faces-all": "all faces present",
-        "faces-missing": "scale and zero are told apart without {faces:&, }",
+        "faces-missing": "scale and bias cannot be separated without {faces:&, }",
         # moves and turns of a gyro
-        "gyro-scale": "scale of gyro axis {axis} (S{axis}{axis}), known to {share:.2g %} of the scale",
-        "gyro-share": "the share of gyro axis {axis} in the rate about axis {rate} (S{rate}{axis}), known to "
-        "{share:.2g %} of the scale",
-        "gyro-answer": "answer of gyro axis {axis} to turns about case axis {about}, known to {share:.2g %}",
-        "turn-about": "lay body axis {axis} level and turn the sensor about it by 90 to 120 degrees, "
-        "{start:?starting with body axis {upright} upright|{is_twice:?twice, starting with each of the two other axes "
-        "upright once|and back}}, with a still pose before and after",
-        "moves-about-all": "add moves about all three body axes held level, each with a still pose before and after",
+        "gyro-scale": "scale of gyro {axis:axis} (S_{axis:letter}{axis:letter}), uncertainty {share:.2g %} (1 σ)",
+        "gyro-share": "gyro cross-axis {axis:axis} into {rate:axis} (S_{rate:letter}{axis:letter}), uncertainty "
+        "{share:.2g %} of the scale (1 σ)",
+        "gyro-answer": "response of gyro {axis:axis} to turns about {about:axis} of the case, uncertainty "
+        "{share:.2g %} (1 σ)",
+        "turn-about": "lay the body's {axis:axis} axis level and turn the sensor about it by 90 to 120°, "
+        "{start:?starting with {upright:axis} up|{is_twice:?twice, starting with each of the two other axes "
+        "up once|and back}}, with a pose before and after",
+        "moves-about-all": "add moves about all three body axes held level, each with a pose before and after",
         # known attitudes
-        "sensitivity-to": "sensitivity to {axis}",
-        "zero-reading": "zero reading",
-        "tilt-towards-vertical": "tilt {axis} towards the vertical",
-        "zero-both-ways": "turn the zero reading's axis both ways up",
+        "sensitivity-to": "sensitivity to {axis:axis}",
+        "zero-reading": "bias",
+        "tilt-towards-vertical": "tilt {axis:axis} towards the vertical",
+        "zero-both-ways": "place the axis of this bias up and down",
         # why a fit ended
         "small-step": "converged: the Gauss-Newton step no longer moves the parameters",
         "small-gradient": "converged: the residual is orthogonal to every parameter",
@@ -54,24 +55,23 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "closed-form": "closed form",
         "linear-least-squares": "linear least squares",
         # what a model's numbers resemble
-        "zeros-never-added": "All zeros of the model's {sensor} are none: a bias was drawn and never added, or there "
-        "is none.",
+        "zeros-never-added": "All simulated {sensor} biases are 0: was the drawn bias never applied?",
         "accelerometer-scales-relative": "Scales of the accelerometer are relative to the mean of its three axes: the "
         "{side} is in counts ({per_g:.5g} per g), whose nominal size is not known.",
         "gyro-scales-relative": "Scales of the gyro are relative to the mean of its three axes: the {side} is in "
         "counts ({per_deg_s:.4g} per °/s), whose nominal size is not known.",
         # residuals of a domain
-        "length-at-rest": "|f| − |g| at rest",
-        "rate-at-rest": "rate at rest, minus its mean",
-        "gravity-missed": "gravity missed after the move",
-        "velocity-over-move": "velocity over the move",
-        # laws of what stays unexplained
-        "law-follows": "The {sensor}'s {is_at_rest:?zero|reading in motion} ({axes:&, }) follows {depends:and}: "
+        "length-at-rest": "gravity error in static poses, |f| − |g|",
+        "rate-at-rest": "rate in static poses, minus its mean",
+        "gravity-missed": "tilt error after a rotation",
+        "velocity-over-move": "velocity error over a rotation",
+        # empirical relations of what stays unexplained
+        "law-follows": "The {sensor}'s {is_at_rest:?bias|reading in motion} ({axes:axes}) follows {depends:and}: "
         "{share:.0f %} of the held-out misfit.",
-        "law-follows-room": "The gyro's zero follows a vector fixed in the room, {inclination_deg:.0f}° ± "
+        "law-follows-room": "The gyro's bias follows a vector fixed in the room, {inclination_deg:.0f}° ± "
         "{inclination_sigma_deg:.0f}° from the vertical: {share:.0f %} of the held-out misfit.",
-        "law-form": "reading of {axes:&, } grows by {terms:& + }",
-        "law-form-room": "zero = K Rᵀ m, m a unit vector fixed in the room",
+        "law-form": "reading of {axes:axes} grows by {terms:& + }",
+        "law-form-room": "bias = K Rᵀ m, m a unit vector fixed in the room",
         "angle-to-vertical": "angle to the vertical",
         # places in a file, amounts
         "line": "line {line}",
@@ -89,7 +89,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         # what an exception said, or a finding, or an effect: a sentence becomes a clause of another
         "because": "{sentence:clause}",
         "quoted": "{sentence}",
-        # why an effect was not taken off
+        # why an effect was not compensated
         "effect-unknown": "this version does not know it",
         "effect-of-session": "it belongs to that session, not to the sensor",
         # why a recording does not go with the others

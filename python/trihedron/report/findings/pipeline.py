@@ -7,7 +7,7 @@ from trihedron.records.finding import Severity
 from trihedron.report.findings.entry import Entry
 
 NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
-_MANY = "The common numbers are the mean of different ones: use the spread below as their error, or calibrate anew "
+_MANY = "The common parameters are the mean of different ones: use the spread below as their error, or recalibrate "
 _MANY += "after the change."
 
 _CALIBRATE = (
@@ -16,31 +16,31 @@ _CALIBRATE = (
         "",
         WARNING,
         "Gravity was not given; {gravity_m_s2} m/s² was used. Where people live it lies between {low_m_s2:.3f} and "
-        "{high_m_s2:.3f} m/s², and its error goes into every scale and zero of the accelerometer: up to "
+        "{high_m_s2:.3f} m/s², and its error goes into every scale and bias of the accelerometer: up to "
         "{possible_error_percent:.1f} % that no residual shows and no ± contains.",
-        "Neither --gravity nor --latitude was said.",
+        "Neither --gravity nor --latitude was given.",
         "Give --latitude DEG (and --height M), or --gravity M_S2.",
     ),
     Entry(
         Code.JOINT_FIT_LEFT,
         "",
         NOTE,
-        "The moves contradict the still poses (one fit of both raises χ² of the poses by {chi2_increase:.3g}; noise "
-        "explains 28); the accelerometer was therefore taken from the still poses alone, and the gyro from the moves "
-        "by it.",
+        "The moves contradict the poses (one fit of both raises χ² of the poses by {chi2_increase:.3g}; noise "
+        "explains 28); the accelerometer was therefore fitted to the poses alone, and the gyro to the moves with "
+        "that accelerometer.",
         "An effect in the moves that the model does not have, which one fit of both would spread over the "
         "accelerometer.",
-        "Say --method separate to choose this from the start.",
+        "Use --method separate to choose this from the start.",
     ),
     Entry(
         Code.TURN_ANGLE_UNKNOWN,
         "",
         SERIOUS,
         "The gyro was not calibrated: its readings are counts, and its turns would fit 90°, 180° and 360° alike. "
-        "90, 180 or 360°? say --turns",
-        "Nothing in the log tells the gyro's scale: no unit, no nominal scale, and no moves that turn gravity well "
-        "enough to exclude half and twice.",
-        "Say --turns 180,-180,... (one angle a turn, 0 leaves it out), or --gyro-nominal.",
+        "Give the angles with --turns.",
+        "Nothing in the log determines the gyro's scale: no unit, no nominal scale, and no moves that turn gravity "
+        "well enough to exclude half and twice.",
+        "Give --turns 180,-180,... (one angle a turn, 0 excludes it), or --gyro-nominal.",
     ),
     Entry(
         Code.GYROSCOPE_LEFT_OUT,
@@ -48,7 +48,7 @@ _CALIBRATE = (
         WARNING,
         "The gyro was not calibrated: {why}.",
         "The recording does not hold what the gyro needs.",
-        "Turn the sensor about all three axes between still poses; docs/procedure.md shows how.",
+        "Turn the sensor about all three axes between poses; docs/procedure.md shows how.",
     ),
     Entry(
         Code.NOT_FIT,
@@ -101,10 +101,10 @@ _VERIFIED = (
         Code.CALIBRATION_SHIFT,
         "gyro-bias",
         SERIOUS,
-        "At rest the gyro reads {rate_rad_s:.3g deg/s} with this calibration, {times_expected:.0f} times what the "
-        "scatter of the poses and the stated uncertainty allow: its bias is another one.",
+        "In static poses the calibrated gyro reads {rate_rad_s:.3g deg/s}, {times_expected:.0f} times what the "
+        "scatter of the poses and the stated uncertainty allow: its bias has changed.",
         "A bias with the wrong sign or unit, of another unit, or of another temperature.",
-        "Do not subtract this bias; measure it at rest before use.",
+        "Do not subtract this bias; measure it in a static pose before use.",
     ),
 )
 
@@ -113,7 +113,7 @@ _USE = (
         Code.GYROSCOPE_LEFT_OUT,
         "calibration-has-none",
         WARNING,
-        "The gyro was left out: the calibration holds none.",
+        "The gyro was excluded: the calibration holds none.",
         "It was made without gyro readings, or they did not suffice.",
         "Calibrate both sensors in one recording.",
     ),
@@ -121,7 +121,7 @@ _USE = (
         Code.GYROSCOPE_LEFT_OUT,
         "model-has-none",
         WARNING,
-        "The gyro was left out: the model has none.",
+        "The gyro was excluded: the model has none.",
         "It was made without gyro readings, or they did not suffice.",
         "Give a calibration of both sensors.",
     ),
@@ -145,22 +145,22 @@ _USE = (
         Code.CALIBRATION_DOUBTED,
         "",
         SERIOUS,
-        "The calibration itself was not to be trusted: {seen}",
-        "What it said when it was made holds for all that it is applied to.",
+        "The calibration itself is not to be trusted: {seen}",
+        "This finding was made when it was calibrated; it concerns everything the calibration is applied to.",
         "Calibrate again as its findings say, or apply another calibration.",
     ),
     Entry(
         Code.EFFECT_NOT_APPLIED,
         "of-session",
         NOTE,
-        "{effect} of the extended calibration was not taken off: {why}.",
+        "{effect} of the extended calibration was not compensated: {why}.",
         "It was in the recording that was calibrated; S and b were fitted beside it.",
     ),
     Entry(
         Code.EFFECT_NOT_APPLIED,
         "",
         WARNING,
-        "{effect} of the extended calibration was not taken off: {why}.",
+        "{effect} of the extended calibration was not compensated: {why}.",
         "It was in the recording that was calibrated; S and b were fitted beside it.",
         "Log that channel, or update the program that applies the calibration.",
     ),
@@ -168,25 +168,25 @@ _USE = (
         Code.LIMIT_EXCEEDED,
         "rest",
         SERIOUS,
-        "Gravity at rest is missed by {rms_mg:.3g} mg rms; the limit is {limit_mg:g} mg.",
-        "The calibration does not hold here as well as was asked for.",
+        "The gravity error in static poses is {rms_mg:.3g} mg rms; the limit is {limit_mg:g} mg.",
+        "The calibration is less accurate here than required.",
         "Calibrate again, or accept a wider limit.",
     ),
     Entry(
         Code.LIMIT_EXCEEDED,
         "moves",
         SERIOUS,
-        "Gravity carried through moves is missed by {rms_deg:.3g} deg rms; the limit is {limit_deg:g} deg.",
-        "The calibration does not hold here as well as was asked for.",
+        "The tilt error after a rotation is {rms_deg:.3g} deg rms; the limit is {limit_deg:g} deg.",
+        "The calibration is less accurate here than required.",
         "Calibrate again, or accept a wider limit.",
     ),
     Entry(
         Code.SAME_RECORDING,
         "",
         WARNING,
-        "This is the recording that the calibration was made from: what it says here proves nothing.",
+        "This is the recording that the calibration was made from: a verification with it proves nothing.",
         "The same file was named twice.",
-        "Verify on another session; the calibration's own report already holds out poses and moves.",
+        "Verify on another session; the calibration report already has cross-validated errors.",
     ),
     Entry(
         Code.OUTSIDE_VALID_RANGE,
@@ -195,8 +195,8 @@ _USE = (
         "{n_outside} of {n_samples} samples were recorded outside {low_degc:.1f} to {high_degc:.1f} °C, for which the "
         "calibration was made (the log: {log_low_degc:.1f} to {log_high_degc:.1f} °C).{ends_are_held:? S and b of the "
         "nearer end were used there.|}",
-        "The calibration saw no such temperature: a polynomial beyond its ends is no measurement.",
-        "Calibrate at these temperatures too, or leave those samples out.",
+        "The calibration has no data at such temperatures; a polynomial is not extrapolated.",
+        "Calibrate at these temperatures too, or exclude those samples.",
     ),
     Entry(
         Code.TEMPERATURE_MISSING,
@@ -210,15 +210,17 @@ _USE = (
 )
 
 _MODELLED = "The linear model alone does not reproduce this recording: {statements:&; }."
-_TAKES_OFF = "`trihedron apply` takes off what belongs to the sensor; S and b alone are only half of this model."
+_TAKES_OFF = (
+    "`trihedron apply` compensates the effects that belong to the sensor; S and b alone are only part of this model."
+)
 _DIAGNOSE = (
     Entry(
         Code.EFFECTS_MODELLED,
         "stays-linear",
         WARNING,
-        "The calibration stays linear: with {effects:&, } what was left out is predicted worse ({domain} from "
+        "The calibration stays linear: with {effects:&, } the cross-validated error grows ({domain} from "
         "{rms_before:.3g} to {rms_after:.3g} {unit} rms).",
-        "The effects belong to this session more than to the sensor, or its poses are too few to tell their size.",
+        "The effects belong to this session more than to the sensor, or its poses are too few to determine their size.",
         "`trihedron diagnose` shows them; record another session to see which of them return.",
         numbers=("n_effects",),
     ),
@@ -226,16 +228,16 @@ _DIAGNOSE = (
         Code.EFFECTS_MODELLED,
         "none",
         NOTE,
-        "The diagnosis accepted no effect: the linear model stands as it was.",
+        "The diagnosis accepted no effect: the linear model is unchanged.",
         numbers=("left", "n_effects", "n_domains_left"),
     ),
     Entry(
         Code.EFFECTS_MODELLED,
         "none-but-disagree",
         WARNING,
-        "The diagnosis accepted no effect: the linear model stands as it was, and {left:&, } still disagree with it.",
+        "The diagnosis accepted no effect: the linear model is unchanged, and {left:&, } still disagree with it.",
         "Something in this recording that no effect of the catalogue describes.",
-        "`trihedron diagnose` shows where it sits.",
+        "`trihedron diagnose` shows where it occurs.",
         numbers=("n_effects", "n_domains_left"),
     ),
     Entry(
@@ -260,14 +262,14 @@ _DIAGNOSE = (
         Code.PROTOCOL_DIFFERS,
         "",
         NOTE,
-        "The simulated recording has {n_simulated} still poses and the real one {n_real}.",
+        "The simulated recording has {n_simulated} poses and the real one {n_real}.",
         "They do not follow the same protocol, or a pose was not still.",
-        "Numbers, noise and physics are compared all the same, each from its own poses; only their error bars differ.",
+        "Parameters, noise and physics are compared all the same, each from its own poses; their uncertainties differ.",
     ),
 )
 
 _CHANGED_CAUSE = {
-    "zero": "Turning on, mounting, temperature or age moved the zero by more than it wanders in a recording.",
+    "bias": "A calibration shift between sessions (turn-on, mounting, temperature, age).",
     "scale": "Temperature, stress or the gravity that was given.",
     "misalignment": "Stress in the package or the board, or another unit.",
     "alignment": "One of two parts was remounted, or another unit.",
@@ -275,17 +277,17 @@ _CHANGED_CAUSE = {
 }
 _CHANGED_SEEN = {
     "differs": "differs between the two recordings by {amount}",
-    "apart": "is another in {where} than in all other recordings, by {amount}",
+    "apart": "in {where} differs from all other recordings, by {amount}",
     "step": "changed before {where}, by {amount}",
-    "trend": "moves from recording to recording, by {amount} each",
-    "scatter": "is another in every recording, by {amount} (standard deviation)",
+    "trend": "changes from recording to recording, by {amount} each",
+    "scatter": "differs in every recording, by {amount} (standard deviation)",
 }
 _MANY_RECORDINGS = (
     Entry(
         Code.SESSION_LEFT_OUT,
         "",
         WARNING,
-        "{name} was left out: {why}.",
+        "Recording {name} was excluded: {why}.",
         "One recording that cannot be calibrated does not stop the others.",
         "See `trihedron check {path}`.",
     ),
@@ -293,7 +295,7 @@ _MANY_RECORDINGS = (
         Code.FEW_SESSIONS,
         "",
         NOTE,
-        "Only {n_groups} {kind}: spreads are known to a factor of several, as their intervals say.",
+        "Only {n_groups} {kind}: the spreads are uncertain by a factor of several, as their intervals show.",
         "A standard deviation of few values is uncertain whatever is done with them.",
         "Record {wanted} or more.",
     ),
@@ -301,15 +303,15 @@ _MANY_RECORDINGS = (
         Code.TEMPERATURE_DRIVEN,
         "",
         WARNING,
-        "The recordings were made between {low_degc:.0f} and {high_degc:.0f} °C, and what temperature does is in their "
-        "spread.",
-        "Zeros and scales of every part follow temperature.",
-        "Say --by temperature.",
+        "The recordings were made between {low_degc:.0f} and {high_degc:.0f} °C, and their spread includes the effect "
+        "of temperature.",
+        "Biases and scales of every part follow temperature.",
+        "Use --by temperature.",
         numbers=("span_degc",),
     ),
     *(
         Entry(
-            Code.NUMBERS_CHANGED,
+            Code.PARAMETERS_CHANGED,
             f"{parameter}-{kind}",
             WARNING,
             f"{{what:& of }} {seen}.",

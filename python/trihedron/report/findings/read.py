@@ -47,8 +47,8 @@ _UNITS = (
         Code.UNIT_ASSUMED,
         "never-whole",
         WARNING,
-        "The accelerometer has no stretch without missing readings to tell its unit by; taken as raw counts.",
-        "A raw reading of unknown scale, a log that never rests, or wrong columns.",
+        "The accelerometer has no stretch without missing readings to determine its unit; taken as raw counts.",
+        "A raw reading of unknown scale, a log without static poses, or wrong columns.",
         _SAY_ACCEL_UNIT,
         numbers=("rest_norm",),
     ),
@@ -58,7 +58,7 @@ _UNITS = (
         WARNING,
         "The accelerometer reads {rest_norm:.4g} in its quietest stretches, which is gravity in no known unit; taken "
         "as raw counts.",
-        "A raw reading of unknown scale, a log that never rests, or wrong columns.",
+        "A raw reading of unknown scale, a log without static poses, or wrong columns.",
         _SAY_ACCEL_UNIT,
     ),
     Entry(
@@ -75,7 +75,7 @@ _UNITS = (
         SERIOUS,
         f"The accelerometer is in {{unit}} {_SOURCE}, but at rest it reads {{rest_norm:.4g}} {{unit}}, "
         "{gravities:.3g} times gravity.",
-        "A wrong unit, wrong columns, or a log that never rests.",
+        "A wrong unit, wrong columns, or a log without static poses.",
         _SAY_ACCEL_UNIT,
     ),
     Entry(Code.UNIT_DETECTED, "stated", NOTE, f"The {{sensor}} is in {{unit}} {_SOURCE}."),
@@ -108,7 +108,7 @@ _UNITS = (
         WARNING,
         "Nothing states the gyro's unit; it reads {rest:.3g} at rest and {largest:.4g} at most, so it was taken as "
         "{unit}.",
-        "No unit in the header, and no turns between rests to settle it.",
+        "No unit in the header, and no turns between static poses to determine it.",
         _SAY_GYRO_UNIT,
     ),
 )
@@ -117,7 +117,7 @@ _WHY_FIRST = {
     "poses": "its quiet readings differ from pose to pose",
     "level": "its steady reading stands far above its noise, as gravity does",
 }
-_WHY_UNKNOWN = {"short": "the log is too short to tell", "alike": "both triads look alike"}
+_WHY_UNKNOWN = {"short": "the log is too short", "alike": "both triads look alike"}
 _NAME_THEM = "Name them with --columns, for example --columns ax,ay,az,gx,gy,gz."
 _COLUMNS = (
     Entry(
@@ -176,7 +176,7 @@ _COLUMNS = (
         Code.COLUMNS_ASSUMED,
         "header-ignored",
         WARNING,
-        "The line '{line}' above the numbers does not name their {n_columns} columns, so it was passed over.",
+        "The line '{line}' above the numbers does not name their {n_columns} columns, so it was skipped.",
         "A header with another number of names than there are columns.",
         "Name the columns with --columns.",
     ),
@@ -225,13 +225,13 @@ _COLUMNS = (
         Code.COLUMN_LEFT_OUT,
         "words",
         NOTE,
-        "Column {column} holds words (such as {example!r}) and was left out.",
+        "Column {column} holds words (such as {example!r}) and was excluded.",
     ),
     Entry(
         Code.COLUMN_LEFT_OUT,
         "type",
         NOTE,
-        "Column '{column}' holds {kind}, not numbers, and was left out.",
+        "Column '{column}' holds {kind}, not numbers, and was excluded.",
     ),
 )
 
@@ -240,22 +240,22 @@ _ROWS = (
         Code.ROWS_LEFT_OUT,
         "above",
         WARNING,
-        "{rows_left_out} lines above the first row of {n_columns} numbers were passed over (first: line {line}).",
+        "{rows_left_out} lines above the first row of {n_columns} numbers were skipped (first: line {line}).",
         "Rows of another layout, damaged rows, or numbers that belong to a preamble.",
-        "Look at these lines; nothing else of the file was left out.",
+        "Look at these lines; nothing else of the file was excluded.",
     ),
     Entry(
         Code.ROWS_LEFT_OUT,
         "remarks",
         NOTE,
-        "{rows_left_out} lines between the rows begin like remarks and were passed over (first: line {line}).",
+        "{rows_left_out} lines between the rows begin like remarks and were skipped (first: line {line}).",
         "Remarks of the logger, or rows that somebody took out.",
     ),
     Entry(
         Code.LINE_INCOMPLETE,
         "",
         NOTE,
-        "The last line ({line}) breaks off in the middle and was left out.",
+        "The last line ({line}) breaks off in the middle and was excluded.",
         "The logger was stopped while it wrote.",
         "Nothing is lost but one sample.",
         numbers=("rows_left_out",),
@@ -265,7 +265,7 @@ _ROWS = (
         Code.ROWS_UNACCOUNTED,
         "",
         SERIOUS,
-        "The file holds {in_file} rows, {read} were read and {reported} reported as left out: {count} are not "
+        "The file holds {in_file} rows, {read} were read and {reported} reported as excluded: {count} are not "
         "accounted for.",
         "A fault of the reader.",
         "Report it with the file; until then convert the log to CSV with another program.",
@@ -274,7 +274,7 @@ _ROWS = (
         Code.REPEATED_ROWS,
         "copies",
         WARNING,
-        "{rows_left_out} rows are copies of the row before, time stamp included (first: {where}); they were left out.",
+        "{rows_left_out} rows are copies of the row before, timestamp included (first: {where}); they were excluded.",
         "A logger that writes a row twice, or a stream joined with itself.",
         numbers=("count", "row"),
     ),
@@ -335,7 +335,7 @@ _DEVICES = (
         "in-turn",
         NOTE,
         "{accelerometer_rows} rows hold the accelerometer and {gyroscope_rows} the gyro, with the other's cells empty: "
-        "they were read as two logs and joined on their stamps.",
+        "they were read as two logs and joined on their timestamps.",
         numbers=("rows_left_out",),
     ),
 )

@@ -1,4 +1,4 @@
-"""What is said about still poses and moves."""
+"""What is said about poses and moves."""
 
 from __future__ import annotations
 
@@ -10,47 +10,47 @@ NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 
 ENTRIES = (
     Entry(
-        Code.HOLD_CREEPS,
+        Code.POSE_SETTLING,
         "",
         WARNING,
-        "{holds:# hold} {holds:?drifts|drift} while still: in hold {worst_hold} at {worst_s:.1f} s the second half "
-        "reads {worst_sigmas:.1f} standard errors from the first (hold {which:first 8}).",
+        "{holds:# pose} {holds:?drifts|drift} while still: in pose {worst_hold} at {worst_s:.1f} s the second half "
+        "differs by {worst_sigmas:.1f} σ from the first (pose {which:first 8}).",
         "The support gives way, the case settles after being let go, or the sensor warms up.",
         "Wait until the case has settled, hold for less time, or put it on a firmer support.",
         or_severity=SERIOUS,
     ),
     Entry(
-        Code.HOLD_BUMPED,
+        Code.POSE_DISTURBED,
         "",
         NOTE,
-        "{disturbances:# disturbance} inside {holds:# hold} (hold {which:first 8}), {left_out_s:.1f} s in all, the "
-        "first at {first_s:.1f} s, left out of the means.",
+        "{disturbances:# disturbance} inside {holds:# pose} (pose {which:first 8}), {left_out_s:.1f} s in all, the "
+        "first at {first_s:.1f} s, excluded from the means.",
         "The table or the cable was touched, or samples are missing there.",
-        "Nothing needs to be done; keep hands off the table during a hold.",
+        "Nothing needs to be done; keep hands off the table while the sensor is in a pose.",
     ),
     Entry(
-        Code.HOLD_UNSTEADY,
+        Code.POSE_UNSTEADY,
         "",
         WARNING,
-        "{holds:# hold} never {holds:?comes|come} down to the sensor's own noise (hold {which:first 8}; first at "
+        "{holds:# pose} never {holds:?comes|come} down to the sensor's own noise (pose {which:first 8}; first at "
         "{first_s:.1f} s).",
         "The sensor was held in the hand or stood on a support that shakes.",
-        "Their means weigh less, by their own scatter; rest the case on something firm for a better result.",
+        "Their means weigh less, by their own scatter; put the case on a firm support for a better result.",
     ),
     Entry(
-        Code.HOLD_AT_LIMIT,
+        Code.POSE_AT_RANGE_LIMIT,
         "",
         WARNING,
-        "{holds:# still pose} {holds:?reads|read} the end of the accelerometer's range (first at {first_s:.1f} s, a "
-        "reading of {reading:.6g}) and {holds:?is|are} left out: only a bound of gravity is known there.",
-        "The range ends below 1 g plus the zero of that axis.",
-        "Set a wider range; the poses that remain calibrate what they show.",
+        "{holds:# pose} {holds:?reaches|reach} the accelerometer's range limit (first at {first_s:.1f} s, a "
+        "reading of {reading:.6g}) and {holds:?is|are} excluded: clipped readings only bound gravity.",
+        "The range limit is below 1 g plus the bias of that axis.",
+        "Set a wider range; the remaining poses are used.",
     ),
     Entry(
         Code.NOT_STATIC,
         "",
         SERIOUS,
-        "No still pose of a second or more in {duration_s:.1f} s of log.",
+        "No pose of a second or more in {duration_s:.1f} s of log.",
         "The sensor was moving, or held in the hand, all the time; or the log is too short.",
         "Log again: put the case down for several seconds in each pose.",
         numbers=("holds",),
@@ -59,24 +59,24 @@ ENTRIES = (
         Code.SLOW_TURN,
         "",
         NOTE,
-        "{turning_s:.1f} s look still to the accelerometer but turn: the gyro reads away from its zero, first at "
-        "{first_s:.1f} s; taken as moving.",
+        "{turning_s:.1f} s are still to the accelerometer while the gyro shows a slow turn, first at {first_s:.1f} s; "
+        "taken as moving.",
         "A slow steady turn about the vertical.",
         "Nothing needs to be done.",
     ),
     Entry(
-        Code.NO_INITIAL_REST,
+        Code.NO_INITIAL_POSE,
         "",
         NOTE,
-        "The log does not begin at rest: the first still pose starts at {first_hold_s:.1f} s.",
+        "The log does not begin at rest: the first pose starts at {first_hold_s:.1f} s.",
         "Logging was started with the case in hand.",
-        "Nothing needs to be done: the noise was measured in the still poses themselves.",
+        "Nothing needs to be done: the noise was measured in the poses themselves.",
     ),
     Entry(
         Code.FEW_POSES,
         "",
         WARNING,
-        "{holds:# still pose} found in {duration_s:.1f} s; a calibration of nine parameters needs at least {needed}, "
+        "{holds:# pose} found in {duration_s:.1f} s; a calibration of nine parameters needs at least {needed}, "
         "in different directions.",
         "The log has few poses, or they were held for less than a second.",
         "Log the six faces and twelve edges of a cube (18 poses), a few seconds each.",

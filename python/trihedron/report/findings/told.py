@@ -11,9 +11,9 @@ from trihedron.report.document import FindingList, Paragraph
 from trihedron.report.numbers import how_many, listed
 
 _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
-# A number that is a value; one that names a thing (hold 3) is told apart by the word before it.
+# A number that is a value; one that names a thing (pose 3) is recognised by the word before it.
 _NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
-_NAMED = re.compile(r"^(Move|Hold|Still pose|Pose|Turn) (\d+)(?: \([^)]*\))?,? (.*)$", re.DOTALL)
+_NAMED = re.compile(r"^(Move|Pose|Turn) (\d+)(?: \([^)]*\))?,? (.*)$", re.DOTALL)
 _AXIS = re.compile(r"^((?:gyro|accel)(?:\s\w+)?|ch\d+|\w+ [xyz123]): (.*)$", re.DOTALL | re.IGNORECASE)
 
 
@@ -71,7 +71,7 @@ def _axes(parts: Sequence[re.Match[str]], rest: str) -> str:
 
 
 def _things(parts: Sequence[re.Match[str]], rest: str) -> str:
-    """``Moves 7, 9 and 22: each misses gravity by ...``"""
+    """``Moves 7, 9 and 22: each has a gravity error of ...``"""
     return f"{parts[0][1]}s {listed([part[2] for part in parts])}: each {rest}"
 
 

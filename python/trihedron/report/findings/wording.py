@@ -5,7 +5,7 @@ A place is a name and, after the colon, how its value becomes words:
 ``.3g`` · ``.3g mm/s²``  a number, in the unit named there (values are SI); ``abs .3g %`` without its sign;
                          ``.3g !%`` without the unit's name
 ``all .2g °/s``          several numbers in one unit, which is named once: ``0.1, 0.2 °/s``
-``# hold``               ``1 hold``, ``3 holds``
+``# pose``               ``1 pose``, ``3 poses``
 ``?drifts|drift``        the first words where the value is 1 or true, else the second; they may hold places
 ``<below|above``         the first words where the value is negative, else the second; they may hold places
 ``&, the ``              several words, joined by what stands after the ``&``; ``and``: ``x, y and z``
@@ -14,6 +14,10 @@ A place is a name and, after the colon, how its value becomes words:
 ``clause``               a sentence without its stop
 ``first 8``              ``3, 5, 6``, with ``...`` behind the eighth
 ``numbered``             several words as ``(1) ...; (2) ...``
+``axis``                 ``X`` for 1 or ``x``
+``axes`` · ``axes and ``  several of them, joined by comma or by the word: ``X, Y``, ``X and Z``
+``letter``               ``x`` for 1
+``run``                  several groups of values, each by the entry's line of that name, with nothing between
 ``each`` · ``each; ``    several groups of values, each by the entry's line of that name, joined by comma or ``; ``
 """
 
@@ -86,12 +90,20 @@ def branches(how: str) -> tuple[str, str]:
 
 
 def _in_words(value: Any, how: str, line: str) -> str:
+    if how == "run":
+        return "".join(filled(line, {f"v{i}": v for i, v in enumerate(group)}, {}) for group in value)
     if how.startswith("each"):
         return (how[4:] or ", ").join(filled(line, {f"v{i}": v for i, v in enumerate(group)}, {}) for group in value)
     if how.startswith("all "):
         digits, _, unit = how[4:].partition(" ")
         alike = f"{digits} !{unit}" if unit else digits
         return ", ".join(_number(number, alike) for number in value) + (f" {unit}" if unit else "")
+    if how == "axis":
+        return axis_name(value)
+    if how == "letter":
+        return axis_name(value).lower()
+    if how.startswith("axes"):
+        return (" and " if how == "axes and" else ", ").join(map(axis_name, value))
     if how == "and":
         return listed([str(word) for word in value])
     if how == "together":
@@ -111,6 +123,11 @@ def _in_words(value: Any, how: str, line: str) -> str:
         noun = how[2:]
         return f"{value:.0f} {noun if value == 1 else _plural(noun)}"
     return _number(value, how) if how else str(value)
+
+
+def axis_name(axis: int | str) -> str:
+    """``X``, as printed on the board, of axis 1 or ``x``."""
+    return axis.upper() if isinstance(axis, str) else "XYZ"[int(axis) - 1]
 
 
 def _number(value: float, how: str) -> str:

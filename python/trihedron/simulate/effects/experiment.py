@@ -79,7 +79,7 @@ def disturbed(scenario: Scenario, poses: Sequence[int], tilt_deg: float = 0.5, s
         else:
             steps.append(step)
     if any(not 0 <= p < count for p in poses):
-        raise RefusedError(f"the motion has holds 0 to {count - 1}, got {list(poses)}")
+        raise RefusedError(f"the motion has poses 0 to {count - 1}, got {list(poses)}")
     return replace(scenario, motion=replace(scenario.motion, steps=tuple(steps)))
 
 

@@ -58,9 +58,9 @@ def _warmed(scenario: Scenario, warm_up_k: float, warm_up_tau_s: float, logged: 
     return replace(scenario, environment=replace(scenario.environment, temperature=temperature))
 
 
-def zero_scatter(sensor: Sensor) -> Change:
+def bias_repeatability(sensor: Sensor) -> Change:
     def change(scenario: Scenario, sigma: Values) -> Scenario:
-        return electronics(scenario, sensor, zero_scatter=triple(sigma))
+        return electronics(scenario, sensor, bias_repeatability=triple(sigma))
 
     return change
 
@@ -172,7 +172,7 @@ def supply(
 def handedness(scenario: Scenario, sensor: Sensor, axis: int) -> Scenario:
     """``axis`` 1, 2 or 3 points against its documentation."""
     if axis not in (1, 2, 3):
-        raise RefusedError(f"axis is 1, 2 or 3, got {axis}")
+        raise RefusedError(f"axis is 1, 2 or 3 (X, Y, Z), got {axis}")
     part = getattr(scenario, checked(sensor))
     S = np.array(part.S)
     S[:, axis - 1] *= -1.0

@@ -92,10 +92,10 @@ def _note_electronics(
     if any(drift.amplitude) or any(drift.change):
         dies = {"amplitude": drift.amplitude, "tau_s": drift.tau_s} if any(drift.amplitude) else {}
         goes_on = {"change": drift.change, "length_s": drift.length_s} if any(drift.change) else {}
-        note(f"{prefix}-hidden-drift", **dies, **goes_on)
-    if any(electronics.zero_scatter) or any(electronics.zero_in_moves):
-        in_moves = {"in_moves": electronics.zero_in_moves} if any(electronics.zero_in_moves) else {}
-        note(f"{prefix}-zero-scatter", sigma=electronics.zero_scatter, **in_moves)
+        note(f"{prefix}-bias-drift", **dies, **goes_on)
+    if any(electronics.bias_repeatability) or any(electronics.bias_in_moves):
+        in_moves = {"in_moves": electronics.bias_in_moves} if any(electronics.bias_in_moves) else {}
+        note(f"{prefix}-bias-repeatability", sigma=electronics.bias_repeatability, **in_moves)
     if any(math.isfinite(v) for v in electronics.saturation):
         note(f"{prefix}-saturation", limit=electronics.saturation)
     if any(electronics.lag_s) or electronics.filter.cutoff_hz:

@@ -104,7 +104,7 @@ class Vibrate:
 
 @dataclass(frozen=True)
 class Disturb:
-    """A push during a hold: a half-second rocking and shift that leaves the pose as it was."""
+    """A push during a pose: a half-second rocking and shift that leaves the pose as it was."""
 
     duration_s: float = 0.6
     tilt_deg: float = 0.3

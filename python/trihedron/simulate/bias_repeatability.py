@@ -14,7 +14,7 @@ RESTS = frozenset({"hold", "disturbance", "vibration"})
 """Kinds of steps that leave the attitude: a knocked pose is the same pose."""
 
 
-def zero_of_poses(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, rng: np.random.Generator) -> FloatArray:
+def bias_of_poses(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, rng: np.random.Generator) -> FloatArray:
     """(n, 3) zeros at ``time_s`` (n,): one normal draw a pose with deviations ``sigma`` (3,), a straight line between.
 
     Poses are stretches of rest between which anything moved. Unit: that of ``sigma``.
@@ -28,8 +28,8 @@ def zero_of_poses(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, 
     return out
 
 
-def zero_in_moves(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, rng: np.random.Generator) -> FloatArray:
-    """(n, 3) by how much the zero leaves, during moves only, the line between its poses (eq. 11.8b).
+def bias_in_moves(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, rng: np.random.Generator) -> FloatArray:
+    """(n, 3) by how much the bias leaves, during moves only, the line between its poses (eq. 11.8b).
 
     N(0, ``sigma``²) at the first and at the last instant of a move, independently, linear between; nothing at rest.
     """

@@ -1,0 +1,197 @@
+"""Retired words, held against everything that a user can read: help, reports, schemas, documents, public names.
+
+One word for one thing, the field's own: bias, pose, timestamp, uncertainty, resolution, range limit, X Y Z.
+"""
+
+import dataclasses
+import html
+import inspect
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import typer
+
+import trihedron
+from trihedron.cli import COMMANDS, build_app
+from trihedron.records.finding import FindingCode
+from trihedron.report.effects.catalogue import ENTRIES as EFFECTS
+from trihedron.report.effects.laws import FAMILIES
+from trihedron.report.effects.reasons import REASONS
+from trihedron.report.findings.catalogue import ENTRIES as FINDINGS
+from trihedron.report.findings.phrases import LINES, PHRASES
+from trihedron.simulate import hand_session
+from written_session import G, simulated
+
+ROOT = Path(__file__).parents[1]
+SCHEMAS = sorted((ROOT / "python/trihedron/files/schema").glob("*.json"))
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+RETIRED = {
+    # Only where zero means a bias: as a number it stays.
+    r"\bzero[- ]readings?": "bias",
+    r"\bzero[- ]scatter|\bzeros? (that )?(scatters?|wanders?|strays?|drifts?|walks?|differs?|jumps?|moved)\b": "bias",
+    r"\b(gyro|gyroscope|accelerometer|sensor)s?(['’]s?)? zeros?\b": "bias",
+    r"\b(one|its|their|whose|a) zeros? (per|for|of|is|are|from)\b": "bias",
+    r"\bhidden[- ]drift": "bias drift",
+    # Only the noun: a log holds readings, and a hand holds still.
+    r"\b(in|of|hold|from|to|before|after) hold \d": "pose",
+    r"\b(each|every|between|inside|per|neighbouring|\d+) holds?\b(?! (the|a|still|up)\b)": "pose",
+    r"\bstill (poses?|stretch(es)?)\b": "pose",
+    r"\bgravity at rest\b": "gravity error in static poses",
+    r"\bgravity (is )?(carried through|after (a|the|every) moves?)\b": "tilt error after a rotation",
+    r"\bvelocity over (a|the) move\b": "velocity error over a rotation",
+    r"\bmissed by\b": "error",
+    # A figure may have error bars.
+    r"\berror bars?\b(?![:)])|\bhonest (bars|uncertainties)\b": "uncertainty",
+    r"\b(scales?|angles?|term|time) known to\b|\bknown to (\d|\{)": "uncertainty ... (1 σ)",
+    r"\bpa(id|ying) for the search\b|\bsearch(ed)? paid for\b": "corrected for multiple testing",
+    r"\btime[- ]stamps?\b|(?<![\w_-])stamps?\b(?!_)|\bstamped\b": "timestamp",
+    r"\btold (apart|by)\b|\btells? (them |\w+ )?apart\b": "separate, identify",
+    r"\bconverters?\b": "resolution (LSB), ADC",
+    r"\bends? of (its|the|their|a) range\b|\bcut peaks\b|\bcrowded ends?\b|\bmet its limit\b": "range limit, clipping",
+    r"\bhalf[- ]power\b": "-3 dB bandwidth",
+    r"\bterms are of below\b|\bdescribed from\b": "fit band",
+    r"\bcreeps? (of|in) a (hold|pose)\b|\b(hold|pose)s? creeps?\b": "settling",
+    r"\b(bumped|pushed) poses?\b|\bposes? (was|were) (bumped|pushed)\b": "disturbed pose",
+    r"\bwhat (was|is|it|the model|a model) left out\b|\bleft out of (the|a|your) model\b": "missing effects",
+    r"(?<!power )(?<!power-)\blaws?\b": "empirical relation",
+    r"(?<!digital )\btwins?\b": "session state; digital twin of simulate",
+    r"\b[afw]['′]\d|\b[af]\d =|\bS[123][123]\b|(?<!its )\bax[ei]s [123]\b|\bpoints? half (up|down)\b": "X, Y, Z, S_xx",
+    r"\binstrument trihedron\b": "body frame",
+    r"\b(taken|takes?) off\b": "compensate",
+    r"\bspeaks? against\b": "no problems found",
+    r"\bgains? most from\b": "most useful next pose",
+    r"\bnumbers (differ|re-estimated)\b|\bother numbers\b|\bnumbers of (any|the|a given) (model|device)": "parameters",
+}
+ALLOWED = {
+    "docs/model.md": r"\binstrument trihedron\b",
+    "docs/tutorials/laboratory.md": r"\binstrument trihedron\b",
+}
+"""Where the word is the subject: the manual's own name beside ours, once."""
+_PATTERN = {re.compile(pattern, re.IGNORECASE): word for pattern, word in RETIRED.items()}
+
+
+def retired(text: str) -> list[str]:
+    """Each retired word in a text, in its surroundings, with the word to write instead."""
+    return [
+        f"...{text[max(found.start() - 40, 0) : found.end() + 20]}... -> {word}"
+        for pattern, word in _PATTERN.items()
+        for found in pattern.finditer(text)
+    ]
+
+
+def prose(markdown: str) -> str:
+    """A page without fences, code and addresses."""
+    text = re.sub(r"^ *```.*?^ *```", "", markdown, flags=re.DOTALL | re.MULTILINE)
+    text = re.sub(r"^    .*$", "", text, flags=re.MULTILINE)
+    return re.sub(r"`[^`\n]*`|\]\([^)]*\)|\$[^$\n]*\$", "", text)
+
+
+def test_the_words_are_found_where_they_are():
+    assert retired("The gyro's zero is -0.3 °/s; gravity at rest missed by 3 mm/s² in hold 3.")
+    assert retired("Still poses tell a converter's steps; stamps of axis 1; the law of its twin.")
+    assert not retired("The log holds zeros where nothing was read; the timestamp of X; a digital twin; rows of zeros.")
+
+
+@pytest.mark.parametrize("name", ["", *(command.__name__.replace("_", "-") for command in COMMANDS)])
+def test_no_help_uses_a_retired_word(name):
+    group = typer.main.get_command(build_app())
+    command = group.commands[name] if name else group  # type: ignore[attr-defined]
+    words = command.get_help(typer.Context(command, info_name=f"trihedron {name}".strip()))
+    assert retired(re.sub(r"\s+", " ", words)) == []
+
+
+@pytest.fixture(scope="module")
+def results():
+    recording = simulated(hand_session(n_poses=14, hold_s=2.0, move_s=1.0))
+    made = trihedron.calibrate(recording, gravity_m_s2=float(G))
+    return {
+        "calibration": made,
+        "verification": trihedron.verify(made, recording, gravity_m_s2=float(G)),
+        "diagnosis": trihedron.diagnose(recording, gravity_m_s2=float(G)),
+        "check": trihedron.check(recording),
+        "segments": trihedron.segment(recording),
+    }
+
+
+@pytest.mark.parametrize("kind", ["calibration", "verification", "diagnosis", "check", "segments"])
+def test_no_report_uses_a_retired_word(results, kind, tmp_path):
+    assert retired(trihedron.report(results[kind], tmp_path / "report.html")) == []
+    page = re.sub(r"<(style|script)\b.*?</\1>", " ", (tmp_path / "report.html").read_text("utf-8"), flags=re.DOTALL)
+    assert retired(html.unescape(re.sub(r"<[^>]*>", " ", page))) == []
+
+
+def sentences() -> Iterator[tuple[str, str]]:
+    """Every sentence of the catalogues, with where it stands; the names of its places are no words."""
+    for entry in FINDINGS:
+        for text in (entry.seen, entry.cause, entry.action):
+            yield f"finding {entry.code.value} {entry.case}", text
+    for effect in EFFECTS:
+        for text in (effect.mechanism, effect.experiment, effect.experiment_at_rest, *effect.said.values()):
+            yield f"effect {effect.id}", text
+    for name, text in {**PHRASES, **LINES, **REASONS}.items():
+        yield f"phrase {name}", text
+    for name, family in FAMILIES.items():
+        yield f"family {name}", " ".join([family.experiment, *family.resembles])
+
+
+def test_no_sentence_of_a_catalogue_uses_a_retired_word():
+    said = {where: retired(re.sub(r"\{(\w+)", "{", text or "")) for where, text in sentences()}
+    assert {where: words for where, words in said.items() if words} == {}
+
+
+@pytest.mark.parametrize("path", SCHEMAS, ids=lambda path: path.name)
+def test_no_schema_uses_a_retired_word(path):
+    words: list[str] = []
+
+    def walk(node: object) -> None:
+        if isinstance(node, dict):
+            words.extend(str(node[key]) for key in ("title", "description") if isinstance(node.get(key), str))
+            words.extend(key.replace("_", " ") for key in node.get("properties", {}))
+        for child in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
+            walk(child)
+
+    walk(json.loads(path.read_text(encoding="utf-8")))
+    assert [found for word in words for found in retired(word)] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_no_page_uses_a_retired_word(page):
+    text = prose(page.read_text(encoding="utf-8"))
+    allowed = ALLOWED.get(str(page.relative_to(ROOT)))
+    assert retired(re.sub(allowed, "", text) if allowed else text) == []
+
+
+def test_public_docstrings_use_no_retired_word():
+    said = {
+        name: retired(inspect.getdoc(getattr(trihedron, name)) or "") for name in trihedron.__all__ if name[0] != "_"
+    }
+    assert {name: words for name, words in said.items() if words} == {}
+
+
+def names() -> Iterator[str]:
+    """Public names: verbs and their parameters, classes and what they show, findings' codes, effects' ids."""
+    for name in filter(str.isidentifier, trihedron.__all__):
+        public = getattr(trihedron, name)
+        yield name
+        if inspect.isclass(public):
+            fields = dataclasses.fields(public) if dataclasses.is_dataclass(public) else ()
+            yield from (f"{name}.{one}" for one in {*dir(public), *(f.name for f in fields)} if not one.startswith("_"))
+        elif callable(public):
+            yield from (f"{name}.{parameter}" for parameter in inspect.signature(public).parameters)
+    yield from (code.value for code in FindingCode)
+    yield from (effect.id for effect in EFFECTS)
+
+
+RETIRED_IN_NAMES = re.compile(
+    r"(?<![a-z])(zeros?|holds?|bars|stamps?|laws?|creeps?|told|scatter|converters?|hidden)(?![a-z])"
+)
+STILL_RETIRED = {"Recording.with_distinct_stamps", "Segments.holds", "Segments.n_holds", "Truth.holds", "plan.hold_s"}
+"""Names that code everywhere uses and that are still to be renamed: none may be added."""
+
+
+def test_no_public_name_is_a_retired_word():
+    assert {name for name in names() if RETIRED_IN_NAMES.search(name)} == STILL_RETIRED
