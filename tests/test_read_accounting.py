@@ -46,7 +46,7 @@ def test_two_devices_in_one_table_are_listed_and_chosen_and_never_merged(tmp_pat
     ]
     path = text(tmp_path, "TimeUS,I,AccX,AccY,AccZ,GyrX,GyrY,GyrZ\n" + "\n".join(lines) + "\n")
     with pytest.raises(
-        ReadError, match=r"column 'I' tells 2 devices apart: 0 \(200 rows\), 1 \(200 rows\).*--instance 0"
+        ReadError, match=r"column 'I' identifies 2 devices: 0 \(200 rows\), 1 \(200 rows\).*--instance 0"
     ):
         read_recording(path)
     recording = read_recording(path, instance=1)

@@ -214,7 +214,7 @@ def _log_bias(dof: float) -> float:
 
 def _not_one_unit(by_device: dict[str, list[Session]]) -> tuple[MixedLogs, ...]:
     """Groups of logs whose scales or directions of axes differ by more than one unit's ever do, beyond their errors."""
-    fixed = [k for k, parameter in enumerate(PARAMETERS) if not parameter.id.endswith("zero")]
+    fixed = [k for k, parameter in enumerate(PARAMETERS) if not parameter.id.endswith("bias")]
     found = []
     for serial, sessions in by_device.items():
         pairs = list(combinations(sessions, 2))

@@ -34,7 +34,7 @@ FEWEST_BLOCKS = 4
 """Blocks of a tenth of a second a pose must have: two on either side carry the line."""
 SHAKES_P = 1e-6
 """p-value of a pose's variance, times the number of poses and channels, from which it shakes: 48 healthy sessions do
-not come below 0.02 (benches/diagnosis_thresholds.py), and real noise is not as white."""
+not come below 0.02, and real noise is not as white."""
 IN_EITHER_HALF = 0.5
 """Share of ``LOUD`` that shaking reaches in both halves of its pose; a push is in one of them."""
 MOST_NAMED = 4

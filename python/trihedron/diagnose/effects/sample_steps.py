@@ -25,7 +25,7 @@ LEAST_GAIN = 40.0
 """Chi-square a count must win: by chance once in 4·10⁹, once in 650 sessions of 10⁵ intervals and 60 counts each."""
 OVER_USUAL, LEFT_SHARE = 5.0, 0.1
 """It must also win five times what joints nearby cost anyway, and leave little: none was found in 48
-healthy sessions (benches/diagnosis_thresholds.py)."""
+healthy sessions."""
 
 
 @dataclass(frozen=True, eq=False)

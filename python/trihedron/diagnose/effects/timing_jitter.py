@@ -21,7 +21,7 @@ SHARP, FEWEST_SHARP = 0.5, 50
 """Intervals are used whose noise is below half a step of time, fifty at least: four blocks of twelve give the error."""
 SURE = 5.0
 """Standard errors of the common error of time: 3·10⁻⁷ by chance; the most in 48 healthy sessions
-is 1.9 (benches/diagnosis_thresholds.py)."""
+is 1.9."""
 ORDINARY = 0.01
 """Jitter, in steps, that the common curvature of a smooth motion is mistaken for: not worth a name alone."""
 

@@ -13,7 +13,7 @@ ACCEL_PER_POWER, GYRO_PER_POWER = 0.02, 1e-3
 """1/(m/s²), 20 mg/g², and (rad/s)/(m/s²)²: what vibrating consumer parts show."""
 STANDS_OUT = 1.5
 """Power of a pose over the median pose: the variance of 300 white readings is known to 8 %; the most in 48
-healthy sessions is 1.13 (benches/diagnosis_thresholds.py)."""
+healthy sessions is 1.13."""
 
 
 class VibrationRectification(Effect):

@@ -13,7 +13,7 @@ from trihedron.diagnose.context import LEAST_SWING_K, LEAST_SWING_V, Context
 AXES = ("x", "y", "z")
 HIGH, VIBRATES = 0.9, 3.0
 """Vibration is a signal where the 90 % point of the poses' powers is three times their median: in 48 healthy
-sessions 2.1 is the most (benches/diagnosis_thresholds.py)."""
+sessions 2.1 is the most."""
 
 
 @dataclass(frozen=True, eq=False)

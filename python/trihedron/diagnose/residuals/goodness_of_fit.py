@@ -103,8 +103,8 @@ AT_END = 1.01
 """Share of a bound within which a search ends there."""
 AT_EDGE = 1.5
 """Rms of the walk over the error of a pose's mean, its strength at the end of its range: of 120 healthy sessions (60
-with consumer 1/f noise), in which it is there for 57 gyros and 74 accelerometers, 1.05 is the most
-(benches/diagnosis_thresholds.py, ``--flicker``); a zero that jumps between poses passes, or drifts by two errors."""
+with consumer 1/f noise), in which it is there for 57 gyros and 74 accelerometers, 1.05 is the most; a bias
+that jumps between poses passes, or drifts by two errors."""
 
 
 def _strayed(fitted: Fit, label: int) -> tuple[float, float, Where]:

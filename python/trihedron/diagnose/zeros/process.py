@@ -167,7 +167,7 @@ class ZeroProcess:
         """Sizes of the axes relative to each other, where equal ones are plainly refuted.
 
         Three axes together tell a strength better than each its own: with freely fitted factors the errors of
-        coefficients came out 25 % too small under a walk (benches/zero_process.py), with this limit 2 %.
+        coefficients came out 25 % too small under a walk, with this limit 2 %.
         """
         if len(self.axis_factor) == 1:
             return self
