@@ -44,7 +44,7 @@ pub(super) struct Open {
 impl Open {
     fn of(group: &Group, back: &Whitening, passed: &Passed) -> Self {
         let rows = &group.rows;
-        let parts = [&rows.border, &rows.here, &rows.next].map(|part| part.as_slice());
+        let parts = [&rows.border, &rows.here, &rows.next].map(DMatrix::as_slice);
         let flat: Vec<f64> = parts
             .into_iter()
             .flatten()

@@ -247,7 +247,7 @@ impl<'a> Search<'a> {
         let (here, i) = (self.x, direction.start);
         let (down, up) = (self.moved(direction, -*step), self.moved(direction, *step));
         let mut value_of = |x: &Point| {
-            if *x == here {
+            if x.map(f64::to_bits) == here.map(f64::to_bits) {
                 f64::NEG_INFINITY
             } else {
                 self.at(x)

@@ -3,9 +3,11 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use trihedron::rotation::exp;
 use trihedron::session_model::chain::{Chain, Layout, Rows};
-use trihedron::session_model::fit::{Fit, fit, widened};
+use trihedron::session_model::fit::{Fit, fit};
 use trihedron::session_model::move_rows::Weights;
 use trihedron::session_model::moves::{Move, MoveNoise};
+use trihedron::session_model::strength_search::Within;
+use trihedron::session_model::strengths::tune;
 use trihedron::session_model::{AtRest, Distortion, Session, State, Strengths};
 
 /// A small generator of uniform numbers in (-1, 1): the test must not depend on the simulator.
@@ -111,11 +113,9 @@ fn made(scatter: bool) -> (Session, State) {
             rate_density: noise_rate,
             jitter_s: 0.0,
             nominal_step_s: 0.02,
-            inflation: [1.0, 1.0],
         },
         prior: None,
         scatter: scatter.then_some([noise_force / 2.0, noise_rate / 2.0]),
-        is_scatter_given: false,
         expected_scatter: 0.0,
     };
     let state = State {
@@ -136,7 +136,7 @@ fn made(scatter: bool) -> (Session, State) {
 
 const STRENGTHS: Strengths = Strengths {
     corner_s: [40.0, 40.0],
-    scatter: [1.0, 1.0],
+    scatter: [1.0; 4],
     between: [0.6, 0.6],
     excess: [1.0, 1.0],
 };
@@ -279,27 +279,25 @@ fn rows_that_miss_by_a_thousand_errors_end_in_one_place_whatever_the_start() {
 }
 
 #[test]
-fn moves_widened_from_a_fit_are_those_of_a_session_so_wide_from_the_start() {
+fn strengths_are_sought_within_bounds_and_only_raise_the_likelihood() {
     let (session, truth) = made(true);
     let none = Distortion::default();
-    let start = beside(&truth, session.layout(0), 0);
-    let found = fit(&session, start.clone(), STRENGTHS, &none).expect("fit");
-    let found = Fit {
-        likely_scatter: [0.7, 0.3],
-        ..found
+    let given = fit(&session, truth.clone(), STRENGTHS, &none).expect("fit");
+    let within = Within {
+        corner_s: [50.0, 50.0],
+        scatter: [2.0, 0.5],
+        excess: [1.0, 1.0],
     };
-    let (wide, again) = widened(&session, &found, [3.0, 20.0]).expect("fit");
-    // Handed on bit for bit.
-    let bits = |pair: [f64; 2]| pair.map(f64::to_bits);
-    assert_eq!(bits(wide.noise.inflation), bits([3.0, 20.0]));
-    assert_eq!(bits(again.likely_scatter), bits([0.7, 0.3]));
-    let fresh = fit(&wide, start, STRENGTHS, &none).expect("fit");
-    let rows = |of: &Fit| residuals(&wide, &of.state, &fresh.state, &none);
-    let seen = rows(&fresh);
-    let spread = (seen.norm_squared() / seen.len() as f64).sqrt().max(1.0);
-    // Either ends when a step moves all rows together by less than a thousandth of an error as large as they show it.
-    let parted = (seen - rows(&again)).norm();
-    assert!(parted < 2e-3 * spread, "{parted} {spread}");
+    let tuned =
+        |within: &Within| tune(&session, truth.clone(), STRENGTHS, &none, within).expect("fit");
+    let (free, bound) = (tuned(&Within::ANYTHING), tuned(&within));
+    // A search ends where a pass gains less than a tenth.
+    assert!(free.log_marginal() > given.log_marginal() - 0.1);
+    assert!(free.log_marginal() > bound.log_marginal() - 0.1);
+    let found = bound.strengths;
+    assert!(found.corner_s.iter().all(|corner| *corner >= 50.0 - 1e-9));
+    assert!(found.scatter[0] <= 2.0 + 1e-9 && found.scatter[1..].iter().all(|s| *s <= 0.5 + 1e-9));
+    assert!(found.excess.iter().all(|excess| *excess <= 1.0 + 1e-9));
 }
 
 #[test]
