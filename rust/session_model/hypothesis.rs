@@ -11,7 +11,6 @@ use super::move_rows::{Passed, Whitening};
 use super::moves::N_MOVE;
 use super::rows::{Domain, Group, N_PROCESSES, size_row};
 use super::strength_search::{Search, Within};
-use super::weighed_moves::Scratch;
 use crate::error::{Error, Result};
 
 /// Normal equations of some rows: `JᵀJ`, `Jᵀr`, `Σ r²`, number of rows.
@@ -152,11 +151,10 @@ impl Hypothesis {
         let mut chain = self.fixed.chain.clone();
         let mut side = self.fixed.side.clone();
         let mut sum = self.fixed.sum;
-        let mut scratch = Scratch::default();
         for open in &self.moves {
             let white = open.whitening(strengths)?;
             weight += white.diagonal().map(f64::ln).sum();
-            sum += chain.add_move(open.pose, &open.columns, &white, &mut side, &mut scratch);
+            sum += chain.add_move(open.pose, &open.columns, &white, &mut side);
         }
         chain.mirror();
         let n = N_MOVE * self.moves.len() + self.fixed.n;

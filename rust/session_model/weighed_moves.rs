@@ -1,5 +1,5 @@
-//! Moves weighed anew at other strengths and added to the normal equations, with nothing allocated between them: a search
-//! asks for it hundreds of times (docs/model-session.md, 11.18).
+//! Moves weighed anew at other strengths and added to the normal equations: a search asks for it hundreds of times
+//! (docs/model-session.md, 11.18).
 
 use nalgebra::DMatrix;
 
@@ -7,13 +7,6 @@ use super::blocks::{add_gram, add_rows};
 use super::chain::{Chain, Layout};
 use super::move_rows::Whitening;
 use super::moves::N_MOVE;
-
-/// Room for the rows of a move, used again by the next.
-#[derive(Debug, Default)]
-pub(super) struct Scratch {
-    weighed: Vec<f64>,
-    rows: Vec<f64>,
-}
 
 impl Chain {
     /// Adds the rows of a move, given as `columns` by border, pose, next pose and residual, once weighed by a lower
@@ -24,14 +17,12 @@ impl Chain {
         columns: &DMatrix<f64>,
         white: &Whitening,
         side: &mut DMatrix<f64>,
-        scratch: &mut Scratch,
     ) -> f64 {
         let Layout {
             border: b, pose: p, ..
         } = self.layout;
         let n = columns.ncols();
-        let Scratch { weighed, rows } = scratch;
-        weighed.clear();
+        let mut weighed = Vec::with_capacity(N_MOVE * n);
         for column in columns.as_slice().chunks_exact(N_MOVE) {
             for r in 0..N_MOVE {
                 weighed.push((0..=r).map(|k| white[(r, k)] * column[k]).sum());
@@ -47,12 +38,9 @@ impl Chain {
             side[(unknown, 0)] += product;
         }
         let part = |first: usize, width: usize| &weighed[N_MOVE * first..N_MOVE * (first + width)];
-        let mut laid = |first: usize, width: usize| {
-            rows.clear();
-            for r in 0..N_MOVE {
-                rows.extend(part(first, width).iter().skip(r).step_by(N_MOVE));
-            }
-            rows.clone()
+        let laid = |first: usize, width: usize| -> Vec<f64> {
+            let row = |r: usize| part(first, width).iter().skip(r).step_by(N_MOVE).copied();
+            (0..N_MOVE).flat_map(row).collect()
         };
         let (of_border, here, next) = (laid(0, b), laid(b, p), laid(b + p, p));
         add_gram(&mut self.corner, 1.0, &of_border, b);

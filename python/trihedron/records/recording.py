@@ -86,7 +86,8 @@ class Recording(Presented):
         lost hold NaN in the sensor that lost them; stages skip them.
     rate_hz : float
         Sampling rate: samples per second outside gaps (a median step would believe timestamps rounded to a
-    millisecond). temperature_degc, supply_v : (n,) or None
+        millisecond).
+    temperature_degc, supply_v : (n,) or None
         Auxiliary channels where the log has them.
     source, sha256 : str
         Where it came from, for people; and the hash of the bytes that were read (of the arrays when made in memory).
