@@ -92,8 +92,11 @@ def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
     size, std = _size(model, effect)
     is_large = not effect.walks or _walked(model, s) > LEAST_WALK
     parameters, statement = effect.of_strength(size, std)
-    # Strengths of noise are in every hypothesis: none is searched for among mechanisms.
-    return BiasStrength(effect, gain, gain, size, std, parameters, statement, without, is_large)
+    # Strengths of noise are in every hypothesis: none is searched for among mechanisms. Each axis beyond the first is
+    # one more that was fitted, known to 1/sqrt(2n) in its logarithm: it pays for that as a parameter does.
+    n_strengths = 3 if effect.sensor == 1 and not effect.walks else 1
+    paid = (n_strengths - 1) * float(np.log(2.0 * max(model.obs.n_holds, 1)))
+    return BiasStrength(effect, gain, gain - paid, size, std, parameters, statement, without, is_large)
 
 
 def _flicker(model: Hypothesis) -> FloatArray:
