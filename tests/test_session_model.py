@@ -9,7 +9,7 @@ import pytest
 
 from trihedron import calibrate
 from trihedron.diagnose.session.observations import observe
-from trihedron.diagnose.session.solve import folds_of, leverage, predict_held_out, reduce, tune_noise
+from trihedron.diagnose.session.solve import folds_of, leverage, predict_held_out, tune_noise
 from trihedron.diagnose.session.starting_point import start_twin
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, NO_DISTORTION, core_model, core_state
 from trihedron.estimate.accelerometer import calibrate_norm
@@ -115,7 +115,7 @@ def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_an
     np.testing.assert_allclose(leverage(fitted), np.einsum("ri,ij,rj->r", scaled, inverse, scaled), atol=1e-8)
     columns = np.random.default_rng(1).standard_normal((len(r), 3))
     np.testing.assert_allclose(
-        reduce(fitted).project(columns), columns - scaled @ (inverse @ (scaled.T @ columns)), atol=1e-8
+        fitted.line.core.project(columns), columns - scaled @ (inverse @ (scaled.T @ columns)), atol=1e-8
     )
     folds = folds_of(fitted)
     found = predict_held_out(fitted, folds)

@@ -76,6 +76,11 @@ class Answer:
             for (effect, _, own), share in zip(self.gains, self.shares, strict=True)
         )
 
+    @property
+    def are_spread(self) -> bool:
+        """Whether all that was accepted says how far something scatters, or where one pose was pushed: not why."""
+        return all(effect.is_spread or effect.is_local for effect, *_ in self.gains)
+
 
 def excess(fitted: Fit) -> float:
     """Chi-square beyond its degrees of freedom, over the domains that have more than they should."""

@@ -17,8 +17,7 @@ from trihedron.diagnose.effects.dropped_samples import DroppedSamples
 from trihedron.diagnose.effects.sample_steps import step_errors
 from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_error
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
-from trihedron.diagnose.laws.find import find_laws
-from trihedron.diagnose.relations import with_room_field
+from trihedron.diagnose.relation_records import records
 from trihedron.diagnose.residuals.before_after import residuals_before_after, with_covariance
 from trihedron.diagnose.residuals.creep import settling, with_settling
 from trihedron.diagnose.residuals.goodness_of_fit import hidden_zeros, judge_rows
@@ -81,9 +80,8 @@ def diagnose_recording(
     run = _run(obs, start, prior, alpha, tell)
     answer = run.answer
     model = answer.found.model
-    disagree = {d.domain for d in run.remaining if d.disagrees} | {one.effect.domain for one in answer.biases}
-    laws = find_laws(model.context, disagree)
-    verdict = verdict_of(answer, run.domains, run.remaining, has_laws=bool(laws))
+    relations = () if answer.found.related is None else records(answer.found.related)
+    verdict = verdict_of(answer, run.domains, run.remaining, has_relations=bool(relations))
     # Without anything missing the numbers are those of a calibration of this recording.
     base = run.bare.fitted
     final = base if verdict == "consistent" else answer.numbers.fitted
@@ -102,7 +100,7 @@ def diagnose_recording(
         recording_sha256=recording.sha256,
         references=MappingProxyType(model.context.references),
         residuals=residuals_before_after(run.predicted, answer.judged, {one.effect.sensor for one in answer.biases}),
-        relations=laws,
+        relations=relations,
         stages=held_out_stages(run.bare, answer),
     )
     tell(1.0, "done")
@@ -158,8 +156,8 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
         observed = more
         bare, found = _searched(observed, prior, alpha)
     tell(0.8, "asking what biases do by themselves")
-    # What follows a direction of the room is no bias that wanders.
-    biases, asked = bias_strengths(with_room_field(found.model, alpha), alpha)
+    # What follows something is no bias that wanders.
+    biases, asked = bias_strengths(found.model if found.related is None else found.related.model, alpha)
     tell(0.9, "checking what remains")
     judged = again(found.model, found.model.terms, noise_bounds(found.model, tuple(one.effect for one in biases)))
     answer = Answer(found, with_shapes(found.model), biases, observed.seen, judged.fitted)

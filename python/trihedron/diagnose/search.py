@@ -17,7 +17,7 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again, hypothesis
-from trihedron.diagnose.relations import without_doubtful
+from trihedron.diagnose.relations.search import Related, related
 from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
 from trihedron.diagnose.session.twin import (
     DYNAMICS,
@@ -64,6 +64,8 @@ class Found:
     gains: tuple[float, ...] = ()
     without: tuple[Hypothesis, ...] = ()
     rivals: tuple[tuple[str, ...], ...] = ()
+    related: Related | None = None
+    """The final hypothesis with what else it follows."""
 
     @property
     def scores(self) -> tuple[float, ...]:
@@ -120,9 +122,7 @@ def _concluded(state: _State, alpha: float) -> Found:
     swapped, named = _swapped(judged, state.rivals)
     if swapped is not judged.model:
         judged = _pruned(swapped, threshold(alpha))
-    doubted = without_doubtful(judged.model, alpha)
-    if doubted is not judged.model:
-        judged = _pruned(doubted, threshold(alpha))
+    judged, beside = _beside_relations(judged, threshold(alpha))
     model = judged.model
     tried, missing = all_beside(model)
     held = {term.effect.id for term in model.terms}
@@ -130,8 +130,24 @@ def _concluded(state: _State, alpha: float) -> Found:
         model, {one.term.effect.id: one for one in reversed(tried)},
         {key: other for key, other in state.against.items() if other in held and key not in held}, missing,
         tuple(2.0 * (model.log_evidence - one.log_evidence) for one in judged.without), judged.without,
-        tuple(tuple(named.get(term.effect.id, ())) for term in model.terms),
+        tuple(tuple(named.get(term.effect.id, ())) for term in model.terms), beside,
     )  # fmt: skip
+
+
+def _beside_relations(judged: _Judged, limit: float) -> tuple[_Judged, Related]:
+    """What follows something without a name; a name goes where relations explain clearly more without it."""
+    best = related(judged.model, limit)
+    if not best.relations:
+        return judged, best
+    k = 0
+    while k < len(judged.model.terms):
+        fewer = again(judged.model, [t for j, t in enumerate(judged.model.terms) if j != k])
+        other = related(fewer, limit)
+        if other.relations and other.score > best.score + NEAR:
+            judged, best, k = _pruned(fewer, limit), other, 0
+        else:
+            k += 1
+    return judged, best
 
 
 @dataclass(frozen=True, eq=False)

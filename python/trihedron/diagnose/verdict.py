@@ -31,16 +31,17 @@ def verdict_of(
     domains: tuple[DomainTest, ...],
     remaining: tuple[DomainTest, ...] = (),
     *,
-    has_laws: bool = False,
+    has_relations: bool = False,
 ) -> Verdict:
     """One word; ``not-testable`` where neither gravity nor rest had a say and the samples show nothing either.
 
     Footnotes (one pushed pose, a faint line) are no answer while something else disagrees.
     """
     if answer.ids:
-        is_left = any(d.disagrees for d in remaining)
-        return "unexplained" if is_left and answer.are_footnotes else "missing-physics"
-    if has_laws or any(d.disagrees for d in domains):
+        is_left = has_relations or any(d.disagrees for d in remaining)
+        says_why = not answer.are_footnotes and not answer.are_spread
+        return "missing-physics" if says_why or not is_left else "unexplained"
+    if has_relations or any(d.disagrees for d in domains):
         return "unexplained"
     # A weak prior fills what the poses leave open; rows that it alone decides test nothing.
     if not any(d.domain in POSE_DOMAINS and d.dof >= LEAST_DOF for d in domains):

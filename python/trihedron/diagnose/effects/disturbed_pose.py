@@ -90,7 +90,7 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
         gyro_bias=np.zeros((n, 3)) if whole.hold_rate is None else whole.hold_rate @ twin.gyro_S.T,
         accel_bias=np.zeros((n, 3)),
     )
-    fits = (fit(whole, start, NO_DISTORTION, context.fitted.line.prior, n_iterations=2), context.fitted)
+    fits = (fit(whole, start, NO_DISTORTION, context.fitted.line.prior), context.fitted)
     before, after = (predict_held_out(one, folds_of(one)) for one in fits)
     gain = (before.per_row - after.per_row) * after.n_rows / np.maximum(after.per_row, 1.0)
     if gain.max() < MIN_GAIN or not (after.per_row < MUST_FALL * before.per_row)[gain.argmax()]:

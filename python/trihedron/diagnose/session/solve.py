@@ -30,11 +30,6 @@ from trihedron.diagnose.session.twin import (
 )
 from trihedron.session.noise import PART_NOISE, START_STRENGTHS, Bounds
 
-N_DOMAINS = 4
-"""Domains of residual rows: the first four labels."""
-SEEN = 1e-6
-"""Share of a column's squared length beside the fit, at least: below it rounding decides what is left."""
-
 
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -111,19 +106,13 @@ def _fitted(
     return Fit(twin, Linearisation(obs, twin, distortion, prior, core))
 
 
-def fit(
-    obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None = None, n_iterations: int = 4
-) -> Fit:
+def fit(obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None = None) -> Fit:
     """Gauss-Newton on every row to convergence, noise corners as they are (eq. 11.9)."""
-    del n_iterations
     return _fitted(obs, start, distortion, prior)
 
 
-def tune_noise(
-    obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None, n_iterations: int = 4
-) -> Fit:
+def tune_noise(obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None) -> Fit:
     """The same with walks as strong as is likeliest, no stronger than the noise of parts makes them (eq. 11.18)."""
-    del n_iterations
     return _fitted(obs, start, distortion, prior, PART_NOISE)
 
 
@@ -137,59 +126,6 @@ def move_misfit(obs: Observations, twin: Twin) -> FloatArray:
 def leverage(fitted: Fit) -> FloatArray:
     """(rows,) share of every row that the fit used up; degrees of freedom of a block are the sum of one minus it."""
     return fitted.used
-
-
-@dataclass(frozen=True, eq=False)
-class Reduced:
-    """The rows of a fit with its unknowns projected out, ready to score many candidates cheaply."""
-
-    fitted: Fit
-
-    def project(self, columns: FloatArray) -> FloatArray:
-        """Columns minus what the unknowns of the fit can imitate."""
-        return self.fitted.line.core.project(np.ascontiguousarray(columns))
-
-
-def reduce(fitted: Fit) -> Reduced:
-    """A fit ready for score tests."""
-    return Reduced(fitted)
-
-
-@dataclass(frozen=True, eq=False)
-class Score:
-    """Score test of added columns: ``chi2`` gained, ``rank`` directions seen, the one-step estimate, its covariance.
-
-    ``projected`` (rows, K) are the columns minus what the unknowns of the fit can imitate.
-    """
-
-    chi2: float
-    rank: int
-    estimate: FloatArray
-    covariance: FloatArray
-    visible: npt.NDArray[np.bool_]
-    projected: FloatArray
-
-
-def score(reduced: Reduced, columns: FloatArray) -> Score:
-    """Rao's score test of effect columns against the fitted twin (eq. 8.8).
-
-    Directions whose projection keeps less than ``SEEN`` of their squared length are imitated by the calibration itself
-    and are not counted: they cannot be seen in this recording.
-    """
-    residual = reduced.fitted.system.residual
-    projected = reduced.project(columns)
-    length = np.sqrt((columns**2).sum(axis=0))
-    length[length == 0] = 1.0
-    normal = (projected / length).T @ (projected / length)
-    gradient = (projected / length).T @ residual
-    value, vector = np.linalg.eigh(normal)
-    seen = value > SEEN
-    along = vector[:, seen].T @ gradient
-    chi2 = float((along**2 / value[seen]).sum())
-    inverse = (vector[:, seen] / value[seen]) @ vector[:, seen].T
-    visible = np.diag(normal) > SEEN
-    estimate, covariance = -(inverse @ gradient) / length, inverse / np.outer(length, length)
-    return Score(chi2, int(seen.sum()), estimate, covariance, visible, projected)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,17 +156,6 @@ class Prediction:
         return out
 
 
-def held_out_gain(before: Prediction, after: Prediction) -> FloatArray:
-    """(folds,) gain in log predictive density, each domain's chi-square over what remains in it (eq. 8.9).
-
-    Noise that is larger than predicted makes every difference of chi-square larger too; divided by the dispersion that
-    stays after the effect (at least 1), a gain counts as it would in a recording without the unexplained rest.
-    """
-    stays = np.maximum(after.per_row, 1.0)
-    gain: FloatArray = 0.5 * ((before.fold_chi2 - after.fold_chi2) / stays).sum(axis=1)
-    return gain + 0.5 * (before.fold_log_det - after.fold_log_det)
-
-
 def folds_of(fitted: Fit, n_folds: int = 8) -> list[npt.NDArray[np.bool_]]:
     """Blocks of neighbouring poses, then of neighbouring moves, whose rows are held out together."""
     system, obs = fitted.system, fitted.line.obs
@@ -244,12 +169,11 @@ def folds_of(fitted: Fit, n_folds: int = 8) -> list[npt.NDArray[np.bool_]]:
     return out
 
 
-def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]], n_domains: int = N_DOMAINS) -> Prediction:
+def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]]) -> Prediction:
     """Predict every fold's rows from the others (blocked cross-validation, eq. 11.15).
 
     The held-out hold's own vertical and biases are unknown to the training rows; a weak prior (its column scale) keeps
     them proper, and it is the same for every model that is compared.
     """
-    del n_domains
     flags = np.array(folds, dtype=bool).reshape(len(folds), len(fitted.system.residual))
     return Prediction(*fitted.line.core.held_out(np.ascontiguousarray(flags)))

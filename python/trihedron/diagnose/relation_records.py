@@ -1,0 +1,108 @@
+"""Relations as the record that reports and files show."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.accepted import held_out_records
+from trihedron.diagnose.relations.search import Follows, Related
+from trihedron.diagnose.relations.signals import AXES, ROOM_VECTOR
+from trihedron.records.diagnosis import EffectParameter, Relation
+from trihedron.records.domains import Domain, HeldOut
+from trihedron.records.words import law_experiment, law_resembles, words
+
+OUT = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
+AT_REST: dict[str, Domain] = {"gyroscope": "static-gyro", "accelerometer": "static-accel"}
+IN_MOTION: dict[str, Domain] = {"gyroscope": "moves", "accelerometer": "dynamics"}
+EARTH_RATE_RAD_S = 7.292115e-5
+"""WGS 84."""
+ROOM_SIGMAS = 3.0
+"""Standard errors within which a coupling is that of the Earth's own rotation."""
+
+
+def records(found: Related) -> tuple[Relation, ...]:
+    """Every relation with its coefficients and what it predicts on poses and moves left out, largest share first."""
+    models = [*found.steps[1:], found.model] if found.relations else []
+    first = len(found.model.terms) - len(found.relations)
+    out = []
+    for k, (one, before, after) in enumerate(zip(found.relations, found.steps, models, strict=True)):
+        value, covariance = found.model.value(first + k)
+        domain = (IN_MOTION if one.signal.is_motion else AT_REST)[one.signal.sensor]
+        held = next((h for h in held_out_records(before, after) if h.domain == domain), None)
+        is_room = one.signal.family == "room"
+        out.append(_of_room(value, covariance, held) if is_room else _of_signal(one, value, covariance, held))
+    return tuple(sorted(out, key=lambda relation: -relation.share))
+
+
+def _share(held: HeldOut | None) -> float:
+    """Of the held-out sum of squares in a domain, what the relation removes."""
+    if held is None or not held.rms_before > 0.0:
+        return 0.0
+    return float(np.clip(1.0 - (held.rms_after / held.rms_before) ** 2, 0.0, 1.0))
+
+
+def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, held: HeldOut | None) -> Relation:
+    signal, sigma = one.signal, np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    size, error = (x.reshape(len(one.axes), -1) for x in (value, sigma))
+    unit = OUT[signal.sensor] if signal.unit == "1" else f"({OUT[signal.sensor]})/({signal.unit})"
+    axes = tuple(AXES[a] for a in one.axes)
+    return Relation(
+        sensor=signal.sensor,
+        depends_on=signal.names,
+        form=words("law-form", axes=axes, terms=[f"c{k + 1}·({name})" for k, name in enumerate(signal.names)]),
+        coefficients=tuple(
+            EffectParameter(f"{axis}: {name}", float(size[i, j]), float(error[i, j]), unit)
+            for i, axis in enumerate(axes)
+            for j, name in enumerate(signal.names)
+        ),
+        share=_share(held),
+        held_out=held,
+        resembles=law_resembles(signal.family),
+        experiment=law_experiment(signal.family),
+        statement=words(
+            "law-follows", sensor="gyro" if signal.sensor == "gyroscope" else signal.sensor,
+            is_at_rest=not signal.is_motion, axes=axes, depends=signal.names, share=_share(held),
+        ),
+    )  # fmt: skip
+
+
+def _of_room(value: FloatArray, covariance: FloatArray, held: HeldOut | None) -> Relation:
+    """``bias = K Rᵀ m``: the coefficients are K times the parts of m along the level axes, of which m is one vector."""
+    coupling, inclination = _coupling(value.reshape(9, 3))
+    rng = np.random.default_rng(0)
+    drawn = [_coupling(v.reshape(9, 3), coupling) for v in rng.multivariate_normal(value, covariance, 200)]
+    sigma = np.std([k for k, _ in drawn], axis=0)
+    spread = float(np.std([angle for _, angle in drawn]))
+    away = min(float((np.abs(coupling - s * EARTH_RATE_RAD_S * np.eye(3)) / sigma).max()) for s in (1.0, -1.0))
+    family = "earth" if away < ROOM_SIGMAS else "room"
+    share = _share(held)
+    return Relation(
+        sensor="gyroscope",
+        depends_on=(ROOM_VECTOR,),
+        form=words("law-form-room"),
+        coefficients=(
+            *(
+                EffectParameter(f"{AXES[i]}: m_{AXES[j]}", float(coupling[i, j]), float(sigma[i, j]), "rad/s")
+                for i in range(3)
+                for j in range(3)
+            ),
+            EffectParameter(words("angle-to-vertical"), inclination, spread, "deg"),
+        ),
+        share=share,
+        held_out=held,
+        resembles=law_resembles(family),
+        experiment=law_experiment(family),
+        statement=words(
+            "law-follows-room", inclination_deg=inclination, inclination_sigma_deg=spread, share=share
+        ),
+    )  # fmt: skip
+
+
+def _coupling(parts: FloatArray, like: FloatArray | None = None) -> tuple[FloatArray, float]:
+    """K (3, 3) and the angle of m to the vertical [deg]: the nearest product of both, up to one sign of the two."""
+    left, size, right = np.linalg.svd(parts, full_matrices=False)
+    coupling, vector = size[0] * left[:, 0].reshape(3, 3), right[0]
+    if (coupling * like).sum() < 0.0 if like is not None else np.trace(coupling) < 0.0:
+        coupling, vector = -coupling, -vector
+    return coupling, float(np.degrees(np.arccos(np.clip(vector[2], -1.0, 1.0))))

@@ -1,0 +1,1 @@
+"""Relations that compete with names: what a session follows that no effect of the catalogue describes."""
