@@ -29,13 +29,13 @@ WANTED = 0.1
 
 def zeros_along(segments, n, sigma, jump, rng):
     """(n, 3) zero of every sample: one of its own in every pose, and a story for the moves between."""
-    own = sigma * rng.standard_normal((segments.n_holds, 3))
+    own = sigma * rng.standard_normal((segments.n_poses, 3))
     out = np.zeros((n, 3))
-    for hold, zero in zip(segments.holds, own, strict=True):
-        out[hold.start : hold.stop] = zero
-    out[: segments.holds[0].start] = own[0]
-    out[segments.holds[-1].stop :] = own[-1]
-    for i, (before, after) in enumerate(zip(segments.holds[:-1], segments.holds[1:], strict=True)):
+    for pose, zero in zip(segments.poses, own, strict=True):
+        out[pose.start : pose.stop] = zero
+    out[: segments.poses[0].start] = own[0]
+    out[segments.poses[-1].stop :] = own[-1]
+    for i, (before, after) in enumerate(zip(segments.poses[:-1], segments.poses[1:], strict=True)):
         a, b = before.stop, after.start
         x = (np.arange(a, b) - a + 0.5) / max(b - a, 1)
         if jump == "own":

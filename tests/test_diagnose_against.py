@@ -93,7 +93,7 @@ def unit():
 
 
 def log(profile, accel, gyro, layout, seed, effect=None, **size):
-    scenario = Scenario(hand_session(22, hold_s=4.0, layout=layout), "pair", accel, gyro, profile.clock)
+    scenario = Scenario(hand_session(22, pose_s=4.0, layout=layout), "pair", accel, gyro, profile.clock)
     return simulate(scenario if effect is None else with_effect(scenario, effect, **size), seed)[0]
 
 

@@ -28,7 +28,7 @@ def session(seed, lean_rad, scatter_rad_s):
     force, rate = recording.accelerometer.copy(), recording.gyroscope.copy()
     to_raw = np.linalg.inv(np.asarray(truth.accelerometer_S)), np.linalg.inv(np.asarray(truth.gyroscope_S))
     for part in truth.segments:
-        if part.kind != "hold":
+        if part.kind != "pose":
             continue
         here = slice(part.start, part.stop)
         since = recording.time_s[here] - recording.time_s[part.start]

@@ -29,7 +29,7 @@ def clipped():
     accel, gyro = profile.unit(5)
     code = round(math.radians(LIMIT_DEG_S) / gyro.S[0][0])
     gyro = replace(gyro, adc=replace(gyro.adc, low=-float(code), high=float(code)))
-    scenario = Scenario(hand_session(24, hold_s=3.0, move_s=1.6, layout=8), "unit", accel, gyro, profile.clock)
+    scenario = Scenario(hand_session(24, pose_s=3.0, move_s=1.6, layout=8), "unit", accel, gyro, profile.clock)
     return code, simulate(scenario, 11)[0]
 
 

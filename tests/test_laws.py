@@ -29,9 +29,9 @@ def session(seed):
     profile = profile_by_name("adis")
     accelerometer, gyroscope = profile.unit(seed)
     log, truth = simulate(Scenario(hand_session(30, layout=seed), "", accelerometer, gyroscope, profile.clock), seed)
-    holds = [(p.start, p.stop) for p in truth.segments if p.kind != "move"]
-    middles = [(a[1] + b[0]) / 2 for a, b in pairwise(holds)]
-    return log, truth, np.searchsorted(middles, np.arange(log.n_samples)), len(holds)
+    poses = [(p.start, p.stop) for p in truth.segments if p.kind != "move"]
+    middles = [(a[1] + b[0]) / 2 for a, b in pairwise(poses)]
+    return log, truth, np.searchsorted(middles, np.arange(log.n_samples)), len(poses)
 
 
 def added(log, truth, of_rate):

@@ -14,7 +14,7 @@ from trihedron.refused import RefusedError
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
-SHORT = hand_session(n_poses=18, hold_s=3.0, move_s=1.5, first_hold_s=5.0)
+SHORT = hand_session(n_poses=18, pose_s=3.0, move_s=1.5, first_pose_s=5.0)
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +116,7 @@ def test_a_recording_without_gyro_is_calibrated_alone_and_without_accelerometer_
 
 
 def test_verification_expects_what_it_sees_on_another_session(scenario, result):
-    other, _ = simulate(replace(scenario, motion=hand_session(n_poses=16, hold_s=3.0, move_s=1.5, layout=3)), 12)
+    other, _ = simulate(replace(scenario, motion=hand_session(n_poses=16, pose_s=3.0, move_s=1.5, layout=3)), 12)
     judged = trihedron.verify(result, other).verification
     z = judged.norm_error / judged.norm_sigma
     # 16 poses: χ² within its 1e-4 limits.
@@ -127,7 +127,7 @@ def test_verification_expects_what_it_sees_on_another_session(scenario, result):
 
 
 def test_a_move_beyond_the_gyros_range_is_left_out_of_what_verification_says_of_moves(scenario, result):
-    other, truth = simulate(replace(scenario, motion=hand_session(n_poses=16, hold_s=3.0, move_s=1.5, layout=3)), 12)
+    other, truth = simulate(replace(scenario, motion=hand_session(n_poses=16, pose_s=3.0, move_s=1.5, layout=3)), 12)
     move = [part for part in truth.segments if part.kind == "move"][4]
     beyond = np.array(other.gyroscope)
     beyond[move.start + 40 : move.stop - 40] = [32767.0, -32768.0, 32767.0]

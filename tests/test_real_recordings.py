@@ -13,7 +13,7 @@ import trihedron
 from trihedron.cli import main
 from trihedron.estimate.gyroscope import Turn, calibrate_turns
 from trihedron.pipeline.demonstrating import compare_with_truth, truth_of_the_day
-from trihedron.records import Calibration, FindingCode, Hold, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, FindingCode, Pose, Recording, Segments, SensorCalibration
 from trihedron.sensor_model import other_form
 from trihedron.simulate import scenario_by_name, simulate
 from trihedron.units import RateUnit
@@ -38,7 +38,7 @@ def xsens(real_data):
 def test_xsens_raw_counts_agree_with_the_published_calibration(xsens, real_data, capsys):
     document = calibrated(capsys, *xsens)
     published = json.loads((real_data / "xsens_mti" / "published_imu_tk.json").read_text())
-    assert len(document["segments"]["holds"]) >= 34
+    assert len(document["segments"]["poses"]) >= 34
     accelerometer, gyroscope = document["accelerometer"], document["gyroscope"]
     # Published scales are those of columns: x = T K (raw - B) with T near one.
     for sensor, key, within in ((accelerometer, "acc", 1e-3), (gyroscope, "gyro", 5e-3)):
@@ -70,7 +70,7 @@ def test_kim_residual_per_degree_of_freedom_is_the_published_one(real_data, run,
     assert "even-clock" in {finding.code.value for finding in recording.findings}
     segments = trihedron.segment(recording)
     # How the published figures weighed the poses is not known; alike is the plainest guess.
-    same = np.full((segments.n_holds, 3), 1e-3)
+    same = np.full((segments.n_poses, 3), 1e-3)
     alike = replace(segments, accelerometer_sigma_mean=same, accelerometer_sigma_up=None)
     plain = trihedron.calibrate(recording, segments=alike, gravity_m_s2=9.79871, method="separate")
     assert 1e3 * plain.accelerometer.quality.rms_dof == pytest.approx(published_mm_s2, rel=0.3)
@@ -93,11 +93,11 @@ def test_kim_residual_per_degree_of_freedom_is_the_published_one(real_data, run,
 def poses_of(means, sigma, ranges):
     """Segments of nothing but still poses, as somebody else annotated or averaged them."""
     n = len(means)
-    holds = tuple(Hold(k, first, last, first, last) for k, (first, last) in enumerate(ranges))
+    poses = tuple(Pose(k, first, last, first, last) for k, (first, last) in enumerate(ranges))
     lengths = np.array([last - first for first, last in ranges])
     middles = np.array([0.5 * (first + last) for first, last in ranges])
     return Segments(
-        holds, (), np.full(3, np.nan), None, means, None, np.broadcast_to(sigma, (n, 3)).copy(), None, lengths,
+        poses, (), np.full(3, np.nan), None, means, None, np.broadcast_to(sigma, (n, 3)).copy(), None, lengths,
         middles, lengths.astype(float),
     )  # fmt: skip
 

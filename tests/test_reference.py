@@ -95,7 +95,7 @@ def test_error_bars_of_a_wobbling_table_cover_the_truth():
 
 
 def test_commands_of_a_rate_table_are_enough():
-    trial = commanded_table(11, hold_s=3.0)
+    trial = commanded_table(11, pose_s=3.0)
     result = trihedron.calibrate(trial.log, reference=trial.motion, gravity_m_s2=G)
     A = np.linalg.inv(trial.unit.M)
     # Plateaus of 2.5 s of a 0.05 °/s wobble and 1.5 °/s of noise a sample: 0.2 % of scale is ten times what noise does.

@@ -81,9 +81,9 @@ def test_smooth_motion_is_not_fast_because_samples_between_are_missing():
     kept = np.ones(len(t), dtype=bool)
     kept[510:690:19] = False
     stop = int(np.count_nonzero(kept[:700]))
-    ranges, holds = ((500, stop),), [(0, 480), (stop + 20, stop + 480)]
-    seen = unresolved_variance(rate[kept], ranges, holds, 0.01, np.zeros(3), t[kept])
-    blind = unresolved_variance(rate[kept], ranges, holds, 0.01, np.zeros(3))
+    ranges, poses = ((500, stop),), [(0, 480), (stop + 20, stop + 480)]
+    seen = unresolved_variance(rate[kept], ranges, poses, 0.01, np.zeros(3), t[kept])
+    blind = unresolved_variance(rate[kept], ranges, poses, 0.01, np.zeros(3))
     white = 1e-6 * 0.01 * 2.0
     assert np.all(seen < 0.1 * white)
     assert np.any(blind > white)

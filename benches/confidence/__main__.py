@@ -153,7 +153,7 @@ def session(name, make, options, seed):
     except ValueError as error:
         row["codes"] = [str(error)[:60]]
         return row
-    row["holds"] = result.segments.n_holds == len(motion.rests)
+    row["holds"] = result.segments.n_poses == len(motion.rests)
     row["codes"] = sorted({f.code.value for f in result.findings if f.severity.value != "note"})
     if result.gyroscope is None:
         return row

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts.lines import lines_of_holds, without_lines
+from trihedron.channel_facts.lines import lines_of_poses, without_lines
 from trihedron.channel_facts.low_pass import Spectrum, undisturbed
-from trihedron.channel_facts.pooled import Pooled, pooled_logarithm, robust_holds
+from trihedron.channel_facts.pooled import Pooled, pooled_logarithm, robust_poses
 from trihedron.channel_facts.step import converter_step
 from trihedron.ranges import ranges_of
-from trihedron.records.hold_noise import HoldLine
+from trihedron.records.pose_noise import PoseLine
 from trihedron.refused import RefusedError
 from trihedron.transforms import cosine_transform
 
@@ -35,22 +35,22 @@ class AxisAtRest:
 
     parts: list[FloatArray]
     step: float
-    lines: tuple[HoldLine, ...]
+    lines: tuple[PoseLine, ...]
     pooled: Pooled
     spectrum: Spectrum
 
     @classmethod
-    def of(cls, x: FloatArray, rate_hz: float, holds: Sequence[tuple[int, int]], name: str) -> AxisAtRest:
-        parts = [run for start, stop in holds for run in _unbroken(x[start:stop])]
+    def of(cls, x: FloatArray, rate_hz: float, poses: Sequence[tuple[int, int]], name: str) -> AxisAtRest:
+        parts = [run for start, stop in poses for run in _unbroken(x[start:stop])]
         if not parts:
             raise RefusedError(f"{name}: no hold has {SHORTEST} readings in a row; hold still for longer")
         step = converter_step(np.concatenate(parts))
         power = _Power.of(parts)
-        keep = robust_holds(power.variance, power.dof)
+        keep = robust_poses(power.variance, power.dof)
         parts = [part for part, kept in zip(parts, keep, strict=True) if kept]
         # A line is stated as one; it is neither white noise nor a filter's corner.
         spectrum = _segments(parts, rate_hz)
-        lines = lines_of_holds(*spectrum, rate_hz)
+        lines = lines_of_poses(*spectrum, rate_hz)
         if lines:
             parts = without_lines(parts, lines, rate_hz)
             spectrum = _segments(parts, rate_hz)

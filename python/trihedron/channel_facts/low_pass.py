@@ -12,7 +12,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.records.channel_facts import LowPass
-from trihedron.records.hold_noise import Measured
+from trihedron.records.pose_noise import Measured
 
 EARNED = 16.0
 """Drop of the deviance that a corner must earn: it is searched over a grid and five shapes."""

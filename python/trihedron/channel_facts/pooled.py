@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.records.hold_noise import Measured, Ratio
+from trihedron.records.pose_noise import Measured, Ratio
 from trihedron.refused import RefusedError
 
 MOST_LEFT_OUT = 0.25
@@ -30,7 +30,7 @@ class Pooled:
     scatter: float
 
 
-def robust_holds(variance: FloatArray, dof: FloatArray) -> npt.NDArray[np.bool_]:
+def robust_poses(variance: FloatArray, dof: FloatArray) -> npt.NDArray[np.bool_]:
     """(k,) holds whose noise is not far above the rest's; at most a quarter is excluded, the worst first."""
     keep = np.asarray(variance > 0.0)
     if np.count_nonzero(keep) < 4:

@@ -76,7 +76,7 @@ def suspicions_of(
 ) -> tuple[Suspicion, ...]:
     """The mistake in the accelerometer's and in the gyro's part, where undoing one makes it fit."""
     assert segments.accelerometer_mean is not None
-    means, zero = segments.accelerometer_mean, np.zeros((segments.n_holds, 3))
+    means, zero = segments.accelerometer_mean, np.zeros((segments.n_poses, 3))
 
     def norm(S: FloatArray, b: FloatArray) -> float:
         sensor = replace(own.accelerometer, S=S, b=b)

@@ -53,10 +53,10 @@ def verify_calibration(
     """
     if recording.accelerometer is None or segments.accelerometer_mean is None:
         raise RefusedError("verification needs the accelerometer: gravity is what a calibration is tested against")
-    if segments.n_holds == 0:
+    if segments.n_poses == 0:
         raise RefusedError("verification needs poses, and none was found: keep the sensor still for some seconds")
     accelerometer = calibration.accelerometer
-    noise = _variance(segments.norm_sigma, segments.n_holds)
+    noise = _variance(segments.norm_sigma, segments.n_poses)
     error, error_noise, error_sigma = norm_error(accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)
     empty = np.zeros(0)
     moves = Carriage(empty, empty, empty, np.zeros(0, dtype=np.int64), ())
@@ -122,7 +122,7 @@ def _worse_than_none(
     """Where readings taken at their unit's word serve better: whatever the file states of its uncertainty."""
     error, angle = errors
     assert segments.accelerometer_mean is not None
-    noise = _variance(segments.norm_sigma, segments.n_holds)
+    noise = _variance(segments.norm_sigma, segments.n_poses)
     bare, _, _ = norm_error(without.accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)
     pairs = {"rest": (error, bare)}
     gyroscope = without.gyroscope

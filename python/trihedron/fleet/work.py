@@ -94,7 +94,7 @@ def _row(result: Any) -> Row:
         "n_samples": result.recording.n_samples,
         "duration_s": result.recording.duration_s,
         "rate_hz": result.recording.rate_hz,
-        "n_poses": result.segments.n_holds,
+        "n_poses": result.segments.n_poses,
         "is_trustworthy": result.is_trustworthy,
         "gravity_m_s2": calibration.gravity_m_s2,
         "accelerometer_unit": accel.raw_unit,

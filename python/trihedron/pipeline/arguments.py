@@ -29,7 +29,7 @@ RANGES: dict[str, tuple[float, float, str]] = {
     "sigma_angle_deg": (0.0, 180.0, "degrees"),
     "sigma_turn_rad": (0.0, 3.2, "rad"),
     "turn_s": (1e-3, 1e6, "s"),
-    "hold_s": (1e-3, 1e6, "s"),
+    "pose_s": (1e-3, 1e6, "s"),
     "seconds": (1e-3, 1e9, "s"),
     "wait_s": (0.0, 1e9, "s"),
     "gyroscope_density": (1e-15, 1e3, "rad/s/√Hz, a positive number"),

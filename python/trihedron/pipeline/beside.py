@@ -57,8 +57,8 @@ def beside(
     found = held_against(recording, reference, gravity, columns=columns, given=given)
     segments = segment(recording)
     try:
-        if segments.n_holds < FEWEST_POSES:
-            raise RefusedError(f"{segments.n_holds} poses are too few for a model of their own")
+        if segments.n_poses < FEWEST_POSES:
+            raise RefusedError(f"{segments.n_poses} poses are too few for a model of their own")
         result = ordinary()
     except REFUSALS as error:
         if found.kind == ANOTHER_UNIT:

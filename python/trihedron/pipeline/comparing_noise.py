@@ -12,11 +12,11 @@ from scipy.stats import chi2
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.against import FittedModel
-from trihedron.estimate.noise import noise_of_holds, ratio_of
+from trihedron.estimate.noise import noise_of_poses, ratio_of
 from trihedron.pipeline.comparing_draws import one_draw_for_all, uniform_for_normal
-from trihedron.records import Hold, Recording
+from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
-from trihedron.records.hold_noise import HoldNoise, Measured
+from trihedron.records.pose_noise import Measured, PoseNoise
 from trihedron.records.sampling import StampKind
 from trihedron.refused import REFUSALS
 
@@ -67,7 +67,7 @@ class Sampled:
     ``likeness`` is the smallest correlation, in size, of the noise of any two axes.
     """
 
-    noise: dict[Sensor, tuple[HoldNoise, ...]]
+    noise: dict[Sensor, tuple[PoseNoise, ...]]
     excess: dict[Sensor, FloatArray]
     n_differences: dict[Sensor, int]
     likeness: dict[Sensor, float]
@@ -75,10 +75,10 @@ class Sampled:
     jitter_steps: float
 
 
-def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> Sampled:
+def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> Sampled:
     """Noise inside poses of a recording, by the scale of its own fit."""
-    holds = [(pose.start, pose.stop) for pose in poses]
-    noise: dict[Sensor, tuple[HoldNoise, ...]] = {}
+    ranges = [(pose.start, pose.stop) for pose in poses]
+    noise: dict[Sensor, tuple[PoseNoise, ...]] = {}
     excess: dict[Sensor, FloatArray] = {}
     count: dict[Sensor, int] = {}
     likeness: dict[Sensor, float] = {}
@@ -91,10 +91,10 @@ def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> 
             continue
         si = readings / np.linalg.norm(np.linalg.inv(S), axis=1)
         try:
-            noise[sensor] = noise_of_holds(si, recording.rate_hz, holds)
+            noise[sensor] = noise_of_poses(si, recording.rate_hz, ranges)
         except REFUSALS:
             continue  # no hold is long enough: nothing to compare
-        differences = np.concatenate([np.diff(si[a:b], axis=0) for a, b in holds if b - a > 2])
+        differences = np.concatenate([np.diff(si[a:b], axis=0) for a, b in ranges if b - a > 2])
         differences = differences[np.isfinite(differences).all(axis=1)]
         centred = differences - differences.mean(axis=0)
         power = np.maximum((centred**2).mean(axis=0), 1e-150)
@@ -160,7 +160,7 @@ def _value(figure: Measured | None) -> float | None:
     return None if figure is None else figure.value
 
 
-def _white(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) -> NoiseDifference | None:
+def _white(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> NoiseDifference | None:
     unit = "m/s^2/sqrt(Hz)" if sensor == "accelerometer" else "rad/s/sqrt(Hz)"
     if m.white is None or r.white is None or not (m.white.value > 0.0 and r.white.value > 0.0):
         if (m.white is None) == (r.white is None):
@@ -169,7 +169,7 @@ def _white(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) 
     return _measured(sensor, axis, "N", (m.white, r.white), unit, LEAST_RATIO, alpha)
 
 
-def _hidden(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, unit: str) -> NoiseDifference:
+def _hidden(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, unit: str) -> NoiseDifference:
     """One side shows no noise: hidden by its converter, or, where noise like the other's would show, not there."""
     quiet, loud = (m, r) if m.white is None or not m.white.value > 0.0 else (r, m)
     side, other = ("model", "recording") if quiet is m else ("recording", "model")
@@ -237,8 +237,8 @@ def _are_even(white: Sequence[Measured | None]) -> bool:
 def _step(
     sensor: Sensor,
     axis: str,
-    model: tuple[HoldNoise, Sequence[HoldNoise]],
-    recording: tuple[HoldNoise, Sequence[HoldNoise]],
+    model: tuple[PoseNoise, Sequence[PoseNoise]],
+    recording: tuple[PoseNoise, Sequence[PoseNoise]],
 ) -> Iterator[NoiseDifference]:
     """One axis of either side, with all axes of its sensor."""
     m, r = model[0], recording[0]
@@ -264,7 +264,7 @@ def _step(
     yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, ratio, None, unit, None, is_far, remark)
 
 
-def _shows_steps(one: HoldNoise, axes: Sequence[HoldNoise]) -> bool:
+def _shows_steps(one: PoseNoise, axes: Sequence[PoseNoise]) -> bool:
     """Whether readings go in steps: a distance of numbers far below the noise is that of chance, not of a converter.
 
     Nor is one that no other axis has: the axes of a sensor share a converter.
@@ -275,7 +275,7 @@ def _shows_steps(one: HoldNoise, axes: Sequence[HoldNoise]) -> bool:
     return one.step > LEAST_SEEN_STEP * one.reading_sigma
 
 
-def _corner(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) -> Iterator[NoiseDifference]:
+def _corner(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> Iterator[NoiseDifference]:
     if m.corner_hz is not None and r.corner_hz is not None:
         yield _measured(sensor, axis, "bandwidth", (m.corner_hz, r.corner_hz), "Hz", LEAST_CORNER_RATIO, alpha)
         return
@@ -292,7 +292,7 @@ def _corner(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float)
     )
 
 
-def _octaves(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) -> Iterator[NoiseDifference]:
+def _octaves(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> Iterator[NoiseDifference]:
     """Octave by octave; significant where it differs otherwise than white noise and filter do."""
     if m.white is None or r.white is None:
         return

@@ -47,10 +47,10 @@ def at_rest(
 
 def _is_rest(recording: Recording, segments: Segments, calibrated: Calibrated) -> bool:
     mean = segments.accelerometer_mean
-    if mean is None or segments.n_holds < FEWEST_POSES:
+    if mean is None or segments.n_poses < FEWEST_POSES:
         return True
     up = mean / np.linalg.norm(mean, axis=1, keepdims=True)
-    lasts = np.array([hold.stop - hold.start for hold in segments.holds], dtype=np.float64)
+    lasts = np.array([pose.stop - pose.start for pose in segments.poses], dtype=np.float64)
     of_orientations = []
     free = np.ones(len(up), dtype=bool)
     while free.any():
@@ -161,4 +161,4 @@ def _calibration(model: LinearModel, gravity_m_s2: float, source: str) -> Calibr
 
 def _too_few(recording: Recording, segments: Segments) -> Finding:
     lasts = float(recording.time_s[-1] - recording.time_s[0])
-    return Finding.of(FindingCode.NOT_FIT, "few-orientations", duration_s=lasts, n_holds=segments.n_holds)
+    return Finding.of(FindingCode.NOT_FIT, "few-orientations", duration_s=lasts, n_poses=segments.n_poses)

@@ -15,7 +15,7 @@ from trihedron.estimate.kalman import (
     check_same_gravity,
     noise_from_identified,
 )
-from trihedron.estimate.noise import identify_noise, noise_of_holds
+from trihedron.estimate.noise import identify_noise, noise_of_poses
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of
@@ -163,12 +163,12 @@ def _settle_noise(
 def _check_converter(given: Sequence[AxisNoise], recording: Recording, segments: Segments) -> None:
     """Refuse the noise of a static log that another converter wrote."""
     readings = recording.accelerometer
-    if readings is None or not segments.holds:
+    if readings is None or not segments.poses:
         return
-    windows = [(hold.start, hold.stop) for hold in segments.holds if hold.stop - hold.start >= SHORTEST_HOLD]
+    windows = [(pose.start, pose.stop) for pose in segments.poses if pose.stop - pose.start >= SHORTEST_HOLD]
     if not windows:
         return
-    inside = noise_of_holds(readings, recording.rate_hz, windows)
+    inside = noise_of_poses(readings, recording.rate_hz, windows)
     # Codes between the poses count too: inside a hold a coarse converter shows one.
     steps = recording.facts.of("accelerometer").step.tolist()
     octaves = [axis.octaves for axis in inside]

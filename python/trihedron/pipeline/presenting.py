@@ -83,7 +83,7 @@ _KINDS: dict[type, _Shown] = {
     Noise: _Shown(noise_report, noise_record, frames.noise_columns),
     AllanCurve: _Shown(summaries.curve_summary, machine.curve_record, frames.curve_columns),
     Recording: _Shown(summaries.recording_summary, machine.recording_record, frames.recording_columns),
-    Segments: _Shown(summaries.segments_summary, machine.holds_record, frames.segments_columns),
+    Segments: _Shown(summaries.segments_summary, machine.poses_record, frames.segments_columns),
     ExperimentPlan: _Shown(plan_report, plan_record),
 }
 

@@ -179,7 +179,7 @@ def segment(recording: AnyRecording, *, progress: Progress | None = None) -> Seg
     Examples
     --------
     >>> poses = trihedron.segment(recording)
-    >>> poses.accelerometer_mean.shape == (poses.n_holds, 3)
+    >>> poses.accelerometer_mean.shape == (poses.n_poses, 3)
     True
     """
     recording = recording_of(recording)

@@ -43,7 +43,7 @@ class CalibrationResult(Presented):
 
     def __repr__(self) -> str:
         sensors = "accelerometer" if self.gyroscope is None else "accelerometer and gyroscope"
-        return f"<CalibrationResult of {one_line(self.recording.source)}: {sensors}, {self.segments.n_holds} poses>"
+        return f"<CalibrationResult of {one_line(self.recording.source)}: {sensors}, {self.segments.n_poses} poses>"
 
     def __str__(self) -> str:
         from trihedron.report import calibration_report, to_text

@@ -259,7 +259,7 @@ def _temperature(result: CalibrationResult) -> tuple[float, float, float, int]:
     if T is None:
         return math.nan, math.nan, math.nan, 0
     means = [
-        float(np.nanmean(T[h.start : h.stop])) for h in result.segments.holds if np.isfinite(T[h.start : h.stop]).any()
+        float(np.nanmean(T[h.start : h.stop])) for h in result.segments.poses if np.isfinite(T[h.start : h.stop]).any()
     ]
     if not means:
         return math.nan, math.nan, math.nan, 0

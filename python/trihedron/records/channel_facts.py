@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.records.frozen import Frozen
-from trihedron.records.hold_noise import Measured
+from trihedron.records.pose_noise import Measured
 from trihedron.refused import RefusedError
 
 SAME_STEP = 0.02

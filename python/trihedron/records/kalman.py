@@ -74,7 +74,7 @@ class PoseTable:
     specific_force: FloatArray
     sigma_m_s2: float = 0.0
     source: str = "memory"
-    hold: npt.NDArray[np.int64] | None = None
+    pose: npt.NDArray[np.int64] | None = None
     start_s: FloatArray | None = None
     stop_s: FloatArray | None = None
 
@@ -127,7 +127,7 @@ class PoseTable:
             raise RefusedError(f"sigma_m_s2 must be zero or positive, got {self.sigma_m_s2}")
         f.setflags(write=False)
         object.__setattr__(self, "specific_force", f)
-        for name in ("hold", "start_s", "stop_s"):
+        for name in ("pose", "start_s", "stop_s"):
             column = getattr(self, name)
             if column is not None and np.shape(column) != (len(f),):
                 raise RefusedError(f"{name} must have one entry per pose ({len(f)}), got shape {np.shape(column)}")
@@ -223,7 +223,7 @@ class KalmanCalibration(Frozen):
     references: FloatArray
     readings: FloatArray
     start_s: FloatArray
-    hold_s: FloatArray
+    pose_s: FloatArray
     residual_m_s2: FloatArray
     findings: tuple[Finding, ...] = ()
     extensions: MappingProxyType[str, object] = field(default_factory=lambda: MappingProxyType({}))

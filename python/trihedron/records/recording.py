@@ -160,7 +160,7 @@ class Recording(Presented):
             kind_of(name, getattr(self, name), str)
         freeze(self)
 
-    def with_distinct_stamps(self) -> Recording:
+    def with_distinct_timestamps(self) -> Recording:
         """This recording with no two samples at one instant: shared timestamps are spread (:func:`spread_stamps`)."""
         distinct = spread_stamps(self.time_s, 1.0 / self.rate_hz)
         return self if distinct is self.time_s else self.with_same_readings(time_s=distinct)

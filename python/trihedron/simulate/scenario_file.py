@@ -18,7 +18,7 @@ from trihedron.refused import RefusedError
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.gyroscope import Gyroscope
-from trihedron.simulate.motion import LEVEL, Disturb, Hold, Motion, MoveTo, Oscillate, Turn, Vibrate, attitude_with_up
+from trihedron.simulate.motion import LEVEL, Disturb, Motion, MoveTo, Oscillate, Pose, Turn, Vibrate, attitude_with_up
 from trihedron.simulate.named import SESSIONS
 from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.scenario import Clock, Environment, Scenario
@@ -29,7 +29,7 @@ else:  # pragma: no cover
     import tomli as tomllib
 
 _STEPS: dict[str, type[Any]] = {
-    "hold": Hold,
+    "pose": Pose,
     "move": MoveTo,
     "turn": Turn,
     "oscillate": Oscillate,

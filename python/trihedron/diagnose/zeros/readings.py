@@ -43,7 +43,7 @@ def _parts(obs: Observations, temperature: FloatArray | None, parts: int) -> _Pa
     """Means over equal parts of every pose."""
     pose, time_s, length_s, force, rate, heat = [], [], [], [], [], []
     of_force, of_rate = obs.half_means if parts == 2 else obs.part_means(parts)
-    for i, hold in enumerate(obs.segments.holds):
+    for i, hold in enumerate(obs.segments.poses):
         for k, part in enumerate(np.array_split(hold.samples(), parts)):
             if len(part) < 2:
                 continue
@@ -67,7 +67,7 @@ def _temperature(context: Context) -> FloatArray | None:
     if logged is None or not np.isfinite(logged).any():
         return None
     filled = np.where(np.isfinite(logged), logged, np.nanmean(logged))
-    of_holds = np.array([np.nanmean(filled[hold.samples()]) for hold in context.obs.segments.holds])
+    of_holds = np.array([np.nanmean(filled[hold.samples()]) for hold in context.obs.segments.poses])
     return None if np.ptp(of_holds) < LEAST_SWING_K else filled
 
 

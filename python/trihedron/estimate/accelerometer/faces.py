@@ -137,7 +137,7 @@ def _estimate_placements(
         return _estimate(values[used], noise[used], faces[used], g, closed=closed)
     spread = placed.noise
     # Readings half a turn apart have opposite tilts: none is in their mean.
-    is_cancelled = opposite is not None and len(opposite.hold) == len(placed.means)
+    is_cancelled = opposite is not None and len(opposite.pose) == len(placed.means)
     if placed.scatter is not None:
         S_a, _, _ = _least_squares(placed.means, placed.noise, placed.faces, g)
         tilt2 = placed.scatter / (g**2 * float(np.mean(np.sum(S_a**2, axis=0))))

@@ -109,7 +109,7 @@ def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
     """
     gyroscope = _required(recording.gyroscope, "gyroscope")
     step_s = 1.0 / recording.rate_hz
-    kept = [(k, *part) for k, hold in enumerate(segments.holds) for part in hold.undisturbed()]
+    kept = [(k, *part) for k, pose in enumerate(segments.poses) for part in pose.undisturbed()]
     owner, *edges = np.array(kept, dtype=np.int64).reshape(-1, 3).T
     squares, count = _core.block_differences(
         gyroscope, np.column_stack(edges), np.ascontiguousarray(owner), max(1, round(BLOCK_S / step_s))
@@ -213,7 +213,7 @@ def _moves_of(recording: Recording, segments: Segments) -> list[Move]:
         raise RefusedError(
             "no move between two poses was found: turn the sensor by hand between poses and keep each for some seconds"
         )
-    if moves[-1].stop > recording.n_samples or segments.holds[-1].stop > recording.n_samples:
+    if moves[-1].stop > recording.n_samples or segments.poses[-1].stop > recording.n_samples:
         raise RefusedError("the segments reach beyond the recording: they belong to another log")
     return moves
 
@@ -293,7 +293,7 @@ def audit_moves(measured: MoveMeasurements) -> list[Finding]:
 
 def _edges_and_links(moves: Sequence[Move]) -> tuple[IntArray, IntArray]:
     edges = np.array([[move.start, move.stop] for move in moves], dtype=np.int64)
-    links = np.array([[move.hold_before, move.hold_after] for move in moves], dtype=np.int64)
+    links = np.array([[move.pose_before, move.pose_after] for move in moves], dtype=np.int64)
     return edges, links
 
 

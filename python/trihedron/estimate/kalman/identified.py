@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from trihedron.records.calibration import SensorCalibration
-from trihedron.records.hold_noise import OctaveNoise
 from trihedron.records.kalman import AxisNoise
+from trihedron.records.pose_noise import OctaveNoise
 from trihedron.refused import RefusedError
 from trihedron.units import AccelerationUnit, acceleration_to_si
 

@@ -47,15 +47,15 @@ class LiveCalibration:
         prior: Prior | None = None,
         options: ShapingOptions | None = None,
         session_s: float = 1800.0,
-        hold_s: float = 3.0,
+        pose_s: float = 3.0,
         pause_s: float = 3.0,
     ) -> None:
         self.goal = goal or Goal()
         self._gravity = gravity_m_s2
-        self._hold, self._pause = hold_s, pause_s
+        self._pose, self._pause = pose_s, pause_s
         options = options or ShapingOptions()
-        models = [shaping_model(n, options, session_s=session_s, hold_s=hold_s) for n in noise_per_axis(noise)]
-        prior = prior or Prior.diffuse([model.fast_variance(hold_s) ** 0.5 for model in models])
+        models = [shaping_model(n, options, session_s=session_s, pose_s=pose_s) for n in noise_per_axis(noise)]
+        prior = prior or Prior.diffuse([model.fast_variance(pose_s) ** 0.5 for model in models])
         self._filters = [
             _core.AxisKalman(model, _core.KalmanStart(prior.mean[i], prior.sigma[i], prior.walk[i]))
             for i, model in enumerate(models)
@@ -72,7 +72,7 @@ class LiveCalibration:
         reference: npt.ArrayLike,
         *,
         start_s: float,
-        hold_s: float,
+        pose_s: float,
         plan: npt.ArrayLike | None = None,
         look_ahead: int = 100,
     ) -> LiveEstimate:
@@ -105,7 +105,7 @@ class LiveCalibration:
         nis = np.empty(3)
         vector = [float(v) for v in f]
         for axis, one in enumerate(self._filters):
-            innovation, variance = one.add(float(z[axis]), vector, start_s, hold_s)
+            innovation, variance = one.add(float(z[axis]), vector, start_s, pose_s)
             nis[axis] = innovation**2 / variance
         return self.estimate(nis=nis, plan=plan, look_ahead=look_ahead)
 
@@ -149,5 +149,5 @@ class LiveCalibration:
         vector = [float(v) for v in direction]
         copies = [one.copy() for one in filters]
         for one in copies:
-            one.imagine(vector, start, self._hold)
+            one.imagine(vector, start, self._pose)
         return copies

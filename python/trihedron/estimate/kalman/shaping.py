@@ -30,18 +30,18 @@ class ShapingOptions:
     averages: bool = True
 
     @classmethod
-    def of_the_article(cls, session_s: float, hold_s: float) -> ShapingOptions:
+    def of_the_article(cls, session_s: float, pose_s: float) -> ShapingOptions:
         """Eight states: one Gauss-Markov process in the middle of the session's time scales, instantaneous readings."""
-        return cls(flicker_rates_per_s=(1.0 / float(np.sqrt(session_s * hold_s)),), averages=False)
+        return cls(flicker_rates_per_s=(1.0 / float(np.sqrt(session_s * pose_s)),), averages=False)
 
 
 def shaping_model(
-    noise: AxisNoise, options: ShapingOptions, *, session_s: float, hold_s: float
+    noise: AxisNoise, options: ShapingOptions, *, session_s: float, pose_s: float
 ) -> _core.AxisKalmanModel:
     """Compiled shaping filter of one axis for a session of ``session_s`` with holds of about ``hold_s``."""
     rates = options.flicker_rates_per_s
     if not rates:
-        slow, fast = SLOWEST_PER_SESSION / session_s, FASTEST_PER_HOLD / hold_s
+        slow, fast = SLOWEST_PER_SESSION / session_s, FASTEST_PER_HOLD / pose_s
         n = max(2, int(np.ceil(np.log10(fast / slow))) + 1)
         rates = tuple(float(rate) for rate in np.geomspace(slow, fast, n))
     return _core.AxisKalmanModel(

@@ -32,7 +32,7 @@ from trihedron.estimate.noise.of_zeros import (
     kernels,
     levels,
 )
-from trihedron.records.hold_noise import Measured, Ratio
+from trihedron.records.pose_noise import Measured, Ratio
 
 DRAWS = 8192
 """Points over six strengths and a scatter: some hundred of them share the weight of a session of 30 poses."""

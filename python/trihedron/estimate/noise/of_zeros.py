@@ -23,7 +23,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from trihedron.arrays import FloatArray
-from trihedron.records.hold_noise import Measured, Ratio
+from trihedron.records.pose_noise import Measured, Ratio
 
 FEWEST_CONTRASTS = 11
 """A variance from eleven differences is known to a factor of 1.5, its root to 1.25: with fewer nothing is compared."""

@@ -41,7 +41,7 @@ def grid_of(recording: Recording) -> Grid:
     """
     if recording.gyroscope is None:
         raise RefusedError(f"{recording.source}: a reference is held against the gyro, and this log has none.")
-    recording = recording.with_distinct_stamps()
+    recording = recording.with_distinct_timestamps()
     gyroscope = recording.gyroscope
     assert gyroscope is not None
     readings = gyroscope if recording.accelerometer is None else np.hstack([gyroscope, recording.accelerometer])

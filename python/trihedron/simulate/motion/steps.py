@@ -23,7 +23,7 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Hold:
+class Pose:
     """Stand still. ``creep_deg`` turns slowly by that angle about ``creep_axis`` (body) over the whole hold."""
 
     duration_s: float
@@ -138,7 +138,7 @@ class Replay:
         object.__setattr__(self, "acceleration_m_s2", acceleration)
 
 
-Step: TypeAlias = Hold | MoveTo | Turn | Oscillate | Vibrate | Disturb | Replay
+Step: TypeAlias = Pose | MoveTo | Turn | Oscillate | Vibrate | Disturb | Replay
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ class OctaveNoise:
 
 
 @dataclass(frozen=True)
-class HoldLine:
+class PoseLine:
     """A line of ``amplitude`` [u] at ``frequency_hz`` that the poses have in common, over ``limit`` times its level."""
 
     frequency_hz: float
@@ -40,7 +40,7 @@ class HoldLine:
 
 
 @dataclass(frozen=True)
-class HoldNoise:
+class PoseNoise:
     """Noise of one axis inside the holds of a session; u is the unit of the raw readings.
 
     ``white`` is the density N [u/√Hz] of the white noise ahead of the sensor's filter, freed of the rounding of the
@@ -55,13 +55,13 @@ class HoldNoise:
     name: str
     unit: str
     rate_hz: float
-    n_holds: int
+    n_poses: int
     n_readings: int
     white: Measured | None
     reading_sigma: float
     step: float
     octaves: tuple[OctaveNoise, ...]
-    lines: tuple[HoldLine, ...]
+    lines: tuple[PoseLine, ...]
     corner_hz: Measured | None
     corner_above_hz: float
     scatter: float

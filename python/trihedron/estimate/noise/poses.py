@@ -19,7 +19,7 @@ from trihedron.channel_facts.low_pass import low_passes
 from trihedron.channel_facts.pooled import as_measured, pooled_logarithm, root_of
 from trihedron.estimate.noise.densities import densities_below
 from trihedron.records.channel_facts import LowPass
-from trihedron.records.hold_noise import HoldNoise, Measured, OctaveNoise
+from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise
 from trihedron.refused import RefusedError
 from trihedron.transforms import cosine_transform
 
@@ -29,14 +29,14 @@ LEVEL_KNOWN = 1.0
 """Standard error of the logarithm of a density below a corner, from which on the differences of readings say more."""
 
 
-def noise_of_holds(
+def noise_of_poses(
     readings: npt.ArrayLike,
     rate_hz: float,
-    holds: Sequence[tuple[int, int]],
+    poses: Sequence[tuple[int, int]],
     *,
     names: Sequence[str] = (),
     units: Sequence[str] = (),
-) -> tuple[HoldNoise, ...]:
+) -> tuple[PoseNoise, ...]:
     """Noise of every axis inside the holds of a session, each figure with its interval.
 
     The channels are those of one sensor: they share a low-pass unless their spectra deny it.
@@ -69,21 +69,21 @@ def noise_of_holds(
     x = x[:, np.newaxis] if x.ndim == 1 else x
     if not (math.isfinite(rate_hz) and rate_hz > 0):
         raise RefusedError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
-    for start, stop in holds:
+    for start, stop in poses:
         if not 0 <= start < stop <= len(x):
             raise RefusedError(f"a pose runs from an earlier to a later of {len(x)} readings, got {start} to {stop}")
     channels = x.shape[1]
     names = tuple(names) or tuple(f"channel {c + 1}" for c in range(channels))
     units = tuple(units) or ("",) * channels
-    axes = [AxisAtRest.of(x[:, c], rate_hz, holds, names[c]) for c in range(channels)]
+    axes = [AxisAtRest.of(x[:, c], rate_hz, poses, names[c]) for c in range(channels)]
     filters = low_passes([axis.spectrum for axis in axes], rate_hz)
     white = _white(axes, filters, rate_hz)
     return tuple(
-        HoldNoise(
+        PoseNoise(
             name=name,
             unit=unit,
             rate_hz=rate_hz,
-            n_holds=len(axis.parts),
+            n_poses=len(axis.parts),
             n_readings=sum(len(part) for part in axis.parts),
             white=density,
             reading_sigma=math.sqrt(max(axis.total - axis.rounding, 0.0)) if axis.is_dithered else 0.0,
