@@ -8,9 +8,9 @@ import pytest
 from scipy import stats
 
 import trihedron
+from trihedron.errors import RefusedError
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.demonstrating import compare_with_truth, truth_of_the_day
-from trihedron.refused import RefusedError
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.units import STANDARD_GRAVITY_M_S2
 

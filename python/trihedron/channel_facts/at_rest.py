@@ -13,9 +13,9 @@ from trihedron.channel_facts.lines import lines_of_poses, without_lines
 from trihedron.channel_facts.low_pass import Spectrum, undisturbed
 from trihedron.channel_facts.pooled import Pooled, pooled_logarithm, robust_poses
 from trihedron.channel_facts.step import converter_step
+from trihedron.errors import RefusedError
 from trihedron.ranges import ranges_of
 from trihedron.records.pose_noise import PoseLine
-from trihedron.refused import RefusedError
 from trihedron.transforms import cosine_transform
 
 SHORTEST = 32

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records.pose_noise import Measured, Ratio
-from trihedron.refused import RefusedError
 
 MOST_LEFT_OUT = 0.25
 """Share of holds that may be left out for noise far above the rest's: a disturbed hold, not another sensor."""

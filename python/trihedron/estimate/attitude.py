@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 Form = Literal["matrices", "quaternions", "vectors"]
 """How attitudes are written."""

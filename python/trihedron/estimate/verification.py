@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.aligned_moves import denies_cut
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.session.carried import Carried, carried
@@ -23,7 +24,6 @@ from trihedron.records import (
     Severity,
     Verification,
 )
-from trihedron.refused import RefusedError
 from trihedron.session.averaging import broadening
 
 FALSE_ALARM = 1e-3

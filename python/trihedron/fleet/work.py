@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from trihedron.errors import REFUSALS, RefusedError
 from trihedron.fleet.logs import program
 from trihedron.records.checked import WrongTypeError
-from trihedron.refused import REFUSALS, RefusedError
 
 Row = dict[str, Any]
 REFUSED: tuple[type[Exception], ...] = (*REFUSALS, WrongTypeError, OSError)

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from numbers import Integral, Real
 from typing import Any
 
+from trihedron.errors import RefusedError
 from trihedron.records.checked import WrongTypeError, number_of, numbers_of, said
-from trihedron.refused import RefusedError
 
 MOST_WHOLE = 2**63 - 1
 """What the core takes as a whole number."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.reference import moves_along
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
@@ -24,7 +25,6 @@ from trihedron.read.reference import of_recording
 from trihedron.records import Calibration, Finding, FindingCode, Recording
 from trihedron.records.reference import AgainstReference
 from trihedron.records.words import words
-from trihedron.refused import REFUSALS, RefusedError
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit, rate_to_si
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
+from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm, shared_rounding
 from trihedron.estimate.accelerometer.bending import with_bending
 from trihedron.estimate.accelerometer.face_poses import faces_up
@@ -36,7 +37,6 @@ from trihedron.records import Calibration, Finding, FindingCode, Frame, Recordin
 from trihedron.records.plain import as_plain
 from trihedron.records.progress import Progress
 from trihedron.records.words import words
-from trihedron.refused import REFUSALS, RefusedError
 from trihedron.sensor_model import in_frame
 from trihedron.units import rate_to_si
 

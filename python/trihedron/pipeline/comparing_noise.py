@@ -12,13 +12,13 @@ from scipy.stats import chi2
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.against import FittedModel
+from trihedron.errors import REFUSALS
 from trihedron.estimate.noise import noise_of_poses, ratio_of
 from trihedron.pipeline.comparing_draws import one_draw_for_all, uniform_for_normal
 from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
 from trihedron.records.pose_noise import Measured, PoseNoise
 from trihedron.records.sampling import StampKind
-from trihedron.refused import REFUSALS
 
 Sensor = Literal["accelerometer", "gyroscope"]
 

@@ -11,6 +11,7 @@ from typing import Any
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.against import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open
+from trihedron.errors import REFUSALS, RefusedError
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.beside import beside, shared_log
@@ -33,7 +34,6 @@ from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.records.progress import Progress
-from trihedron.refused import REFUSALS, RefusedError
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, read_scenario
 

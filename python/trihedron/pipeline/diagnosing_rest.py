@@ -17,10 +17,10 @@ from trihedron.diagnose.session.starting_point import (
     extended_sensor,
     is_open,
 )
+from trihedron.errors import REFUSALS
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, LinearModel
-from trihedron.refused import REFUSALS
 from trihedron.units import acceleration_to_si, rate_to_si
 
 Calibrated = Callable[[], Calibration]

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import REFUSALS
 from trihedron.files.log import write_recording
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.carried_misses import CarriedMisses, carried_misses
 from trihedron.pipeline.reading import read
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.refused import REFUSALS
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, simulate, twin_scenario
 

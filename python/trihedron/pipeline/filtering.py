@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from trihedron.channel_facts.at_rest import SHORTEST as SHORTEST_HOLD
+from trihedron.errors import RefusedError
 from trihedron.estimate.kalman import (
     NormFrame,
     calibrate_session,
@@ -19,7 +20,6 @@ from trihedron.estimate.noise import identify_noise, noise_of_poses
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of
-from trihedron.printable import one_line
 from trihedron.read import read_axis_noise, read_pose_table, read_recording
 from trihedron.records import (
     AxisNoise,
@@ -35,7 +35,7 @@ from trihedron.records import (
 from trihedron.records.noise import Noise
 from trihedron.records.presented import Presented
 from trihedron.records.progress import Progress
-from trihedron.refused import RefusedError
+from trihedron.sanitise import one_line
 
 NoiseSource = AxisNoise | Sequence[AxisNoise] | Noise | str | os.PathLike[str]
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import REFUSALS
 from trihedron.estimate.accelerometer.poses import ENTRIES, design_rows, parameter_names, pose_in_words
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.planning_poses import (
@@ -26,7 +27,6 @@ from trihedron.pipeline.results import CalibrationResult, VerificationResult
 from trihedron.pipeline.verifying import verify
 from trihedron.records import Calibration, FindingCode, Recording, Segments, Severity
 from trihedron.records.guiding import LEAST_POSES, Accuracy, Examination, Uncertain
-from trihedron.refused import REFUSALS
 from trihedron.sensor_model import in_frame
 from trihedron.units import (
     STANDARD_GRAVITY_M_S2,

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from trihedron.errors import RefusedError
 from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
 from trihedron.estimate.gyroscope.turn_design import (
     PlannedMove,
@@ -15,7 +16,6 @@ from trihedron.estimate.gyroscope.turn_design import (
     design_zero_first,
 )
 from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan, PoseWorth, TurnPlan
-from trihedron.refused import RefusedError
 from trihedron.units import STANDARD_GRAVITY_M_S2, m_s2_from_micro_g, radians_from_degrees
 
 POSE_SETS = ("6 faces", "9 poses", "12 edges", "18 poses: faces and edges", "26 poses: faces, edges and corners")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.diagnose.against import FittedModel, compare_numbers, model_of_calibration
+from trihedron.errors import RefusedError
 from trihedron.estimate.reference import ACCEPTED, fit_reference
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.reading import read
@@ -27,7 +28,6 @@ from trihedron.records.diagnosis import (
 )
 from trihedron.records.domains import DomainTest
 from trihedron.records.reference import AgainstReference, Estimate, ReferenceMotion
-from trihedron.refused import RefusedError
 from trihedron.sensor_model import in_frame
 from trihedron.units import acceleration_to_si
 

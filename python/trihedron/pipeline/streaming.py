@@ -15,6 +15,7 @@ from typing import Any, cast
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.files.calibration import calibration_text
 from trihedron.files.checkpoint import Checkpoint, made_of
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units
@@ -23,7 +24,6 @@ from trihedron.pipeline.results import CalibrationResult
 from trihedron.read import ChunkedLog, open_chunks
 from trihedron.records import Move, Pose, Recording, Segments
 from trihedron.records.progress import Progress
-from trihedron.refused import RefusedError
 from trihedron.segment import BlockSums, segment_blocks
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit

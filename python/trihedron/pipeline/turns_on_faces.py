@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from trihedron.errors import RefusedError
 from trihedron.estimate.accelerometer import OppositeHeadings, opposite_headings
 from trihedron.estimate.gyroscope import Turn
 from trihedron.records import Recording, Segments
 from trihedron.records.segments import Move
-from trihedron.refused import RefusedError
 
 
 def _moves_on_faces(segments: Segments, up: np.ndarray[tuple[int], np.dtype[np.int64]]) -> list[Move]:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.errors import RefusedError
 from trihedron.records.frozen import Frozen
 from trihedron.records.pose_noise import Measured
-from trihedron.refused import RefusedError
 
 SAME_STEP = 0.02
 """Part by which one step of three converters may be measured differently where text has cut its digits."""

@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 LEAST_POSES = 12
 """Nine numbers of the accelerometer, and three poses more than numbers: residuals that can contradict it."""

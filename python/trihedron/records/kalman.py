@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen
-from trihedron.refused import RefusedError
 from trihedron.units import radians_from_degrees
 
 CONSTANT_NAMES: tuple[str, ...] = ("kx", "ky", "kz", "U0")

@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.printable import one_line
+from trihedron.errors import RefusedError
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
-from trihedron.refused import RefusedError
+from trihedron.sanitise import one_line
 
 AllanKind = Literal["overlapping", "non-overlapping", "modified", "hadamard", "total"]
 

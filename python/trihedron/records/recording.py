@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import CORE_MEMORY, FloatArray
-from trihedron.printable import one_line
+from trihedron.errors import RefusedError
 from trihedron.records.channel_facts import Limit, LowPass, RecordingFacts
 from trihedron.records.checked import all_of, kind_of, number_of, numbers_of, word_of
 from trihedron.records.finding import Finding
@@ -19,7 +19,7 @@ from trihedron.records.frozen import freeze
 from trihedron.records.onboard import Onboard
 from trihedron.records.presented import Presented
 from trihedron.records.sampling import UNJUDGED, Sampling
-from trihedron.refused import RefusedError
+from trihedron.sanitise import one_line
 from trihedron.units import AccelerationUnit, RateUnit
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.errors import RefusedError
 from trihedron.records import (
     PARAMETER_NAMES,
     AllanCurve,
@@ -20,7 +21,6 @@ from trihedron.records import (
     Verification,
 )
 from trihedron.records.diagnosis import Diagnosis
-from trihedron.refused import RefusedError
 from trihedron.report.noise_units import PER_UNIT
 
 Columns = dict[str, Sequence[Any] | npt.NDArray[Any]]

@@ -6,10 +6,10 @@ import json
 from typing import Any
 
 from trihedron.files.calibration import calibration_document, plain
-from trihedron.printable import printable_json
 from trihedron.records import AllanCurve, Calibration, Finding, Recording, Segments, Verification
 from trihedron.records.published import published_figures
 from trihedron.report.channels import channels_record
+from trihedron.sanitise import printable_json
 
 
 def recording_record(recording: Recording) -> dict[str, Any]:

@@ -8,10 +8,10 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.errors import RefusedError
 from trihedron.quantiles import medians
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-from trihedron.refused import RefusedError
 from trihedron.session.aliasing import unresolved_variance
 from trihedron.session.coloured_noise import coloured_variance
 from trihedron.session.flicker import expected_scatter, expected_scatter_of_axes

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.gyroscope import Gyroscope

@@ -11,7 +11,7 @@ from scipy.signal import lfilter, lfilter_zi
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 Triple: TypeAlias = tuple[float, float, float]
 Matrix: TypeAlias = tuple[Triple, Triple, Triple]

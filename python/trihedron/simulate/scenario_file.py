@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.documents import DocumentError, check_values, of_path, read_text
-from trihedron.printable import meant
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
+from trihedron.sanitise import meant
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.gyroscope import Gyroscope

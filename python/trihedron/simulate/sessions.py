@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 from trihedron.simulate.motion import Motion, MoveTo, Pose, Step, Turn, attitude_with_up
 from trihedron.simulate.noise import stream
 

@@ -14,8 +14,8 @@ from scipy.linalg import solveh_banded
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.refused import RefusedError
 from trihedron.sensor_model import correct
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.gyroscope import Gyroscope

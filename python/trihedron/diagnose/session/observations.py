@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records import Recording, Segments
-from trihedron.refused import RefusedError
 from trihedron.session.averaging import broadening
 from trihedron.session.lines_at_rest import means_beside_lines
 from trihedron.session.noise import Along, along_gradient, measure_noise

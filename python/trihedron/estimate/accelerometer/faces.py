@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.accelerometer import face_poses, face_tilt, inputs, verdict
 from trihedron.estimate.accelerometer.face_placements import placements
 from trihedron.estimate.accelerometer.norm import norm_residual
@@ -18,7 +19,6 @@ from trihedron.estimate.accelerometer.whole_turns import OppositeHeadings, with_
 from trihedron.records.calibration import FitQuality, Frame, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.words import words
-from trihedron.refused import REFUSALS, RefusedError
 from trihedron.sensor_model import other_form, other_form_jacobian, reframing
 from trihedron.units import AccelerationUnit, degrees_from_radians
 

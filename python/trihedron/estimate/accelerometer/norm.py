@@ -9,12 +9,12 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.accelerometer import inputs, verdict
 from trihedron.estimate.accelerometer.poses import ENTRIES, PoseDesign
 from trihedron.records.calibration import FitQuality, Frame, SensorCalibration
 from trihedron.records.finding import Finding
 from trihedron.records.words import words
-from trihedron.refused import RefusedError
 from trihedron.sensor_model import reframing
 from trihedron.units import AccelerationUnit
 

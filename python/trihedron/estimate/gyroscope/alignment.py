@@ -10,11 +10,11 @@ import numpy as np
 from trihedron import _core
 from trihedron._core import AlignmentFit
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.probability import MEDIAN_CHI2, chdtrc, chdtri
 from trihedron.quantiles import median
 from trihedron.records.calibration import SensorCalibration
-from trihedron.refused import RefusedError
 
 RateDegree = Literal[0, 1, 3]
 """Degree of the rate polynomial over a sample: 0 constant, 1 linear, 3 coning-corrected."""

@@ -10,6 +10,7 @@ import numpy as np
 from trihedron import _core
 from trihedron._core import Moves
 from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, Clipped, bridge_clipping, clipped_time
 from trihedron.estimate.gyroscope.rounding import (
@@ -25,7 +26,6 @@ from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
-from trihedron.refused import RefusedError
 from trihedron.session.averaging import Averaging
 
 GAP_STEPS = 5.0

@@ -10,11 +10,11 @@ import numpy as np
 
 from trihedron._core import integrate_raw_rate
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.measurements import BLOCK_S
 from trihedron.estimate.gyroscope.turn_rounding import HiddenAngles, hidden_angles
 from trihedron.estimate.gyroscope.zeros import pool_zeros
 from trihedron.records.recording import Recording
-from trihedron.refused import RefusedError
 from trihedron.units import rate_to_si
 
 QUARTER = math.pi / 2.0

@@ -9,11 +9,11 @@ import numpy as np
 
 from trihedron._core import integrate_raw_rate
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
-from trihedron.refused import RefusedError
 
 SAME_POSE_RAD = math.radians(5.0)
 """A turn on a table leaves gravity where it was, but for twice the table's tilt: a table leans two degrees at most."""

@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 State = TypeVar("State")
 

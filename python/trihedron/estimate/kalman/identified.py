@@ -8,10 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
+from trihedron.errors import RefusedError
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.kalman import AxisNoise
 from trihedron.records.pose_noise import OctaveNoise
-from trihedron.refused import RefusedError
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 MOST_ABOVE = 2.0

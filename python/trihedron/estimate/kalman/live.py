@@ -9,11 +9,11 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.kalman.guide import Goal, Guide
 from trihedron.estimate.kalman.per_axis import Prior, noise_per_axis
 from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.kalman import AxisNoise, LiveEstimate
-from trihedron.refused import RefusedError
 
 
 class LiveCalibration:

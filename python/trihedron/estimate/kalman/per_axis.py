@@ -10,13 +10,13 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.kalman.consistency import check_innovations, consistency_findings, is_settled
 from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisKalmanResult, AxisNoise, ConstantsTrack, KalmanCalibration, PoseTable
 from trihedron.records.words import words
-from trihedron.refused import REFUSALS, RefusedError
 
 DIFFUSE = 1e8
 """Width of a diffuse start in standard deviations of one reading: its information is 1e-16 of one pose's."""

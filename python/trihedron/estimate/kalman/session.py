@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.kalman.norm_invariant import NormFrame, calibrate_without_references
 from trihedron.estimate.kalman.norm_start import NormStart
 from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
@@ -22,7 +23,6 @@ from trihedron.records import (
     Recording,
     Segments,
 )
-from trihedron.refused import RefusedError
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,10 +17,10 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts.at_rest import AxisAtRest
 from trihedron.channel_facts.low_pass import low_passes
 from trihedron.channel_facts.pooled import as_measured, pooled_logarithm, root_of
+from trihedron.errors import RefusedError
 from trihedron.estimate.noise.densities import densities_below
 from trihedron.records.channel_facts import LowPass
 from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise
-from trihedron.refused import RefusedError
 from trihedron.transforms import cosine_transform
 
 FEWEST_HOLDS = 3

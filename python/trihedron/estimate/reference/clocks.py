@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.reference.together import Grid, Reference
-from trihedron.refused import RefusedError
 
 LEAST_CORRELATION = 0.7
 """Below this the two motions are not taken for one: of 7140 pairs of unrelated hand motions of 30 to 60 s one in a

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 Mask = npt.NDArray[np.bool_]
 

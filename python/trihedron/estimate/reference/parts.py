@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.reference.clocks import JUMP_S
 from trihedron.estimate.reference.gyroscope import GyroFit
 from trihedron.estimate.reference.settled import running_mean
 from trihedron.estimate.reference.together import Grid, Mask, Reference
-from trihedron.refused import RefusedError
 
 STRETCH_S, HOP_S = 2.0, 1.0
 """A hand turns about within two seconds: what is left then shows a lag of its own."""

@@ -10,9 +10,9 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records import Recording
 from trihedron.records.reference import ReferenceMotion
-from trihedron.refused import RefusedError
 
 Mask = npt.NDArray[np.bool_]
 

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.sessions.spread import spread_within
 from trihedron.probability import fdtrc
 from trihedron.records.sessions import PARAMETERS, Session, Spread, ThermalModel, ThermalTerm
-from trihedron.refused import RefusedError
 
 MAX_ORDER = 3
 SPARE = 2

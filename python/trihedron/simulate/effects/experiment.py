@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 from trihedron.simulate.effects.sizes import Sensor, Values, checked, triple
 from trihedron.simulate.motion import Disturb, Motion, Pose, Step, Turn, Vibrate
 from trihedron.simulate.scenario import Loss, Scenario

@@ -9,8 +9,8 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records.truth import SegmentKind
-from trihedron.refused import RefusedError
 from trihedron.simulate.motion.attitude import (
     quaternion_from_vector,
     quaternion_product,
