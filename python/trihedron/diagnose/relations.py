@@ -1,4 +1,4 @@
-"""Relations that compete with names: columns like an effect's, asked beside what was found (docs/laws.md)."""
+"""Relations that compete with names: columns like an effect's, asked beside what was found (docs/relations.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A misfit and what columns would take out of it, in sample and on blocks left out (docs/laws.md, eq. L.1-L.4).
+"""A misfit and what columns would take out of it, in sample and on blocks left out (docs/relations.md, eq. L.1-L.4).
 
 Everything is in terms of ``P = V⁻¹ − V⁻¹B(BᵀV⁻¹B)⁻¹BᵀV⁻¹``: V the noise with its slow part, B columns that the model
 fits anyway. The residual of a block b that nothing of the fit has seen is ``P_bb⁻¹ (P y)_b``, with precision ``P_bb``.

@@ -1,4 +1,4 @@
-"""The dictionary: physical variables that an unknown law may depend on, at every pose (docs/laws.md, table 1)."""
+"""The dictionary: physical variables that an unknown law may depend on, at every pose (docs/relations.md, table 1)."""
 
 from __future__ import annotations
 

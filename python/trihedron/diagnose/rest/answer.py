@@ -1,4 +1,4 @@
-"""The diagnosis of a log that holds one or two orientations (docs/rest.md)."""
+"""The diagnosis of a log that holds one or two orientations (docs/static-logs.md)."""
 
 from __future__ import annotations
 
