@@ -7,7 +7,7 @@
 
 Kinds: the same unit on another day's session; a nominal simulation of the part; another unit; one number moved (zero,
 scale, misalignment, the gyro triad turned, gravity); an effect that only the recording has, or only the simulation, or
-both; noise twice as large; a coarser converter. Each pair is held against its log (``--against``) or, for one kind in
+both; noise twice as large; a coarser ADC. Each pair is held against its log (``--against``) or, for one kind in
 three, against a calibration made from the simulated log (``--calibration``). A name said of nothing that was drawn is
 false; a group of numbers whose true difference exceeds five of its own stated errors must be found.
 
@@ -128,7 +128,7 @@ def session(rng: np.random.Generator) -> Any:
 
 
 def with_nuisances(recording: Recording, rng: np.random.Generator) -> Recording:
-    """Zeros that differ from pose to pose and a faint line, as public recordings show them."""
+    """Biases that differ from pose to pose and a faint line, as public recordings show them."""
     segments = trihedron.segment(recording)
     accel, gyro = np.array(recording.accelerometer), np.array(recording.gyroscope)
     unit_a = 9.81 / float(np.median(np.linalg.norm(accel[segments.poses[0].samples()], axis=1)))
@@ -141,7 +141,7 @@ def with_nuisances(recording: Recording, rng: np.random.Generator) -> Recording:
         gyro[first:last] += step_g * rng.standard_normal(3)
     line = np.radians(rng.uniform(0.005, 0.02)) / unit_g * np.sin(2 * np.pi * rng.uniform(3, 30) * t)
     gyro[:, int(rng.integers(3))] += line
-    # Every second recording has passed its converter after all that; the other was brought to other units since.
+    # Every second recording has passed its ADC after all that; the other was brought to other units since.
     again = np.random.default_rng(int(rng.integers(1 << 30)))
     if again.random() < 0.5:
         # Whole codes moved by a part of one would be moved by none or a whole one: zeros a step apart, in two values.

@@ -1,8 +1,8 @@
-"""Are the error bars honest where zeros scatter from pose to pose?
+"""Are the uncertainties honest where biases scatter from pose to pose?
 
     python benches/coverage_zeros.py [--sessions N] [--gyro DEG_S] [--accel MM_S2] [--jump uniform|middle|linear|own]
 
-Healthy simulated sessions of 24 poses; every pose gets a zero of its own. What the zero does during a move is one of
+Healthy simulated sessions of 24 poses; every pose gets a bias of its own. What the bias does during a move is one of
 four stories (``--jump``): it leaps at an instant drawn anew for every move, at the middle, it runs straight from one
 pose to the next, or every move has a third zero that belongs to neither pose. Both `calibrate` and the model without
 effects of `diagnose` are compared with the truth; nothing but the comparison knows it.

@@ -111,7 +111,7 @@ def test_the_next_pose_brings_what_was_promised():
                 ratios += [new.now / old.after_next for old, new in pairs if new.now and old.now]
             before = now
             hand.go(now.next_up, now.pose_s)
-    # The pose is missed by degrees, the hold differs, and the moves are not the shortest: a third, in the middle.
+    # The pose is missed by degrees, its length differs, and the moves are not the shortest: a third, in the middle.
     assert 0.75 < np.median(ratios) < 1.33
     assert np.quantile(ratios, 0.9) < 2.5
 

@@ -37,7 +37,7 @@ def seen(recording, segments, measured, truth, covariance=None):
 
 def test_two_turns_about_the_vertical_with_stamps_that_stray_have_no_negative_variance():
     recording, segments, measured, truth = measured_session(1e-12)
-    # Stamps alone: an error along the axis turned about, which is the vertical, and none across it.
+    # Timestamps alone: an error along the axis turned about, which is the vertical, and none across it.
     zero = np.zeros_like(measured.zero)
     alone = replace(measured, sigma_time_s=1e-3, var_zero=zero, var_reading=zero, noise_density=np.zeros(3))
     one = np.linspace(-1.0, 1.0, 9)

@@ -49,7 +49,7 @@ def test_slow_turns_of_a_table_that_leans_are_no_part_of_the_holds(rate_deg_s):
     result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
     assert result.segments.n_poses == len(motion.rests)
     error = np.degrees(result.gyroscope.b - lower(truth).b_w)
-    # The zero of a 16-bit gyro with 20°/h of noise: hundredths of a degree per second; turns in holds gave 0.1 to 8.
+    # The zero of a 16-bit gyro with 20°/h of noise: hundredths of a degree per second; turns in poses gave 0.1 to 8.
     assert np.abs(error).max() < 0.02
 
 
@@ -120,8 +120,8 @@ def test_a_coarse_gyro_has_the_error_bars_of_its_rounding(bits):
         z.append(scores)
         of_zero.append((result.gyroscope.b - lower(truth).b_w) / result.gyroscope.sigma_b)
     assert len(z) >= 2
-    # Mean square of 6 to 9 scores, between limits that chance passes once in a hundred: 0.04 when the part of the zero
-    # that its step hides was counted as the holds' and as the moves'.
+    # Mean square of 6 to 9 scores, between limits that chance passes once in a hundred: 0.04 when the part of the bias
+    # that its step hides was counted as the poses' and as the moves'.
     assert 0.15 < np.mean(np.square(of_zero)) < 2.8
     # At most 27 scores: none beyond four, nor larger together than chance allows once in a thousand.
     assert np.abs(z).max() < 4.0

@@ -75,7 +75,7 @@ def test_rates_of_the_world_are_told_from_rates_of_the_body():
     other = trihedron.segment(world)
     seen = carried_gravity(world, other)
     assert seen.is_of_world
-    # Ten moves by a part with scales and zeros of a data sheet.
+    # Ten moves by a part with scales and biases of a data sheet.
     assert seen.world_rad < np.radians(5.0)
     assert carried_gravity(replace(world, gyroscope_unit="counts"), other) is None
 

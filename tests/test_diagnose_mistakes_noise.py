@@ -144,7 +144,7 @@ def test_a_bias_that_was_drawn_and_never_added_is_named_and_a_drawn_one_is_not()
     assert "was the drawn bias never applied?" in next(p.remark for p in rows if p.id == "gyro-bias")
     other = numbers((-0.02, 0.06, 0.01), (0.02, 0.01, -0.01))
     assert not any(p.remark for p in compare_numbers(other, real, alpha=0.01).parameters)
-    # A recording whose zeros are as good as none refutes nothing.
+    # A recording whose biases are as good as none refutes nothing.
     assert not any(p.remark for p in compare_numbers(numbers(), numbers(), alpha=0.01).parameters)
 
 

@@ -41,7 +41,7 @@ def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
     gyro = replace(gyro, S=tuple(tuple(2.0 * v for v in row) for row in gyro.S))
     motion = hand_session(26, pose_s=4.0, layout=5)
     plain = Scenario(motion, "unit", accel, gyro, profile.clock)
-    # Half of what the zeros do is the scatter: without it in the noise, a drift does not remove half of their misfit.
+    # Half of what the biases do is the scatter: without it in the noise, a drift does not remove half of their misfit.
     size = np.radians(0.1)
     flawed = with_effect(plain, "gyro-bias-drift", amplitude=(size, -size, size), tau_s=80.0)
     recording = scattered(simulate(flawed, 11)[0], 0.03 * 65.5, 3)

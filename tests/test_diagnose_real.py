@@ -65,14 +65,14 @@ def test_two_runs_of_one_unit_give_one_g_sensitivity_and_scatter_under_restless_
 
 def test_stamps_on_a_coarse_grid_are_not_when_the_samples_were_taken(real_data: Path) -> None:
     recording = read_recording(real_data / "kim/kim_imu_good1.txt")
-    # Reading has taken the even clock behind them already; here the stamps are put back as they were logged.
+    # Reading has taken the even clock behind them already; here the timestamps are put back as they were logged.
     assert FindingCode.EVEN_CLOCK in {finding.code for finding in recording.findings}
     logged = np.loadtxt(real_data / "kim/kim_imu_good1.txt", usecols=0)
     recording = replace(recording, time_s=logged - logged[0])
     observed = observe(recording, resegment(recording, segment_recording(recording)))
     found = stamp_errors(observed)
     assert found is not None
-    # Stamps on a grid of 5.12 ms scatter by its twelfth root, 1.48 ms; the readings do not follow them at all.
+    # Timestamps on a grid of 5.12 ms scatter by its twelfth root, 1.48 ms; the readings do not follow them at all.
     assert found.rms_s == pytest.approx(5.12e-3 / np.sqrt(12.0), rel=0.05)
     assert abs(found.followed) < 0.1
     assert stamp_errors(replace(observed, time_s=found.even_s)) is None

@@ -13,7 +13,7 @@ STEP = 0.002
 
 
 def peaks(rng, limit, n=6000):
-    """(n, 3) readings whose channels reach their own heights, on a converter's steps, stopped at ``limit``."""
+    """(n, 3) readings whose channels reach their own heights, on an LSB, stopped at ``limit``."""
     t = np.arange(n) / 100.0
     x = np.stack(
         [height * np.sin(2.0 * np.pi * f * t) for height, f in ((3.0, 0.31), (2.6, 0.43), (2.2, 0.37))], axis=1

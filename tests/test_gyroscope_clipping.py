@@ -10,7 +10,7 @@ RATE_HZ = 100.0
 
 
 def turns(rng, n_moves=18, peak=12000.0, tremor=120.0, noise=3.0):
-    """Counts (n, 3) of bumps with a tremor upon them between rests, as a 16-bit converter gives them."""
+    """Counts (n, 3) of bumps with a tremor upon them between rests, as a 16-bit ADC gives them."""
     t = np.arange(0.0, 2.0, 1.0 / RATE_HZ)
     parts = []
     for _ in range(n_moves):

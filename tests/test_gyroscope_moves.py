@@ -171,7 +171,7 @@ def test_moves_about_one_axis_are_called_not_observable_with_the_moves_to_add():
     finding = next(f for f in findings if f.code is FindingCode.NOT_OBSERVABLE)
     assert "Y axis" in finding.action
     assert "Z axis" in finding.action
-    # What was turned about is known; what was not has error bars as large as the scale itself.
+    # What was turned about is known; what was not has uncertainties as large as the scale itself.
     assert found.sigma_S[0, 0] < 0.2 * found.sigma_S[:, 1:].max()
     assert found.sigma_S[:, 1:].max() > 0.3
 

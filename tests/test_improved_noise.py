@@ -1,4 +1,4 @@
-"""What an improved scenario says of noise and of moves: recovered from simulated holds and moves of known noise."""
+"""What an improved scenario says of noise and of moves: recovered from simulated poses and moves of known noise."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -50,7 +50,7 @@ def test_white_noise_flicker_and_a_low_pass_are_recovered_from_octaves(N, B, low
     density = np.array([[axis.octaves[k].density.value for axis in axes] for k in range(len(bands))])
     sigma = np.array([[axis.octaves[k].density.sigma_log for axis in axes] for k in range(len(bands))])
     noise, found = noise_of_octaves(np.array([(o.low_hz, o.high_hz) for o in bands]), density, sigma, 1.0 / RATE)
-    # Densities of 25 holds are good to some per cent, flicker of one octave beyond the white noise to a quarter.
+    # Densities of 25 poses are good to some per cent, flicker of one octave beyond the white noise to a quarter.
     assert pytest.approx((N,) * 3, rel=0.06) == noise.N
     assert (np.mean(noise.B) == pytest.approx(B, rel=0.3)) if B else np.mean(noise.B) < 0.5 * N
     # Corners are tried a fifth apart.

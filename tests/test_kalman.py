@@ -26,7 +26,7 @@ from twins_kalman import (
 )
 
 SIGMA = 0.11 * 0.032002 / GRAVITY
-"""The article's converter noise of 0.11 m/s² in volts."""
+"""The article's ADC noise of 0.11 m/s² in volts."""
 
 
 def compiled(*, rates=(0.01,), averages=True, ramp_frequency=1e-4, **terms):
@@ -158,7 +158,7 @@ def noise_factor(noise):
 
 
 def article_readings(seed, noise):
-    """References and readings of the article's session, noise drawn from the model of hold means."""
+    """References and readings of the article's session, noise drawn from the model of pose means."""
     draws = noise_factor(noise) @ np.random.default_rng(seed).standard_normal((324, 3))
     table = PoseTable.from_angles(*DIVIDING_HEAD_ANGLES_DEG.T, gravity_m_s2=GRAVITY)
     return table, table.specific_force @ ARTICLE_CONSTANTS[:, :3].T + ARTICLE_CONSTANTS[:, 3] + draws, START, POSE

@@ -1,4 +1,4 @@
-"""From a log and a pose table to the filters: matching, noise from the holds, recordings."""
+"""From a log and a pose table to the filters: matching, noise from the poses, recordings."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Samples lost from a log whose stamps were made anew: the calibration says that its gyro is not to be trusted."""
+"""Samples lost from a log whose timestamps were made anew: the calibration says that its gyro is not to be trusted."""
 
 from dataclasses import replace
 

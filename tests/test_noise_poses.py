@@ -1,4 +1,4 @@
-"""Noise inside holds: simulated sessions of known figures, and one held against another."""
+"""Noise inside poses: simulated sessions of known figures, and one held against another."""
 
 import math
 
@@ -12,7 +12,7 @@ RATE = 100.0
 
 
 def session(rng, poses=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0.0, knocks=0, line=0.0, rate=RATE):
-    """Readings (n,) of one axis and windows of its holds, a second of handling between them."""
+    """Readings (n,) of one axis and windows of its poses, a second of handling between them."""
     parts, windows, at = [], [], 0
     for k in range(poses):
         n = int(rate * seconds * rng.uniform(0.7, 1.4))
@@ -123,7 +123,7 @@ def test_a_line_is_neither_white_noise_nor_a_corner_nor_the_noise_of_its_octave(
         ratios.append(lined.white.value / plain.white.value)
         corners.append(lined.corner_hz)
         both = zip(plain.octaves, lined.octaves, strict=True)
-        # The same noise: what the line's own two numbers a hold take off, of some 70 in its octave.
+        # The same noise: what the line's own two numbers a pose take off, of some 70 in its octave.
         assert all(abs(np.log(b.density.value / a.density.value)) < 0.1 for a, b in both)
     # Left in, half its square would be 2 and 22 % of the density.
     assert np.abs(np.log(ratios)).max() < 0.01
@@ -163,5 +163,5 @@ def test_holds_that_a_hand_shakes_lift_white_noise_below_a_corner_no_more_than_t
         assert axis.corner_hz is not None
         assert axis.white is not None
         below = [o.density.value for o in axis.octaves if o.low_hz >= 1.0 and o.high_hz <= 8.0]
-        # The mean over all holds is six times the octaves' typical hold, its root 2.4; a filter's shape is worth 10 %.
+        # The mean over all poses is six times the octaves' typical pose, its root 2.4; a filter's shape is worth 10 %.
         assert axis.white.value < 1.3 * math.sqrt(float(np.mean(below)))

@@ -1,4 +1,4 @@
-"""The pipeline as people use it from Python, and whether its error bars are honest end to end."""
+"""The pipeline as people use it from Python, and whether its uncertainties are honest end to end."""
 
 import importlib
 from dataclasses import replace
@@ -82,7 +82,7 @@ def test_both_methods_agree_within_their_error_bars(recording, result):
     for name in ("accelerometer", "gyroscope"):
         one, other = getattr(result, name), getattr(apart, name)
         sigma = np.where(other.sigma_S > 0, other.sigma_S, 1.0)
-        # Same data: they differ by less than either's error bar.
+        # Same data: they differ by less than either's uncertainty.
         assert np.all(np.abs(one.S - other.S) < 2.0 * sigma)
 
 
@@ -156,7 +156,7 @@ def test_a_miss_far_beyond_what_was_expected_is_not_to_be_trusted_unless_a_limit
     # 0.9 m/s² more of one zero is missed by 50 mg rms; whoever can live with 200 mg is told, not stopped.
     wide = trihedron.verify(result, other, limit_mg=200.0)
     assert {f.severity.value for f in wide.findings if f.code.value == "residual-above-noise"} == {"warning"}
-    # A change of a few times the error bars is a warning.
+    # A change of a few times the uncertainties is a warning.
     slightly = replace(scenario, accelerometer=replace(scenario.accelerometer, b=(0.303, -0.3834, 0.1025)))
     near, _ = simulate(slightly, 13)
     assert all(f.severity.value != "serious" for f in trihedron.verify(result, near).findings)

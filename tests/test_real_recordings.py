@@ -83,7 +83,7 @@ def test_kim_residual_per_degree_of_freedom_is_the_published_one(real_data, run,
         assert 1e3 * quality.rms_dof == pytest.approx(published_mm_s2, rel=0.3)
     low, high = stats.chi2.ppf([0.005, 0.995], quality.dof)
     if run == 3:
-        # Noise along the vertical is 0.9 mm/s², the norms stray by twice that: zeros differ between the poses.
+        # Noise along the vertical is 0.9 mm/s², the norms stray by twice that: biases differ between the poses.
         assert quality.chi2 > high
         assert quality.covariance_scale > 1.0
     else:
@@ -91,7 +91,7 @@ def test_kim_residual_per_degree_of_freedom_is_the_published_one(real_data, run,
 
 
 def poses_of(means, sigma, ranges):
-    """Segments of nothing but still poses, as somebody else annotated or averaged them."""
+    """Segments of nothing but poses, as somebody else annotated or averaged them."""
     n = len(means)
     poses = tuple(Pose(k, first, last, first, last) for k, (first, last) in enumerate(ranges))
     lengths = np.array([last - first for first, last in ranges])
@@ -167,7 +167,7 @@ def test_tomi_clips_in_moves_and_agrees_with_the_published_scales(real_data, cap
 
 
 def model(S, b):
-    """A published accelerometer model as a calibration without error bars."""
+    """A published accelerometer model as a calibration without uncertainties."""
     sensor = SensorCalibration(np.asarray(S), np.asarray(b), np.zeros((12, 12)), "m/s^2", "m/s^2", "published")
     return Calibration(sensor, None, np.zeros((12, 12)), "case", 9.7974, "given", extensions=MappingProxyType({}))
 
@@ -248,7 +248,7 @@ def test_ctu_turns_give_one_scale_consistent_with_the_reference_angles(real_data
     for turn, zero in zip(turns, zeros, strict=True):
         rest = gyroscope[zero[0] : zero[1]].mean(axis=0)
         seen = (gyroscope[turn.start : turn.stop] - rest).sum(axis=0) / 100.0
-        # Back through the calibration: the reference angle, within the drift of the zero over 5 s.
+        # Back through the calibration: the reference angle, within the drift of the bias over 5 s.
         assert abs((found.S @ seen)[turn.axis] - turn.angle_rad) < math.radians(0.5)
 
 

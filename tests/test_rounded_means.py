@@ -11,7 +11,7 @@ POSES = 40
 
 
 def poses(noise, rng):
-    """Poses of 4 s, turns of 1 s between, |g| of 50 steps of the converter, ``noise`` of a step; and the truth."""
+    """Poses of 4 s, turns of 1 s between, |g| of 50 LSB, ``noise`` of a step; and the truth."""
     force, rate, truth = [], [], []
     last = None
     for _ in range(POSES):

@@ -63,7 +63,7 @@ def session():
     ("motion", "least"),
     [
         (hand_session(12), 0.8),
-        # A tenth of a second at each end is 15 % of a hold that short; a chance trim takes up to a third.
+        # A tenth of a second at each end is 15 % of a pose that short; a chance trim takes up to a third.
         (hand_session(12, pose_s=1.6, first_pose_s=1.6, move_s=1.5), 0.4),
         (hand_session(6, pose_s=60.0), 0.9),
         (hand_session(12, wobble_deg=25.0, travel_m=0.4, move_s=1.0), 0.8),
@@ -141,7 +141,7 @@ def test_a_slow_turn_about_gravity_is_not_stillness(rate_deg_s):
 
 @pytest.mark.parametrize("duration_s", [1.5, 4.0, 10.0])
 def test_the_gyro_scale_does_not_depend_on_how_long_a_move_takes(duration_s):
-    """Eight quarter turns: their integral between trimmed holds is a quarter turn, within its own error bar."""
+    """Eight quarter turns: their integral between trimmed poses is a quarter turn, within its own uncertainty."""
     steps = [Pose(10.0)]
     for k in range(8):
         steps += [Turn((0.0, 0.0, 1.0), 90.0 * (-1) ** k, duration_s, ramp=0.5), Pose(4.0)]

@@ -28,7 +28,7 @@ def test_xsens_session_shows_its_several_dozen_poses(real_data):
 def test_mpu9150_sessions_show_their_poses(real_data, unit):
     recording = read_recording(real_data / "mpu9150" / f"imu{unit}.log", rate_hz=100.0)
     segments = segment_recording(recording)
-    # The first 25 s are moved about in the hand, with pauses of which up to four count as unsteady holds.
+    # The first 25 s are moved about in the hand, with pauses of which up to four count as unsteady poses.
     after = segments.time_mid_s > 25.0
     assert 18 <= after.sum() <= 20
     assert all(pose.is_unsteady for pose, late in zip(segments.poses, after, strict=True) if not late)
@@ -82,7 +82,7 @@ def test_phone_holds_agree_with_the_published_sections(real_data, run):
         max((min(h.stop, b) - max(h.start, a)) / (max(h.stop, b) - min(h.start, a)) for h in segments.poses)
         for a, b in published
     ]
-    # Marked by hand, some with up to three seconds given away at an end; a hold of this very quiet sensor loses its
+    # Marked by hand, some with up to three seconds given away at an end; a pose of this very quiet sensor loses its
     # settling, up to a third of it.
     assert np.median(agreement) > 0.9
     assert min(agreement) > 0.6

@@ -47,9 +47,9 @@ def test_the_zero_of_a_session_is_that_of_its_middle():
         )
         found = calibrate_joint(drifting, segments, alone, truth.gravity_m_s2, "given", MoveOptions(n_folds=0))
         middle = np.mean([part[pose.start : pose.stop].mean() for pose in segments.poses])
-        # f = S a' + b, so that b is minus the zero.
+        # f = S a' + b, so that b is minus the bias.
         away.append(found.accelerometer.b + drift * middle)
-    # A third of what the zero of the first pose is away.
+    # A third of what the bias of the first pose is away.
     assert np.sqrt(np.mean(np.square(away))) < drift / 2 / 3
 
 

@@ -121,7 +121,7 @@ def test_a_log_reads_back_as_it_was_simulated(tmp_path, suffix):
             recording.accelerometer_unit,
             recording.gyroscope_unit,
         )
-        # Stamps are written to the nanosecond.
+        # Timestamps are written to the nanosecond.
         assert np.abs(again.time_s - recording.time_s).max() < 1e-9
         if recording.temperature_degc is not None:
             assert np.abs(again.temperature_degc - recording.temperature_degc).max() < 1e-9

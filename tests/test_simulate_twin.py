@@ -1,4 +1,4 @@
-"""A twin repeats its original: pose means, moves, stamps, noise spectrum, converter."""
+"""A twin repeats its original: pose means, moves, timestamps, noise spectrum, ADC."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ OCTAVES = ((2, 4), (4, 8), (8, 16), (16, 32), (32, 65))
 
 
 def spectrum(readings, poses):
-    """(65, 3) periodogram averaged over all windows inside the holds."""
+    """(65, 3) periodogram averaged over all windows inside the poses."""
     taper = np.hanning(WINDOW)[:, None]
     total, count = np.zeros((WINDOW // 2 + 1, 3)), 0
     for pose in poses:

@@ -55,7 +55,7 @@ def test_segments_of_pieces_are_those_of_the_whole_to_the_last_bit(whole, path, 
 def test_a_log_on_disk_is_calibrated_as_the_whole_is(whole, path):
     found = streaming.calibrate_file(opened(path), gravity_m_s2=G).calibration
     wanted = trihedron.calibrate(whole, gravity_m_s2=G).calibration
-    # The same rows but those between the edges of holds and moves: none here.
+    # The same rows but those between the edges of poses and moves: none here.
     np.testing.assert_allclose(found.accelerometer.S, wanted.accelerometer.S, rtol=0, atol=1e-12)
     np.testing.assert_allclose(found.gyroscope.S, wanted.gyroscope.S, rtol=0, atol=1e-9)
 

@@ -1,4 +1,4 @@
-"""Moves that miss more than their samples' noise, or that lost samples: what the error bars carry, and what not."""
+"""Moves that miss more than their samples' noise, or that lost samples: what the uncertainties carry, and what not."""
 
 import sys
 from pathlib import Path
@@ -108,7 +108,7 @@ def test_a_move_far_from_the_others_is_left_out_and_all_that_miss_alike_are_not(
 
 
 def test_nine_poses_are_as_certain_as_their_moves_let_them_be():
-    """Nine lengths of gravity tell no scatter of the zero from none: moves that are not bent do."""
+    """Nine lengths of gravity tell no scatter of the bias from none: moves that are not bent do."""
     scores = []
     for seed in range(6):
         f, w, rate, truth, _ = hand(850100 + seed, n_poses=9)

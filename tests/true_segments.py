@@ -6,7 +6,7 @@ from trihedron.records import Move, Pose, Segments
 
 
 def segments_from_truth(recording, truth, trim_s=0.05):
-    """Holds as they were made, edges trimmed, means with the standard error of white noise."""
+    """Poses as they were made, edges trimmed, means with the standard error of white noise."""
     trim = max(1, round(trim_s * recording.rate_hz))
     poses, edges = [], []
     for segment in truth.segments:

@@ -16,7 +16,7 @@ ARTICLE_CONSTANTS = np.array(
 
 
 def covariance_of_pose_means(start, pose, *, white=0.0, quantisation=0.0, walk=0.0, slope=0.0, gauss_markov=()):
-    """Covariance of means over holds, from the integrals by hand: noise starts at ``start[0]``, ``slope`` is constant.
+    """Covariance of means over poses, from the integrals by hand: noise starts at ``start[0]``, ``slope`` is constant.
 
     ``gauss_markov`` lists pairs (inverse correlation time, standard deviation).
     """

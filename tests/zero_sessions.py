@@ -14,7 +14,7 @@ STEP_S = 0.25
 
 @dataclass(frozen=True)
 class Session:
-    """What is drawn. Sizes are rms over the session in the unit of the zeros (°/s), per axis."""
+    """What is drawn. Sizes are rms over the session in the unit of the biases (°/s), per axis."""
 
     n_poses: int = 25
     pose_s: float = 6.0

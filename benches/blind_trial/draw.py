@@ -108,7 +108,7 @@ def make(job: Job) -> tuple[Recording, float, dict[str, Any]]:
 
 
 def true_saturations(recording: Recording, scenario: Scenario, drawn: tuple[str, ...]) -> list[str]:
-    """Saturations that nobody drew: three readings in a row at the end of a converter's range."""
+    """Saturations that nobody drew: three readings in a row at the end of an ADC's range."""
     out = []
     for effect, raw, adc in (
         ("accel-saturation", recording.accelerometer, scenario.accelerometer.adc),

@@ -88,7 +88,7 @@ def _lag(size: dict[str, Any], _s: Scenario, _r: Recording, _t: Truth) -> Sealed
 
 
 def _losses(_size: dict[str, Any], _s: Scenario, log: Recording, truth: Truth) -> Sealed:
-    # Where the log's rows jump, by the log's own stamps: those have closed over the gaps.
+    # Where the log's rows jump, by the log's own timestamps: those have closed over the gaps.
     gaps = np.diff(truth.kept) - 1
     at = np.flatnonzero(gaps > 0)
     named = {f"lost_at_{log.time_s[k]:.2f}s": float(gaps[k]) for k in at}

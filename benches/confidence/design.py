@@ -40,7 +40,7 @@ PER_SAMPLE = {25.0: 24, 100.0: 6, 400.0: 2}
 
 @dataclass(frozen=True)
 class Session:
-    """Stamps (n,), readings (n, 3) of both sensors in counts, the rate [Hz], the truth, and one entry a pose."""
+    """Timestamps (n,), readings (n, 3) of both sensors in counts, the rate [Hz], the truth, and one entry a pose."""
 
     time_s: np.ndarray
     force: np.ndarray

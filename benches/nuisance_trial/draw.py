@@ -155,7 +155,7 @@ def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
         f = rng.uniform(0.06, 0.45) * rate_hz
         values |= {"frequency": np.array([f])} if flaw == "periodic-interference" else {}
         rate = rate + line * np.sin(2 * np.pi * f * t)[:, None] * rng.normal(size=3)
-    # -- the part: axes, filter, noise, converter ---------------------------------------------------------------------
+    # -- the part: axes, filter, noise, ADC ---------------------------------------------------------------------
     force, rate = (np.apply_along_axis(np.convolve, 0, x, np.ones(over) / over, "same") for x in (force, rate))
     force[:over], force[-over:], rate[:over], rate[-over:] = force[over], force[-over - 1], rate[over], rate[-over - 1]
     when = np.arange(over, n_fine - over, over)

@@ -18,7 +18,7 @@ from trihedron.records.guiding import Accuracy, Examination, GuideView, Phase
 Examine = Callable[[], Examination]
 
 FIRST_HOLD_S = 6.0
-"""The first hold also measures the noise."""
+"""The first pose also measures the noise."""
 
 SAME_POSE_DEG = 15.0
 N_CHECKS = 3

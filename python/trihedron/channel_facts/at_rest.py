@@ -19,7 +19,7 @@ from trihedron.records.pose_noise import PoseLine
 from trihedron.transforms import cosine_transform
 
 SHORTEST = 32
-"""Readings of a hold that is used: fewer hold no octave below the uppermost two."""
+"""Readings of a pose that is used: fewer hold no octave below the uppermost two."""
 LEAST_DITHER = 0.4
 """Noise over step below which the rounding is not noise of step²/12 any more, and what lies under it is hidden."""
 LAGS = 8
@@ -31,7 +31,7 @@ FEWER = 4.0 / 3.0
 
 @dataclass(frozen=True, eq=False)
 class AxisAtRest:
-    """Holds of one axis without disturbed ones and lines, and what is pooled over them."""
+    """Poses of one axis without disturbed ones and lines, and what is pooled over them."""
 
     parts: list[FloatArray]
     step: float
@@ -67,7 +67,7 @@ class AxisAtRest:
 
     @property
     def total(self) -> float:
-        """Half the mean squared difference of a typical hold."""
+        """Half the mean squared difference of a typical pose."""
         return math.exp(self.pooled.mean)
 
     @property
@@ -76,7 +76,7 @@ class AxisAtRest:
         return self.total > 0.0 and self.dithers(self.total - self.rounding)
 
     def dithers(self, variance: float) -> bool:
-        """Whether a variance of one reading spreads over the steps of the converter."""
+        """Whether a variance of one reading spreads over the LSB."""
         return self.step == 0.0 or variance > (LEAST_DITHER * self.step) ** 2
 
 
@@ -93,7 +93,7 @@ class _Power:
 
     @classmethod
     def of(cls, parts: Sequence[FloatArray]) -> _Power:
-        """Of holds (n,) each; the correlation and the kurtosis of differences are those of all holds together."""
+        """Of holds (n,) each; the correlation and the kurtosis of differences are those of all poses together."""
         squares = [np.diff(part) ** 2 for part in parts]
         mean = np.array([float(s.mean()) for s in squares])
         count = np.array([len(s) for s in squares], dtype=np.float64)
@@ -109,7 +109,7 @@ class _Power:
 
 
 def _segments(parts: Sequence[FloatArray], rate_hz: float, *, most: bool = False) -> tuple[FloatArray, FloatArray, int]:
-    """Frequencies (k,), mean power (k,) and number of segments of one length that most holds have.
+    """Frequencies (k,), mean power (k,) and number of segments of one length that most poses have.
 
     With ``most``, of half that length where more readings are in such segments by a third.
     """

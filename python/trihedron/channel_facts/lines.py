@@ -1,4 +1,4 @@
-"""Lines that the holds of a session have in common, and the poses without them."""
+"""Lines that the poses of a session have in common, and the poses without them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from trihedron.channel_facts.pooled import as_measured, root_of
 from trihedron.records.pose_noise import PoseLine
 
 LINE_CHANCE = 1e-4
-"""Probability that the holds of one axis show a line by chance."""
+"""Probability that the poses of one axis show a line by chance."""
 LONGEST_PIECE = 4096
 """Readings of a piece that a line is taken off at once: the frequency is known to a sixteenth of a period in it."""
 FINER = 16
@@ -51,7 +51,7 @@ def lines_of_poses(frequency: FloatArray, power: FloatArray, count: int, rate_hz
 
 
 def without_lines(parts: Sequence[FloatArray], lines: Sequence[PoseLine], rate_hz: float) -> list[FloatArray]:
-    """Holds (n,) each, less sinusoids at the frequencies of ``lines``, of each piece's own size and phase.
+    """Poses (n,) each, less sinusoids at the frequencies of ``lines``, of each piece's own size and phase.
 
     What is left is scaled for the two degrees of freedom that a line takes: white noise keeps its power.
     """

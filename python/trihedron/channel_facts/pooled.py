@@ -13,7 +13,7 @@ from trihedron.errors import RefusedError
 from trihedron.records.pose_noise import Measured, Ratio
 
 MOST_LEFT_OUT = 0.25
-"""Share of holds that may be left out for noise far above the rest's: a disturbed hold, not another sensor."""
+"""Share of holds that may be excluded for noise far above the rest's: a disturbed pose, not another sensor."""
 UNKNOWN = 50.0
 """Logarithm beyond which an interval says no more: 21 decades either way."""
 FAR = 5.0
@@ -22,7 +22,7 @@ FAR = 5.0
 
 @dataclass(frozen=True)
 class Pooled:
-    """Mean logarithm over holds, its standard error with the degrees of freedom of that, and the poses' own scatter."""
+    """Mean logarithm over poses, its standard error with the degrees of freedom of that, and the poses' own scatter."""
 
     mean: float
     sigma: float

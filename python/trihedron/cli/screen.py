@@ -20,7 +20,7 @@ POSE, HERE, TARGET = "o", "@", "X"
 
 
 def hemispheres(view: GuideView, width: int = 17, height: int = 9) -> list[str]:
-    """Where up pointed in the body: two discs seen from axis 3, its upper half left and its lower half right."""
+    """Where up pointed in the body: two discs seen from Z, its upper half left and its lower half right."""
     discs = [[[" "] * width for _ in range(height)] for _ in range(2)]
     for disc in discs:
         for i in range(height):

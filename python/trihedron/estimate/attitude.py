@@ -66,7 +66,7 @@ def integrate_rate(
     Notes
     -----
     Equation (5.3) of ``docs/model-gyroscope.md``. Errors of a million steps are some 1e-13 rad of arithmetic; what
-    limits an attitude is the zero of the gyro, which adds its error times the time.
+    limits an attitude is the bias of the gyro, which adds its error times the time.
 
     Examples
     --------

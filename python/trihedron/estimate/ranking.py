@@ -50,7 +50,7 @@ def rms_interval(errors: FloatArray) -> Interval:
 
 
 def with_bias_of_log(calibration: Calibration, segments: Segments, gravity_m_s2: float) -> Calibration:
-    """The calibration with the biases that its file does not hold taken from the still poses of the log."""
+    """The calibration with the biases that its file does not hold taken from the poses of the log."""
     without = calibration.extensions.get("without_bias", ())
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     if "accelerometer" in without and segments.accelerometer_mean is not None:  # type: ignore[operator]

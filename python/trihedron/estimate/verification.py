@@ -49,7 +49,7 @@ def verify_calibration(
     Raises
     ------
     ValueError
-        When the recording has no accelerometer or no still pose.
+        When the recording has no accelerometer or no pose.
     """
     if recording.accelerometer is None or segments.accelerometer_mean is None:
         raise RefusedError("verification needs the accelerometer: gravity is what a calibration is tested against")
@@ -173,7 +173,7 @@ def _variance(sigma: FloatArray | None, n: int) -> FloatArray:
 @dataclass(frozen=True, eq=False)
 class Carriage:
     """Angles (m,) [deg] between gravity carried through moves and gravity measured after them, the noise of that, and
-    the same with the calibration's uncertainty; ``which`` (m,) moves these are and which were left out."""
+    the same with the calibration's uncertainty; ``which`` (m,) moves these are and which were excluded."""
 
     angle_deg: FloatArray
     noise_deg: FloatArray
@@ -185,7 +185,7 @@ class Carriage:
 def _carried(
     calibration: Calibration, gyroscope: SensorCalibration, recording: Recording, segments: Segments
 ) -> Carriage:
-    """The figure that a calibration publishes of its own session (docs/model-session.md), with a zero per pose, here
+    """The figure that a calibration publishes of its own session (docs/model-session.md), with a bias per pose, here
     with S and b held at the calibration's; of the same moves: not of those that were at the gyro's limit for long."""
     accelerometer = calibration.accelerometer
 

@@ -62,7 +62,7 @@ def beside(
         result = ordinary()
     except REFUSALS as error:
         if found.kind == ANOTHER_UNIT:
-            # What two gyros tell apart may be either's: with no poses nobody says whose.
+            # What two gyros separate may be either's: with no poses nobody says whose.
             found = replace(found, findings=(*found.findings, _shared(found)))
         values = diagnosis_by(found, recording, gravity, given, alpha)
         calibration = (

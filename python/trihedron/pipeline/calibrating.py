@@ -181,7 +181,7 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
 
 
 def _as_they_weigh(segments: Segments) -> Found:
-    """Findings of the segmentation; that holds creep is serious for a calibration where it is no exception."""
+    """Findings of the segmentation; that holds settling is serious for a calibration where it is no exception."""
     return tuple(
         replace(finding, severity=Severity.SERIOUS)
         if finding.code is FindingCode.POSE_SETTLING and finding.numbers["poses"] > MOST_CREEPING * segments.n_poses

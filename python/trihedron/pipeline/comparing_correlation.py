@@ -21,7 +21,7 @@ SENSORS: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
 
 
 def correlation_times(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
-    """A row for each sensor whose noise forgets within the holds of both logs; a time used for both is named."""
+    """A row for each sensor whose noise forgets within the poses of both logs; a time used for both is named."""
     times = {
         sensor: (correlation_time(model.noise[sensor]), correlation_time(recording.noise[sensor]))
         for sensor in SENSORS

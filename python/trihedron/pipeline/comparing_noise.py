@@ -28,20 +28,20 @@ numbers, a twelfth on slow noise."""
 LEAST_RATIO = 1.05
 """White noise of one part differs by 5 % over 30 K (its resistors' noise goes with the root of temperature)."""
 LEAST_STEP_RATIO = math.sqrt(2.0)
-"""Ranges of a converter come in powers of two: halfway between two of them."""
+"""Ranges of an ADC come in powers of two: halfway between two of them."""
 DIGITS = 0.1
-"""Steps of a tenth of the noise add a thousandth to its variance: whether they are a converter's changes nothing."""
+"""Steps of a tenth of the noise add a thousandth to its variance: whether they are an ADC's changes nothing."""
 LEAST_SEEN_STEP = 1e-2
-"""Of the noise: hardly a converter has a hundred codes to a standard deviation; sums of readings and what was taken off
+"""Of the noise: hardly an ADC has a hundred codes to a standard deviation; sums of readings and what was taken off
 them come that near to a grid, and steps as fine cannot be told from the digits of a file."""
 FEWEST_ALIKE = 2
-"""Axes with one step, of which a converter shows."""
+"""Axes with one step, of which an ADC shows."""
 LEAST_CORNER_RATIO = 1.2
 """Filters are chosen from lists whose neighbours differ by 1.5 to 2; within a fifth they are the same entry."""
 LEAST_RATE_RATIO = 1.02
 """Oscillators of cheap parts are specified to 1 to 2 %."""
 LEAST_OCTAVE_RATIO = 1.5
-"""Octaves below the white floor hold a few periods a hold each: smaller differences belong to the day."""
+"""Octaves below the white floor hold a few periods a pose each: smaller differences belong to the day."""
 LEAST_JITTER = 0.05
 """Scatter of the timestamps, in steps, from which on it matters to a session (0.05 of 10 ms is 0.5 ms)."""
 PERFECT_CLOCK = 1e-6
@@ -55,7 +55,7 @@ UNLIKE_BY_CHANCE = 0.01
 RESEMBLES = 1.06
 """A ratio this near to √rate, or to its inverse, is taken for it."""
 SHOWS = 0.5
-"""Noise of half a converter step moves its last digit in every third reading: it cannot be overlooked."""
+"""Noise of half an ADC step moves its last digit in every third reading: it cannot be overlooked."""
 _AXES = ("x", "y", "z")
 _SCATTERED = (StampKind.LATE, StampKind.SCATTERED)
 
@@ -170,7 +170,7 @@ def _white(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) 
 
 
 def _hidden(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, unit: str) -> NoiseDifference:
-    """One side shows no noise: hidden by its converter, or, where noise like the other's would show, not there."""
+    """One side shows no noise: hidden by its ADC, or, where noise like the other's would show, not there."""
     quiet, loud = (m, r) if m.white is None or not m.white.value > 0.0 else (r, m)
     side, other = ("model", "recording") if quiet is m else ("recording", "model")
     assert loud.white is not None
@@ -257,7 +257,7 @@ def _step(
         return
     ratio = m.step / r.step
     levels = [one.reading_sigma for one in (m, r) if one.reading_sigma > 0.0]
-    # Steps far below the noise are as likely the digits of a file as a converter's.
+    # Steps far below the noise are as likely the digits of a file as an ADC's.
     is_seen = not levels or max(m.step, r.step) > DIGITS * min(levels)
     is_far = max(ratio, 1.0 / ratio) > LEAST_STEP_RATIO and is_seen
     remark = f"The resolution (LSB) of the {name} is {ratio:.3g} times the recording's." if is_far else ""
@@ -265,9 +265,9 @@ def _step(
 
 
 def _shows_steps(one: PoseNoise, axes: Sequence[PoseNoise]) -> bool:
-    """Whether readings go in steps: a distance of numbers far below the noise is that of chance, not of a converter.
+    """Whether readings go in steps: a distance of numbers far below the noise is that of chance, not of an ADC.
 
-    Nor is one that no other axis has: the axes of a sensor share a converter.
+    Nor is one that no other axis has: the axes of a sensor share an ADC.
     """
     alike = sum(max(one.step, other.step) < LEAST_STEP_RATIO * min(one.step, other.step) for other in axes)
     if one.step > 0.0 and alike < min(FEWEST_ALIKE, len(axes)):

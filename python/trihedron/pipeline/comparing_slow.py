@@ -83,7 +83,7 @@ def _rows(
 
 
 def _drifts(found: Diagnosis, sensor: Sensor, *, but_curve: bool = False) -> bool:
-    """Whether the zeros of a recording's sensor move in a way that has another name, or that nothing explains.
+    """Whether the biases of a recording's sensor move in a way that has another name, or that nothing explains.
 
     ``but_curve``: a free curve through them is compared as the walk that the other side's is.
     """

@@ -58,7 +58,7 @@ def _is_rest(recording: Recording, segments: Segments, calibrated: Calibrated) -
         near = free & (np.arccos(np.clip(up @ up[first], -1.0, 1.0)) < SAME_POSE_RAD)
         of_orientations.append(float(lasts[near].sum()))
         free &= ~near
-    # Counts about the middle of a converter's range all point the same way: there the fit alone tells.
+    # Counts about the middle of an ADC's range all point the same way: there the fit alone tells.
     is_known = acceleration_to_si(recording.accelerometer_unit) is not None
     if is_known and len(of_orientations) <= TWO_ORIENTATIONS:
         return _turns(recording, segments) <= MOST_TURNS

@@ -161,7 +161,7 @@ def _settle_noise(
 
 
 def _check_converter(given: Sequence[AxisNoise], recording: Recording, segments: Segments) -> None:
-    """Refuse the noise of a static log that another converter wrote."""
+    """Refuse the noise of a static log that another ADC wrote."""
     readings = recording.accelerometer
     if readings is None or not segments.poses:
         return
@@ -169,7 +169,7 @@ def _check_converter(given: Sequence[AxisNoise], recording: Recording, segments:
     if not windows:
         return
     inside = noise_of_poses(readings, recording.rate_hz, windows)
-    # Codes between the poses count too: inside a hold a coarse converter shows one.
+    # Codes between the poses count too: inside a hold a coarse ADC shows one.
     steps = recording.facts.of("accelerometer").step.tolist()
     octaves = [axis.octaves for axis in inside]
     check_same_converter(given, steps, octaves, recording.rate_hz, recording.source)

@@ -182,7 +182,7 @@ def _rough_model(
         return np.zeros(3), np.eye(3)
     lowest, highest = float(np.nanmin(readings)), float(np.nanmax(readings))
     if lowest >= 0.0:
-        # A converter without sign: zero lies near the middle of its range.
+        # An ADC without sign: zero lies near the middle of its range.
         bits = max(int(np.ceil(np.log2(highest + 1.0))), 1)
         return np.full(3, 2.0 ** (bits - 1)), np.eye(3)
     if len(means) >= 6:

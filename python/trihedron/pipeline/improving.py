@@ -191,7 +191,7 @@ def _numbers(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosi
         tables[name] |= {"S": np.array(fit["S"]), "b": np.array(fit["b"]), "unit": str(fit["raw_unit"])}
         readings = getattr(found.recording, name)
         if readings is not None and getattr(given, name).unit.value != fit["raw_unit"]:
-            # Codes of another unit: the converter is that of the recording.
+            # Codes of another unit: the ADC is that of the recording.
             tables[name]["adc"] = {"lsb": found.recording.facts.of(name).common_step}
 
 
@@ -202,10 +202,10 @@ def _gravity(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosi
 
 
 def _ranges(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> set[str]:
-    """Ranges of the recording's converters, where its readings end at them exactly; the effects that say so already.
+    """Ranges of the recording's ADCs, where its readings end at them exactly; the effects that say so already.
 
     An end that no reading came to is where the other one is. Channels with limits of their own, and limits that noise
-    has blurred, are none of a converter: those stay an effect.
+    has blurred, are none of an ADC: those stay an effect.
     """
     out = set()
     for effect, name in SENSOR.items():

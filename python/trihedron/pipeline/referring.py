@@ -206,7 +206,7 @@ def parameters_of(found: AgainstReference, given: Calibration, alpha: float) -> 
     covariance[12:, 12:] = fit.covariance
     covariance[:12, :12] = model.covariance[:12, :12] if force is None else force.covariance
     S, b = (model.accel_S, model.accel_b) if force is None else (force.S, force.b)
-    # Zeros wander from one day to the next by what nobody measured here: only the fit's own error is known.
+    # Biases wander from one day to the next by what nobody measured here: only the fit's own error is known.
     seen = FittedModel(
         S, b, model.accel_unit, fit.S, fit.b, model.gyro_unit or "counts", covariance, np.zeros(3), np.zeros(3)
     )

@@ -31,7 +31,7 @@ from trihedron.units import AccelerationUnit, RateUnit
 PIECE_ROWS = 1 << 18
 KEPT_S = 60.0
 """Of a pose longer than twice this, a minute at either end goes into the fit: the mean and its error are those of the
-whole hold, and the bias next to a move is read off the readings next to it."""
+whole pose, and the bias next to a move is read off the readings next to it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Triad:
 
 @dataclass(frozen=True)
 class EvenTime:
-    """Stamps of an even clock, made when they are asked for: stands for an array (n,)."""
+    """Timestamps of an even clock, made when they are asked for: stands for an array (n,)."""
 
     n: int
     rate_hz: float
@@ -177,7 +177,7 @@ def calibrate_file(
     progress: Progress | None = None,
     **options: Any,
 ) -> CalibrationResult:
-    """Calibrate a log on disk from the statistics of its holds and the rows of its moves; options as for ``calibrate``.
+    """Calibrate a log on disk from the statistics of its poses and the rows of its moves; options as for ``calibrate``.
 
     ``checkpoint`` as in :func:`segment_file`, whose pass over the log is what takes long. The same as
     :func:`trihedron.calibrate` of the whole, where no hold is longer than two minutes.
@@ -192,7 +192,7 @@ def calibrate_file(
 def condensed(log: LogOnDisk, segments: Segments) -> tuple[Recording, Segments]:
     """The rows of moves and of the ends of poses, at their own times, and the segments counted in them.
 
-    Means, errors and durations remain those of whole holds.
+    Means, errors and durations remain those of whole poses.
     """
     kept = max(round(KEPT_S * log.rate_hz), 1)
     ranges: list[tuple[int, int]] = []

@@ -26,7 +26,7 @@ class AxisNoise:
 
     ``quantisation`` Q [u·s] of the integrated output, ``white`` N [u/√Hz], ``flicker`` B [u], ``walk`` K [u/√s],
     ``ramp`` R [u/s]; ``gauss_markov`` [u] is the standard deviation of a first-order process seen as such, with
-    correlation time ``gauss_markov_time_s``. ``resolution`` is one step of the converter [u] and ``sample_sigma`` the
+    correlation time ``gauss_markov_time_s``. ``resolution`` is one LSB [u] and ``sample_sigma`` the
     noise of one sample before it [u], which decides how much of the rounding error averages out (0: none of it).
     """
 

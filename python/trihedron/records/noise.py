@@ -132,7 +132,7 @@ class NoiseTerm:
 class SlowPair:
     """Whether the log shows slow noise at all: ``evidence`` is the rise of the deviance without B and K together.
 
-    ``is_present`` without either of the two being named: slow noise is there, flicker and walk cannot be told apart.
+    ``is_present`` without either of the two being named: slow noise is there, flicker and walk cannot be separated.
     """
 
     evidence: float

@@ -41,15 +41,15 @@ class PoseLine:
 
 @dataclass(frozen=True)
 class PoseNoise:
-    """Noise of one axis inside the holds of a session; u is the unit of the raw readings.
+    """Noise of one axis inside the poses of a session; u is the unit of the raw readings.
 
     ``white`` is the density N [u/√Hz] of the white noise ahead of the sensor's filter, freed of the rounding of the
-    converter, ``None`` where the converter hides it; ``reading_sigma`` [u] the noise from reading to reading (that of
+    ADC, ``None`` where the ADC hides it; ``reading_sigma`` [u] the noise from reading to reading (that of
     their differences over √2, rounding taken off; zero where it is hidden), which is N times the root of the rate
     where there is no filter. ``step`` [u] is the resolution, zero where the readings are finer than their noise shows.
     ``corner_hz`` is the corner of a low-pass filter where one shows, ``corner_above_hz`` what it lies above where none
     does; ``corner_shape`` is the order of the Butterworth filter that it resembles, 0 for a Gaussian. ``scatter`` is by
-    how much the noise differs from hold to hold beyond chance (standard deviation of the logarithm of its power).
+    how much the noise differs from pose to pose beyond chance (standard deviation of the logarithm of its power).
     """
 
     name: str

@@ -213,7 +213,7 @@ class Recording(Presented):
 
     @cached_property
     def facts(self) -> RecordingFacts:
-        """What the readings say of the converters behind them: found when first asked for, which the reader does."""
+        """What the readings say of the ADCs behind them: found when first asked for, which the reader does."""
         # How facts are found is a room of its own; a record only carries them.
         from trihedron.channel_facts import facts_of
 

@@ -21,7 +21,7 @@ class Pose:
     ``[start, stop)`` are the samples that may be averaged: edges trimmed, so that no motion leaks in.
     ``[outer_start, outer_stop)`` is the stretch as detected, before trimming. ``disturbed`` are sub-ranges
     ``(start, stop)`` inside ``[start, stop)`` that were bumped and are excluded from means. ``is_unsteady`` says that
-    the hold nowhere comes down to the sensor's own noise: held in the hand, or on a support that shakes.
+    the pose nowhere comes down to the sensor's own noise: held in the hand, or on a support that shakes.
     """
 
     index: int
@@ -71,7 +71,7 @@ class Move:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Segments(Presented):
-    """Holds and moves of one recording, and the sensor noise that decided them.
+    """Poses and moves of one recording, and the sensor noise that decided them.
 
     ``accelerometer_sigma`` and ``gyroscope_sigma`` (3,) are the white noise of one sample in raw units, measured inside
     the poses; ``accelerometer_mean`` / ``gyroscope_mean`` (n_poses, 3) the mean raw reading of each pose, with

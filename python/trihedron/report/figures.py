@@ -108,7 +108,7 @@ def draw_poses(sensor: SensorCalibration, means: FloatArray) -> Figure:
     for axis, sign, title in ((axes[0], 1.0, "+Z above the horizon"), (axes[1], -1.0, "+Z below the horizon")):
         _hemisphere(axis, title)
         for k, direction in enumerate(up):
-            # A pose with level axis 3 lies on the rim of both.
+            # A pose with level Z lies on the rim of both.
             if sign * direction[2] < -1e-2:
                 continue
             x, y = _equal_area(direction * np.array([1.0, 1.0, sign]))
@@ -185,7 +185,7 @@ def _envelope(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, Float
 
 
 def _equal_area(direction: FloatArray) -> tuple[float, float]:
-    """Lambert's azimuthal projection of a unit vector about +axis 3, scaled so that the equator has radius one."""
+    """Lambert's azimuthal projection of a unit vector about +Z, scaled so that the equator has radius one."""
     factor = 1.0 / np.sqrt(1.0 + max(float(direction[2]), 0.0))
     return float(direction[0] * factor), float(direction[1] * factor)
 

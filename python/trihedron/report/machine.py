@@ -66,7 +66,7 @@ def poses_record(segments: Segments) -> dict[str, Any]:
 
 
 def segments_record(recording: Recording, segments: Segments) -> dict[str, Any]:
-    """Holds with their means, moves, noise."""
+    """Poses with their means, moves, noise."""
     poses = [
         {
             "start": pose.start,

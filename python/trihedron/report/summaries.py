@@ -40,7 +40,7 @@ def recording_summary(recording: Recording) -> Document:
 
 
 def segments_summary(segments: Segments) -> Document:
-    """Holds and moves without the recording: how many, how long, their mean readings."""
+    """Poses and moves without the recording: how many, how long, their mean readings."""
     found = f"{how_many(segments.n_poses, 'pose')}, {how_many(len(segments.moves), 'move')}."
     still_s = float(np.sum(segments.duration_s)) if segments.n_poses else 0.0
     return Document(

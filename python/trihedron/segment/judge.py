@@ -16,7 +16,7 @@ from trihedron.segment.range_ends import RangeEnd, is_cut
 from trihedron.segment.runs import MIN_HOLD_S, Run, means_of
 
 CREEP_CHANCE = 1e-3
-"""Chance that some steady hold of a log is called creeping though none is."""
+"""Chance that some steady pose of a log is called settling though none is."""
 POSES_FOR_NINE = 9
 """A norm fit of nine parameters needs nine poses in different directions, and more to check itself."""
 
@@ -28,7 +28,7 @@ def judge_runs(
     poses: tuple[Pose, ...],
     noise: MeanNoise,
 ) -> list[Finding]:
-    """Creep, bumps and unsteadiness of single holds, each named by its number and time."""
+    """Settling, bumps and unsteadiness of single poses, each named by its number and time."""
     found: list[Finding] = []
     sizes = _creep_sizes(channels, runs, noise, CREEP_CHANCE / max(len(runs), 1))
     creeping = [(size, k) for k, size in enumerate(sizes.tolist()) if size > 0.0]
@@ -160,5 +160,5 @@ def _start_s(recording: Recording, pose: Pose) -> float:
 
 
 def _named(indices: list[int]) -> list[int]:
-    """Holds as reports count them."""
+    """Poses as reports count them."""
     return [k + 1 for k in sorted(indices)]

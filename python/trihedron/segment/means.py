@@ -17,9 +17,9 @@ from trihedron.segment.vertical import along, noise_along, upright
 from trihedron.units import acceleration_to_si
 
 PIECE = 1 << 18
-"""Rows of a hold that are read at a time."""
+"""Rows of a pose that are read at a time."""
 OCTAVES = 4
-"""A hold's own excess noise is judged on stretches from a half down to a sixteenth of it: the four octaves that weigh
+"""A pose's own excess noise is judged on stretches from a half down to a sixteenth of it: the four octaves that weigh
 in the error of its mean."""
 
 
@@ -43,8 +43,8 @@ def average_poses(
     """Means over the samples of each pose; their variances are the pooled law times the pose's own excess.
 
     The excess of a pose is the ratio of its own two-sample variances to the pooled law over the four coarsest octaves;
-    being uncertain, it is drawn towards 1 by as many degrees of freedom as the ratios' scatter over holds leaves room
-    for (empirical Bayes). An unsteady hold is taken at its own word, axis by axis.
+    being uncertain, it is drawn towards 1 by as many degrees of freedom as the ratios' scatter over poses leaves room
+    for (empirical Bayes). An unsteady pose is taken at its own word, axis by axis.
     """
     n_channels = channels.mean.shape[1]
     mean, n_averaged = _sample_means(
@@ -100,7 +100,7 @@ def _sample_means(triads: list[FloatArray], poses: tuple[Pose, ...]) -> tuple[Fl
     for k, pose in enumerate(poses):
         sums = [_Sum() for _ in triads]
         for first, last in pose.undisturbed():
-            # In pieces: a hold of hours is not copied as a whole.
+            # In pieces: a pose of hours is not copied as a whole.
             for start in range(first, last, PIECE):
                 readings = [triad[start : min(start + PIECE, last)] for triad in triads]
                 finite = [np.asarray(np.isfinite(r).all(axis=1)) for r in readings]
@@ -152,7 +152,7 @@ def _prior_freedom(ratio: FloatArray, freedom: FloatArray) -> float:
     seen = freedom > 0.0
     if seen.sum() < 2:
         return 1e3
-    # E[(r-1)^2] = 2/ν of sampling + 2/ν0 of real differences; the median keeps one odd hold from deciding.
+    # E[(r-1)^2] = 2/ν of sampling + 2/ν0 of real differences; the median keeps one odd pose from deciding.
     spread = float(np.mean(np.minimum((ratio[seen] - 1.0) ** 2, 4.0)))
     real = spread - float(np.mean(2.0 / freedom[seen]))
     return float(np.clip(2.0 / max(real, 1e-9), 1.0, 1e3))
@@ -161,11 +161,11 @@ def _prior_freedom(ratio: FloatArray, freedom: FloatArray) -> float:
 NORMAL_AT, NORMAL_WEIGHT = np.array([-np.sqrt(3.0), 0.0, np.sqrt(3.0)]), np.array([1.0, 4.0, 1.0]) / 6.0
 """Three points that stand for a normal number (Gauss and Hermite)."""
 FEWEST_PHASES = 6
-"""Codes, a step of the converter and more apart in the rms, from which on places inside a step are any."""
+"""Codes, an LSB and more apart in the rms, from which on places inside a step are any."""
 HARMONICS = np.arange(1, 61)
 """Of a period of one step: with noise of 3 % of a step the sixtieth is down to a thousandth."""
 NOISE_TRIED = np.concatenate([[0.0], np.linspace(0.03, 1.0, 98)])
-"""Noise of one reading in steps of the converter."""
+"""Noise of one reading in LSB."""
 BIAS_VARIANCE = np.where(
     NOISE_TRIED > 0.0,
     np.sum(np.exp(-4.0 * (np.pi * np.outer(NOISE_TRIED, HARMONICS)) ** 2) / (2.0 * (np.pi * HARMONICS) ** 2), axis=1),
@@ -188,7 +188,7 @@ def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
 
     The mean of a rounded Gaussian of deviation σ is off by the sum over k of (q/πk) exp(-2π²k²σ²/q²) sin(2πkx/q): q/√12
     rms without noise, a fifth of it at σ = 0.28 q (Widrow and Kollár 2008, ch. 4). σ follows from what the readings
-    scatter by, which depends on the place in a step as well: many holds apart have all places, a bias has one.
+    scatter by, which depends on the place in a step as well: many poses apart have all places, a bias has one.
     """
     if not runs:
         return np.zeros(channels.mean.shape[1])

@@ -1,4 +1,4 @@
-"""One recording into holds and moves: the composition of the room."""
+"""One recording into poses and moves: the composition of the room."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def segment_blocks(
     progress: Progress | None = None,
 ) -> Segments:
     """The same from blocks that were made already, with the (channel, limit) that readings were seen to end at; of the
-    recording itself only rows of holds are read."""
+    recording itself only rows of poses are read."""
     report = progress or (lambda _done, _text: None)
     if channels.is_valid.sum() < WINDOW_BLOCKS:
         return _nothing_found(recording, channels)

@@ -21,7 +21,7 @@ def resegment(recording: Recording, segments: Segments, shortest_s: float = 0.3)
 
     A bump inside a pose turns the body; averaged over, it contradicts the moves on both sides. Cut there, the gyro
     carries the attitude across it like across any move. A pose that vibrates is no rest, but its slow part stands
-    still: it becomes a hold of its own, so that a bias that follows the vibration can be seen.
+    still: it becomes a pose of its own, so that a bias that follows the vibration can be seen.
 
     The answer's ``whole`` are the poses as they were found, each averaged over whatever happened in it.
     """

@@ -49,7 +49,7 @@ def _hand_session() -> Scenario:
 
 
 def _linear() -> Scenario:
-    """The hand session without noise and converter: what a perfect estimator inverts exactly."""
+    """The hand session without noise and ADC: what a perfect estimator inverts exactly."""
     accelerometer, gyroscope = MPU.unit(1)
     accel = Accelerometer(accelerometer.S, accelerometer.b, accelerometer.unit)
     gyro = Gyroscope(gyroscope.S, gyroscope.b, gyroscope.unit)
@@ -91,7 +91,7 @@ def _rest() -> Scenario:
 
 
 def _rest_manual() -> Scenario:
-    """Two hours at rest, the manual's unit with a finer converter, for Allan curves."""
+    """Two hours at rest, the manual's unit with a finer ADC, for Allan curves."""
     accel, gyro = ANALOG_6DOF.accelerometer, ANALOG_6DOF.gyroscope
     accel = replace(accel, adc=replace(accel.adc, lsb=0.0))
     gyro = replace(gyro, adc=replace(gyro.adc, lsb=0.0))
@@ -106,7 +106,7 @@ def _rest_industrial() -> Scenario:
 def _dividing_head() -> Scenario:
     """324 poses of an optical dividing head, industrial part on a 12-bit ADC."""
     scenario = _of(ADIS, dividing_head(), "dividing-head")
-    step = 0.11 * math.sqrt(12.0)  # the published converter's own noise of 0.11 m/s² as the rms of its rounding
+    step = 0.11 * math.sqrt(12.0)  # the published ADC's own noise of 0.11 m/s² as the rms of its rounding
     accel = scenario.accelerometer
     lsb = step / float(np.abs(np.diag(np.asarray(accel.S))).mean())
     return replace(scenario, accelerometer=replace(accel, adc=replace(accel.adc, lsb=lsb)))

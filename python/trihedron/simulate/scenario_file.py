@@ -73,7 +73,7 @@ def read_scenario(path: str | Path) -> Scenario:
 _TABLES = {"clock": Clock, "environment": Environment, "accelerometer": Accelerometer, "gyroscope": Gyroscope}
 
 _MOST_POSES = 100_000
-"""Poses of a session: three days of holds of two seconds."""
+"""Poses of a session: three days of poses of two seconds."""
 
 
 def scenario_from_table(table: Mapping[str, Any], name: str = "scenario") -> Scenario:

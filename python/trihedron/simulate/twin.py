@@ -1,6 +1,6 @@
-"""The twin: a real recording repeated as a simulation, from its poses, moves, instants, noise and converter.
+"""The twin: a real recording repeated as a simulation, from its poses, moves, instants, noise and ADC.
 
-Poses are the directions of gravity that the calibrated holds show; moves are replayed from the calibrated rates and
+Poses are the directions of gravity that the calibrated poses show; moves are replayed from the calibrated rates and
 accelerations, turned by a slow level rotation so that each ends in the pose that follows. What the calibration does not
 explain is therefore what differs between the recording and its twin.
 """

@@ -26,7 +26,7 @@ FLICKER_EARNS = 6.63
 NEAR = 0.3
 """In the logarithm: neighbours of the corners that are tried differ by about as much."""
 HIDDEN = 1e-2
-"""Power gain below which a converter's rounding and what leaks hide the shape of a filter."""
+"""Power gain below which an ADC's rounding and what leaks hide the shape of a filter."""
 LOWEST, HIGHEST = 5e-3, 2.0
 """Of the rate: corners that are seen at all (a 64th of Nyquist, four times Nyquist)."""
 SHAPES = 0.1
@@ -38,7 +38,7 @@ def noise_of_poses(
 ) -> tuple[NoiseTerms, Smoother]:
     """Terms per axis of (n, 3) readings inside the poses ``[start, stop)``, and the low-pass all axes share.
 
-    ``step`` of the converter is taken off. What is longer than a third of a pose cannot be told and is excluded.
+    ``step`` of the ADC is taken off. What is longer than a third of a pose cannot be told and is excluded.
     """
     steps = np.broadcast_to(np.asarray(step, dtype=np.float64), (3,))
     measured = [_pooled(signal[:, k], poses, float(steps[k])) for k in range(3)]

@@ -1,4 +1,4 @@
-"""Which axis of the case points up in a still pose."""
+"""Which axis of the case points up in a pose."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def calibrate_faces(
     or in closed form from the means of the six faces (eq. 7 and 8).
 
     Faces that contradict each other beyond their noise were not level: the tilt per pose that makes them consistent is
-    estimated, reported (TABLE_TILT) and carried into weights and error bars as a horizontal error of each pose. A tilt
+    estimated, reported (TABLE_TILT) and carried into weights and uncertainties as a horizontal error per pose. A tilt
     that is common to all poses in the case's own axes cannot be seen by this method; it turns Mz against the case.
 
     Parameters
@@ -153,9 +153,9 @@ def _estimate_placements(
 
 def _with_doubt(estimate: _Estimate, tilt2: float, g: float) -> _Estimate:
     """A tilted face reads ``g cos t``: the scale may be short by the mean square tilt per component, to second order,
-    and the zero off by as much of g: misalignments by which the tilt reaches an axis that is up are known to it only.
+    and the bias off by as much of g: misalignments by which the tilt reaches an axis that is up are known to it only.
 
-    It is not corrected, for what scatters need not be a tilt; the error bars contain it.
+    It is not corrected, for what scatters need not be a tilt; the uncertainties contain it.
     """
     scale = np.concatenate([estimate.S_a.ravel(), np.zeros(3)])
     covariance = estimate.covariance + np.outer(scale, scale) * tilt2**2

@@ -50,7 +50,7 @@ def stated_turns(
 
     The axis of a turn is the table's normal in the body. As the body turns by θ, gravity moves on a circle about it:
     ``f(t) = n̄ + c cos θ + s sin θ + k θ'²`` (the last term for a sensor that does not sit on the axis), fitted over the
-    turn and the holds on both sides; ``n̄`` is the axis.
+    turn and the poses on both sides; ``n̄`` is the axis.
 
     Raises
     ------

@@ -37,7 +37,7 @@ def design_least_squares(
     Raises
     ------
     ValueError
-        When the turns do not determine an axis, or nothing tells the zero.
+        When the turns do not determine an axis, or nothing tells the bias.
     """
     if not 1e-30 < noise_density < 1e30:
         raise RefusedError(f"a noise density of {noise_density:g} is that of no gyro")

@@ -13,7 +13,7 @@ from trihedron.units import rate_to_si
 FEWEST_MOVES = 4
 """Three unknown angles of the first attitude and some moves to spare."""
 MISSED_RAD = 0.3
-"""Gravity carried by body rates misses by less than this after any move, scales and zeros of cheap parts included."""
+"""Gravity carried by body rates misses by less than this after any move, scales and biases of cheap parts included."""
 BETTER = 0.3
 """World rates explain what body rates do not where their error is less than this share of it."""
 
@@ -35,7 +35,7 @@ def carried_gravity(recording: Recording, segments: Segments) -> CarriedGravity 
     """Gravity carried through the moves by the rates, as if of the body and as if of the world.
 
     Of the body: ``u₊ = ΔRᵀ u``. Of the world: ``R₊ = ΔR R``, so ``u_n = R₀ᵀ (ΔR_n … ΔR_1)ᵀ e_z``, with R₀ from all
-    poses (Wahba's problem). Rates are read by their unit, zeros off by the rest before and after each move; ``None``
+    poses (Wahba's problem). Rates are read by their unit, biases off by the rest before and after each move; ``None``
     without a unit or with fewer than four moves in a row.
     """
     scale = rate_to_si(recording.gyroscope_unit)

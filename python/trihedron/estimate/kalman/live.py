@@ -1,4 +1,4 @@
-"""Live use: an estimate with error bars after every pose, when to stop, and what to do next."""
+"""Live use: an estimate with uncertainties after every pose, when to stop, and what to do next."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class LiveCalibration:
     session_s : float
         Rough length of the session; sets the slowest noise that is modelled.
     hold_s, pause_s : float
-        Length of the holds and pauses to come, for the prediction.
+        Length of the poses and pauses to come, for the prediction.
     """
 
     def __init__(
@@ -81,11 +81,11 @@ class LiveCalibration:
         Parameters
         ----------
         reading : (3,)
-            Mean raw reading of the hold.
+            Mean raw reading of the pose.
         reference : (3,)
             Specific force in the body, m/s².
         start_s, hold_s : float
-            When the hold started and how long it lasted.
+            When the pose started and how long it lasted.
         plan : (m, 3), optional
             Poses still planned, m/s²; without it the most useful of 26 directions is taken each time.
         look_ahead : int

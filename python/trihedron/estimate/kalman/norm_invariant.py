@@ -208,11 +208,11 @@ def calibrate_without_references(
     Parameters
     ----------
     readings : (n, 3)
-        Mean raw reading of each hold.
+        Mean raw reading of each pose.
     noise : AxisNoise or three of them
         Noise of the raw readings.
     start_s, hold_s : (n,)
-        When each hold starts and how long it lasts, s.
+        When each pose starts and how long it lasts, s.
     start : NormStart, optional
         Default: guessed from the range of the readings, positive axes.
     extra_variance : scalar, (n,) or (n, 3)

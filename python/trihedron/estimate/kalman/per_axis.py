@@ -75,13 +75,13 @@ def calibrate_with_references(
     Parameters
     ----------
     readings : (n, 3)
-        Mean raw reading of each hold.
+        Mean raw reading of each pose.
     references : PoseTable or (n, 3)
         Specific force in the body, m/s².
     noise : AxisNoise or three of them
         Noise of the raw readings.
     start_s, hold_s : (n,)
-        When each hold starts and how long it lasts, s; scalars are not enough for ``start_s``.
+        When each pose starts and how long it lasts, s; scalars are not enough for ``start_s``.
     extra_variance : (n,), (n, 3) or scalar
         Variance of a reading on top of the noise model, raw².
     prior : Prior, optional

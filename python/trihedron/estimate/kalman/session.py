@@ -1,4 +1,4 @@
-"""From a recording and its still poses to what the filters take: mean readings, times, noise."""
+"""From a recording and its poses to what the filters take: mean readings, times, noise."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from trihedron.records import (
 
 @dataclass(frozen=True, eq=False)
 class PoseReadings:
-    """Mean raw readings (n, 3) of the still poses, their starts and lengths (n,) [s], and standard errors (n, 3)."""
+    """Mean raw readings (n, 3) of the poses, their starts and lengths (n,) [s], and standard errors (n, 3)."""
 
     mean: FloatArray
     start_s: FloatArray
@@ -36,15 +36,15 @@ class PoseReadings:
 
 
 def pose_readings(recording: Recording, segments: Segments, table: PoseTable | None = None) -> PoseReadings:
-    """Means of the still poses, matched with a pose table.
+    """Means of the poses, matched with a pose table.
 
-    A table with start and stop times is averaged over its own times; one with hold numbers picks still poses of the
-    log; one with neither must have as many rows as the log has still poses.
+    A table with start and stop times is averaged over its own times; one with hold numbers picks poses of the
+    log; one with neither must have as many rows as the log has poses.
 
     Raises
     ------
     ValueError
-        When there is no accelerometer, the log has no still pose, or table and log do not match.
+        When there is no accelerometer, the log has no pose, or table and log do not match.
     """
     a = recording.accelerometer
     if a is None:
@@ -94,7 +94,7 @@ def _timed_means(
 
 
 def noise_from_poses(recording: Recording, segments: Segments) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
-    """White noise as scattered inside the holds, and the converter's step where it is coarse: nothing slow.
+    """White noise as scattered inside the poses, and the LSB where it is coarse: nothing slow.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def _noise(
         return noise, np.zeros_like(poses.mean), ()
     assumed = noise_from_poses(recording, segments)
     white = np.array([one.white for one in assumed])
-    # What the segmentation saw beyond white noise inside a hold comes on top of each mean.
+    # What the segmentation saw beyond white noise inside a pose comes on top of each mean.
     extra = np.maximum(poses.sigma_mean**2 - white**2 / poses.pose_s[:, None], 0.0)
     finding = Finding.of(FindingCode.NOISE_ASSUMED)
     return assumed, extra, (finding,)
@@ -140,7 +140,7 @@ def calibrate_session(
 ) -> KalmanCalibration:
     """Calibrate the accelerometer of a recording in the known attitudes of a pose table, all methods side by side.
 
-    ``noise`` None takes what the holds show (white noise and resolution) and says so in a finding.
+    ``noise`` None takes what the poses show (white noise and resolution) and says so in a finding.
 
     Raises
     ------
@@ -173,12 +173,12 @@ def calibrate_session_without_references(
     frame: NormFrame = "lower",
     options: ShapingOptions | None = None,
 ) -> NormKalmanCalibration:
-    """Calibrate the accelerometer of a recording from the length of gravity in its still poses.
+    """Calibrate the accelerometer of a recording from the length of gravity in its poses.
 
     Raises
     ------
     ValueError
-        When there are fewer than nine still poses.
+        When there are fewer than nine poses.
     """
     poses = pose_readings(recording, segments)
     used, extra, findings = _noise(recording, segments, noise, poses)

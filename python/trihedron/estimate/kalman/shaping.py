@@ -10,7 +10,7 @@ from trihedron import _core
 from trihedron.records.kalman import AxisNoise
 
 SLOWEST_PER_SESSION, FASTEST_PER_HOLD = 0.3, 6.0
-"""Extreme inverse correlation times, over those of the session and of a hold. With one Gauss-Markov process per decade
+"""Extreme inverse correlation times, over those of the session and of a pose. With one Gauss-Markov process per decade
 between them the Allan deviation follows flicker within 2 %."""
 
 
@@ -21,7 +21,7 @@ class ShapingOptions:
     ``flicker_rates_per_s`` are the inverse correlation times β of the Gauss-Markov processes for flicker: one for the
     article's filter, empty for as many as the session needs. ``ramp_frequency_rad_s`` is ω₀ of the second-order ramp, 0
     for one tenth of the session's inverse length: its slope then lasts for the whole session; ``ramp_damping`` is ζ.
-    With ``averages`` a reading is the mean over its hold, exactly; without, it is the value at its end (the article).
+    With ``averages`` a reading is the mean over its pose, exactly; without, it is the value at its end (the article).
     """
 
     flicker_rates_per_s: tuple[float, ...] = ()

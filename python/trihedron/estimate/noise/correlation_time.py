@@ -1,4 +1,4 @@
-"""The time in which a sensor's coloured noise forgets: a first-order Gauss-Markov process in the octaves of its holds.
+"""The time in which a sensor's coloured noise forgets: a first-order Gauss-Markov process in the octaves of its poses.
 
     S(f) = N² + q / (1 + (2πfτ)²)                                                             (docs/noise.md, eq. N.1)
 

@@ -23,9 +23,9 @@ from trihedron.records.finding import Finding
 from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
 
 MOST_DISTURBED = 0.25
-"""Share of an axis that may be left out by itself."""
+"""Share of an axis that may be excluded by itself."""
 SHORTEST = 512
-"""Readings below which noise terms are not told apart."""
+"""Readings below which noise terms are not separated."""
 
 
 def identify_noise(

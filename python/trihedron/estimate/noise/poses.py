@@ -1,7 +1,7 @@
-"""Noise inside the holds of a session: white density, spectrum by octaves, lines, filter corner, resolution.
+"""Noise inside the poses of a session: white density, spectrum by octaves, lines, filter corner, resolution.
 
-A session's holds are seconds long and differ a little (temperature, gravity on the axis, a hand): every figure is a
-mean of logarithms over holds, whose error comes from the number of readings and from the holds' own scatter. Two logs
+A session's poses are seconds long and differ a little (temperature, gravity on the axis, a hand): every figure is a
+mean of logarithms over poses, whose error comes from the number of readings and from the poses' own scatter. Two logs
 are then compared figure by figure (:func:`ratio_of`). docs/noise.md, section 8.
 """
 
@@ -24,7 +24,7 @@ from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise
 from trihedron.transforms import cosine_transform
 
 FEWEST_HOLDS = 3
-"""Holds that must show an octave, where there are as many: the scatter of one is not known."""
+"""Poses that must show an octave, where there are as many: the scatter of one is not known."""
 LEVEL_KNOWN = 1.0
 """Standard error of the logarithm of a density below a corner, from which on the differences of readings say more."""
 
@@ -37,7 +37,7 @@ def noise_of_poses(
     names: Sequence[str] = (),
     units: Sequence[str] = (),
 ) -> tuple[PoseNoise, ...]:
-    """Noise of every axis inside the holds of a session, each figure with its interval.
+    """Noise of every axis inside the poses of a session, each figure with its interval.
 
     The channels are those of one sensor: they share a low-pass unless their spectra deny it.
 
@@ -117,7 +117,7 @@ def _white(axes: Sequence[AxisAtRest], filters: Sequence[LowPass], rate_hz: floa
 def _band_power(
     parts: Sequence[FloatArray], rate_hz: float, low_hz: float, high_hz: float
 ) -> tuple[FloatArray, FloatArray]:
-    """(k,) mean power of each hold between two frequencies, and its number of ordinates; holds too short left out."""
+    """(k,) mean power of each pose between two frequencies, and its number of ordinates; holds too short left out."""
     power, ordinates = [], []
     for part in parts:
         first, last = (math.ceil(f * 2.0 * len(part) / rate_hz) for f in (low_hz, high_hz))
@@ -139,9 +139,9 @@ def _of_differences(axis: AxisAtRest, rate_hz: float) -> Measured | None:
 
 
 def _of_level(axis: AxisAtRest, density: float, sigma_log: float, corner_hz: float, rate_hz: float) -> Measured | None:
-    """White density below a filter's corner, of a typical hold.
+    """White density below a filter's corner, of a typical pose.
 
-    ``density`` is that of the mean over holds, which loud ones fill: how far a typical one lies beneath it is read off
+    ``density`` is that of the mean over poses, which loud ones fill: how far a typical one lies beneath it is read off
     the same band, for holds differ there by a hand's tremor too, and by less in their differences.
     """
     if not (density > 0.0 and axis.dithers(2.0 * corner_hz * density)):
@@ -160,7 +160,7 @@ def _of_level(axis: AxisAtRest, density: float, sigma_log: float, corner_hz: flo
 
 
 def _octaves(parts: Sequence[FloatArray], rate_hz: float) -> tuple[OctaveNoise, ...]:
-    """Mean power between powers of two of a hertz, over the holds long enough to have four ordinates there."""
+    """Mean power between powers of two of a hertz, over the poses long enough to have four ordinates there."""
     nyquist = rate_hz / 2.0
     found: dict[int, tuple[list[float], list[float]]] = {}
     for part in parts:
@@ -179,7 +179,7 @@ def _octaves(parts: Sequence[FloatArray], rate_hz: float) -> tuple[OctaveNoise, 
             dofs.append(float(n))
     out = []
     for octave in sorted(found):
-        # One long hold, perhaps with the hand still on it, is not the sensor's low octave.
+        # One long pose, perhaps with the hand still on it, is not the sensor's low octave.
         if len(found[octave][0]) < min(FEWEST_HOLDS, len(parts)):
             continue
         pooled = pooled_logarithm(np.array(found[octave][0]), np.array(found[octave][1]))

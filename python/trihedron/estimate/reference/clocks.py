@@ -31,7 +31,7 @@ SURE = 0.97
 beyond a jump: one that found a neighbouring turn instead fits worse there than at its own lag."""
 SEARCH_S = 6.0
 ALIKE = 0.01
-"""Peaks whose correlation is this near the best are not told apart by it: the stamps then decide."""
+"""Peaks whose correlation is this near the best are not separated by it: the timestamps then decide."""
 
 
 @dataclass(frozen=True)

@@ -225,7 +225,7 @@ def _right_way_round(
 
 
 def _stamped(recording: Recording, motion: ReferenceMotion) -> float | None:
-    """What both logs' own stamps say of the offset; ``None`` where they do not count from one epoch."""
+    """What both logs' own timestamps say of the offset; ``None`` where they do not count from one epoch."""
     offset = recording.start_epoch_s - motion.start_epoch_s
     return offset if abs(offset) < 0.5 * max(recording.duration_s, motion.time_s[-1]) else None
 
@@ -238,7 +238,7 @@ def _windows(grid: Grid, reference: Reference, seen: Mask) -> Windows:
 
 
 def _own_counts(offset: float, recording: Recording, motion: ReferenceMotion) -> float:
-    """By how much the reference's stamps run ahead of the log's, in both clocks' own counts if they share an epoch."""
+    """By how much the reference's timestamps run ahead of the log's, in both own counts if they share an epoch."""
     if abs(recording.start_epoch_s - motion.start_epoch_s) > 1e5:
         return float(offset)
     return float(offset + motion.start_epoch_s - recording.start_epoch_s)

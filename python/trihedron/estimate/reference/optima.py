@@ -1,4 +1,4 @@
-"""Two places of a clock that the motion does not tell apart."""
+"""Two places of a clock that the motion does not separate."""
 
 from __future__ import annotations
 

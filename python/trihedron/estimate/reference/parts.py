@@ -30,7 +30,7 @@ FEWEST = 2
 def refuse_parts_elsewhere(grid: Grid, reference: Reference, gyro: GyroFit) -> None:
     """Refuse a reference of which a part fits at another lag than all of it was fitted at.
 
-    The clock's own stretches are 8 s long and see only sizes of rates: a jump in the last seconds is left out by them
+    The clock's own stretches are 8 s long and see only sizes of rates: a jump in the last seconds is excluded by them
     as a stretch of another motion, and by the fit as outliers.
 
     Raises

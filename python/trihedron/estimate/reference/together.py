@@ -56,7 +56,7 @@ def grid_of(recording: Recording) -> Grid:
 
 
 def within(stamps: FloatArray, time: FloatArray, step: float) -> Mask:
-    """Whether times (n,) lie among stamps (m,) that are no more than ``LONGEST_GAP`` steps apart there."""
+    """Whether times (n,) lie among timestamps (m,) that are no more than ``LONGEST_GAP`` steps apart there."""
     after = np.clip(np.searchsorted(stamps, time), 1, len(stamps) - 1)
     is_close = stamps[after] - stamps[after - 1] <= LONGEST_GAP * step
     return np.asarray(is_close & (time >= stamps[0]) & (time <= stamps[-1]), dtype=bool)

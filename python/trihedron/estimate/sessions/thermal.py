@@ -144,7 +144,7 @@ def _branches(values: FloatArray, variances: FloatArray, X: FloatArray, branch: 
         gain += float(np.sum(w * (values[:, axis] - X @ narrow) ** 2)) - after
         left += after
         size.append(float(c[-1]))
-    # The scatter is never taken as less than the sessions' own error bars say.
+    # The scatter is never taken as less than the sessions' own uncertainties say.
     ratio = (gain / k) / max(left / (k * dof), 1.0)
     return np.array(size), fdtrc(k, k * dof, ratio)
 

@@ -24,7 +24,7 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Pose:
-    """Stand still. ``creep_deg`` turns slowly by that angle about ``creep_axis`` (body) over the whole hold."""
+    """Stand still. ``creep_deg`` turns slowly by that angle about ``creep_axis`` (body) over the whole pose."""
 
     duration_s: float
     name: str = ""
