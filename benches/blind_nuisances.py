@@ -51,7 +51,7 @@ def trial(job):
 
 
 LEAST_CLIPPED = 1
-"""Readings at the end of the range from which a trial counts."""
+"""Readings at the range limit from which a trial counts."""
 
 
 def judged(answer, said, crash, seconds):

@@ -7,7 +7,7 @@
 
 Kinds: the same unit on another day's session; a nominal simulation of the part; another unit; one number moved (zero,
 scale, misalignment, the gyro triad turned, gravity); an effect that only the recording has, or only the simulation, or
-both; noise twice as large; a coarser converter. Each pair is held against its log (``--against``) or, for one kind in
+both; noise twice as large; a coarser ADC. Each pair is held against its log (``--against``) or, for one kind in
 three, against a calibration made from the simulated log (``--calibration``). A name said of nothing that was drawn is
 false; a group of numbers whose true difference exceeds five of its own stated errors must be found.
 
@@ -122,26 +122,26 @@ def moved(kind: str, accel: Any, gyro: Any, rng: np.random.Generator) -> tuple[A
 
 def session(rng: np.random.Generator) -> Any:
     return hand_session(
-        int(rng.integers(20, 33)), hold_s=float(rng.uniform(3.5, 7.0)), layout=int(rng.integers(1, 10000)),
+        int(rng.integers(20, 33)), pose_s=float(rng.uniform(3.5, 7.0)), layout=int(rng.integers(1, 10000)),
         move_s=float(rng.uniform(1.4, 2.6)),
     )  # fmt: skip
 
 
 def with_nuisances(recording: Recording, rng: np.random.Generator) -> Recording:
-    """Zeros that differ from pose to pose and a faint line, as public recordings show them."""
+    """Biases that differ from pose to pose and a faint line, as public recordings show them."""
     segments = trihedron.segment(recording)
     accel, gyro = np.array(recording.accelerometer), np.array(recording.gyroscope)
-    unit_a = 9.81 / float(np.median(np.linalg.norm(accel[segments.holds[0].samples()], axis=1)))
+    unit_a = 9.81 / float(np.median(np.linalg.norm(accel[segments.poses[0].samples()], axis=1)))
     unit_g = np.radians(1 / 65.5)
     step_a, step_g = rng.uniform(5e-4, 3e-3) / unit_a, np.radians(rng.uniform(0.005, 0.03)) / unit_g
     t = recording.time_s
-    edges = [0, *[(a.stop + b.start) // 2 for a, b in itertools.pairwise(segments.holds)], len(t)]
+    edges = [0, *[(a.stop + b.start) // 2 for a, b in itertools.pairwise(segments.poses)], len(t)]
     for first, last in itertools.pairwise(edges):
         accel[first:last] += step_a * rng.standard_normal(3)
         gyro[first:last] += step_g * rng.standard_normal(3)
     line = np.radians(rng.uniform(0.005, 0.02)) / unit_g * np.sin(2 * np.pi * rng.uniform(3, 30) * t)
     gyro[:, int(rng.integers(3))] += line
-    # Every second recording has passed its converter after all that; the other was brought to other units since.
+    # Every second recording has passed its ADC after all that; the other was brought to other units since.
     again = np.random.default_rng(int(rng.integers(1 << 30)))
     if again.random() < 0.5:
         # Whole codes moved by a part of one would be moved by none or a whole one: zeros a step apart, in two values.
@@ -153,21 +153,21 @@ def with_settling(recording: Recording, rng: np.random.Generator) -> Recording:
     """A knock as the sensor is set down in three poses of ten, and a support that gives way slowly in every pose."""
     segments = trihedron.segment(recording)
     accel, gyro = np.array(recording.accelerometer), np.array(recording.gyroscope)
-    unit_a = 9.81 / float(np.median(np.linalg.norm(accel[segments.holds[0].samples()], axis=1)))
+    unit_a = 9.81 / float(np.median(np.linalg.norm(accel[segments.poses[0].samples()], axis=1)))
     unit_g = np.radians(1 / 65.5)
     tau, reach = rng.uniform(0.4, 2.0), np.radians(rng.uniform(0.01, 0.05))
-    for hold in segments.holds[1:]:
-        t = recording.time_s[hold.start : hold.stop] - recording.time_s[hold.start]
-        force = accel[hold.start : hold.stop].mean(axis=0)
+    for pose in segments.poses[1:]:
+        t = recording.time_s[pose.start : pose.stop] - recording.time_s[pose.start]
+        force = accel[pose.start : pose.stop].mean(axis=0)
         lean = np.cross(force / np.linalg.norm(force), reach * rng.standard_normal(3))
         decay = np.exp(-t / tau)[:, None]
         # The body still turns by v: gravity is seen turned back by it, the gyro reads its change.
-        accel[hold.start : hold.stop] -= np.cross(lean * decay, force)
-        gyro[hold.start : hold.stop] += -lean * decay / tau / unit_g
+        accel[pose.start : pose.stop] -= np.cross(lean * decay, force)
+        gyro[pose.start : pose.stop] += -lean * decay / tau / unit_g
         if rng.random() < 0.3:
             ring = np.exp(-t / 0.08) * np.cos(2 * np.pi * rng.uniform(12, 40) * t)
-            accel[hold.start : hold.stop] += np.outer(ring, rng.uniform(0.05, 0.5) * rng.standard_normal(3)) / unit_a
-            gyro[hold.start : hold.stop] += np.outer(ring, np.radians(2.0) * rng.standard_normal(3)) / unit_g
+            accel[pose.start : pose.stop] += np.outer(ring, rng.uniform(0.05, 0.5) * rng.standard_normal(3)) / unit_a
+            gyro[pose.start : pose.stop] += np.outer(ring, np.radians(2.0) * rng.standard_normal(3)) / unit_g
     return replace(recording, accelerometer=accel, gyroscope=gyro)
 
 

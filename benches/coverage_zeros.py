@@ -1,8 +1,8 @@
-"""Are the error bars honest where zeros scatter from pose to pose?
+"""Are the uncertainties honest where biases scatter from pose to pose?
 
     python benches/coverage_zeros.py [--sessions N] [--gyro DEG_S] [--accel MM_S2] [--jump uniform|middle|linear|own]
 
-Healthy simulated sessions of 24 poses; every pose gets a zero of its own. What the zero does during a move is one of
+Healthy simulated sessions of 24 poses; every pose gets a bias of its own. What the bias does during a move is one of
 four stories (``--jump``): it leaps at an instant drawn anew for every move, at the middle, it runs straight from one
 pose to the next, or every move has a third zero that belongs to neither pose. Both `calibrate` and the model without
 effects of `diagnose` are compared with the truth; nothing but the comparison knows it.
@@ -29,13 +29,13 @@ WANTED = 0.1
 
 def zeros_along(segments, n, sigma, jump, rng):
     """(n, 3) zero of every sample: one of its own in every pose, and a story for the moves between."""
-    own = sigma * rng.standard_normal((segments.n_holds, 3))
+    own = sigma * rng.standard_normal((segments.n_poses, 3))
     out = np.zeros((n, 3))
-    for hold, zero in zip(segments.holds, own, strict=True):
-        out[hold.start : hold.stop] = zero
-    out[: segments.holds[0].start] = own[0]
-    out[segments.holds[-1].stop :] = own[-1]
-    for i, (before, after) in enumerate(zip(segments.holds[:-1], segments.holds[1:], strict=True)):
+    for pose, zero in zip(segments.poses, own, strict=True):
+        out[pose.start : pose.stop] = zero
+    out[: segments.poses[0].start] = own[0]
+    out[segments.poses[-1].stop :] = own[-1]
+    for i, (before, after) in enumerate(zip(segments.poses[:-1], segments.poses[1:], strict=True)):
         a, b = before.stop, after.start
         x = (np.arange(a, b) - a + 0.5) / max(b - a, 1)
         if jump == "own":

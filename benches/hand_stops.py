@@ -161,10 +161,10 @@ def _overlap(a, b):
 
 def score(made, segments):
     """Poses lost, holds that are pauses or nothing (with whether they are called unsteady), poses in two."""
-    holds = [(h.start, h.stop) for h in segments.holds]
-    lost = [p for p in made.poses if not any(_overlap(p, h) > FOUND * min(h[1] - h[0], p[1] - p[0]) for h in holds)]
-    false = [h for h in holds if not any(_overlap(p, h) > FOUND * (h[1] - h[0]) for p in made.poses)]
-    in_two = [p for p in made.poses if sum(_overlap(p, h) > 0 for h in holds) > 1]
+    poses = [(h.start, h.stop) for h in segments.poses]
+    lost = [p for p in made.poses if not any(_overlap(p, h) > FOUND * min(h[1] - h[0], p[1] - p[0]) for h in poses)]
+    false = [h for h in poses if not any(_overlap(p, h) > FOUND * (h[1] - h[0]) for p in made.poses)]
+    in_two = [p for p in made.poses if sum(_overlap(p, h) > 0 for h in poses) > 1]
     return lost, false, in_two
 
 

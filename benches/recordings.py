@@ -73,7 +73,7 @@ def calibrated(name, arguments, gravity):
     held = "–" if quality.held_out_rms is None else f"{1e3 * quality.held_out_rms:.2f} mm/s²"
     verdict = "good" if result.is_trustworthy else "not to be trusted"
     norms = f"{1e3 * quality.rms_dof:5.2f} mm/s² {held:>10s} {1e3 * quality.floor:4.2f} mm/s²"
-    return f"{name:26s} {seconds:5.2f} s {result.segments.n_holds:5d} {norms} {angle:>9s}  {verdict}"
+    return f"{name:26s} {seconds:5.2f} s {result.segments.n_poses:5d} {norms} {angle:>9s}  {verdict}"
 
 
 def of(arguments, gravity):
@@ -105,7 +105,7 @@ def as_row(name, d, why, seconds):
     left = ", ".join(f"{t.domain} {t.chi2_per_dof:.2g}" for t in d.remaining if t.disagrees)
     related = "".join(f"; relation: {', '.join(one.depends_on)}" for one in d.relations)
     told = "; ".join(ids) + related
-    return (f"| {name} | {d.segments.n_holds} | {d.verdict}{': ' if told else ''}{told} | {'; '.join(sizes)} "
+    return (f"| {name} | {d.segments.n_poses} | {d.verdict}{': ' if told else ''}{told} | {'; '.join(sizes)} "
             f"| {'; '.join(held)} | {left or '–'} | {seconds:.0f} s |")  # fmt: skip
 
 
@@ -134,7 +134,7 @@ def against_published(folder: Path) -> None:
         arguments, gravity = sessions[f"kim run {k}"]
         recording = trihedron.read(**arguments)
         segments = trihedron.segment(recording)
-        alike = replace(segments, accelerometer_sigma_mean=np.full((segments.n_holds, 3), 1e-3))
+        alike = replace(segments, accelerometer_sigma_mean=np.full((segments.n_poses, 3), 1e-3))
         found = [
             trihedron.calibrate(recording, segments=s, gravity_m_s2=gravity, method="separate").accelerometer.quality
             for s in (alike, segments)

@@ -5,7 +5,7 @@ python benches/rivals.py [--rounds 3] [--rows 1e7] [--only norm] [--write]
 Each method runs in a process of its own, in turn, `--rounds` times; a round is the fastest of some calls after a first.
 Numbers are CPU time on one core (`two cores` and reading: wall time), so that a busy machine shifts them little; quote
 ratios. `--write` puts the tables into docs/evidence.md.
-A rival that is not installed is left out: `pip install numba python-ins bottleneck pandas pyarrow
+A rival that is not installed is excluded: `pip install numba python-ins bottleneck pandas pyarrow
 filterpy colorednoise`.
 """
 

@@ -26,7 +26,7 @@ unit = "us"
 
 
 def counts_recording(n: int, rate_hz: float, seed: int = 0) -> Recording:
-    """Readings of a ten-bit converter, all different from row to row."""
+    """Readings of a ten-bit ADC, all different from row to row."""
     rng = np.random.default_rng(seed)
     readings = np.round(rng.uniform(0.0, 1023.0, (n, 6)))
     return Recording(np.arange(n) / rate_hz, readings[:, :3], readings[:, 3:], rate_hz, "counts", "counts")

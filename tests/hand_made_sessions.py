@@ -35,16 +35,16 @@ class Instrument:
         return replace(self, **{name: getattr(self, name) + np.asarray(change) for name, change in changes.items()})
 
 
-def recorded(instrument, seed, *, n_poses=20, hold_s=3.0, move_s=1.5, rate_hz=50.0, temperature_degc=None, name=""):
+def recorded(instrument, seed, *, n_poses=20, pose_s=3.0, move_s=1.5, rate_hz=50.0, temperature_degc=None, name=""):
     """One session; ``temperature_degc`` a number, or (first, last) for a ramp."""
     rng = np.random.default_rng(seed)
     R = np.eye(3)
     f, w = [], []
-    n_hold, n_move = int(hold_s * rate_hz), int(move_s * rate_hz)
+    n_pose, n_move = int(pose_s * rate_hz), int(move_s * rate_hz)
     for pose in range(n_poses):
         first = 4 if pose == 0 else 1
-        f += [np.tile(R.T @ [0, 0, G], (first * n_hold, 1))]
-        w += [np.zeros((first * n_hold, 3))]
+        f += [np.tile(R.T @ [0, 0, G], (first * n_pose, 1))]
+        w += [np.zeros((first * n_pose, 3))]
         if pose == n_poses - 1:
             break
         axis = rng.normal(size=3)

@@ -192,17 +192,17 @@ def measured_table(seed, seconds=90, wobble_deg=0.15):
 LEVELS_DEG = (0, 30, -30, 60, -60, 120, -120, 0)
 
 
-def commanded_table(seed, hold_s=6.0, wobble_deg=0.05, lag_s=0.15):
+def commanded_table(seed, pose_s=6.0, wobble_deg=0.05, lag_s=0.15):
     """The manual's method 1: constant rates about each axis in turn, as commanded; the table follows with a lag."""
     rng = np.random.default_rng(seed)
     u = unit(rng, 3.0)
     levels = np.radians(LEVELS_DEG)
     commands = [(axis, level) for axis in range(3) for level in levels]
-    t = np.arange(0, hold_s * len(commands), 1 / FINE_HZ)
+    t = np.arange(0, pose_s * len(commands), 1 / FINE_HZ)
     told = np.zeros((len(commands) + 1, 3))
     for k, (axis, level) in enumerate(commands):
         told[k, axis] = level
-    wanted = told[np.minimum((t / hold_s).astype(int), len(commands) - 1)]
+    wanted = told[np.minimum((t / pose_s).astype(int), len(commands) - 1)]
     decay = np.exp(-1 / FINE_HZ / lag_s)
     true = lfilter([1 - decay], [1, -decay], wanted, axis=0)
     angle = np.cumsum(true, axis=0).sum(axis=1) / FINE_HZ
@@ -214,7 +214,7 @@ def commanded_table(seed, hold_s=6.0, wobble_deg=0.05, lag_s=0.15):
     log = Recording.from_arrays(
         times(len(gyro), 10), accelerometer, gyro, accelerometer_unit="counts", gyroscope_unit="counts"
     )
-    stamps = hold_s * np.arange(len(commands) + 1)
+    stamps = pose_s * np.arange(len(commands) + 1)
     return Trial(
         log, ReferenceMotion(stamps, rate=told, is_stepwise=True, source="commands.csv"), u, 0.0, 0.0, np.zeros(3)
     )

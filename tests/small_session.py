@@ -45,7 +45,7 @@ matrix = [[1e-3, 0, 0], [0, 1e-3, 0], [0, 0, 1e-3]]
 def made_once() -> Path:
     """Folder with log.csv, log.npy, rest.csv, c.json, untrusted.json, noise.json, diagnosis.json and s.toml."""
     folder = Path(tempfile.mkdtemp(prefix="session-"))
-    motion = hand_session(n_poses=12, hold_s=2.0, move_s=1.0, first_hold_s=4.0)
+    motion = hand_session(n_poses=12, pose_s=2.0, move_s=1.0, first_pose_s=4.0)
     recording = simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)[0]
     rows = np.column_stack([recording.time_s, recording.accelerometer, recording.gyroscope])
     names = "time_s,ax,ay,az,gx,gy,gz\n"

@@ -1,4 +1,4 @@
-"""Poses that miss |g| beyond their noise: error bars hold whether their zeros scatter or an axis bends."""
+"""Poses that miss |g| beyond their noise: uncertainties hold whether their biases scatter or an axis bends."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Method 2: truth comes back inside its error bars, and what the poses do not tell is not claimed."""
+"""Method 2: truth comes back inside its uncertainties, and what the poses do not tell is not claimed."""
 
 import doctest
 import importlib
@@ -64,7 +64,7 @@ def test_six_faces_are_refused_and_the_missing_poses_named():
     assert "6 of the 9" in refusal.seen
     assert refusal.action.count(" up") >= 3
     assert sensor.observability.rank == 6
-    # Scales and zeros are seen, the three angles are as unknown as for any triad off the shelf: 10 % of the scale.
+    # Scales and biases are seen, the three angles are as unknown as for any triad off the shelf: 10 % of the scale.
     assert np.all(sensor.sigma_S[np.tril_indices(3, -1)] > 0.09 * 2.4e-3)
     np.testing.assert_allclose(np.diag(sensor.S), np.diag(S_TRUE), rtol=1e-3)
 
@@ -107,7 +107,7 @@ def test_the_solver_agrees_with_a_slow_obvious_one(frame):
 def test_the_manuals_left_handed_triad_is_recovered_and_reported():
     S = np.array([[-0.0393, 0, 0], [0.0001, 0.0390, 0], [0.0001, 0.0002, 0.0385]])
     b = np.array([19.5696, -22.4746, -20.3088])
-    sigma = np.full(3, 0.05)  # a twentieth of a count of a ten-bit converter, after averaging
+    sigma = np.full(3, 0.05)  # a twentieth of a count of a ten-bit ADC, after averaging
     means = distort(G * cube_poses(), S, b) + sigma * np.random.default_rng(9).standard_normal((18, 3))
     sensor, findings = calibrate_norm(means, sigma, G, axis_signs=(-1, 1, 1))
     free = np.tri(3, dtype=bool)

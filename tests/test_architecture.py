@@ -22,7 +22,7 @@ MAY_USE_CORE = {"read", "segment", "estimate", "diagnose", "simulate", "session"
     "arrays.py",
     "probability.py",
     "quantiles.py",
-    "refused.py",
+    "errors.py",
 }
 LONGEST_FILE, LONGEST_FUNCTION, MOST_ARGUMENTS = 350, 79, 9
 

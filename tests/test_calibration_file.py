@@ -24,7 +24,7 @@ from trihedron.units import AccelerationUnit
 
 @pytest.fixture(scope="module")
 def session():
-    scenario = replace(scenario_by_name("hand-session"), motion=hand_session(n_poses=14, first_hold_s=5.0))
+    scenario = replace(scenario_by_name("hand-session"), motion=hand_session(n_poses=14, first_pose_s=5.0))
     recording, truth = simulate(scenario, seed=7)
     return recording, calibrate(recording, gravity_m_s2=truth.gravity_m_s2)
 

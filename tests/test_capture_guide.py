@@ -30,7 +30,7 @@ ACCURACY = Accuracy.parse("accel 0.1 %, gyro 0.2 %")
 
 def guided_session(seed, accuracy, n_checks=3):
     """A hand that does what the guide says, heard only through the guide's view; the session grows pose by pose."""
-    hand = FollowingHand(scenario_by_name("hand-session"), seed, first_hold_s=7.5)
+    hand = FollowingHand(scenario_by_name("hand-session"), seed, first_pose_s=7.5)
     state = {}
 
     def look():
@@ -51,7 +51,7 @@ def guided_session(seed, accuracy, n_checks=3):
         done = recording.n_samples
         # A second more than asked for: stillness is known half a second late.
         target = guide.view().target_up
-        hand.go(np.array([0.3, 0.5, 0.8]) if target is None else target, guide.view().hold_s + 1.0)
+        hand.go(np.array([0.3, 0.5, 0.8]) if target is None else target, guide.view().pose_s + 1.0)
     return guide, views, state["recording"], state["truth"]
 
 
@@ -69,7 +69,7 @@ def test_a_hand_that_follows_the_guide_ends_with_the_wanted_accuracy(led):
     result, check = conclude(recording, guide.cut_s, gravity_m_s2=truth.gravity_m_s2)
     assert result.calibration.is_trustworthy
     # Held back: the pose of the cut and the three after it.
-    assert check.segments.n_holds == 4
+    assert check.segments.n_poses == 4
     assert check.verification.norm_rms < 3 * 2.5e-3
     scale = np.linalg.norm(truth.accelerometer_S, axis=0)
     assert np.allclose(np.linalg.norm(result.calibration.accelerometer.S, axis=0) / scale, 1.0, atol=3e-3)
@@ -79,7 +79,7 @@ def test_the_guide_waits_holds_moves_checks_and_ends_in_this_order(led):
     _, views, _, _ = led
     phases = [views[0].phase, *(b.phase for a, b in pairwise(views) if a.phase is not b.phase)]
     text = " ".join(phase.value for phase in phases)
-    assert re.fullmatch(r"begin move( hold move)+( hold)? check done", text), text
+    assert re.fullmatch(r"begin move( pose move)+( pose)? check done", text), text
     assert all(view.instruction for view in views)
     # Every pose rings once: poses of the calibration and of the check.
     assert views[-1].n_events == views[-1].n_poses + 3
@@ -110,8 +110,8 @@ def test_the_next_pose_brings_what_was_promised():
                 pairs = zip(before.uncertain, now.uncertain, strict=True)
                 ratios += [new.now / old.after_next for old, new in pairs if new.now and old.now]
             before = now
-            hand.go(now.next_up, now.hold_s)
-    # The pose is missed by degrees, the hold differs, and the moves are not the shortest: a third, in the middle.
+            hand.go(now.next_up, now.pose_s)
+    # The pose is missed by degrees, its length differs, and the moves are not the shortest: a third, in the middle.
     assert 0.75 < np.median(ratios) < 1.33
     assert np.quantile(ratios, 0.9) < 2.5
 

@@ -7,16 +7,16 @@ import numpy as np
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried
 from trihedron.records import SensorCalibration
-from trihedron.simulate import Accelerometer, Gyroscope, Hold, Motion, MoveTo, NoiseTerms, Scenario, Turn, simulate
+from trihedron.simulate import Accelerometer, Gyroscope, Motion, MoveTo, NoiseTerms, Pose, Scenario, Turn, simulate
 from true_segments import segments_from_truth
 
 FACES = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.6, -0.8))
 
 
 def measured_session(noise=1e-3):
-    steps = [Hold(3.0)]
+    steps = [Pose(3.0)]
     for k, face in enumerate(FACES * 2):
-        steps += [MoveTo(face, 1.5), Hold(2.0), Turn(face, 720.0 * (-1) ** k, 3.0, ramp=0.5), Hold(2.0)]
+        steps += [MoveTo(face, 1.5), Pose(2.0), Turn(face, 720.0 * (-1) ** k, 3.0, ramp=0.5), Pose(2.0)]
     accelerometer = Accelerometer(noise=NoiseTerms(N=(noise,) * 3))
     gyroscope = Gyroscope(
         S=((1.0, 0.2, 0.1), (0.0, 1.1, -0.1), (0.05, 0.0, 0.9)), noise=NoiseTerms(N=(0.1 * noise,) * 3)
@@ -37,7 +37,7 @@ def seen(recording, segments, measured, truth, covariance=None):
 
 def test_two_turns_about_the_vertical_with_stamps_that_stray_have_no_negative_variance():
     recording, segments, measured, truth = measured_session(1e-12)
-    # Stamps alone: an error along the axis turned about, which is the vertical, and none across it.
+    # Timestamps alone: an error along the axis turned about, which is the vertical, and none across it.
     zero = np.zeros_like(measured.zero)
     alone = replace(measured, sigma_time_s=1e-3, var_zero=zero, var_reading=zero, noise_density=np.zeros(3))
     one = np.linspace(-1.0, 1.0, 9)

@@ -1,4 +1,4 @@
-"""Facts of a channel, each found by one rule: the step of the converter, its noise, the limits it ends at."""
+"""Facts of a channel, each found by one rule: the LSB, its noise, the limits it ends at."""
 
 from dataclasses import replace
 

@@ -71,7 +71,7 @@ def test_blocks_of_a_stopped_run_are_those_of_one_run(path, tmp_path, monkeypatc
     monkeypatch.setattr(streaming.ChunkedLog, "chunks", counted)
     found, wanted = streaming.segment_file(opened(path), checkpoint=kept), streaming.segment_file(opened(path))
     assert read == [times * 700, 0]
-    assert found.holds == wanted.holds
+    assert found.poses == wanted.poses
     np.testing.assert_array_equal(found.accelerometer_mean, wanted.accelerometer_mean)
     np.testing.assert_array_equal(found.gyroscope_sigma_mean, wanted.gyroscope_sigma_mean)
     assert not kept.exists()

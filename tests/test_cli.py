@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from trihedron.cli import main
-from trihedron.simulate import Hold, Motion, MoveTo, hand_session, scenario_by_name, six_faces
+from trihedron.simulate import Motion, MoveTo, Pose, hand_session, scenario_by_name, six_faces
 from written_session import G, log_text, recording, refused_only, session, simulated
 
 __all__ = ["recording", "session"]
@@ -62,7 +62,7 @@ def test_apply_writes_si_readings_that_the_tool_reads_back_at_the_norm_of_gravit
 
 def test_verify_on_another_session_passes_and_a_limit_turns_the_status(session, tmp_path, capsys):
     other = tmp_path / "other.csv"
-    other.write_text(log_text(simulated(hand_session(n_poses=10, hold_s=3.0, move_s=1.5, layout=4), seed=9)))
+    other.write_text(log_text(simulated(hand_session(n_poses=10, pose_s=3.0, move_s=1.5, layout=4), seed=9)))
     assert main(["verify", str(session / "c.json"), str(other)]) == 0
     assert "tilt error after a rotation" in capsys.readouterr().out
     assert main(["verify", str(session / "c.json"), str(other), "--limit-mg", "0.001"]) == 2
@@ -183,10 +183,10 @@ def test_a_reader_that_leaves_early_is_no_error(session):
 
 
 def tilted_about_one_axis():
-    steps = [Hold(5.0)]
+    steps = [Pose(5.0)]
     for k in range(1, 14):
         angle = 2.0 * np.pi * k / 14
-        steps += [MoveTo((0.0, float(np.sin(angle)), float(np.cos(angle))), 1.5), Hold(3.0)]
+        steps += [MoveTo((0.0, float(np.sin(angle)), float(np.cos(angle))), 1.5), Pose(3.0)]
     return Motion(tuple(steps))
 
 
@@ -208,7 +208,7 @@ def test_six_faces_and_turns_are_calibrated_by_method_one(tmp_path, capsys):
 
     log = tmp_path / "log.csv"
     faces = ((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0))
-    log.write_text(log_text(simulated(table_turns((90.0, -90.0), hold_s=3.0, faces=faces))))
+    log.write_text(log_text(simulated(table_turns((90.0, -90.0), pose_s=3.0, faces=faces))))
     status = main(["calibrate", str(log), "--gravity", G, "--method", "faces", "--json"])
     document = json.loads(capsys.readouterr().out)
     assert document["frame"] == "case"

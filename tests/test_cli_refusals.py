@@ -10,7 +10,7 @@ import pytest
 
 from trihedron.cli import main
 from trihedron.records import Recording
-from trihedron.simulate import Hold, Motion, MoveTo
+from trihedron.simulate import Motion, MoveTo, Pose
 from written_session import G, log_text, recording, refused, refused_only, session, simulated
 
 __all__ = ["recording", "session"]
@@ -128,7 +128,7 @@ def test_gravity_said_twice_or_by_height_alone_is_refused(session, capsys):
 
 def test_too_few_poses_and_a_log_that_never_rests_are_refused_with_the_remedy(tmp_path, capsys):
     two = tmp_path / "two.csv"
-    two.write_text(log_text(simulated(Motion((Hold(5.0), MoveTo((1.0, 0.0, 0.0), 2.0), Hold(5.0))))))
+    two.write_text(log_text(simulated(Motion((Pose(5.0), MoveTo((1.0, 0.0, 0.0), 2.0), Pose(5.0))))))
     said = refused(capsys, "calibrate", two)
     assert "two.csv" in said
     assert "poses" in said

@@ -1,4 +1,4 @@
-"""Method 1 with converters whose step noise does not reach: a steady rate inside one step is misread all along."""
+"""Method 1 with ADCs whose step noise does not reach: a steady rate inside one step is misread all along."""
 
 import numpy as np
 import pytest
@@ -80,7 +80,7 @@ def test_an_axis_that_is_up_shows_one_rounding_error_at_every_heading():
     # One face, two headings of which the first comes back.
     values = np.array([[10.0, -3.0, 200.0], [-8.0, 5.0, 200.0], [10.0, -3.0, 200.0]])
     merged = placements(values, noise, np.array([3, 3, 3]), step2 / 12.0)
-    # Up: one reading in three holds. Level: two readings. The rest averages over the holds.
+    # Up: one reading in three poses. Level: two readings. The rest averages over the poses.
     assert merged.noise[0, 2, 2] == pytest.approx(1.0 / 12.0 + 1e-4 / 3.0, rel=0.1)
     assert merged.noise[0, 0, 0] > 1.0 / 24.0
 

@@ -9,7 +9,7 @@ from scipy.stats import binom
 
 import trihedron
 from trihedron.diagnose.against.fitted import model_of_calibration
-from trihedron.estimate.noise import noise_of_holds
+from trihedron.estimate.noise import noise_of_poses
 from trihedron.pipeline import improving
 from trihedron.pipeline.comparing_noise import Sampled
 from trihedron.pipeline.comparing_noise import sampled as sampled_of
@@ -25,7 +25,7 @@ EQUAL = N / (2.0 * RATE**0.5)
 
 def sampled(Q, seed):
     x = make_noise(NoiseTerms(N=(N,) * 3, Q=Q), 30 * 500, 1.0 / RATE, seed, "quantisation")
-    axes = tuple(noise_of_holds(x, RATE, [(k * 500, k * 500 + 450) for k in range(30)]))
+    axes = tuple(noise_of_poses(x, RATE, [(k * 500, k * 500 + 450) for k in range(30)]))
     return Sampled({"gyroscope": axes}, {}, {}, {}, RATE, 0.0)
 
 
@@ -63,9 +63,9 @@ def test_an_improved_scenario_takes_white_and_quantisation_noise_from_one_fit():
     white = float(gyro.noise.N[0])
     Q = 2.0 * white / (2.0 * RATE**0.5)
     loud = replace(gyro, noise=replace(gyro.noise, Q=(Q, 0.0, 0.0)))
-    recording, _ = simulate(Scenario(hand_session(16, hold_s=3.0, layout=3), "unit", accel, loud, profile.clock), 1)
+    recording, _ = simulate(Scenario(hand_session(16, pose_s=3.0, layout=3), "unit", accel, loud, profile.clock), 1)
     own = trihedron.calibrate(recording, gravity_m_s2=9.80665)
     fit = model_of_calibration(own.calibration)
-    both = improving.white_and_quantisation_of(sampled_of(recording, own.segments.holds, fit), "gyroscope")
+    both = improving.white_and_quantisation_of(sampled_of(recording, own.segments.poses, fit), "gyroscope")
     assert both["Q"] == pytest.approx([Q, 0.0, 0.0], rel=0.15)
     assert both["N"] == pytest.approx([white] * 3, rel=0.1)

@@ -37,7 +37,7 @@ def test_the_gyro_scale_is_the_same_however_slowly_the_sensor_is_turned(move_s, 
     f, w, rate, truth, motion = hand(21, n_poses=12, move_s=move_s)
     result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
     z, relative = gyro_z(result, lower(truth))
-    assert result.segments.n_holds == len(motion.rests)
+    assert result.segments.n_poses == len(motion.rests)
     # Nine numbers, each within four standard errors; the rate noise over a minute is 0.04° in 90°.
     assert np.abs(z).max() < 4.0
     assert relative < part
@@ -45,11 +45,11 @@ def test_the_gyro_scale_is_the_same_however_slowly_the_sensor_is_turned(move_s, 
 
 @pytest.mark.parametrize("rate_deg_s", [2.0, 10.0])
 def test_slow_turns_of_a_table_that_leans_are_no_part_of_the_holds(rate_deg_s):
-    f, w, rate, truth, motion = table(5, turns=(180.0,), rate_deg_s=rate_deg_s, hold_s=5.0)
+    f, w, rate, truth, motion = table(5, turns=(180.0,), rate_deg_s=rate_deg_s, pose_s=5.0)
     result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
-    assert result.segments.n_holds == len(motion.rests)
+    assert result.segments.n_poses == len(motion.rests)
     error = np.degrees(result.gyroscope.b - lower(truth).b_w)
-    # The zero of a 16-bit gyro with 20°/h of noise: hundredths of a degree per second; turns in holds gave 0.1 to 8.
+    # The zero of a 16-bit gyro with 20°/h of noise: hundredths of a degree per second; turns in poses gave 0.1 to 8.
     assert np.abs(error).max() < 0.02
 
 
@@ -94,7 +94,7 @@ def test_the_manuals_session_by_stated_turns_about_any_axis_lies_inside_its_bars
 def test_the_zero_of_a_coarse_gyro_is_not_drawn_to_its_code():
     place, miss = [], []
     for seed in range(900, 906):
-        f, w, rate, truth, _ = hand(seed, n_poses=12, hold_s=2.5, gyro_bits=10)
+        f, w, rate, truth, _ = hand(seed, n_poses=12, pose_s=2.5, gyro_bits=10)
         result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
         zero = -np.linalg.solve(truth.S_w, truth.b_w)
         place.append(zero - np.round(zero))
@@ -120,8 +120,8 @@ def test_a_coarse_gyro_has_the_error_bars_of_its_rounding(bits):
         z.append(scores)
         of_zero.append((result.gyroscope.b - lower(truth).b_w) / result.gyroscope.sigma_b)
     assert len(z) >= 2
-    # Mean square of 6 to 9 scores, between limits that chance passes once in a hundred: 0.04 when the part of the zero
-    # that its step hides was counted as the holds' and as the moves'.
+    # Mean square of 6 to 9 scores, between limits that chance passes once in a hundred: 0.04 when the part of the bias
+    # that its step hides was counted as the poses' and as the moves'.
     assert 0.15 < np.mean(np.square(of_zero)) < 2.8
     # At most 27 scores: none beyond four, nor larger together than chance allows once in a thousand.
     assert np.abs(z).max() < 4.0

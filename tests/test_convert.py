@@ -1,4 +1,4 @@
-"""Converted logs hold the numbers of the log, and say what was left out on the way."""
+"""Converted logs hold the numbers of the log, and say what was excluded on the way."""
 
 import numpy as np
 import pytest

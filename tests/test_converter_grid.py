@@ -1,4 +1,4 @@
-"""The grid of a converter's values against its NumPy twin."""
+"""The grid of an ADC's values against its NumPy twin."""
 
 import numpy as np
 import pytest

@@ -93,7 +93,7 @@ def unit():
 
 
 def log(profile, accel, gyro, layout, seed, effect=None, **size):
-    scenario = Scenario(hand_session(22, hold_s=4.0, layout=layout), "pair", accel, gyro, profile.clock)
+    scenario = Scenario(hand_session(22, pose_s=4.0, layout=layout), "pair", accel, gyro, profile.clock)
     return simulate(scenario if effect is None else with_effect(scenario, effect, **size), seed)[0]
 
 
@@ -105,7 +105,7 @@ def test_a_zero_that_moved_since_the_calibration_is_a_number_and_no_drift(unit):
     assert found.verdict == "parameters-differ"
     assert {p.id for p in found.parameters if p.significant} == {"gyro-bias"}
     z = next(p for p in found.parameters if p.id == "gyro-bias" and p.name == "z")
-    # One fixed pair: 4 sigma of its own error bar, which must be below 0.02 °/s to be of use.
+    # One fixed pair: 4 sigma of its own uncertainty, which must be below 0.02 °/s to be of use.
     assert abs(z.difference - np.radians(0.31)) < 4.0 * z.std
     assert z.std < np.radians(0.02)
     assert "gyro Z bias" in str(found)

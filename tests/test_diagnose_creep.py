@@ -1,4 +1,4 @@
-"""Rates at rest that are motion: supports that give are no zeros that scatter."""
+"""Rates at rest that are motion: supports that give are no biases that scatter."""
 
 from functools import cache
 
@@ -22,13 +22,13 @@ from trihedron.simulate.profiles import profile_by_name
 
 @cache
 def session(seed, lean_rad, scatter_rad_s):
-    """Poses that lean by ``lean_rad`` within seconds of being set down, gyro zeros drawn anew in each."""
+    """Poses that lean by ``lean_rad`` within seconds of being set down, gyro biases drawn anew in each."""
     recording, truth = simulate(_of(profile_by_name("tactical"), hand_session(24, layout=seed), "session", seed), seed)
     rng = np.random.default_rng(seed)
     force, rate = recording.accelerometer.copy(), recording.gyroscope.copy()
     to_raw = np.linalg.inv(np.asarray(truth.accelerometer_S)), np.linalg.inv(np.asarray(truth.gyroscope_S))
     for part in truth.segments:
-        if part.kind != "hold":
+        if part.kind != "pose":
             continue
         here = slice(part.start, part.stop)
         since = recording.time_s[here] - recording.time_s[part.start]

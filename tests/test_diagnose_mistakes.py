@@ -11,7 +11,7 @@ from trihedron.diagnose.against import FittedModel, compare_numbers
 from trihedron.estimate.gyroscope.world_rates import carried_gravity
 from trihedron.estimate.noise.of_zeros import PoseZeros, compare_slow
 from trihedron.pipeline.comparing_frames import sign_of_gravity
-from trihedron.records import Hold
+from trihedron.records import Pose
 from trihedron.records.sampling import Sampling, StampKind
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
@@ -54,7 +54,7 @@ def test_a_unit_that_the_log_states_and_keeps_is_no_mistake():
 
 def session_with_world_rates(seed):
     """A simulated log and the same with its rates turned into the world."""
-    scenario = replace(scenario_by_name("hand-session"), motion=hand_session(10, hold_s=2.0, layout=4))
+    scenario = replace(scenario_by_name("hand-session"), motion=hand_session(10, pose_s=2.0, layout=4))
     recording = simulate(scenario, seed)[0]
     recording = replace(recording, gyroscope=np.radians(recording.gyroscope / 131.0), gyroscope_unit="rad/s")
     segments = trihedron.segment(recording)
@@ -75,7 +75,7 @@ def test_rates_of_the_world_are_told_from_rates_of_the_body():
     other = trihedron.segment(world)
     seen = carried_gravity(world, other)
     assert seen.is_of_world
-    # Ten moves by a part with scales and zeros of a data sheet.
+    # Ten moves by a part with scales and biases of a data sheet.
     assert seen.world_rad < np.radians(5.0)
     assert carried_gravity(replace(world, gyroscope_unit="counts"), other) is None
 
@@ -86,7 +86,7 @@ def test_gravity_of_the_other_sign_is_said_pose_by_pose_and_only_of_one_protocol
     turned = replace(segments, accelerometer_mean=-segments.accelerometer_mean + 2.0 * known_centre(known))
     assert "opposite sign" in sign_of_gravity((turned, known), (segments, known)).remark
     assert sign_of_gravity((segments, known), (segments, known)) is None
-    other = simulate(replace(scenario_by_name("hand-session"), motion=hand_session(10, hold_s=2.0, layout=9)), 5)[0]
+    other = simulate(replace(scenario_by_name("hand-session"), motion=hand_session(10, pose_s=2.0, layout=9)), 5)[0]
     assert sign_of_gravity((trihedron.segment(other), known), (segments, known)) is None
 
 
@@ -158,10 +158,10 @@ def test_stamps_that_reading_made_even_still_count_as_scattered():
                     temperature_degc=None, supply_v=None, rate_hz=100.0)  # fmt: skip
     late = replace(clean, sampling=Sampling(StampKind.LATE, 0.01, 0.0, 1.5e-3, is_even=True))
     rounded = replace(clean, sampling=Sampling(StampKind.ROUNDED, 0.01, 0.0, 1.5e-3, is_even=True))
-    holds = tuple(Hold(k, 500 * k, 500 * k + 450, 500 * k, 500 * k + 450) for k in range(8))
-    given, fit = sampled(clean, holds, model(1.0, 1.0)), model(1.0, 1.0)
+    poses = tuple(Pose(k, 500 * k, 500 * k + 450, 500 * k, 500 * k + 450) for k in range(8))
+    given, fit = sampled(clean, poses, model(1.0, 1.0)), model(1.0, 1.0)
     for log, expected in ((late, {"jitter"}), (rounded, set()), (clean, set())):
-        rows = compare_noise(given, sampled(log, holds, fit), alpha=0.01)
+        rows = compare_noise(given, sampled(log, poses, fit), alpha=0.01)
         assert {n.term for n in rows if n.significant} == expected
-    jitter = next(n for n in compare_noise(given, sampled(late, holds, fit), alpha=0.01) if n.term == "jitter")
+    jitter = next(n for n in compare_noise(given, sampled(late, poses, fit), alpha=0.01) if n.term == "jitter")
     assert "1.5 ms" in jitter.remark

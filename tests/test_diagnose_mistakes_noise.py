@@ -9,11 +9,11 @@ from scipy.signal import lfilter
 from trihedron.diagnose.against import FittedModel, compare_numbers
 from trihedron.pipeline.comparing_correlation import correlation_times
 from trihedron.pipeline.comparing_noise import compare_noise, sampled
-from trihedron.records import Hold, Recording
+from trihedron.records import Pose, Recording
 from trihedron.records.channel_facts import LowPass
 
-RATE_HZ, HOLD, EVERY, N_HOLDS = 100.0, 900, 1000, 12
-HOLDS = tuple(Hold(k, EVERY * k, EVERY * k + HOLD, EVERY * k, EVERY * k + HOLD) for k in range(N_HOLDS))
+RATE_HZ, POSE, EVERY, N_HOLDS = 100.0, 900, 1000, 12
+HOLDS = tuple(Pose(k, EVERY * k, EVERY * k + POSE, EVERY * k, EVERY * k + POSE) for k in range(N_HOLDS))
 STEP = 1e-4
 SENSORS = {"accelerometer": 1e-2, "gyroscope": 1e-3}
 """Noise of a reading, SI."""
@@ -50,7 +50,7 @@ def log(seed, *, axes=(1.0, 1.1, 1.25), uniform=False, size=1.0, step=STEP, tau_
 def _without_corners():
     """Corners of filters cost nine tenths of a spectrum's time; tests/test_noise_holds.py has them."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("trihedron.estimate.noise.holds.low_passes", lambda s, _: [LowPass(None, RATE_HZ)] * len(s))
+        patch.setattr("trihedron.estimate.noise.poses.low_passes", lambda s, _: [LowPass(None, RATE_HZ)] * len(s))
         patch.setattr("trihedron.channel_facts.at_rest.undisturbed", lambda spectrum, _: spectrum)
         yield
 
@@ -144,7 +144,7 @@ def test_a_bias_that_was_drawn_and_never_added_is_named_and_a_drawn_one_is_not()
     assert "was the drawn bias never applied?" in next(p.remark for p in rows if p.id == "gyro-bias")
     other = numbers((-0.02, 0.06, 0.01), (0.02, 0.01, -0.01))
     assert not any(p.remark for p in compare_numbers(other, real, alpha=0.01).parameters)
-    # A recording whose zeros are as good as none refutes nothing.
+    # A recording whose biases are as good as none refutes nothing.
     assert not any(p.remark for p in compare_numbers(numbers(), numbers(), alpha=0.01).parameters)
 
 

@@ -28,8 +28,8 @@ def scattered(recording, sigma, seed):
     """Zeros of the gyro that are others in every pose, by ``sigma`` of its raw unit."""
     rng = np.random.default_rng(seed)
     gyro = np.array(recording.gyroscope)
-    holds = trihedron.segment(recording).holds
-    edges = [0, *[(a.stop + b.start) // 2 for a, b in pairwise(holds)], len(gyro)]
+    poses = trihedron.segment(recording).poses
+    edges = [0, *[(a.stop + b.start) // 2 for a, b in pairwise(poses)], len(gyro)]
     for first, last in pairwise(edges):
         gyro[first:last] += sigma * rng.standard_normal(3)
     return replace(recording, gyroscope=gyro)
@@ -39,9 +39,9 @@ def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(7)
     gyro = replace(gyro, S=tuple(tuple(2.0 * v for v in row) for row in gyro.S))
-    motion = hand_session(26, hold_s=4.0, layout=5)
+    motion = hand_session(26, pose_s=4.0, layout=5)
     plain = Scenario(motion, "unit", accel, gyro, profile.clock)
-    # Half of what the zeros do is the scatter: without it in the noise, a drift does not remove half of their misfit.
+    # Half of what the biases do is the scatter: without it in the noise, a drift does not remove half of their misfit.
     size = np.radians(0.1)
     flawed = with_effect(plain, "gyro-bias-drift", amplitude=(size, -size, size), tau_s=80.0)
     recording = scattered(simulate(flawed, 11)[0], 0.03 * 65.5, 3)
@@ -66,9 +66,9 @@ def test_few_poses_of_another_unit_are_numbers_beside_an_ideal_simulation_and_no
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(31)
     # Six poses of one half: what is open stays open, and the simulation's numbers are no knowledge of this unit's.
-    few = Scenario(hand_session(9, hold_s=4.0, layout=11), "few", accel, gyro, profile.clock)
+    few = Scenario(hand_session(9, pose_s=4.0, layout=11), "few", accel, gyro, profile.clock)
     recording, _ = simulate(few, 3)
-    plain = Scenario(hand_session(9, hold_s=4.0, layout=12), "data sheet", profile.accelerometer, profile.gyroscope)
+    plain = Scenario(hand_session(9, pose_s=4.0, layout=12), "data sheet", profile.accelerometer, profile.gyroscope)
     found = trihedron.diagnose(recording, against=simulate(plain, 4)[0], gravity_m_s2=9.80665)
     assert not [one.id for one in found.effects]
     assert found.parameters

@@ -65,14 +65,14 @@ def test_two_runs_of_one_unit_give_one_g_sensitivity_and_scatter_under_restless_
 
 def test_stamps_on_a_coarse_grid_are_not_when_the_samples_were_taken(real_data: Path) -> None:
     recording = read_recording(real_data / "kim/kim_imu_good1.txt")
-    # Reading has taken the even clock behind them already; here the stamps are put back as they were logged.
+    # Reading has taken the even clock behind them already; here the timestamps are put back as they were logged.
     assert FindingCode.EVEN_CLOCK in {finding.code for finding in recording.findings}
     logged = np.loadtxt(real_data / "kim/kim_imu_good1.txt", usecols=0)
     recording = replace(recording, time_s=logged - logged[0])
     observed = observe(recording, resegment(recording, segment_recording(recording)))
     found = stamp_errors(observed)
     assert found is not None
-    # Stamps on a grid of 5.12 ms scatter by its twelfth root, 1.48 ms; the readings do not follow them at all.
+    # Timestamps on a grid of 5.12 ms scatter by its twelfth root, 1.48 ms; the readings do not follow them at all.
     assert found.rms_s == pytest.approx(5.12e-3 / np.sqrt(12.0), rel=0.05)
     assert abs(found.followed) < 0.1
     assert stamp_errors(replace(observed, time_s=found.even_s)) is None
@@ -84,14 +84,14 @@ def test_motion_above_half_the_rate_is_counted_and_smooth_motion_is_not() -> Non
     t = np.arange(n) * step
     smooth = 5.0 * np.sin(2 * np.pi * 0.7 * t)[:, None] * np.ones(3)
     noise = 0.05 * rng.standard_normal((n, 3))
-    moves, holds = ((500, 900), (1500, 1900)), [(2000, 2400), (2500, 2900), (3000, 3400)]
+    moves, poses = ((500, 900), (1500, 1900)), [(2000, 2400), (2500, 2900), (3000, 3400)]
     noise[2000:] -= smooth[2000:]
-    quiet = unresolved_variance(smooth + noise, moves, holds, step, np.zeros(3))
+    quiet = unresolved_variance(smooth + noise, moves, poses, step, np.zeros(3))
     white = 0.05**2 * 400 * step**2
     assert (quiet < 0.2 * white).all()
     struck = smooth + noise
     struck[700] += (8.0, -4.0, 2.0)  # one sample of a jolt
-    found = unresolved_variance(struck, moves, holds, step, np.zeros(3))
+    found = unresolved_variance(struck, moves, poses, step, np.zeros(3))
     # Its area times the share that a flat spectrum has at the sampling frequency: all of it.
     assert np.sqrt(found[0]) == pytest.approx(np.array([8.0, 4.0, 2.0]) * step, rel=0.2)
     assert (found[1] < 0.2 * white).all()
@@ -108,8 +108,8 @@ def test_a_rate_that_steps_between_samples_is_charged_with_what_its_integral_mis
     missed = rate.reshape(moves, n, 3).sum(axis=1) * step - jumps * (n * step - at)[:, None]
     missed += 0.5 * jumps * step  # the first sample after the jump comes half a step late in the mean
     ranges = tuple((k * n + 50, k * n + 150) for k in range(moves))
-    holds = [(k * n + 5, k * n + 45) for k in range(moves)]
-    charged = unresolved_variance(rate, ranges, holds, step, np.zeros(3))
+    poses = [(k * n + 5, k * n + 45) for k in range(moves)]
+    charged = unresolved_variance(rate, ranges, poses, step, np.zeros(3))
     # 900 squares of a jump times a phase have a mean certain to 7 %: two of those, and a tenth for the width of the
     # band, over which a step's power is above that at its middle.
     assert np.mean(missed**2) == pytest.approx(np.mean(charged), rel=0.25)

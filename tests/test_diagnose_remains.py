@@ -10,7 +10,7 @@ import trihedron
 from trihedron.diagnose import verdict
 from trihedron.diagnose.effects.table_tilt import _error_of_mean
 from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
-from trihedron.records import Hold
+from trihedron.records import Pose
 from trihedron.records.domains import DomainTest
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
 
@@ -24,8 +24,8 @@ class Poses:
         self.raw_force, self.raw_rate = force, rate
         self.force_density = np.full(3, 0.1)
         self.rate_density = np.full(3, 0.1)
-        holds = tuple(Hold(k, 500 * k, 500 * (k + 1), 500 * k, 500 * (k + 1)) for k in range(30))
-        self.segments = SimpleNamespace(holds=holds)
+        poses = tuple(Pose(k, 500 * k, 500 * (k + 1), 500 * k, 500 * (k + 1)) for k in range(30))
+        self.segments = SimpleNamespace(poses=poses)
         self.recording = SimpleNamespace(rate_hz=RATE_HZ)
 
 
@@ -52,7 +52,7 @@ def test_a_zero_that_jumps_in_a_few_poses_is_found_and_a_pose_that_turns_is_not(
         force[500 * k + 250 : 500 * k + 500, 0] += 0.0
     found = jumps_in_poses(Poses(force, rate))
     assert found.p_value[1] < JUMPS
-    assert set(found.holds[1]) <= {3, 9, 14, 22, 27}
+    assert set(found.poses[1]) <= {3, 9, 14, 22, 27}
     moved = force.copy()
     for k in (3, 9, 14, 22, 27):
         moved[500 * k + 250 : 500 * k + 500, 0] += 1.0
@@ -84,19 +84,19 @@ def test_restless_poses_hide_neither_a_scatter_nor_the_g_sensitivity_beside_it()
     rng = np.random.default_rng(77)
     profile = profile_by_name("mpu")
     accelerometer, gyroscope = profile.unit(7)
-    motion = hand_session(22, hold_s=4.0, move_s=2.0, first_hold_s=8.0, layout=7)
+    motion = hand_session(22, pose_s=4.0, move_s=2.0, first_pose_s=8.0, layout=7)
     recording, truth = simulate(Scenario(motion, "session", accelerometer, gyroscope, profile.clock), 7)
-    holds = trihedron.segment(recording).holds
+    poses = trihedron.segment(recording).poses
     scale = np.radians(1.0) / np.diag(np.asarray(gyroscope.S))  # one degree a second, in counts
     gyro = recording.gyroscope.copy()
     force = recording.accelerometer[:, 0] * accelerometer.S[0][0]
     gyro[:, 0] += 0.004 * force * scale[0]
-    starts = [h.start for h in holds] + [len(gyro)]
+    starts = [h.start for h in poses] + [len(gyro)]
     for k, (a, b) in enumerate(itertools.pairwise(starts)):
         gyro[a:b, 2] += rng.normal(0.0, 0.06) * scale[2]
         if k in (4, 11, 17):
-            sway = np.sin(2.0 * np.pi * 0.7 * np.arange(holds[k].stop - a) / recording.rate_hz)
-            gyro[a : holds[k].stop, 1] += 1.0 * sway * scale[1]
+            sway = np.sin(2.0 * np.pi * 0.7 * np.arange(poses[k].stop - a) / recording.rate_hz)
+            gyro[a : poses[k].stop, 1] += 1.0 * sway * scale[1]
     found = trihedron.diagnose(replace(recording, gyroscope=gyro), gravity_m_s2=truth.gravity_m_s2)
     assert {"gyro-bias-repeatability", "gyro-g-sensitivity"} <= {one.id for one in found.effects}
     G = next(one for one in found.effects if one.id == "gyro-g-sensitivity")

@@ -23,7 +23,7 @@ def recording(t, accelerometer, gyroscope, **more):
 
 
 def chamber(seed, hysteresis=0.0):
-    """Up from -10 to 60 °C and back, at 4 Hz in 80 min: the gyro's zero follows, lagging if there is hysteresis."""
+    """Up from -10 to 60 °C and back, at 4 Hz in 80 min: the gyro's bias follows, lagging if there is hysteresis."""
     n, rate_hz = 19200, 4.0
     t, accelerometer, gyroscope = still(n, rate_hz, seed)
     u = t / t[-1]

@@ -13,7 +13,7 @@ STEP = 0.002
 
 
 def peaks(rng, limit, n=6000):
-    """(n, 3) readings whose channels reach their own heights, on a converter's steps, stopped at ``limit``."""
+    """(n, 3) readings whose channels reach their own heights, on an LSB, stopped at ``limit``."""
     t = np.arange(n) / 100.0
     x = np.stack(
         [height * np.sin(2.0 * np.pi * f * t) for height, f in ((3.0, 0.31), (2.6, 0.43), (2.2, 0.37))], axis=1
@@ -35,22 +35,22 @@ def test_a_range_that_stops_a_few_readings_is_seen_and_one_that_stops_none_is_no
     assert all(abs(abs(one.value) - limit) < 1e-9 for one in limits)
 
 
-def small_session(seed=3, hold_s=3.0):
+def small_session(seed=3, pose_s=3.0):
     profile = profile_by_name("adis")
     accelerometer, gyroscope = profile.unit(seed)
-    motion = hand_session(14, hold_s=hold_s, move_s=1.5, first_hold_s=5.0, layout=seed)
+    motion = hand_session(14, pose_s=pose_s, move_s=1.5, first_pose_s=5.0, layout=seed)
     return simulate(Scenario(motion, "session", accelerometer, gyroscope, profile.clock), seed)
 
 
 def test_a_short_pose_on_a_machine_that_shakes_is_a_pose():
-    recording, truth = small_session(hold_s=1.4)
-    part = [p for p in truth.segments if p.kind == "hold"][6]
+    recording, truth = small_session(pose_s=1.4)
+    part = [p for p in truth.segments if p.kind == "pose"][6]
     t = recording.time_s[part.start : part.stop] - recording.time_s[part.start]
     force = recording.accelerometer.copy()
     unit = np.linalg.norm(np.asarray(truth.accelerometer_S), axis=0).mean()
     shaking = np.sin(2.0 * np.pi * 0.23 * recording.rate_hz * t)[:, None] * np.array([0.8, -0.5, 0.6]) / unit
     force[part.start : part.stop] += shaking
     shaken = replace(recording, accelerometer=force)
-    holds = resegment(shaken, segment_recording(shaken)).holds
+    poses = resegment(shaken, segment_recording(shaken)).poses
     middle = 0.5 * (part.start + part.stop)
-    assert any(hold.start < middle < hold.stop for hold in holds)
+    assert any(pose.start < middle < pose.stop for pose in poses)

@@ -19,14 +19,14 @@ from trihedron.simulate import (
 WARMING = Environment(temperature=Temperature(warm_up_k=12.0, warm_up_tau_s=120.0, logged=True))
 
 
-def session(grade="mpu", seed=1, n_poses=20, hold_s=3.5, move_s=2.0):
+def session(grade="mpu", seed=1, n_poses=20, pose_s=3.5, move_s=2.0):
     profile = profile_by_name(grade)
     accelerometer, gyroscope = profile.unit(seed)
     if grade == "mpu":
         # The ±500 °/s range: no move runs into its end by accident.
         wide = tuple(tuple(2.0 * v for v in row) for row in gyroscope.S)
         gyroscope = replace(gyroscope, S=wide)
-    motion = hand_session(n_poses, hold_s=hold_s, move_s=move_s, first_hold_s=10.0, layout=seed)
+    motion = hand_session(n_poses, pose_s=pose_s, move_s=move_s, first_pose_s=10.0, layout=seed)
     return Scenario(motion, "session", accelerometer, gyroscope, profile.clock)
 
 
@@ -119,7 +119,7 @@ def test_what_nothing_can_tell_apart_is_named_together(name):
     ],
 )
 def test_play_and_creep_are_told_apart(variant, size):
-    scenario = with_effect(session(hold_s=6.0), "accel-hysteresis", **size)
+    scenario = with_effect(session(pose_s=6.0), "accel-hysteresis", **size)
     first = diagnosed(scenario).effects[0]
     assert first.id == "accel-hysteresis"
     assert first.model["variant"] == variant
@@ -138,10 +138,10 @@ def test_a_wrong_scale_is_not_lost_samples():
 def test_one_bad_pose_is_one_bad_pose():
     scenario = session()
     recording, truth = simulate(scenario, 1)
-    hold = [s for s in truth.segments if s.kind == "hold"][9]
+    pose = [s for s in truth.segments if s.kind == "pose"][9]
     # A steady push in one pose, eight times the noise of its mean, seen by no gyro.
     push = np.zeros_like(recording.accelerometer)
-    push[hold.start : hold.stop] = np.linalg.solve(truth.accelerometer_S, (0.03, -0.05, 0.04))
+    push[pose.start : pose.stop] = np.linalg.solve(truth.accelerometer_S, (0.03, -0.05, 0.04))
     found = trihedron.diagnose(
         replace(recording, accelerometer=recording.accelerometer + np.round(push)), gravity_m_s2=truth.gravity_m_s2
     )

@@ -75,10 +75,10 @@ def test_soft_supports_and_brisk_moves_are_not_vibration(flaw, seed, expected, t
 def test_still_readings_on_two_codes_show_their_grid_and_the_noise_before_it():
     rng = np.random.default_rng(3)
     step, noise, zero = 0.02, 0.2, 0.31
-    holds = [step * np.round(zero + noise * rng.normal(size=400)) for _ in range(20)]
-    assert len(np.unique(np.concatenate(holds))) == 2
-    assert missing_codes(holds, float(np.concatenate(holds).std()), step) == 0
-    sigma, _, _ = before_converter(holds, step)
+    poses = [step * np.round(zero + noise * rng.normal(size=400)) for _ in range(20)]
+    assert len(np.unique(np.concatenate(poses))) == 2
+    assert missing_codes(poses, float(np.concatenate(poses).std()), step) == 0
+    sigma, _, _ = before_converter(poses, step)
     assert sigma == pytest.approx(noise, rel=0.15)  # one level of its grid is 12 %
 
 

@@ -1,4 +1,4 @@
-"""Samples that share a stamp: no stage ends in an error of its own for them."""
+"""Samples that share a timestamp: no stage ends in an error of its own for them."""
 
 import warnings
 from dataclasses import replace

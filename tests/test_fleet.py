@@ -20,7 +20,7 @@ from trihedron.report.fleet import fleet_report
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory):
-    """Two devices of two sessions, the second device's gyro zero 0.02 rad/s away in its second, and what is no log."""
+    """Two devices of two sessions, the second device's gyro bias 0.02 rad/s away in its second, and what is no log."""
     folder = tmp_path_factory.mktemp("fleet")
     for unit in range(2):
         for session in range(2):

@@ -10,7 +10,7 @@ RATE_HZ = 100.0
 
 
 def turns(rng, n_moves=18, peak=12000.0, tremor=120.0, noise=3.0):
-    """Counts (n, 3) of bumps with a tremor upon them between rests, as a 16-bit converter gives them."""
+    """Counts (n, 3) of bumps with a tremor upon them between rests, as a 16-bit ADC gives them."""
     t = np.arange(0.0, 2.0, 1.0 / RATE_HZ)
     parts = []
     for _ in range(n_moves):
@@ -73,25 +73,25 @@ def test_a_pair_at_the_end_of_the_codes_is_a_limit_and_elsewhere_is_none():
     assert bridged(elsewhere) == 0
 
 
-def on_a_table(rng, n_turns, hold_s, ramp_s, quantum):
+def on_a_table(rng, n_turns, pose_s, ramp_s, quantum):
     """Steady turns at a few rates [deg/s], the table's axis not quite the gyro's z; noise far below a code."""
     parts = [np.zeros(200)]
     for _ in range(n_turns):
         ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(round(ramp_s * RATE_HZ)) + 0.5) / round(ramp_s * RATE_HZ))
-        hold = np.ones(round(hold_s * RATE_HZ * rng.uniform(0.7, 1.4)))
-        parts += [rng.uniform(20, 120) * rng.choice([-1, 1]) * np.concatenate([ramp, hold, ramp[::-1]]), np.zeros(200)]
+        pose = np.ones(round(pose_s * RATE_HZ * rng.uniform(0.7, 1.4)))
+        parts += [rng.uniform(20, 120) * rng.choice([-1, 1]) * np.concatenate([ramp, pose, ramp[::-1]]), np.zeros(200)]
     rate = np.outer(np.concatenate(parts), [0.05, -0.1, 1.0]) + rng.uniform(-2.0, 2.0, 3)
     return np.round((rate + 0.02 * rng.normal(size=rate.shape)) / quantum) * quantum
 
 
-@pytest.mark.parametrize("hold_s", [0.5, 3.0])
+@pytest.mark.parametrize("pose_s", [0.5, 3.0])
 @pytest.mark.parametrize("ramp_s", [0.05, 0.3])
-def test_a_steady_turn_of_a_table_under_a_coarse_converter_is_not_at_a_limit(hold_s, ramp_s):
+def test_a_steady_turn_of_a_table_under_a_coarse_converter_is_not_at_a_limit(pose_s, ramp_s):
     # Of these, 9 to 20 in 20 were taken for a limit while only the axis itself was looked at.
     for seed in range(20):
         rng = np.random.default_rng([6, seed])
         quantum = rng.choice([0.5, 1.0, 4.0])
-        codes = on_a_table(rng, rng.integers(1, 7), hold_s, ramp_s, quantum)
+        codes = on_a_table(rng, rng.integers(1, 7), pose_s, ramp_s, quantum)
         found = bridge_clipping(Recording(np.arange(len(codes)) / RATE_HZ, None, codes, RATE_HZ))
         assert found is None, seed
 

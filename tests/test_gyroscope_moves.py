@@ -9,7 +9,7 @@ from trihedron.estimate.gyroscope import MoveOptions, calibrate_moves
 from trihedron.records import FindingCode, SensorCalibration
 from trihedron.segment import segment_recording
 from trihedron.simulate import Accelerometer, Gyroscope, Motion, MoveTo, NoiseTerms, Scenario, hand_session, simulate
-from trihedron.simulate import Hold as SimulatedHold
+from trihedron.simulate import Pose as SimulatedPose
 from true_segments import segments_from_truth
 
 SCALE = ((1.02, 0.01, -0.015), (0.005, 0.98, 0.02), (-0.01, 0.008, 1.01))
@@ -46,7 +46,7 @@ def codes(findings):
 
 @pytest.fixture(scope="module")
 def quiet():
-    recording, truth = simulate(scenario(hand_session(18, hold_s=3.0, first_hold_s=5.0)), seed=1)
+    recording, truth = simulate(scenario(hand_session(18, pose_s=3.0, first_pose_s=5.0)), seed=1)
     return recording, truth, segments_from_truth(recording, truth)
 
 
@@ -63,7 +63,7 @@ def test_the_scale_is_recovered_inside_its_error_bars(quiet):
 def test_error_bars_of_the_scale_and_zero_cover_the_truth_at_their_stated_rate():
     scores = []
     for seed in range(25):
-        recording, truth = simulate(scenario(hand_session(12, hold_s=2.0, first_hold_s=3.0)), seed)
+        recording, truth = simulate(scenario(hand_session(12, pose_s=2.0, first_pose_s=3.0)), seed)
         segments = segments_from_truth(recording, truth)
         options = MoveOptions(n_folds=0)
         found, _ = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2, options)
@@ -76,7 +76,7 @@ def test_error_bars_of_the_scale_and_zero_cover_the_truth_at_their_stated_rate()
 
 
 def test_error_bars_contain_those_of_the_accelerometer():
-    motion = hand_session(14, hold_s=2.0, first_hold_s=3.0)
+    motion = hand_session(14, pose_s=2.0, first_pose_s=3.0)
     recording, truth = simulate(scenario(motion), seed=3)
     segments = segments_from_truth(recording, truth)
     covariance = np.zeros((12, 12))
@@ -93,7 +93,7 @@ def test_error_bars_contain_those_of_the_accelerometer():
 
 def test_a_wrong_accelerometer_inside_its_error_bars_leaves_the_gyro_inside_its_own():
     rng = np.random.default_rng(7)
-    recording, truth = simulate(scenario(hand_session(14, hold_s=2.0, first_hold_s=3.0)), seed=4)
+    recording, truth = simulate(scenario(hand_session(14, pose_s=2.0, first_pose_s=3.0)), seed=4)
     segments = segments_from_truth(recording, truth)
     sigma = np.array([1e-3] * 9 + [5e-3] * 3)
     distance = []
@@ -117,7 +117,7 @@ def test_a_wrong_accelerometer_inside_its_error_bars_leaves_the_gyro_inside_its_
 @pytest.mark.parametrize("sign", [(1, 1, -1), (-1, -1, -1)])
 def test_a_left_handed_gyro_is_recovered_and_reported(sign):
     S = np.array(SCALE) @ np.diag(sign)
-    recording, truth = simulate(scenario(hand_session(14, hold_s=2.0), S=tuple(map(tuple, S))), seed=2)
+    recording, truth = simulate(scenario(hand_session(14, pose_s=2.0), S=tuple(map(tuple, S))), seed=2)
     segments = segments_from_truth(recording, truth)
     found, findings = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2)
     assert np.linalg.det(found.S) < 0.0
@@ -127,7 +127,7 @@ def test_a_left_handed_gyro_is_recovered_and_reported(sign):
 
 def test_exchanged_axes_are_found_without_any_nominal_scale():
     S = np.array(SCALE)[:, [1, 2, 0]]
-    recording, truth = simulate(scenario(hand_session(14, hold_s=2.0), S=tuple(map(tuple, S))), seed=2)
+    recording, truth = simulate(scenario(hand_session(14, pose_s=2.0), S=tuple(map(tuple, S))), seed=2)
     segments = segments_from_truth(recording, truth)
     found, findings = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2)
     assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
@@ -140,7 +140,7 @@ def test_the_manuals_unit_in_counts_is_recovered_and_both_triads_are_left_handed
     b_w = np.radians([-457.68, -400.59, -447.47])
     recording, truth = simulate(
         Scenario(
-            motion=hand_session(18, hold_s=3.0, first_hold_s=5.0),
+            motion=hand_session(18, pose_s=3.0, first_pose_s=5.0),
             accelerometer=Accelerometer(
                 S=tuple(map(tuple, S_f)),
                 b=(19.5696, -22.4746, -20.3088),
@@ -160,9 +160,9 @@ def test_the_manuals_unit_in_counts_is_recovered_and_both_triads_are_left_handed
 
 def test_moves_about_one_axis_are_called_not_observable_with_the_moves_to_add():
     up = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.2), (0.0, 0.3, -1.0), (0.0, -1.0, 0.1), (0.0, 0.1, 1.0), (0.0, 1.0, 0.5))
-    steps = [SimulatedHold(4.0)]
+    steps = [SimulatedPose(4.0)]
     for direction in up[1:]:
-        steps += [MoveTo(direction, 2.0, wobble_deg=0.0), SimulatedHold(3.0)]
+        steps += [MoveTo(direction, 2.0, wobble_deg=0.0), SimulatedPose(3.0)]
     recording, truth = simulate(scenario(Motion(tuple(steps))), seed=1)
     segments = segments_from_truth(recording, truth)
     found, findings = calibrate_moves(
@@ -171,7 +171,7 @@ def test_moves_about_one_axis_are_called_not_observable_with_the_moves_to_add():
     finding = next(f for f in findings if f.code is FindingCode.NOT_OBSERVABLE)
     assert "Y axis" in finding.action
     assert "Z axis" in finding.action
-    # What was turned about is known; what was not has error bars as large as the scale itself.
+    # What was turned about is known; what was not has uncertainties as large as the scale itself.
     assert found.sigma_S[0, 0] < 0.2 * found.sigma_S[:, 1:].max()
     assert found.sigma_S[:, 1:].max() > 0.3
 
@@ -220,7 +220,7 @@ def test_a_zero_that_drifts_is_followed_and_reported(quiet):
     recording, truth, segments = quiet
     drift = 0.01 * recording.time_s / recording.time_s[-1]
     drifting = replace(recording, gyroscope=recording.gyroscope + drift[:, None])
-    means = np.array([drifting.gyroscope[h.start : h.stop].mean(axis=0) for h in segments.holds])
+    means = np.array([drifting.gyroscope[h.start : h.stop].mean(axis=0) for h in segments.poses])
     found, findings = calibrate_moves(
         drifting, replace(segments, gyroscope_mean=means), given_accelerometer(truth), truth.gravity_m_s2
     )
@@ -261,7 +261,7 @@ def test_a_missing_sensor_or_missing_moves_are_refused_in_one_sentence(quiet):
 
 @pytest.mark.parametrize("duration_s", [1.5, 4.0, 10.0])
 def test_the_scale_does_not_depend_on_how_long_the_moves_last(duration_s):
-    motion = hand_session(12, hold_s=4.0, move_s=duration_s, first_hold_s=10.0)
+    motion = hand_session(12, pose_s=4.0, move_s=duration_s, first_pose_s=10.0)
     recording, truth = simulate(scenario(motion), seed=11)
     segments = segment_recording(recording)
     found, _ = calibrate_moves(

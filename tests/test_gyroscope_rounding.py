@@ -1,4 +1,4 @@
-"""What a coarse converter hides of a move is in the variance of its sum: also where readings toggle between codes."""
+"""What a coarse ADC hides of a move is in the variance of its sum: also where readings toggle between codes."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def scores_of_ends(rng, noise, ways):
     variance = rounding_variance(np.repeat(codes[:, None], 3, 1), np.ones(3), np.zeros(3), np.array([True] * 3))[:, 0]
     scores = []
     for part, way in ((slice(0, 400), into), (slice(400, 800), out_of)):
-        # What is turned below the edge of the step in which the zero lies is never read.
+        # What is turned below the edge of the step in which the bias lies is never read.
         is_hidden = np.abs(rate[part]) < 0.5 - way * zero
         scores.append(rate[part][is_hidden].sum() / np.sqrt(variance[part][is_hidden].sum() + 1e-9))
     return scores
@@ -38,7 +38,7 @@ def test_steady_rates_that_toggle_between_two_codes_share_one_error(noise):
     rng = np.random.default_rng(11)
     scores, white = [], []
     for _ in range(150):
-        # Beside the zero's own step, whose error is the zero's.
+        # Beside the bias's own step, whose error is the bias's.
         levels = rng.uniform(3.0, 30.0, 12) * rng.choice([-1.0, 1.0], 12)
         up = np.linspace(0.0, 1.0, 20)
         still = np.zeros(60)

@@ -215,7 +215,7 @@ def test_faces_out_of_flat_are_in_the_error_bars_and_cost_no_turn(tilt_deg):
         thrown += FindingCode.TURN_NOT_A_MULTIPLE in codes(findings)
         scores.append(((found.S - np.array(SCALE)) / found.sigma_S).ravel())
     scores = np.abs(scores)
-    # Twelve turns said nothing of what they share: up to 31σ, and right turns were left out.
+    # Twelve turns said nothing of what they share: up to 31σ, and right turns were excluded.
     assert np.mean(scores < 1.96) > 0.9
     assert scores.max() < 5.0
     assert thrown == 0

@@ -79,8 +79,8 @@ def test_a_strong_line_in_one_pose_costs_no_pose_and_biases_no_mean(hertz):
     force[here] += swing[:, None] * [0.3, 1.0, 0.5]
     segments = segment_recording(replace(made.recording, accelerometer=force))
     assert score(made, segments)[:2] == ([], [])
-    hold = segments.holds[3]
-    assert hold.is_unsteady
-    z = segments.accelerometer_mean[3] - made.still[hold.start : hold.stop, :3].mean(axis=0)
+    pose = segments.poses[3]
+    assert pose.is_unsteady
+    z = segments.accelerometer_mean[3] - made.still[pose.start : pose.stop, :3].mean(axis=0)
     # Three numbers within four of their standard errors: once in 5000 otherwise.
     assert np.abs(z / segments.accelerometer_sigma_mean[3]).max() < 4.0

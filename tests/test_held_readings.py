@@ -1,4 +1,4 @@
-"""A logger that is faster than its sensor writes readings again: peaks that it holds are no ends of a range."""
+"""A logger that is faster than its sensor writes readings again: peaks that it holds are no range limit."""
 
 import numpy as np
 import pytest

@@ -16,7 +16,7 @@ CHANGE = (0.05, -0.08, 0.06)
 def test_a_straight_drift_is_carried_into_the_improved_scenario(tmp_path, monkeypatch):
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(4)
-    base = Scenario(hand_session(26, hold_s=3.0, layout=5), "unit", accel, gyro, profile.clock)
+    base = Scenario(hand_session(26, pose_s=3.0, layout=5), "unit", accel, gyro, profile.clock)
     length_s = float(simulate(base, 3)[0].duration_s)
     flawed = with_effect(base, "accel-bias-drift", change=CHANGE, length_s=length_s)
     recording = simulate(flawed, 3)[0]

@@ -1,4 +1,4 @@
-"""What an improved scenario says of noise and of moves: recovered from simulated holds and moves of known noise."""
+"""What an improved scenario says of noise and of moves: recovered from simulated poses and moves of known noise."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.estimate.noise import gain_of, noise_of_holds
+from trihedron.estimate.noise import gain_of, noise_of_poses
 from trihedron.pipeline import driving
 from trihedron.pipeline.comparing_noise import _are_even
 from trihedron.pipeline.driving import MovedAlike, bias_in_moves, bias_of_poses, driven, flicker_of_poses
 from trihedron.pipeline.improving import _unlike
-from trihedron.records.hold_noise import Measured
+from trihedron.records.pose_noise import Measured
 from trihedron.simulate import (
     NoiseTerms,
     Scenario,
@@ -45,12 +45,12 @@ def few_simulations(monkeypatch):
 )
 def test_white_noise_flicker_and_a_low_pass_are_recovered_from_octaves(N, B, low_pass):
     x = low_pass.apply(make_noise(NoiseTerms(N=(N,) * 3, B=(B,) * 3), 40_000, 1.0 / RATE, 4, "octaves"), 1.0 / RATE)
-    axes = noise_of_holds(x, RATE, [(k * 600, k * 600 + 450) for k in range(25)])
+    axes = noise_of_poses(x, RATE, [(k * 600, k * 600 + 450) for k in range(25)])
     bands = [o for o in axes[0].octaves if o.high_hz <= RATE / 2.0]
     density = np.array([[axis.octaves[k].density.value for axis in axes] for k in range(len(bands))])
     sigma = np.array([[axis.octaves[k].density.sigma_log for axis in axes] for k in range(len(bands))])
     noise, found = noise_of_octaves(np.array([(o.low_hz, o.high_hz) for o in bands]), density, sigma, 1.0 / RATE)
-    # Densities of 25 holds are good to some per cent, flicker of one octave beyond the white noise to a quarter.
+    # Densities of 25 poses are good to some per cent, flicker of one octave beyond the white noise to a quarter.
     assert pytest.approx((N,) * 3, rel=0.06) == noise.N
     assert (np.mean(noise.B) == pytest.approx(B, rel=0.3)) if B else np.mean(noise.B) < 0.5 * N
     # Corners are tried a fifth apart.
@@ -77,7 +77,7 @@ def test_a_low_pass_that_was_seen_is_seen_again_in_the_noise_of_its_simulation(c
     frequency_hz = np.linspace(0.5, 49.5, 99)
     low_pass = low_pass_like(frequency_hz, gain_of(frequency_hz, corner_hz, shape, RATE), 1.0 / RATE)
     x = low_pass.apply(make_noise(NoiseTerms(N=(1e-3,) * 3), 40_000, 1.0 / RATE, 9, "filtered"), 1.0 / RATE)
-    for axis in noise_of_holds(x, RATE, [(k * 600, k * 600 + 450) for k in range(25)]):
+    for axis in noise_of_poses(x, RATE, [(k * 600, k * 600 + 450) for k in range(25)]):
         # 11250 readings an axis: a density to 2 %, a corner to 3 %. Poles alone make no steep filter near half the
         # rate; a fifth is where two corners are called unlike.
         assert axis.white.value == pytest.approx(1e-3, rel=0.08)
@@ -85,7 +85,7 @@ def test_a_low_pass_that_was_seen_is_seen_again_in_the_noise_of_its_simulation(c
 
 
 def test_a_zero_that_strays_in_moves_is_nothing_at_rest():
-    stretches = (("hold", 0.0, 2.0), ("move", 2.0, 3.0), ("hold", 3.0, 5.0))
+    stretches = (("pose", 0.0, 2.0), ("move", 2.0, 3.0), ("pose", 3.0, 5.0))
     labels = tuple(SimpleNamespace(kind=kind, start_s=a, stop_s=b) for kind, a, b in stretches)
     t = np.arange(0.0, 5.0, 0.01)
     drawn = np.array([straying(labels, t, (0.1, 0.2, 0.0), np.random.default_rng(k)) for k in range(400)])
@@ -101,7 +101,7 @@ def session(seed, strays=0.0):
     gyro = replace(gyro, S=tuple(tuple(2.0 * v for v in row) for row in gyro.S))
     electronics = replace(gyro.electronics, bias_in_moves=(strays,) * 3)
     scenario = Scenario(
-        hand_session(20, hold_s=3.0, layout=8), "unit", accel, replace(gyro, electronics=electronics), profile.clock
+        hand_session(20, pose_s=3.0, layout=8), "unit", accel, replace(gyro, electronics=electronics), profile.clock
     )
     return scenario, simulate(scenario, seed)[0]
 
@@ -131,7 +131,7 @@ def beside(own):
 def test_flicker_that_no_pose_shows_is_taken_out():
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(5)
-    clean = Scenario(hand_session(24, hold_s=2.0, layout=8), "unit", accel, gyro, profile.clock)
+    clean = Scenario(hand_session(24, pose_s=2.0, layout=8), "unit", accel, gyro, profile.clock)
     own = trihedron.calibrate(simulate(clean, 7)[0], gravity_m_s2=9.80665)
 
     def with_flicker(size):
@@ -161,7 +161,7 @@ def test_poses_and_moves_that_miss_unlike_the_recordings_are_said():
 def test_what_poses_miss_is_put_on_the_accelerometers_zero_and_then_both_miss_alike():
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(5)
-    clean = Scenario(hand_session(24, hold_s=3.0, layout=8), "unit", accel, gyro, profile.clock)
+    clean = Scenario(hand_session(24, pose_s=3.0, layout=8), "unit", accel, gyro, profile.clock)
     electronics = replace(accel.electronics, bias_repeatability=(0.02,) * 3)
     scattered = replace(clean, accelerometer=replace(accel, electronics=electronics))
     own = trihedron.calibrate(simulate(scattered, 6)[0], gravity_m_s2=9.80665)
@@ -182,11 +182,11 @@ def test_what_poses_miss_is_put_on_the_accelerometers_zero_and_then_both_miss_al
 def test_one_pose_that_was_pushed_makes_no_scatter_for_all_of_them():
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(5)
-    clean = Scenario(hand_session(24, hold_s=3.0, layout=8), "unit", accel, gyro, profile.clock)
+    clean = Scenario(hand_session(24, pose_s=3.0, layout=8), "unit", accel, gyro, profile.clock)
     recording, _ = simulate(clean, 8)
     own = trihedron.calibrate(recording, gravity_m_s2=9.80665)
     readings = np.array(recording.accelerometer)
-    readings[own.segments.holds[7].samples()] *= 1.003
+    readings[own.segments.poses[7].samples()] *= 1.003
     pushed = trihedron.calibrate(replace(recording, accelerometer=readings), gravity_m_s2=9.80665)
     strays = bias_of_poses(clean, beside(pushed))
     # 30 mm/s² in one pose of 24: all of it shared out would be 6 mm/s², what the others take up in the fit is less.

@@ -24,12 +24,12 @@ IDEAL = 'name = "ideal"\nprofile = "ideal"\n\n[session]\nkind = "hand"\n'
 
 @pytest.fixture(scope="module")
 def clipped():
-    """A recording whose gyro ends at ±150 °/s of its converter in several moves, with noise of its own."""
+    """A recording whose gyro ends at ±150 °/s of its ADC in several moves, with noise of its own."""
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(5)
     code = round(math.radians(LIMIT_DEG_S) / gyro.S[0][0])
     gyro = replace(gyro, adc=replace(gyro.adc, low=-float(code), high=float(code)))
-    scenario = Scenario(hand_session(24, hold_s=3.0, move_s=1.6, layout=8), "unit", accel, gyro, profile.clock)
+    scenario = Scenario(hand_session(24, pose_s=3.0, move_s=1.6, layout=8), "unit", accel, gyro, profile.clock)
     return code, simulate(scenario, 11)[0]
 
 
@@ -52,7 +52,7 @@ def test_the_ends_of_a_recordings_range_are_those_of_the_improved_scenario(clipp
     assert "gyro-saturation" in {e.id for e in found.effects}
     table = tomllib.loads(better.read_text())
     assert (table["gyroscope"]["adc"]["low"], table["gyroscope"]["adc"]["high"]) == (-code, code)
-    # The converter's, not an effect beside it; and none of the accelerometer, whose range nothing came to.
+    # The ADC's, not an effect beside it; and none of the accelerometer, whose range nothing came to.
     assert "gyro-saturation" not in {e["id"] for e in table.get("effect", [])}
     assert "low" not in table["accelerometer"].get("adc", {})
 
@@ -65,7 +65,7 @@ def test_a_scenario_with_the_recordings_range_lacks_no_saturation(clipped, impro
 
 
 def test_a_scenario_without_noise_takes_the_recordings(improved):
-    # Three axes of the part's data sheet; 24 holds of three seconds know a density to some per cent.
+    # Three axes of the part's data sheet; 24 poses of three seconds know a density to some per cent.
     part = profile_by_name("mpu").unit(5)
     scenario = read_scenario(improved[1])
     for name, own in zip(("accelerometer", "gyroscope"), part, strict=True):

@@ -16,7 +16,7 @@ S_W = ((1.02, 0.01, -0.015), (0.005, 0.98, 0.02), (-0.01, 0.008, 1.01))
 def session(seed, n_poses=20):
     return simulate(
         Scenario(
-            motion=hand_session(n_poses, hold_s=2.0, first_hold_s=3.0),
+            motion=hand_session(n_poses, pose_s=2.0, first_pose_s=3.0),
             accelerometer=Accelerometer(S=S_F, b=(0.1, -0.1, 0.05), noise=NoiseTerms(N=(3e-3,) * 3)),
             gyroscope=Gyroscope(S=S_W, b=(0.01, -0.02, 0.005), noise=NoiseTerms(N=(2e-4,) * 3)),
         ),

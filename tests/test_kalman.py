@@ -19,14 +19,14 @@ from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode, 
 from twins_kalman import (
     ARTICLE_CONSTANTS,
     GRAVITY,
-    covariance_of_hold_means,
+    covariance_of_pose_means,
     generalised_least_squares,
     naive_covariance_form,
     recursive_least_squares_in_fractions,
 )
 
 SIGMA = 0.11 * 0.032002 / GRAVITY
-"""The article's converter noise of 0.11 m/s² in volts."""
+"""The article's ADC noise of 0.11 m/s² in volts."""
 
 
 def compiled(*, rates=(0.01,), averages=True, ramp_frequency=1e-4, **terms):
@@ -43,11 +43,11 @@ def compiled(*, rates=(0.01,), averages=True, ramp_frequency=1e-4, **terms):
 
 def session(seed, n):
     rng = np.random.default_rng(seed)
-    hold = rng.uniform(1.0, 8.0, n)
+    pose = rng.uniform(1.0, 8.0, n)
     pause = np.where(rng.random(n) < 0.3, 0.0, rng.uniform(0.5, 40.0, n))
-    start = 100.0 + np.cumsum(np.concatenate([[0.0], (hold + pause)[:-1]]))
+    start = 100.0 + np.cumsum(np.concatenate([[0.0], (pose + pause)[:-1]]))
     f = rng.standard_normal((n, 3))
-    return start, hold, GRAVITY * f / np.linalg.norm(f, axis=1)[:, None], rng
+    return start, pose, GRAVITY * f / np.linalg.norm(f, axis=1)[:, None], rng
 
 
 MIXES = {
@@ -71,7 +71,7 @@ MIXES = {
 }
 
 
-def covariance_by_hand(mix, start, hold):
+def covariance_by_hand(mix, start, pose):
     terms = dict(mix)
     terms.pop("ramp_frequency", None)
     terms["slope"] = terms.pop("ramp", 0.0)
@@ -81,28 +81,28 @@ def covariance_by_hand(mix, start, hold):
     # The slowest and fastest process also stand for what lies beyond them.
     alone = (terms.pop("gauss_markov_rate", 0.0), terms.pop("gauss_markov", 0.0))
     processes = [(beta, sigma * np.sqrt(1.25 if beta in ends else 1.0)) for beta in rates]
-    return covariance_of_hold_means(start, hold, gauss_markov=processes + [alone] * (alone[1] > 0), **terms)
+    return covariance_of_pose_means(start, pose, gauss_markov=processes + [alone] * (alone[1] > 0), **terms)
 
 
 @pytest.mark.parametrize("mix", MIXES.values(), ids=MIXES)
 def test_the_noise_covariance_of_hold_means_is_the_integral_done_by_hand(mix):
-    start, hold, _, _ = session(3, 25)
-    got = _core.kalman_noise_covariance(compiled(**mix), start, hold, np.zeros(25))
+    start, pose, _, _ = session(3, 25)
+    got = _core.kalman_noise_covariance(compiled(**mix), start, pose, np.zeros(25))
     # The second-order ramp with ω₀ = 1e-11 rad/s departs from a straight line by ω₀ t ~ 1e-8 over 600 s.
-    np.testing.assert_allclose(got, covariance_by_hand(mix, start, hold), rtol=1e-7, atol=1e-14)
+    np.testing.assert_allclose(got, covariance_by_hand(mix, start, pose), rtol=1e-7, atol=1e-14)
 
 
 @pytest.mark.parametrize("mix", MIXES.values(), ids=MIXES)
 def test_the_filter_is_generalised_least_squares_on_every_prefix(mix):
-    start, hold, f, rng = session(4, 30)
+    start, pose, f, rng = session(4, 30)
     readings = f @ [0.1, -0.02, 0.01] + 2.0 + 0.05 * rng.standard_normal(30)
     model, diffuse = compiled(**mix), np.full(4, 1e7)
     constants, sigma, *_ = _core.kalman_track(
         model,
         _core.KalmanStart(np.zeros(4), diffuse, np.zeros(4)),
-        _core.KalmanPoses(readings, f, start, hold, np.zeros(30)),
+        _core.KalmanPoses(readings, f, start, pose, np.zeros(30)),
     )
-    covariance = covariance_by_hand(mix, start, hold)
+    covariance = covariance_by_hand(mix, start, pose)
     for n in (5, 12, 30):
         expected, cov = generalised_least_squares(f[:n], readings[:n], covariance[:n, :n])
         stated = np.sqrt(np.diag(cov))
@@ -112,15 +112,15 @@ def test_the_filter_is_generalised_least_squares_on_every_prefix(mix):
 
 
 def test_the_smoother_is_the_conditional_expectation_given_all_readings():
-    start, hold, f, rng = session(5, 40)
+    start, pose, f, rng = session(5, 40)
     readings = f @ [0.1, -0.02, 0.01] + 2.0 + 0.05 * rng.standard_normal(40)
     model = compiled(white=0.02, walk=0.004, flicker=0.02, rates=(0.003, 0.03), averages=False)
     start_of = (np.zeros(4), np.full(4, 1e7), np.zeros(4))
     _, _, drift, drift_sigma = _core.kalman_smooth(
-        model, _core.KalmanStart(*start_of), _core.KalmanPoses(readings, f, start, hold, np.zeros(40))
+        model, _core.KalmanStart(*start_of), _core.KalmanPoses(readings, f, start, pose, np.zeros(40))
     )
-    total = _core.kalman_noise_covariance(model, start, hold, np.zeros(40))
-    slow = total - np.diag([model.white_variance(h) for h in hold])
+    total = _core.kalman_noise_covariance(model, start, pose, np.zeros(40))
+    slow = total - np.diag([model.white_variance(h) for h in pose])
     constants, cov = generalised_least_squares(f, readings, total)
     h = np.column_stack([f, np.ones(40)])
     gain = slow @ np.linalg.inv(total)
@@ -147,21 +147,21 @@ def test_factors_keep_their_digits_where_the_printed_covariance_form_loses_them_
     assert np.max(np.abs(naive / [float(v) for v in exact_variance] - 1.0)) > 0.5
 
 
-START, HOLD = 10.0 * np.arange(324), np.full(324, 5.0)
+START, POSE = 10.0 * np.arange(324), np.full(324, 5.0)
 
 
 @functools.cache
 def noise_factor(noise):
     """(324, 324) root of the covariance of the article's poses: 5 s each with 5 s between."""
-    model = shaping_model(noise, ShapingOptions(), session_s=float(START[-1] + 5.0), hold_s=5.0)
-    return np.linalg.cholesky(_core.kalman_noise_covariance(model, START, HOLD, np.zeros(324)))
+    model = shaping_model(noise, ShapingOptions(), session_s=float(START[-1] + 5.0), pose_s=5.0)
+    return np.linalg.cholesky(_core.kalman_noise_covariance(model, START, POSE, np.zeros(324)))
 
 
 def article_readings(seed, noise):
-    """References and readings of the article's session, noise drawn from the model of hold means."""
+    """References and readings of the article's session, noise drawn from the model of pose means."""
     draws = noise_factor(noise) @ np.random.default_rng(seed).standard_normal((324, 3))
     table = PoseTable.from_angles(*DIVIDING_HEAD_ANGLES_DEG.T, gravity_m_s2=GRAVITY)
-    return table, table.specific_force @ ARTICLE_CONSTANTS[:, :3].T + ARTICLE_CONSTANTS[:, 3] + draws, START, HOLD
+    return table, table.specific_force @ ARTICLE_CONSTANTS[:, :3].T + ARTICLE_CONSTANTS[:, 3] + draws, START, POSE
 
 
 ARTICLE_MIX = AxisNoise(white=0.9 * SIGMA * 5**0.5, flicker=0.3 * SIGMA, walk=SIGMA / 60.0, ramp=SIGMA / 3000.0)
@@ -170,9 +170,9 @@ ARTICLE_MIX = AxisNoise(white=0.9 * SIGMA * 5**0.5, flicker=0.3 * SIGMA, walk=SI
 def test_the_articles_experiment_gives_its_constants_back_with_honest_error_bars():
     nees, z = [], []
     for seed in range(40):
-        table, readings, start, hold = article_readings(seed, ARTICLE_MIX)
+        table, readings, start, pose = article_readings(seed, ARTICLE_MIX)
         result = calibrate_with_references(
-            readings, table, ARTICLE_MIX, start_s=start, hold_s=hold, with_baselines=False, raw_unit="V"
+            readings, table, ARTICLE_MIX, start_s=start, pose_s=pose, with_baselines=False, raw_unit="V"
         )
         for axis in result.axes:
             error = axis.constants - ARTICLE_CONSTANTS[axis.axis]
@@ -203,9 +203,9 @@ def test_wrong_noise_shows_in_the_innovations_and_right_noise_does_not(believed,
         else AxisNoise(white=SIGMA * 5**0.5, walk=SIGMA / 4.0)
     )
     for seed in range(10):
-        table, readings, start, hold = article_readings(50 + seed, true)
+        table, readings, start, pose = article_readings(50 + seed, true)
         result = calibrate_with_references(
-            readings, table, believed, start_s=start, hold_s=hold, with_baselines=False, raw_unit="V"
+            readings, table, believed, start_s=start, pose_s=pose, with_baselines=False, raw_unit="V"
         )
         for finding in result.findings:
             reported[finding.code] = reported.get(finding.code, 0) + 1
@@ -217,8 +217,8 @@ def test_wrong_noise_shows_in_the_innovations_and_right_noise_does_not(believed,
 
 
 def test_the_direct_form_carries_the_covariance_of_the_inverse_form():
-    table, readings, start, hold = article_readings(9, ARTICLE_MIX)
-    run = {"start_s": start, "hold_s": hold, "with_baselines": False, "raw_unit": "V"}
+    table, readings, start, pose = article_readings(9, ARTICLE_MIX)
+    run = {"start_s": start, "pose_s": pose, "with_baselines": False, "raw_unit": "V"}
     base = calibrate_with_references(readings, table, ARTICLE_MIX, **run)
     rng = np.random.default_rng(10)
     draws = []
@@ -233,14 +233,14 @@ def test_the_direct_form_carries_the_covariance_of_the_inverse_form():
 
 
 def test_live_calibration_says_what_the_whole_run_says():
-    table, readings, start, hold = article_readings(11, ARTICLE_MIX)
+    table, readings, start, pose = article_readings(11, ARTICLE_MIX)
     result = calibrate_with_references(
-        readings, table, ARTICLE_MIX, start_s=start, hold_s=hold, with_baselines=False, raw_unit="V"
+        readings, table, ARTICLE_MIX, start_s=start, pose_s=pose, with_baselines=False, raw_unit="V"
     )
-    session_s = float(start[-1] + hold[-1] - start[0])
-    live = LiveCalibration(ARTICLE_MIX, gravity_m_s2=GRAVITY, session_s=session_s, hold_s=5.0)
+    session_s = float(start[-1] + pose[-1] - start[0])
+    live = LiveCalibration(ARTICLE_MIX, gravity_m_s2=GRAVITY, session_s=session_s, pose_s=5.0)
     for i in range(324):
-        last = live.add(readings[i], table.specific_force[i], start_s=start[i], hold_s=hold[i], look_ahead=0)
+        last = live.add(readings[i], table.specific_force[i], start_s=start[i], pose_s=pose[i], look_ahead=0)
     np.testing.assert_allclose(last.constants, [a.constants for a in result.axes], rtol=1e-9)
     np.testing.assert_allclose(last.sigma, [a.sigma for a in result.axes], rtol=1e-9)
 
@@ -262,7 +262,7 @@ def test_a_head_with_one_axis_is_enough_with_a_prior():
         table,
         AxisNoise(white=0.01 * 5**0.5),
         start_s=10.0 * np.arange(36),
-        hold_s=5.0,
+        pose_s=5.0,
         prior=Prior(mean, sigma, np.zeros((3, 4))),
     )
     for axis in result.axes:
@@ -278,7 +278,7 @@ def test_a_head_with_one_axis_is_enough_with_a_prior():
     [
         ({"start_s": np.zeros(324)}, "in order of time"),
         ({"start_s": np.zeros(3)}, "one entry per pose"),
-        ({"hold_s": 0.0}, "positive length"),
+        ({"pose_s": 0.0}, "positive length"),
         ({"noise": AxisNoise()}, "believed exactly"),
         ({"noise": [AxisNoise(white=1.0)] * 2}, "one axis or three"),
         ({"readings": np.full((324, 3), np.nan)}, "must be finite"),
@@ -287,8 +287,8 @@ def test_a_head_with_one_axis_is_enough_with_a_prior():
     ],
 )
 def test_malformed_questions_are_refused_in_plain_words(change, message):
-    table, readings, start, hold = article_readings(14, ARTICLE_MIX)
-    asked = {"readings": readings, "references": table, "noise": ARTICLE_MIX, "start_s": start, "hold_s": hold} | change
+    table, readings, start, pose = article_readings(14, ARTICLE_MIX)
+    asked = {"readings": readings, "references": table, "noise": ARTICLE_MIX, "start_s": start, "pose_s": pose} | change
     with pytest.raises(ValueError, match=message):
         calibrate_with_references(**asked)
 

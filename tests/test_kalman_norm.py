@@ -29,22 +29,22 @@ def session(seed, *, n=24, S=S_TRUE, b=B_TRUE, noise=NOISE):
     rng = np.random.default_rng(seed)
     f = rng.standard_normal((n, 3))
     f *= GRAVITY / np.linalg.norm(f, axis=1)[:, None]
-    start, hold = 8.0 * np.arange(n), np.full(n, 4.0)
-    model = shaping_model(noise, ShapingOptions(), session_s=float(start[-1] + 4.0), hold_s=4.0)
-    covariance = _core.kalman_noise_covariance(model, start, hold, np.zeros(n))
+    start, pose = 8.0 * np.arange(n), np.full(n, 4.0)
+    model = shaping_model(noise, ShapingOptions(), session_s=float(start[-1] + 4.0), pose_s=4.0)
+    covariance = _core.kalman_noise_covariance(model, start, pose, np.zeros(n))
     noise_now = np.linalg.cholesky(covariance) @ rng.standard_normal((n, 3))
-    return (f - b) @ np.linalg.inv(S).T + noise_now, start, hold, covariance
+    return (f - b) @ np.linalg.inv(S).T + noise_now, start, pose, covariance
 
 
-def calibrate(readings, start_s, hold_s, **options):
+def calibrate(readings, start_s, pose_s, **options):
     return calibrate_without_references(
-        readings, NOISE, start_s=start_s, hold_s=hold_s, gravity_m_s2=GRAVITY, **options
+        readings, NOISE, start_s=start_s, pose_s=pose_s, gravity_m_s2=GRAVITY, **options
     )
 
 
 def test_repeated_runs_end_at_the_batch_fit_with_the_full_noise_covariance():
-    readings, start, hold, covariance = session(1)
-    result = calibrate(readings, start, hold)
+    readings, start, pose, covariance = session(1)
+    result = calibrate(readings, start, pose)
     S, b = result.accelerometer.S, result.accelerometer.b
     f = readings @ S.T + b
     along = (f / np.linalg.norm(f, axis=1)[:, None]) @ S
@@ -84,14 +84,14 @@ def test_live_use_stops_when_good_enough_and_proposes_poses_that_get_there():
         start=NormStart.nominal(0.039, [500.0, 570.0, 520.0]),
         goal=Goal(sensitivity=2e-3, zero_m_s2=0.02),
         session_s=300.0,
-        hold_s=4.0,
+        pose_s=4.0,
         pause_s=4.0,
     )
     rng = np.random.default_rng(5)
     direction, promised = np.array([0.0, 0.0, GRAVITY]), []
     for i in range(60):
         reading = np.linalg.solve(S_TRUE, direction - B_TRUE) + 0.5 * rng.standard_normal(3)
-        said = live.add(reading, start_s=8.0 * i, hold_s=4.0)
+        said = live.add(reading, start_s=8.0 * i, pose_s=4.0)
         if said.good_enough:
             break
         if said.poses_needed is not None and said.n_poses >= 9:
@@ -123,13 +123,13 @@ def test_a_single_plane_of_poses_is_reported_as_badly_observed():
         ({"readings": np.full((24, 3), np.inf)}, "not finite"),
         ({"readings": np.zeros(24)}, r"shape \(n, 3\)"),
         ({"gravity_m_s2": -1.0}, "gravity must be positive"),
-        ({"hold_s": -1.0}, "positive length"),
+        ({"pose_s": -1.0}, "positive length"),
         ({"start_s": np.arange(24.0)}, "in order of time"),
     ],
 )
 def test_malformed_questions_are_refused_in_plain_words(change, message):
-    readings, start, hold, _ = session(6)
-    asked = {"readings": readings, "noise": NOISE, "start_s": start, "hold_s": hold, "gravity_m_s2": GRAVITY} | change
+    readings, start, pose, _ = session(6)
+    asked = {"readings": readings, "noise": NOISE, "start_s": start, "pose_s": pose, "gravity_m_s2": GRAVITY} | change
     with pytest.raises(ValueError, match=message):
         calibrate_without_references(**asked)
 
@@ -142,10 +142,10 @@ def test_a_session_that_begins_in_one_plane_does_not_collapse_to_zero():
     noise = np.random.default_rng(8).standard_normal(f.shape)
     readings = (f - B_TRUE) @ np.linalg.inv(S_TRUE).T + 0.5 * noise
     live = LiveNormCalibration(
-        AxisNoise(white=1.0), gravity_m_s2=GRAVITY, start=NormStart.from_range(readings, GRAVITY), hold_s=4.0
+        AxisNoise(white=1.0), gravity_m_s2=GRAVITY, start=NormStart.from_range(readings, GRAVITY), pose_s=4.0
     )
     for i in range(90):
-        said = live.add(readings[i], start_s=8.0 * i, hold_s=4.0, look_ahead=0)
+        said = live.add(readings[i], start_s=8.0 * i, pose_s=4.0, look_ahead=0)
         if i >= 9:
             # The start is good to 30 %; no pose may make the scale worse than that.
             assert np.all(np.abs(np.diag(said.constants[:, :3]) / np.diag(S_TRUE) - 1.0) < 0.3), i

@@ -1,4 +1,4 @@
-"""From a log and a pose table to the filters: matching, noise from the holds, recordings."""
+"""From a log and a pose table to the filters: matching, noise from the poses, recordings."""
 
 from dataclasses import dataclass
 
@@ -11,8 +11,8 @@ from trihedron.estimate.kalman import (
     calibrate_session,
     calibrate_session_without_references,
     calibrate_without_references,
-    noise_from_holds,
     noise_from_identified,
+    noise_from_poses,
     normalised_error_squared,
     pose_readings,
 )
@@ -67,8 +67,8 @@ def test_the_same_session_without_its_angles_agrees_up_to_the_frame(head, table)
 
 def test_times_in_the_table_stand_for_the_segmentation(head, table):
     recording, segments = head
-    start = np.array([recording.time_s[h.start] for h in segments.holds])
-    stop = np.array([recording.time_s[h.stop - 1] for h in segments.holds]) + 1.0 / recording.rate_hz
+    start = np.array([recording.time_s[h.start] for h in segments.poses])
+    stop = np.array([recording.time_s[h.stop - 1] for h in segments.poses]) + 1.0 / recording.rate_hz
     timed = PoseTable(table.specific_force, start_s=start, stop_s=stop)
     np.testing.assert_allclose(
         pose_readings(recording, segments, timed).mean, pose_readings(recording, segments, table).mean, rtol=1e-12
@@ -77,14 +77,14 @@ def test_times_in_the_table_stand_for_the_segmentation(head, table):
 
 def test_hold_numbers_pick_still_poses_and_a_mismatch_is_said(head, table):
     recording, segments = head
-    few = PoseTable(table.specific_force[::9], hold=np.arange(0, 324, 9))
+    few = PoseTable(table.specific_force[::9], pose=np.arange(0, 324, 9))
     assert len(pose_readings(recording, segments, few).mean) == 36
     with pytest.raises(ValueError, match=r"lists 36 poses, but .* has 324 poses"):
         pose_readings(recording, segments, PoseTable(table.specific_force[::9]))
     with pytest.raises(ValueError, match="pose 500 is asked for"):
-        pose_readings(recording, segments, PoseTable(table.specific_force[:1], hold=np.array([499])))
+        pose_readings(recording, segments, PoseTable(table.specific_force[:1], pose=np.array([499])))
     with pytest.raises(ValueError, match="each once"):
-        pose_readings(recording, segments, PoseTable(table.specific_force[:2], hold=np.array([3, 3])))
+        pose_readings(recording, segments, PoseTable(table.specific_force[:2], pose=np.array([3, 3])))
     with pytest.raises(ValueError, match="0 readings"):
         pose_readings(
             recording, segments, PoseTable(table.specific_force[:1], start_s=np.array([1e6]), stop_s=np.array([2e6]))
@@ -93,11 +93,11 @@ def test_hold_numbers_pick_still_poses_and_a_mismatch_is_said(head, table):
 
 def test_a_coarse_converter_is_charged_with_its_step():
     recording, segments = head_session(3, adc=0.37, noise=0.001)
-    noise = noise_from_holds(recording, segments)
+    noise = noise_from_poses(recording, segments)
     # Readings are multiples of the step to rounding of the decimal.
     assert noise[0].resolution == pytest.approx(0.37, rel=1e-9)
     fine, _ = head_session(3, adc=0.001)
-    assert noise_from_holds(fine, segment_recording(fine))[0].resolution == 0.0
+    assert noise_from_poses(fine, segment_recording(fine))[0].resolution == 0.0
 
 
 def test_the_filter_agrees_with_the_batch_fit_on_a_hand_session_in_counts():
@@ -115,14 +115,14 @@ def test_the_filter_agrees_with_the_batch_fit_on_a_hand_session_in_counts():
 
 def poses_of(recording, segments):
     poses = pose_readings(recording, segments)
-    return poses.mean, poses.sigma_mean, poses.start_s, poses.hold_s
+    return poses.mean, poses.sigma_mean, poses.start_s, poses.pose_s
 
 
-def assert_agrees_with_batch_fit(means, sigma, start, hold, gravity):
+def assert_agrees_with_batch_fit(means, sigma, start, pose, gravity):
     """The batch fit knows one standard error per mean; the filter gets it as variance on top of next to nothing."""
     batch, _ = calibrate_norm(means, sigma, gravity)
-    tiny = [AxisNoise(white=1e-3 * np.median(sigma[:, i]) * np.sqrt(np.median(hold))) for i in range(3)]
-    run = {"start_s": start, "hold_s": hold, "gravity_m_s2": gravity}
+    tiny = [AxisNoise(white=1e-3 * np.median(sigma[:, i]) * np.sqrt(np.median(pose))) for i in range(3)]
+    run = {"start_s": start, "pose_s": pose, "gravity_m_s2": gravity}
     got = calibrate_without_references(means, tiny, extra_variance=sigma**2, **run).accelerometer
     scale = np.concatenate([batch.sigma_S.ravel(), batch.sigma_b])
     difference = np.concatenate([(got.S - batch.S).ravel(), got.b - batch.b])
@@ -161,7 +161,7 @@ def test_a_pose_table_is_read_by_its_header(tmp_path, text, expected):
         ("a,b\n3,4\n5,6\n", "neither angles .* nor a direction"),
         ("pitch,theta\n3,4\n5,6\n", "both mean pitch"),
         ("fx,fy,fz\n0,0,1\n0,0,0\n", "line 3: the direction has no length"),
-        ("hold,pitch\n0,0\n1,10\n", "count poses from 1"),
+        ("pose,pitch\n0,0\n1,10\n", "count poses from 1"),
         ("start,pitch\n0,0\n1,10\n", "both start and stop"),
         ("start,stop,pitch\n0,1,0\n3,2,10\n", "stops before it starts"),
         ("pitch,roll\n0,0\n10,nan\n", "roll is missing"),

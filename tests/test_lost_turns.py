@@ -1,4 +1,4 @@
-"""Losses that no step shows: believed possible where stamps may have been remade, and carried whatever fitted them."""
+"""Losses that no step shows: believed possible where timestamps may be remade, and carried whatever the fit."""
 
 import sys
 from pathlib import Path
@@ -56,7 +56,7 @@ def lossy(seed, time_of=None):
 
 @pytest.mark.parametrize("seed", [30000, 20018])
 def test_losses_are_possible_wherever_moves_are_missed(seed):
-    """All moves missed more than noise does, or those that missed most were left out: losses were not asked for."""
+    """All moves missed more than noise does, or those that missed most were excluded: losses were not asked for."""
     result, truth = lossy(seed)
     codes = {finding.code for finding in result.findings}
     assert codes & {FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.OUTLIER_MOVE}
@@ -68,7 +68,7 @@ def test_losses_are_possible_wherever_moves_are_missed(seed):
 
 
 def test_a_clock_of_its_own_rules_losses_out():
-    """The same session with a clock's stamps: what was lost is a gap in them, and no share of the scale."""
+    """The same session with a clock's timestamps: what was lost is a gap in them, and no share of the scale."""
 
     def warming(t):
         return t * (1.0 + 20e-6 * t / t[-1])

@@ -1,4 +1,4 @@
-"""Samples lost from a log whose stamps were made anew: the calibration says that its gyro is not to be trusted."""
+"""Samples lost from a log whose timestamps were made anew: the calibration says that its gyro is not to be trusted."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ from trihedron.simulate.profiles import profile_by_name
 def session(share, seed, move_s=2.0, grade="mpu"):
     """A session at 100 Hz from which a share of all rows is missing, numbered anew."""
     scenario = _of(
-        profile_by_name(grade), hand_session(14, hold_s=2, first_hold_s=6, move_s=move_s, layout=seed), "s", seed
+        profile_by_name(grade), hand_session(14, pose_s=2, first_pose_s=6, move_s=move_s, layout=seed), "s", seed
     )
     log, _ = simulate(scenario, seed)
     kept = np.random.default_rng(seed).random(log.n_samples) >= share

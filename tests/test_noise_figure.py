@@ -29,7 +29,7 @@ def test_the_sum_is_made_of_lines_that_are_drawn_and_each_has_a_name(noise):
     for axis, panel in zip(noise.axes, allan_chart(noise.curve, "rad/s", noise.axes).panels, strict=True):
         parts = [mark for mark in panel.marks if isinstance(mark, Line) and mark.name == "parts of the sum"]
         total = next(mark for mark in panel.marks if isinstance(mark, Line) and mark.name == "their sum")
-        # What is left out moves the sum by less than its line is wide.
+        # What is excluded moves the sum by less than its line is wide.
         np.testing.assert_allclose(np.sqrt(sum(part.y**2 for part in parts)), total.y, rtol=2e-3)
         names = [mark.text for mark in panel.marks if isinstance(mark, Note) and mark.colour == "ink"]
         assert len(names) == len(parts)

@@ -10,7 +10,7 @@ N, HOLD_S, GAP_S, POSES, RATE_HZ = 4e-3, 4.5, 2.0, 26, 20.0
 
 
 def session(seed, walk, scatter=0.0, poses=POSES):
-    """Norms of poses whose zeros walk, sample by sample; ``walk`` of all axes or of each [m/s²/√s]."""
+    """Norms of poses whose biases walk, sample by sample; ``walk`` of all axes or of each [m/s²/√s]."""
     rng = np.random.default_rng(seed)
     every, length = int((HOLD_S + GAP_S) * RATE_HZ), int(HOLD_S * RATE_HZ)
     up = rng.standard_normal((poses, 3))

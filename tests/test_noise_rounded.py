@@ -1,4 +1,4 @@
-"""White noise through a coarse converter: N is that of noise and rounding, its bars hold whatever the level."""
+"""White noise through a coarse ADC: N is that of noise and rounding, its bars hold whatever the level."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""calibrate, verify and diagnose answer with one model: the same S and b, the same figures, the same error bars."""
+"""calibrate, verify and diagnose answer with one model: the same S and b, the same figures, the same uncertainties."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ def test_calibrate_and_diagnose_agree_on_every_parameter_within_a_tenth_of_its_e
         apart = np.abs(sensor.S - np.array(model["S"]))[free] / sensor.sigma_S[free]
         assert apart.max() < 0.1
         assert (np.abs(sensor.b - np.array(model["b"])) / sensor.sigma_b).max() < 0.1
-        # One measuring of noise, one of strengths: error bars differ by what single precision of a grid leaves.
+        # One measuring of noise, one of strengths: uncertainties differ by what single precision of a grid leaves.
         wider = sensor.sigma_S[free] / np.array(model["sigma_S"])[free]
         assert wider.min() > 0.95
         if FindingCode.RESIDUAL_ABOVE_NOISE not in {one.code for one in result.findings}:

@@ -34,7 +34,7 @@ def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("reports")
     first, second, rest, cal = (str(made / name) for name in ("log.csv", "other.csv", "rest.npz", "cal.json"))
     for path, n, seed in ((first, 16, 3), (second, 12, 9)):
-        motion = hand_session(n_poses=n, hold_s=3.0, move_s=1.5, first_hold_s=5.0)
+        motion = hand_session(n_poses=n, pose_s=3.0, move_s=1.5, first_pose_s=5.0)
         write_recording(simulate(replace(scenario_by_name("hand-session"), motion=motion), seed)[0], Path(path))
     rng = np.random.default_rng(4)
     np.savez(

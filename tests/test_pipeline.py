@@ -1,4 +1,4 @@
-"""The pipeline as people use it from Python, and whether its error bars are honest end to end."""
+"""The pipeline as people use it from Python, and whether its uncertainties are honest end to end."""
 
 import importlib
 from dataclasses import replace
@@ -8,13 +8,13 @@ import pytest
 from scipy import stats
 
 import trihedron
+from trihedron.errors import RefusedError
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.demonstrating import compare_with_truth, truth_of_the_day
-from trihedron.refused import RefusedError
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
-SHORT = hand_session(n_poses=18, hold_s=3.0, move_s=1.5, first_hold_s=5.0)
+SHORT = hand_session(n_poses=18, pose_s=3.0, move_s=1.5, first_pose_s=5.0)
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,7 @@ def test_both_methods_agree_within_their_error_bars(recording, result):
     for name in ("accelerometer", "gyroscope"):
         one, other = getattr(result, name), getattr(apart, name)
         sigma = np.where(other.sigma_S > 0, other.sigma_S, 1.0)
-        # Same data: they differ by less than either's error bar.
+        # Same data: they differ by less than either's uncertainty.
         assert np.all(np.abs(one.S - other.S) < 2.0 * sigma)
 
 
@@ -116,7 +116,7 @@ def test_a_recording_without_gyro_is_calibrated_alone_and_without_accelerometer_
 
 
 def test_verification_expects_what_it_sees_on_another_session(scenario, result):
-    other, _ = simulate(replace(scenario, motion=hand_session(n_poses=16, hold_s=3.0, move_s=1.5, layout=3)), 12)
+    other, _ = simulate(replace(scenario, motion=hand_session(n_poses=16, pose_s=3.0, move_s=1.5, layout=3)), 12)
     judged = trihedron.verify(result, other).verification
     z = judged.norm_error / judged.norm_sigma
     # 16 poses: χ² within its 1e-4 limits.
@@ -127,7 +127,7 @@ def test_verification_expects_what_it_sees_on_another_session(scenario, result):
 
 
 def test_a_move_beyond_the_gyros_range_is_left_out_of_what_verification_says_of_moves(scenario, result):
-    other, truth = simulate(replace(scenario, motion=hand_session(n_poses=16, hold_s=3.0, move_s=1.5, layout=3)), 12)
+    other, truth = simulate(replace(scenario, motion=hand_session(n_poses=16, pose_s=3.0, move_s=1.5, layout=3)), 12)
     move = [part for part in truth.segments if part.kind == "move"][4]
     beyond = np.array(other.gyroscope)
     beyond[move.start + 40 : move.stop - 40] = [32767.0, -32768.0, 32767.0]
@@ -156,7 +156,7 @@ def test_a_miss_far_beyond_what_was_expected_is_not_to_be_trusted_unless_a_limit
     # 0.9 m/s² more of one zero is missed by 50 mg rms; whoever can live with 200 mg is told, not stopped.
     wide = trihedron.verify(result, other, limit_mg=200.0)
     assert {f.severity.value for f in wide.findings if f.code.value == "residual-above-noise"} == {"warning"}
-    # A change of a few times the error bars is a warning.
+    # A change of a few times the uncertainties is a warning.
     slightly = replace(scenario, accelerometer=replace(scenario.accelerometer, b=(0.303, -0.3834, 0.1025)))
     near, _ = simulate(slightly, 13)
     assert all(f.severity.value != "serious" for f in trihedron.verify(result, near).findings)

@@ -1,4 +1,4 @@
-"""The error bars of an experiment before it is made: the manual's problems 3, 4 and 8."""
+"""The uncertainties of an experiment before it is made: the manual's problems 3, 4 and 8."""
 
 import json
 import math
@@ -63,7 +63,7 @@ def test_one_turn_and_one_zero_turn_give_the_manuals_variance():
     design = design_zero_first([0, 1, 2], [math.pi / 2] * 3, [2.0] * 3, 5.0, N)
     by_hand = N * math.sqrt(2.0 * (1.0 + 2.0 / 5.0)) / (math.pi / 2)
     np.testing.assert_allclose(design.scale, by_hand, rtol=1e-12)
-    # There and back the zero cancels, and both routes are one.
+    # There and back the bias cancels, and both routes are one.
     pair = ([0, 0, 1, 1, 2, 2], [math.pi / 2, -math.pi / 2] * 3, [2.0] * 6, 5.0, N)
     np.testing.assert_allclose(design_zero_first(*pair).scale, N * math.sqrt(2.0 / 2.0) / (math.pi / 2), rtol=1e-12)
     np.testing.assert_allclose(design_least_squares(*pair).scale, design_zero_first(*pair).scale, rtol=1e-12)

@@ -12,7 +12,7 @@ G = 9.80665
 RATE = 100.0
 
 
-def posed(n_poses, *, noise, step, limit=np.inf, seed=1, hold_s=4.0, move_s=1.0):
+def posed(n_poses, *, noise, step, limit=np.inf, seed=1, pose_s=4.0, move_s=1.0):
     """Poses evenly over the sphere with straight moves between them, read with noise, a range and a step (m/s²)."""
     rng = np.random.default_rng(seed)
     k = np.arange(n_poses) + 0.5
@@ -22,7 +22,7 @@ def posed(n_poses, *, noise, step, limit=np.inf, seed=1, hold_s=4.0, move_s=1.0)
     for a, b in zip(up, np.roll(up, -1, axis=0), strict=True):
         s = (1 - np.cos(np.pi * np.arange(move_s * RATE) / (move_s * RATE))) / 2
         way = np.outer(1 - s, a) + np.outer(s, b)
-        parts += [np.tile(a, (int(hold_s * RATE), 1)), way / np.linalg.norm(way, axis=1, keepdims=True)]
+        parts += [np.tile(a, (int(pose_s * RATE), 1)), way / np.linalg.norm(way, axis=1, keepdims=True)]
     force = G * np.vstack(parts)
     read = force + noise * rng.normal(size=force.shape)
     read = np.clip(read, -limit, limit)
@@ -38,10 +38,10 @@ def test_poses_inside_a_range_below_gravity_are_found_and_those_beyond_are_left_
     # One reading in a hundred is beyond 2.33 standard deviations.
     inside = (np.abs(G * up) < limit - 2.33 * 0.01).all(axis=1)
     assert 12 <= inside.sum() < 24
-    assert len(segments.holds) == inside.sum()
+    assert len(segments.poses) == inside.sum()
     np.testing.assert_allclose(segments.accelerometer_mean, G * up[inside], atol=0.01)
     found = {f.code: f for f in segments.findings}
-    assert found[FindingCode.POSE_AT_RANGE_LIMIT].numbers["holds"] == (~inside).sum()
+    assert found[FindingCode.POSE_AT_RANGE_LIMIT].numbers["poses"] == (~inside).sum()
     assert abs(found[FindingCode.POSE_AT_RANGE_LIMIT].numbers["reading"]) == pytest.approx(limit, abs=0.0012)
     result = calibrate(recording, gravity_m_s2=G)
     # A pose at the limit reads up to 0.5 m/s² less than gravity; taken for a reading it moves a scale by per cents.
@@ -50,13 +50,13 @@ def test_poses_inside_a_range_below_gravity_are_found_and_those_beyond_are_left_
     )
 
 
-@pytest.mark.parametrize("hold_s", [4.0, 1.5])
+@pytest.mark.parametrize("pose_s", [4.0, 1.5])
 @pytest.mark.parametrize(("noise", "step"), [(0.0, 0.16), (0.02, 0.16), (0.1, 0.16), (0.0, 1e-3), (0.0, 1e-9)])
-def test_a_converter_too_coarse_to_tell_rest_from_its_end_loses_no_pose(noise, step, hold_s):
+def test_a_converter_too_coarse_to_tell_rest_from_its_end_loses_no_pose(noise, step, pose_s):
     # 8 bit over ±2 g, and an ideal sensor: a pose on the outermost code read keeps it without any range ending there.
-    _, recording = posed(24, noise=noise, step=step, hold_s=hold_s, move_s=2.0)
+    _, recording = posed(24, noise=noise, step=step, pose_s=pose_s, move_s=2.0)
     segments = segment(recording)
-    assert len(segments.holds) == 24
+    assert len(segments.poses) == 24
     assert FindingCode.POSE_AT_RANGE_LIMIT not in {f.code for f in segments.findings}
 
 
@@ -65,4 +65,4 @@ def test_a_range_that_only_moves_reach_loses_no_pose():
     jolted = recording.accelerometer.copy()
     jolted[450::500] = 19.6
     segments = segment(replace(recording, accelerometer=np.clip(jolted, -19.6, 19.6)))
-    assert len(segments.holds) == 24
+    assert len(segments.poses) == 24

@@ -46,7 +46,7 @@ def finding(recording: Recording, code: FindingCode):
 def assert_same(recording: Recording, table: np.ndarray) -> None:
     np.testing.assert_array_equal(recording.accelerometer, table[:, 1:4])
     np.testing.assert_array_equal(recording.gyroscope, table[:, 4:])
-    # Times are made relative to the first stamp: one rounding of numbers up to 100 s.
+    # Times are made relative to the first timestamp: one rounding of numbers up to 100 s.
     np.testing.assert_allclose(recording.time_s, table[:, 0] - table[0, 0], rtol=0, atol=1e-12)
 
 

@@ -182,7 +182,7 @@ def test_readings_in_si_that_step_like_counts_say_their_step(tmp_path):
 
 
 def coarse_readings_on_arrival(n: int = 20_000, seed: int = 5):
-    """Codes of one noise sigma at 1 kHz, stamped on arrival: stamps and readings agree with those before by chance."""
+    """Codes of one noise sigma at 1 kHz, timestamped on arrival: times and readings repeat those before by chance."""
     rng = np.random.default_rng(seed)
     codes = np.round(rng.normal([0.0, 0.0, 400.0, 0.0, 0.0, 0.0], 1.0, (n, 6)))
     stamps = np.maximum.accumulate(np.arange(n) * 1e-3 + rng.exponential(3e-3, n)).round(6)

@@ -61,7 +61,7 @@ def test_jitter_is_given_in_milliseconds_and_does_not_change_the_rate(tmp_path):
     table = counts()
     table[:, 0] += 0.0008 * np.random.default_rng(2).standard_normal(N)
     recording = read(tmp_path, table)
-    # Steps are differences of two stamps: √2 times their jitter.
+    # Steps are differences of two timestamps: √2 times their jitter.
     jitter = finding(recording, FindingCode.TIME_JITTER).numbers["jitter_s"]
     assert jitter == pytest.approx(0.0008 * np.sqrt(2), rel=0.05)
     assert recording.rate_hz == pytest.approx(100, rel=1e-3)
@@ -123,7 +123,7 @@ def test_clipping_is_found_from_the_data_whatever_the_range(tmp_path, limit):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_round_top_of_a_swing_is_not_clipping(seed):
-    # A slow swing seen by a coarse converter stays at its top for many samples; nothing is cut off.
+    # A slow swing seen by a coarse ADC stays at its top for many samples; nothing is cut off.
     rng = np.random.default_rng(seed)
     t = np.arange(20_000) / 100.0
     swing = np.rint(100 * np.sin(0.7 * t + rng.uniform(0, 6)) + 0.3 * rng.standard_normal(len(t)))

@@ -1,4 +1,4 @@
-"""The even clock behind stamps: its rate, what was lost on it, and when it is taken."""
+"""The even clock behind timestamps: its rate, what was lost on it, and when it is taken."""
 
 import numpy as np
 import pytest
@@ -44,13 +44,13 @@ def arrival(tick, law, seed):
 def test_the_period_is_right_and_losses_are_counted_where_they_are(law, lost, seed):
     tick, behind = numbers(seed, lost)
     clock = find_even_clock(arrival(tick, law, seed) - T * tick[0])
-    # Blocks of some tens of rows know their earliest stamp to a few hundredths of a step: over 6000 rows 10⁻⁶ each.
+    # Blocks of some tens of rows know their earliest timestamp to a few hundredths of a step: over 6000 rows 10⁻⁶ each.
     assert clock.period_s == pytest.approx(T, rel=2e-5)
     assert clock.counts_losses
     found = np.flatnonzero(clock.lost_behind > 0)
     assert clock.lost_behind.sum() == lost
     if lost:
-        # Among late stamps, or steps of one and two coarse ticks, the place is told to a few rows.
+        # Among late timestamps, or steps of one and two coarse ticks, the place is told to a few rows.
         assert np.abs(found - behind).max() <= (0 if law in ("exact", "scattered") else 12)
     kinds = {"exact": StampKind.EXACT, "rounded": StampKind.ROUNDED, "scattered": StampKind.SCATTERED}
     assert clock.kind is kinds.get(law, StampKind.LATE)
@@ -122,7 +122,7 @@ def test_a_counter_of_inner_ticks_does_not_count_samples():
 @pytest.mark.parametrize("ppm", [30, 400, 700, 1500, 3000, -400])
 @pytest.mark.parametrize("rate_hz", [50.0, 100.0, 125.0, 200.0, 250.0])
 def test_a_sensor_a_little_fast_of_whole_milliseconds_loses_nothing_to_its_stamps(rate_hz, ppm, lost):
-    # One stamp in some hundreds is a millisecond early: the pattern of a clock of another period with losses.
+    # One timestamp in some hundreds is a millisecond early: the pattern of a clock of another period with losses.
     period = 1.0 / (rate_hz * (1.0 + 1e-6 * ppm))
     tick, behind = numbers(ppm % 7, lost)
     clock = find_even_clock(np.round(0.0021 + period * tick, 3))

@@ -160,7 +160,7 @@ def test_timetables_of_matlab_mobile_are_both_sensors(tmp_path, version):
 
 
 def batches(instance, table, n=8):
-    """FIFO messages of ``n`` samples as PX4 logs them, counts of 1/2048 g and 1/16.4 deg/s; the stamp is the last's."""
+    """FIFO messages of ``n`` samples as PX4 logs them, 1/2048 g and 1/16.4 deg/s; the timestamp is the last's."""
     fields = "uint64_t timestamp_sample;float dt;float scale;uint8_t samples;int16_t[32] x;int16_t[32] y;int16_t[32] z;"
     out = {}
     for name, columns, scale in (

@@ -1,4 +1,4 @@
-"""Passes over stamps and readings give what the plain NumPy of their definition gives."""
+"""Passes over timestamps and readings give what the plain NumPy of their definition gives."""
 
 import numpy as np
 import pytest

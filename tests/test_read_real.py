@@ -188,7 +188,7 @@ def test_kim_is_even_behind_stamps_of_5_ms_ticks(real_data, run):
     assert jitter.numbers["jitter_s"] == pytest.approx(1.17e-3, rel=0.02)
     assert jitter.numbers["median_rate_hz"] == pytest.approx(97.6, abs=0.1)
     # The few steps of 15.3 ms (three ticks) were once counted as gaps; ticks of 5.12 ms make 5, 10 and 15 ms of an even
-    # 10.000 ms, and the turns of the log follow the even clock, not its stamps.
+    # 10.000 ms, and the turns of the log follow the even clock, not its timestamps.
     assert FindingCode.TIME_GAP not in codes(recording)
     even = finding(recording, FindingCode.EVEN_CLOCK)
     assert even.numbers["period_s"] == pytest.approx(0.0100001, abs=5e-8)

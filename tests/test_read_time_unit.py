@@ -18,8 +18,8 @@ def log(rate_hz, unit_s, n=3000, poses=False, seed=1, whole=None):
     direction = np.tile([0.1, -0.2, 9.8], (n, 1))
     if poses:
         t = np.arange(n) / rate_hz
-        hold_s = max(30 / rate_hz, 2.0)
-        pose = np.floor(t / hold_s) + np.clip((t % hold_s) / 0.7, 0, 1)
+        pose_s = max(30 / rate_hz, 2.0)
+        pose = np.floor(t / pose_s) + np.clip((t % pose_s) / 0.7, 0, 1)
         direction = 9.8 * np.stack([np.sin(pose), np.zeros(n), np.cos(pose)], axis=1)
     table[:, 1:4] = direction + 0.02 * rng.standard_normal((n, 3))
     table[:, 4:] = [0.01, -0.02, 0.003] + 0.002 * rng.standard_normal((n, 3))

@@ -101,7 +101,7 @@ def test_a_log_without_a_known_clock_is_not_given_a_rate_while_a_column_runs_lik
 
 
 def in_turn(tmp_path, every: int, extra: str = ""):
-    """A log of one sensor in each row, the gyro's stamps 2 ms behind; or of the gyro in every ``every``-th row."""
+    """A log of one sensor in each row, the gyro's timestamps 2 ms behind; or of the gyro in every ``every``-th row."""
     table = readings(ROWS)
     rows = []
     for i, (t, *values) in enumerate(table.tolist()):
@@ -122,7 +122,7 @@ def test_rows_of_two_sensors_in_turn_are_two_logs_joined_on_their_stamps(tmp_pat
     assert accounts(recording)
     # The first acceleration lies before the first rate.
     np.testing.assert_array_equal(recording.accelerometer, table[1:, 1:4])
-    # The gyro 8 ms before and 2 ms behind: linear interpolation, to the rounding of stamps in a settled clock.
+    # The gyro 8 ms before and 2 ms behind: linear interpolation, to the rounding of timestamps in a settled clock.
     expected = 0.2 * table[:-1, 4:] + 0.8 * table[1:, 4:]
     np.testing.assert_allclose(recording.gyroscope, expected, rtol=0, atol=1e-9)
     only = read_recording(gyroscope_path=path)

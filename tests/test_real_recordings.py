@@ -13,7 +13,7 @@ import trihedron
 from trihedron.cli import main
 from trihedron.estimate.gyroscope import Turn, calibrate_turns
 from trihedron.pipeline.demonstrating import compare_with_truth, truth_of_the_day
-from trihedron.records import Calibration, FindingCode, Hold, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, FindingCode, Pose, Recording, Segments, SensorCalibration
 from trihedron.sensor_model import other_form
 from trihedron.simulate import scenario_by_name, simulate
 from trihedron.units import RateUnit
@@ -38,7 +38,7 @@ def xsens(real_data):
 def test_xsens_raw_counts_agree_with_the_published_calibration(xsens, real_data, capsys):
     document = calibrated(capsys, *xsens)
     published = json.loads((real_data / "xsens_mti" / "published_imu_tk.json").read_text())
-    assert len(document["segments"]["holds"]) >= 34
+    assert len(document["segments"]["poses"]) >= 34
     accelerometer, gyroscope = document["accelerometer"], document["gyroscope"]
     # Published scales are those of columns: x = T K (raw - B) with T near one.
     for sensor, key, within in ((accelerometer, "acc", 1e-3), (gyroscope, "gyro", 5e-3)):
@@ -70,7 +70,7 @@ def test_kim_residual_per_degree_of_freedom_is_the_published_one(real_data, run,
     assert "even-clock" in {finding.code.value for finding in recording.findings}
     segments = trihedron.segment(recording)
     # How the published figures weighed the poses is not known; alike is the plainest guess.
-    same = np.full((segments.n_holds, 3), 1e-3)
+    same = np.full((segments.n_poses, 3), 1e-3)
     alike = replace(segments, accelerometer_sigma_mean=same, accelerometer_sigma_up=None)
     plain = trihedron.calibrate(recording, segments=alike, gravity_m_s2=9.79871, method="separate")
     assert 1e3 * plain.accelerometer.quality.rms_dof == pytest.approx(published_mm_s2, rel=0.3)
@@ -83,7 +83,7 @@ def test_kim_residual_per_degree_of_freedom_is_the_published_one(real_data, run,
         assert 1e3 * quality.rms_dof == pytest.approx(published_mm_s2, rel=0.3)
     low, high = stats.chi2.ppf([0.005, 0.995], quality.dof)
     if run == 3:
-        # Noise along the vertical is 0.9 mm/s², the norms stray by twice that: zeros differ between the poses.
+        # Noise along the vertical is 0.9 mm/s², the norms stray by twice that: biases differ between the poses.
         assert quality.chi2 > high
         assert quality.covariance_scale > 1.0
     else:
@@ -91,13 +91,13 @@ def test_kim_residual_per_degree_of_freedom_is_the_published_one(real_data, run,
 
 
 def poses_of(means, sigma, ranges):
-    """Segments of nothing but still poses, as somebody else annotated or averaged them."""
+    """Segments of nothing but poses, as somebody else annotated or averaged them."""
     n = len(means)
-    holds = tuple(Hold(k, first, last, first, last) for k, (first, last) in enumerate(ranges))
+    poses = tuple(Pose(k, first, last, first, last) for k, (first, last) in enumerate(ranges))
     lengths = np.array([last - first for first, last in ranges])
     middles = np.array([0.5 * (first + last) for first, last in ranges])
     return Segments(
-        holds, (), np.full(3, np.nan), None, means, None, np.broadcast_to(sigma, (n, 3)).copy(), None, lengths,
+        poses, (), np.full(3, np.nan), None, means, None, np.broadcast_to(sigma, (n, 3)).copy(), None, lengths,
         middles, lengths.astype(float),
     )  # fmt: skip
 
@@ -167,7 +167,7 @@ def test_tomi_clips_in_moves_and_agrees_with_the_published_scales(real_data, cap
 
 
 def model(S, b):
-    """A published accelerometer model as a calibration without error bars."""
+    """A published accelerometer model as a calibration without uncertainties."""
     sensor = SensorCalibration(np.asarray(S), np.asarray(b), np.zeros((12, 12)), "m/s^2", "m/s^2", "published")
     return Calibration(sensor, None, np.zeros((12, 12)), "case", 9.7974, "given", extensions=MappingProxyType({}))
 
@@ -248,7 +248,7 @@ def test_ctu_turns_give_one_scale_consistent_with_the_reference_angles(real_data
     for turn, zero in zip(turns, zeros, strict=True):
         rest = gyroscope[zero[0] : zero[1]].mean(axis=0)
         seen = (gyroscope[turn.start : turn.stop] - rest).sum(axis=0) / 100.0
-        # Back through the calibration: the reference angle, within the drift of the zero over 5 s.
+        # Back through the calibration: the reference angle, within the drift of the bias over 5 s.
         assert abs((found.S @ seen)[turn.axis] - turn.angle_rad) < math.radians(0.5)
 
 

@@ -64,7 +64,7 @@ def test_the_earths_rate_is_told_with_its_direction_and_is_neither_a_zero_nor_a_
             np.abs(found.earth_rate.value - NORTH_OF_48_DEG) < 4.5 * found.earth_rate.std + 0.02 * EARTH_RAD_S
         )
         assert max(e.score for e in found.effects.values()) < 8.0
-    # Nine zeros; before the Earth was a part of the model they stood 4.5 error bars off (rms of 24).
+    # Nine zeros; before the Earth was a part of the model they stood 4.5 uncertainties off (rms of 24).
     assert np.sqrt(np.mean(np.square(z))) < 2.0
     lean = np.degrees(np.arcsin(np.mean(seen, axis=0)[2] / EARTH_RAD_S))
     assert abs(lean - 48.0) < 10.0
@@ -95,7 +95,7 @@ def test_error_bars_of_a_wobbling_table_cover_the_truth():
 
 
 def test_commands_of_a_rate_table_are_enough():
-    trial = commanded_table(11, hold_s=3.0)
+    trial = commanded_table(11, pose_s=3.0)
     result = trihedron.calibrate(trial.log, reference=trial.motion, gravity_m_s2=G)
     A = np.linalg.inv(trial.unit.M)
     # Plateaus of 2.5 s of a 0.05 °/s wobble and 1.5 °/s of noise a sample: 0.2 % of scale is ten times what noise does.

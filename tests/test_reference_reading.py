@@ -49,7 +49,7 @@ def written(tmp_path, columns, header=""):
 )
 def test_one_attitude_in_every_way_of_writing_it(tmp_path, columns, header, said):
     motion = read_reference(written(tmp_path, columns, header), said)
-    # Nine decimals; stamps are even, and may be laid anew to a hundredth of a step.
+    # Nine decimals; timestamps are even, and may be laid anew to a hundredth of a step.
     assert np.allclose(motion.attitude, TRUE, atol=1e-6)
     assert np.allclose(motion.time_s, T, atol=2e-4)
 

@@ -25,9 +25,9 @@ def session(seed):
     profile = profile_by_name("adis")
     accelerometer, gyroscope = profile.unit(seed)
     log, truth = simulate(Scenario(hand_session(30, layout=seed), "", accelerometer, gyroscope, profile.clock), seed)
-    holds = [(p.start, p.stop) for p in truth.segments if p.kind != "move"]
-    middles = [(a[1] + b[0]) / 2 for a, b in pairwise(holds)]
-    return log, truth, np.searchsorted(middles, np.arange(log.n_samples)), len(holds)
+    poses = [(p.start, p.stop) for p in truth.segments if p.kind != "move"]
+    middles = [(a[1] + b[0]) / 2 for a, b in pairwise(poses)]
+    return log, truth, np.searchsorted(middles, np.arange(log.n_samples)), len(poses)
 
 
 def added(log, truth, of_rate):
@@ -45,7 +45,7 @@ def test_biases_that_scatter_are_named_and_sized_in_a_session():
     for p in result.effects[0].parameters:
         assert abs(p.value - 0.02 * DEG) < 4.0 * p.std
     assert not result.relations
-    # The scale of the gyro is not pulled by zeros that differ: a tenth of a per cent is three of its errors here.
+    # The scale of the gyro is not pulled by biases that differ: a tenth of a per cent is three of its errors here.
     ratio = np.array(result.extended.gyroscope["S"]) @ np.linalg.inv(truth.gyroscope_S)
     sigma = np.linalg.norm(np.array(result.extended.gyroscope["sigma_S"])) / np.linalg.norm(truth.gyroscope_S)
     assert np.abs(np.linalg.svd(ratio)[1] - 1.0).max() < 5.0 * sigma + 1e-3

@@ -51,7 +51,7 @@ def long_logs(tmp_path_factory):
     """A session and a rest of more than 20 000 readings, beyond which sums are shared between threads."""
     folder = tmp_path_factory.mktemp("long")
     rng = np.random.default_rng(2)
-    motion = hand_session(n_poses=26, hold_s=8.0, move_s=2.0, first_hold_s=10.0)
+    motion = hand_session(n_poses=26, pose_s=8.0, move_s=2.0, first_pose_s=10.0)
     recording = simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)[0]
     assert recording.n_samples > THREADED_ROWS
     rows = np.column_stack([recording.time_s, recording.accelerometer, recording.gyroscope])

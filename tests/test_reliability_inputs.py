@@ -16,12 +16,12 @@ import pytest
 
 from trihedron import _core
 from trihedron.documents import DocumentError, read_text
+from trihedron.errors import RefusedError
 from trihedron.files.calibration import CalibrationFileError, read_calibration
 from trihedron.files.diagnosis import DiagnosisFileError, read_diagnosis
 from trihedron.files.noise import NoiseFileError, read_noise
-from trihedron.printable import printable, printable_json
 from trihedron.read import ReadError, read_recording
-from trihedron.refused import RefusedError
+from trihedron.sanitise import printable, printable_json
 from trihedron.simulate.named import SESSIONS
 from trihedron.simulate.scenario_file import read_scenario
 

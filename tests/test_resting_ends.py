@@ -1,4 +1,4 @@
-"""A coarse gyro's zero inside its step, told by moves: what stands still at their ends says nothing of it."""
+"""A coarse gyro's bias inside its step, told by moves: what stands still at their ends says nothing of it."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ LAWS = {
 
 @pytest.mark.parametrize("law", LAWS)
 def test_what_a_zero_inside_its_step_turns_at_an_end_is_that_of_the_readings_left(law):
-    """Sum of rate - (code at rest) over an end, both ways: the zero times what is not still, to first order."""
+    """Sum of rate - (code at rest) over an end, both ways: the bias times what is not still, to first order."""
     n, zero, lasted, told = np.arange(200.0), 0.1, 0.0, 0.0
     for way in (1.0, -1.0):
         for scale in np.linspace(20.0, 40.0, 41):
@@ -33,7 +33,7 @@ def test_what_a_zero_inside_its_step_turns_at_an_end_is_that_of_the_readings_lef
             told += np.sum(codes - rate)
             lasted += np.count_nonzero(~still[:, 0])
             assert not still[:5, 0].any()
-    # The mean over the ways; 200 readings all along would tell a zero a fifth to four fifths too small.
+    # The mean over the ways; 200 readings all along would tell a bias a fifth to four fifths too small.
     assert told / lasted == pytest.approx(zero, rel=0.15)
 
 

@@ -11,7 +11,7 @@ POSES = 40
 
 
 def poses(noise, rng):
-    """Poses of 4 s, turns of 1 s between, |g| of 50 steps of the converter, ``noise`` of a step; and the truth."""
+    """Poses of 4 s, turns of 1 s between, |g| of 50 LSB, ``noise`` of a step; and the truth."""
     force, rate, truth = [], [], []
     last = None
     for _ in range(POSES):
@@ -35,7 +35,7 @@ def poses(noise, rng):
 def test_the_error_of_a_rounded_mean_is_what_is_said_of_it(noise):
     recording, truth = poses(noise, np.random.default_rng(71))
     segments = segment(recording)
-    assert segments.n_holds == POSES
+    assert segments.n_poses == POSES
     z = (segments.accelerometer_mean - truth) / segments.accelerometer_sigma_mean
     # 120 errors; rounding alone makes them uniform, whose mean square scatters by 0.082, white noise by 0.13; the noise
     # itself is known to a tenth, on which the error hangs steeply: a third.

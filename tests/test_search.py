@@ -137,7 +137,7 @@ def scattering(effect_id, seed, gyro_deg_s, **size):
     """A session with an effect whose gyro's zero is another in every pose, and gravity there."""
     recording, truth = simulated(effect_id, seed, **size)
     rng, zero = np.random.default_rng(seed), np.zeros_like(recording.gyroscope)
-    starts = [part.start for part in truth.segments if part.kind == "hold"]
+    starts = [part.start for part in truth.segments if part.kind == "pose"]
     for start, stop in zip(starts, [*starts[1:], len(zero)], strict=True):
         zero[start:stop] = rng.normal(size=3) * np.radians(gyro_deg_s) / np.radians(1.0 / 131.0)
     return replace(recording, gyroscope=recording.gyroscope + zero), truth.gravity_m_s2

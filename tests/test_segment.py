@@ -10,10 +10,10 @@ from trihedron.records import FindingCode, Recording
 from trihedron.segment import segment_recording
 from trihedron.simulate import (
     Disturb,
-    Hold,
     Motion,
     MoveTo,
     NoiseTerms,
+    Pose,
     Scenario,
     Turn,
     hand_session,
@@ -46,9 +46,9 @@ def overlaps(segments, truth):
         [
             max(
                 (max(0, min(h.stop, t.stop) - max(h.start, t.start)) / (max(h.stop, t.stop) - min(h.start, t.start)))
-                for h in segments.holds
+                for h in segments.poses
             )
-            for t in truth.holds
+            for t in truth.poses
         ]
     )
 
@@ -63,9 +63,9 @@ def session():
     ("motion", "least"),
     [
         (hand_session(12), 0.8),
-        # A tenth of a second at each end is 15 % of a hold that short; a chance trim takes up to a third.
-        (hand_session(12, hold_s=1.6, first_hold_s=1.6, move_s=1.5), 0.4),
-        (hand_session(6, hold_s=60.0), 0.9),
+        # A tenth of a second at each end is 15 % of a pose that short; a chance trim takes up to a third.
+        (hand_session(12, pose_s=1.6, first_pose_s=1.6, move_s=1.5), 0.4),
+        (hand_session(6, pose_s=60.0), 0.9),
         (hand_session(12, wobble_deg=25.0, travel_m=0.4, move_s=1.0), 0.8),
         # Ten seconds of a soft start: what is slower than the noise can be called still.
         (hand_session(8, move_s=10.0), 0.6),
@@ -77,22 +77,22 @@ def test_every_true_hold_is_found_once(motion, least, grade):
     for seed in (1, 2):
         recording, truth = simulate(scenario(motion, grade), seed)
         segments = segment_recording(recording)
-        assert segments.n_holds == len(truth.holds)
+        assert segments.n_poses == len(truth.poses)
         assert overlaps(segments, truth).min() > least
 
 
 def test_no_sample_of_a_move_is_averaged(session):
     recording, truth = session
-    for found, true in zip(segment_recording(recording).holds, truth.holds, strict=True):
+    for found, true in zip(segment_recording(recording).poses, truth.poses, strict=True):
         assert true.start <= found.start < found.stop <= true.stop
 
 
 def test_moves_join_neighbouring_holds_without_loss(session):
     segments = segment_recording(session[0])
-    assert len(segments.moves) == segments.n_holds - 1
+    assert len(segments.moves) == segments.n_poses - 1
     for move in segments.moves:
-        assert move.start == segments.holds[move.hold_before].stop
-        assert move.stop == segments.holds[move.hold_after].start
+        assert move.start == segments.poses[move.pose_before].stop
+        assert move.stop == segments.poses[move.pose_after].start
 
 
 @pytest.mark.parametrize("only", ["accelerometer", "gyroscope"])
@@ -105,7 +105,7 @@ def test_one_sensor_alone_finds_the_same_holds(session, only):
         rate_hz=recording.rate_hz,
     )
     segments = segment_recording(alone)
-    assert segments.n_holds == len(truth.holds)
+    assert segments.n_poses == len(truth.poses)
     assert (segments.gyroscope_mean is None) == (only == "accelerometer")
 
 
@@ -121,35 +121,35 @@ def test_a_log_that_begins_in_motion_is_segmented_alike(session):
         recording.gyroscope_unit,
     )
     segments = segment_recording(late)
-    assert segments.n_holds == len(truth.holds) - 1
+    assert segments.n_poses == len(truth.poses) - 1
     assert FindingCode.NO_INITIAL_POSE in codes(segments)
 
 
 @pytest.mark.parametrize("rate_deg_s", [0.3, 1.0, 5.0])
 def test_a_slow_turn_about_gravity_is_not_stillness(rate_deg_s):
-    steps = [Hold(8.0)]
+    steps = [Pose(8.0)]
     for face in FACES:
-        steps += [MoveTo(face, 2.0), Hold(5.0)]
-    steps += [Turn(FACES[-1], 20.0 * rate_deg_s, 20.0, ramp=0.1), Hold(5.0)]
+        steps += [MoveTo(face, 2.0), Pose(5.0)]
+    steps += [Turn(FACES[-1], 20.0 * rate_deg_s, 20.0, ramp=0.1), Pose(5.0)]
     recording, truth = simulate(scenario(Motion(tuple(steps))), 3)
     segments = segment_recording(recording)
     turn = next(s for s in truth.segments if s.kind == "turn")
     middle = range(turn.start + 250, turn.stop - 250)
-    assert not any(h.start < middle.stop and h.stop > middle.start for h in segments.holds)
+    assert not any(h.start < middle.stop and h.stop > middle.start for h in segments.poses)
     assert FindingCode.SLOW_TURN in codes(segments)
 
 
 @pytest.mark.parametrize("duration_s", [1.5, 4.0, 10.0])
 def test_the_gyro_scale_does_not_depend_on_how_long_a_move_takes(duration_s):
-    """Eight quarter turns: their integral between trimmed holds is a quarter turn, within its own error bar."""
-    steps = [Hold(10.0)]
+    """Eight quarter turns: their integral between trimmed poses is a quarter turn, within its own uncertainty."""
+    steps = [Pose(10.0)]
     for k in range(8):
-        steps += [Turn((0.0, 0.0, 1.0), 90.0 * (-1) ** k, duration_s, ramp=0.5), Hold(4.0)]
+        steps += [Turn((0.0, 0.0, 1.0), 90.0 * (-1) ** k, duration_s, ramp=0.5), Pose(4.0)]
     z = []
     for seed in range(4):
         recording, truth = simulate(scenario(Motion(tuple(steps))), seed)
         segments = segment_recording(recording)
-        assert segments.n_holds == 9
+        assert segments.n_poses == 9
         dt = 1.0 / recording.rate_hz
         angle, variance = 0.0, 0.0
         to_rad = np.linalg.norm(truth.gyroscope_S[2])
@@ -167,26 +167,26 @@ def test_the_gyro_scale_does_not_depend_on_how_long_a_move_takes(duration_s):
 
 
 def test_a_push_inside_a_hold_is_left_out_and_said():
-    steps = [Hold(8.0)]
+    steps = [Pose(8.0)]
     for edge in EDGES[:6]:
-        steps += [MoveTo(edge, 2.0), Hold(5.0), Disturb(), Hold(5.0)]
+        steps += [MoveTo(edge, 2.0), Pose(5.0), Disturb(), Pose(5.0)]
     recording, truth = simulate(scenario(Motion(tuple(steps))), 1)
     segments = segment_recording(recording)
-    assert segments.n_holds == 7
+    assert segments.n_poses == 7
     assert FindingCode.POSE_DISTURBED in codes(segments)
     for push in (s for s in truth.segments if s.kind == "disturbance"):
-        hold = next(h for h in segments.holds if h.start < push.start < h.stop)
-        assert not set(range(push.start + 10, push.stop - 10)) & set(hold.samples().tolist())
+        pose = next(h for h in segments.poses if h.start < push.start < h.stop)
+        assert not set(range(push.start + 10, push.stop - 10)) & set(pose.samples().tolist())
 
 
 def test_a_creeping_hold_stays_a_hold_and_is_said():
-    steps = [Hold(8.0)]
+    steps = [Pose(8.0)]
     for k, edge in enumerate(EDGES):
-        steps += [MoveTo(edge, 2.0), Hold(10.0, creep_deg=0.3 if k == 3 else 0.0)]
+        steps += [MoveTo(edge, 2.0), Pose(10.0, creep_deg=0.3 if k == 3 else 0.0)]
     segments = segment_recording(simulate(scenario(Motion(tuple(steps)), 0.3), 1)[0])
-    assert segments.n_holds == 13
+    assert segments.n_poses == 13
     finding = next(f for f in segments.findings if f.code is FindingCode.POSE_SETTLING)
-    assert finding.numbers["holds"] == 1.0
+    assert finding.numbers["poses"] == 1.0
 
 
 def test_a_pose_held_in_the_hand_is_told_from_a_table():
@@ -194,7 +194,7 @@ def test_a_pose_held_in_the_hand_is_told_from_a_table():
     rng = np.random.default_rng(5)
     t = recording.time_s
     accelerometer, gyroscope = recording.accelerometer.copy(), recording.gyroscope.copy()
-    held = truth.holds[6]
+    held = truth.poses[6]
     rows = slice(held.start, held.stop)
     # A tremor of some hertz: a hundred counts of tilt and turn, ten times the noise.
     tremor = sum(np.sin(2 * np.pi * f * t[rows, None] + rng.uniform(0, 6, 3)) for f in (1.3, 3.1, 7.7))
@@ -205,8 +205,8 @@ def test_a_pose_held_in_the_hand_is_told_from_a_table():
     segments = segment_recording(
         Recording(t, accelerometer, gyroscope, 100.0, recording.accelerometer_unit, recording.gyroscope_unit)
     )
-    assert segments.n_holds == 12
-    assert [h.index for h in segments.holds if h.is_unsteady] == [6]
+    assert segments.n_poses == 12
+    assert [h.index for h in segments.poses if h.is_unsteady] == [6]
     assert FindingCode.POSE_UNSTEADY in codes(segments)
     others = np.delete(segments.accelerometer_sigma_mean, 6, axis=0)
     across = np.arange(3) != along
@@ -221,14 +221,14 @@ def test_missing_rows_and_gaps_in_time_cost_only_themselves(session):
     rng = np.random.default_rng(9)
     accelerometer[rng.choice(len(accelerometer), 200, replace=False)] = np.nan
     time_s = recording.time_s.copy()
-    lost = truth.holds[4].start + 150
+    lost = truth.poses[4].start + 150
     time_s[lost:] += 1.2
     segments = segment_recording(
         Recording(
             time_s, accelerometer, recording.gyroscope, 100.0, recording.accelerometer_unit, recording.gyroscope_unit
         )
     )
-    assert segments.n_holds == len(truth.holds)
+    assert segments.n_poses == len(truth.poses)
     assert np.isfinite(segments.accelerometer_mean).all()
 
 
@@ -238,7 +238,7 @@ def test_a_converter_coarser_than_the_noise_still_shows_the_poses():
     segments = segment_recording(
         Recording(recording.time_s, *coarse, 100.0, recording.accelerometer_unit, recording.gyroscope_unit)
     )
-    assert segments.n_holds == len(truth.holds)
+    assert segments.n_poses == len(truth.poses)
     # Rounding without dither cannot be averaged away: the error of a mean stays near q/√12 = 18 counts or below.
     assert segments.gyroscope_sigma_mean.min() > 5.0
 
@@ -251,7 +251,7 @@ def test_axes_of_very_different_noise_are_weighed_alike(session):
         recording.time_s, recording.accelerometer, gyroscope, 100.0, recording.accelerometer_unit,
         recording.gyroscope_unit,
     )  # fmt: skip
-    assert segment_recording(louder).n_holds == len(truth.holds)
+    assert segment_recording(louder).n_poses == len(truth.poses)
 
 
 def made_session(seed, noise_of):
@@ -286,7 +286,7 @@ def standard_scores(noise_of, is_difference):
     for seed in range(8):
         recording, truth, _ = made_session(seed, noise_of)
         segments = segment_recording(recording)
-        assert segments.n_holds == len(truth)
+        assert segments.n_poses == len(truth)
         error = np.hstack([segments.accelerometer_mean, segments.gyroscope_mean]) - truth
         sigma = np.hstack([segments.accelerometer_sigma_mean, segments.gyroscope_sigma_mean])
         if is_difference:
@@ -308,7 +308,7 @@ def test_a_log_that_never_rests_is_a_serious_finding():
     rng = np.random.default_rng(3)
     walk = np.cumsum(rng.normal(size=(3000, 6)), axis=0)
     segments = segment_recording(Recording(np.arange(3000) / 100.0, walk[:, :3], walk[:, 3:], 100.0))
-    assert segments.n_holds == 0
+    assert segments.n_poses == 0
     assert FindingCode.NOT_STATIC in codes(segments)
 
 
@@ -316,7 +316,7 @@ def test_a_log_of_nothing_but_rest_is_one_hold_and_few_poses():
     rng = np.random.default_rng(4)
     still = Recording(np.arange(6000) / 100.0, rng.normal(size=(6000, 3)), rng.normal(size=(6000, 3)), 100.0)
     segments = segment_recording(still)
-    assert segments.n_holds == 1
+    assert segments.n_poses == 1
     assert FindingCode.FEW_POSES in codes(segments)
     assert segments.duration_s[0] > 58.0
 

@@ -1,4 +1,4 @@
-"""Edges of holds, means over ranges and moments of moves: kernels of the core against NumPy twins."""
+"""Edges of poses, means over ranges and moments of moves: kernels of the core against NumPy twins."""
 
 import itertools
 
@@ -51,7 +51,7 @@ def test_ends_are_trimmed_as_by_a_plain_loop(seed):
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 90))
     mean = 1e3 + rng.normal(size=(n + 9, 3))
-    # Soft ends of any size and length, on the sides of a hold that begins at the fifth block.
+    # Soft ends of any size and length, on the sides of a pose that begins at the fifth block.
     ramp = np.exp(-np.minimum(np.arange(n), np.arange(n)[::-1]) / rng.uniform(0.5, 10.0))
     mean[5 : 5 + n] += 10.0 ** rng.uniform(-2.0, 2.0) * ramp[:, None]
     bumps = ((5 + n // 2, 5 + n // 2 + 3),) if n > 20 and seed % 2 else ()

@@ -18,9 +18,9 @@ def test_xsens_session_shows_its_several_dozen_poses(real_data):
     folder = real_data / "xsens_mti"
     recording = read_recording(accelerometer_path=folder / "xsens_acc.txt", gyroscope_path=folder / "xsens_gyro.txt")
     segments = segment_recording(recording)
-    assert 34 <= segments.n_holds <= 45
+    assert 34 <= segments.n_poses <= 45
     # The 50 s rest the log begins with.
-    assert segments.holds[0].start < 100
+    assert segments.poses[0].start < 100
     assert segments.duration_s[0] > 49.0
 
 
@@ -28,17 +28,17 @@ def test_xsens_session_shows_its_several_dozen_poses(real_data):
 def test_mpu9150_sessions_show_their_poses(real_data, unit):
     recording = read_recording(real_data / "mpu9150" / f"imu{unit}.log", rate_hz=100.0)
     segments = segment_recording(recording)
-    # The first 25 s are moved about in the hand, with pauses of which up to four count as unsteady holds.
+    # The first 25 s are moved about in the hand, with pauses of which up to four count as unsteady poses.
     after = segments.time_mid_s > 25.0
     assert 18 <= after.sum() <= 20
-    assert all(hold.is_unsteady for hold, late in zip(segments.holds, after, strict=True) if not late)
+    assert all(pose.is_unsteady for pose, late in zip(segments.poses, after, strict=True) if not late)
 
 
 @pytest.mark.parametrize(("run", "poses"), [(1, 9), (2, 14), (3, 15)])
 def test_kim_sessions_show_their_poses(real_data, run, poses):
     segments = segment_recording(read_recording(real_data / "kim" / f"kim_imu_good{run}.txt"))
     # A pose that is nudged half way counts twice.
-    assert poses <= segments.n_holds <= poses + 1
+    assert poses <= segments.n_poses <= poses + 1
 
 
 @pytest.mark.parametrize("session", [2, 3, 4, 5])
@@ -50,19 +50,19 @@ def test_mimu4444_poses_are_found_and_violent_rotation_gives_none(real_data, ses
         assert 19 <= steady.sum() <= 20
         gyro = recording.gyroscope
         violent = np.abs(gyro - np.median(gyro, axis=0)).max(axis=1) > 100.0 * segments.gyroscope_sigma.max()
-        for hold in segments.holds:
-            assert not violent[hold.start : hold.stop].any()
+        for pose in segments.poses:
+            assert not violent[pose.start : pose.stop].any()
 
 
 def test_tomi_session_shows_ten_poses(real_data):
     recording = read_recording(real_data / "mpu6050_tomi" / "tomi_example_data_calibration.csv")
-    assert segment_recording(recording).n_holds == 10
+    assert segment_recording(recording).n_poses == 10
 
 
 def test_tomi_rest_is_one_hold_that_lasts(real_data):
     recording = read_recording(real_data / "mpu6050_tomi" / "tomi_example_data_tinit_calc.csv")
     segments = segment_recording(recording)
-    assert segments.n_holds == 1
+    assert segments.n_poses == 1
     assert segments.duration_s[0] > 0.99 * recording.duration_s
 
 
@@ -79,10 +79,10 @@ def test_phone_holds_agree_with_the_published_sections(real_data, run):
     published = json.loads((folder / "published_results.json").read_text())[f"static_sections_rec{run}_samples"]
     segments = segment_recording(read_recording(**phone(folder, run)))
     agreement = [
-        max((min(h.stop, b) - max(h.start, a)) / (max(h.stop, b) - min(h.start, a)) for h in segments.holds)
+        max((min(h.stop, b) - max(h.start, a)) / (max(h.stop, b) - min(h.start, a)) for h in segments.poses)
         for a, b in published
     ]
-    # Marked by hand, some with up to three seconds given away at an end; a hold of this very quiet sensor loses its
+    # Marked by hand, some with up to three seconds given away at an end; a pose of this very quiet sensor loses its
     # settling, up to a third of it.
     assert np.median(agreement) > 0.9
     assert min(agreement) > 0.6
@@ -92,9 +92,9 @@ def test_ferraris_holds_cover_the_annotated_faces_and_no_annotated_turn(real_dat
     segments = segment_recording(read_recording(real_data / "imucal_ferraris" / "example_ferraris_session.csv"))
     faces = [(540, 1271), (1620, 2361), (2814, 3298), (3740, 4152), (4522, 4975), (5376, 5983)]
     for first, last in faces:
-        assert max((min(h.stop, last) - max(h.start, first)) / (last - first) for h in segments.holds) > 0.95
+        assert max((min(h.stop, last) - max(h.start, first)) / (last - first) for h in segments.poses) > 0.95
     for first, last in [(6770, 7093), (8081, 8405), (9205, 9512)]:
-        inside = sum(max(0, min(h.stop, last) - max(h.start, first)) for h in segments.holds)
+        inside = sum(max(0, min(h.stop, last) - max(h.start, first)) for h in segments.poses)
         # The turns were annotated with a little rest at their ends.
         assert inside < 0.25 * (last - first)
 
@@ -102,7 +102,7 @@ def test_ferraris_holds_cover_the_annotated_faces_and_no_annotated_turn(real_dat
 @pytest.mark.parametrize("run", [1, 2, 3, 4, 5])
 def test_a_ten_bit_board_rests_before_and_after_its_flight(real_data, run):
     segments = segment_recording(read_recording(real_data / "analog6dof" / f"imuRaw{run}.csv"))
-    assert segments.n_holds == 2
+    assert segments.n_poses == 2
     assert FindingCode.FEW_POSES in codes(segments)
     # Rounding to a whole count is not averaged away by a sensor quieter than one.
     assert segments.accelerometer_sigma_mean.max() > 0.1

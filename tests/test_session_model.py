@@ -1,4 +1,4 @@
-"""The joint model of a session: whitening, derivatives, zeros that differ from pose to pose, stamps that repeat."""
+"""The joint model of a session: whitening, derivatives, biases that differ by pose, timestamps that repeat."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -39,7 +39,7 @@ def fitted_to(recording, gravity):
 
 
 def scattered(recording, segments, sigma_raw, rng):
-    """The recording with a zero of its own in every pose, carried from pose to pose in the middle of each move."""
+    """The recording with a bias of its own in every pose, carried from pose to pose in the middle of each move."""
     offset = np.zeros_like(recording.gyroscope)
     edges = [0, *((move.start + move.stop) // 2 for move in segments.moves), recording.n_samples]
     for start, stop in pairwise(edges):
@@ -70,7 +70,7 @@ def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_
         accelerometer_path=folder / "session4_acc.txt", gyroscope_path=folder / "session4_gyro.txt"
     )
     fitted, _ = fitted_to(recording, 9.803)
-    # imu_tk found 1.000 on the log's own unit; shrunk by its zeros' scatter it was 0.816, moves 4.70 deg.
+    # imu_tk found 1.000 on the log's own unit; shrunk by its biases' scatter it was 0.816, moves 4.70 deg.
     assert fitted.twin.gyro_S[0, 0] == pytest.approx(1.0, abs=0.01)
     missed = np.linalg.norm(fitted.line.move_errors[0][:, :2], axis=1)
     assert np.degrees(np.sqrt(np.mean(np.square(missed))) / 9.803) < 0.35
@@ -97,7 +97,7 @@ def test_two_samples_with_one_stamp_change_nothing_that_can_be_seen():
     with np.errstate(all="raise", under="ignore"):
         fitted, _ = fitted_to(replace(recording, time_s=stamps), truth.gravity_m_s2)
     sigma = np.sqrt(np.diag(plain.covariance()))[9:18]
-    # One stamp of a move of some hundred samples late by half a step: a fraction of the noise.
+    # One timestamp of a move of some hundred samples late by half a step: a fraction of the noise.
     assert np.abs((fitted.twin.gyro_S - plain.twin.gyro_S).ravel() / sigma).max() < 1.0
 
 
@@ -167,7 +167,7 @@ def test_the_fit_says_why_it_stopped_and_how_far_the_optimum_can_be():
 def test_the_joint_answer_leaves_at_rest_what_it_prints_and_no_more_than_the_poses_alone(
     real_data: Path, name: str, expected_mm_s2: float
 ) -> None:
-    # Moves of this log miss by degrees (lost samples, stamps of arrival). Spread over the accelerometer they left 19
+    # Moves of this log miss by degrees (lost samples, timestamps of arrival). Over the accelerometer they left 19
     # and 24 mm/s² where the report said 3.7 and 10.4; the poses alone leave 2.94 and 8.30.
     result = calibrate(read_recording(real_data / "openaxes" / f"{name}.csv"), gravity_m_s2=9.8127)
     sensor = result.calibration.accelerometer

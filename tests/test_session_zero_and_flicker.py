@@ -19,7 +19,7 @@ from trihedron.session.flicker import expected_scatter
 from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
 from true_segments import segments_from_truth
 
-RATE_HZ, POSES, HOLD, MOVE = 100.0, 18, 400, 200
+RATE_HZ, POSES, POSE, MOVE = 100.0, 18, 400, 200
 UP = np.tile([0.6, 0.0, 0.8], (POSES, 1))
 
 
@@ -30,7 +30,7 @@ def test_the_zero_of_a_session_is_that_of_its_middle():
     for seed in range(6):
         recording, truth = simulate(
             Scenario(
-                motion=hand_session(20, hold_s=2.0, first_hold_s=3.0),
+                motion=hand_session(20, pose_s=2.0, first_pose_s=3.0),
                 accelerometer=Accelerometer(noise=NoiseTerms(N=(2e-3,) * 3)),
                 gyroscope=Gyroscope(noise=NoiseTerms(N=(2e-4,) * 3)),
             ),
@@ -46,24 +46,24 @@ def test_the_zero_of_a_session_is_that_of_its_middle():
             segments.accelerometer_mean, segments.accelerometer_sigma_mean, truth.gravity_m_s2, raw_unit="m/s^2"
         )
         found = calibrate_joint(drifting, segments, alone, truth.gravity_m_s2, "given", MoveOptions(n_folds=0))
-        middle = np.mean([part[hold.start : hold.stop].mean() for hold in segments.holds])
-        # f = S a' + b, so that b is minus the zero.
+        middle = np.mean([part[pose.start : pose.stop].mean() for pose in segments.poses])
+        # f = S a' + b, so that b is minus the bias.
         away.append(found.accelerometer.b + drift * middle)
-    # A third of what the zero of the first pose is away.
+    # A third of what the bias of the first pose is away.
     assert np.sqrt(np.mean(np.square(away))) < drift / 2 / 3
 
 
 def noisy(rng, flicker, white=1.0):
     """(n, 3) readings of white noise (1/√Hz) and a flicker of density h/f, and the ranges of the poses."""
-    n = POSES * (HOLD + MOVE)
+    n = POSES * (POSE + MOVE)
     f = np.fft.rfftfreq(2 * n, 1.0 / RATE_HZ)
     gain = np.zeros_like(f)
     gain[1:] = np.sqrt(flicker / f[1:])
     spectrum = np.fft.rfft(rng.normal(size=(2 * n, 3)) * np.sqrt(RATE_HZ), axis=0) * gain[:, np.newaxis] / np.sqrt(2.0)
     slow = np.fft.irfft(spectrum, 2 * n, axis=0)[:n]
-    starts = np.arange(POSES) * (HOLD + MOVE)
+    starts = np.arange(POSES) * (POSE + MOVE)
     readings = slow + white * np.sqrt(RATE_HZ) * rng.normal(size=(n, 3))
-    return readings, np.stack([starts, starts + HOLD], axis=1), slow
+    return readings, np.stack([starts, starts + POSE], axis=1), slow
 
 
 def test_flicker_inside_poses_says_how_far_zeros_scatter_between_them():
@@ -85,9 +85,9 @@ def test_white_noise_and_a_hand_that_shakes_single_poses_let_expect_nothing():
     said = []
     for _ in range(60):
         readings, spans, _ = noisy(rng, flicker=0.0)
-        for hold in rng.choice(POSES, 2, replace=False):
-            middle = (spans[hold, 0] + spans[hold, 1]) // 2
-            readings[middle : spans[hold, 1]] += 5.0
+        for pose in rng.choice(POSES, 2, replace=False):
+            middle = (spans[pose, 0] + spans[pose, 1]) // 2
+            readings[middle : spans[pose, 1]] += 5.0
         said.append(expected_scatter(readings, spans, UP) > 0.0)
     # One standard error above by chance: one in six, three times 4.8 % of chance in 60 sessions above.
     assert np.mean(said) < 0.31

@@ -100,7 +100,7 @@ def test_the_common_model_and_the_session_that_is_apart_are_found(four_sessions)
     changed = [change for change in result.model.changes if change.significant]
     assert [(c.id, c.kind, c.where) for c in changed] == [("gyro-bias", "apart", "session-3.csv")]
     size = np.array(changed[0].size)
-    # Five of its own standard errors: the truth of the zero along the axis, with its sign (b is added to S w').
+    # Five of its own standard errors: the truth of the bias along the axis, with its sign (b is added to S w').
     np.testing.assert_allclose(size, [-0.01, 0.0, 0.0], atol=5 * max(changed[0].std) + 1e-4)
     accel = result.calibration.accelerometer
     z = (accel.S - UNIT.S_a)[np.tril_indices(3)] / accel.sigma_S[np.tril_indices(3)]

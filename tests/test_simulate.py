@@ -32,8 +32,8 @@ def test_labels_cover_the_recording_and_holds_stand_still():
     assert truth.segments[-1].stop == recording.n_samples
     for before, after in zip(truth.segments, truth.segments[1:], strict=False):
         assert before.stop == after.start
-    for hold in truth.holds:
-        assert not truth.angular_rate_rad_s[hold.start : hold.stop].any()
+    for pose in truth.poses:
+        assert not truth.angular_rate_rad_s[pose.start : pose.stop].any()
 
 
 def test_every_named_scenario_says_what_it_is():

@@ -12,9 +12,9 @@ from trihedron.simulate import (
     Adc,
     Environment,
     Gyroscope,
-    Hold,
     Motion,
     MoveTo,
+    Pose,
     Scenario,
     Temperature,
     Turn,
@@ -28,7 +28,7 @@ from trihedron.simulate.bias_repeatability import bias_of_poses
 from trihedron.simulate.motion import attitude_with_up
 from trihedron.simulate.motion.plan import Label
 
-IDEAL = Scenario(hand_session(8, hold_s=1.0, first_hold_s=2.0, arm_m=0.1), "ideal")
+IDEAL = Scenario(hand_session(8, pose_s=1.0, first_pose_s=2.0, arm_m=0.1), "ideal")
 
 
 def both(effect_id, base=IDEAL, **size):
@@ -151,9 +151,9 @@ def test_the_size_effect_reads_each_axis_at_its_own_place():
     for axis, place in enumerate(places):
         alone, _ = both("lever-arm", arm_m=place)
         assert np.abs(mixed.accelerometer[:, axis] - alone.accelerometer[:, axis]).max() < 1e-12
-    still = [s for s in truth.holds if s.stop - s.start > 2]
-    for hold in still:
-        assert np.abs((mixed.accelerometer - truth.specific_force_m_s2)[hold.start + 1 : hold.stop - 1]).max() < 1e-12
+    still = [s for s in truth.poses if s.stop - s.start > 2]
+    for pose in still:
+        assert np.abs((mixed.accelerometer - truth.specific_force_m_s2)[pose.start + 1 : pose.stop - 1]).max() < 1e-12
 
 
 def test_a_time_offset_reads_the_gyro_later_under_the_same_stamp():
@@ -166,7 +166,7 @@ def test_a_time_offset_reads_the_gyro_later_under_the_same_stamp():
 
 
 def test_a_lag_delays_a_steady_turn_by_its_time_constant():
-    turn = Scenario(Motion((Hold(1.0), Turn((0, 0, 1), 360.0, 4.0, ramp=0.4), Hold(1.0))))
+    turn = Scenario(Motion((Pose(1.0), Turn((0, 0, 1), 360.0, 4.0, ramp=0.4), Pose(1.0))))
     recording, truth = both("sensor-lag", base=turn, sensor="gyroscope", lag_s=0.02)
     # Where the rate changes slowly the lagged rate is the rate 20 ms ago, up to τ² ω''.
     t = recording.time_s
@@ -180,12 +180,12 @@ def test_a_lag_delays_a_steady_turn_by_its_time_constant():
 
 def test_a_butterworth_filter_is_3_db_down_at_its_corner_and_stops_what_would_alias():
     for frequency, order in ((8.0, 2), (8.0, 3), (8.0, 4)):
-        shaken = Motion((Hold(0.5), Vibrate((0, 0, 1), 1.0, frequency, 20.0, fade=0.05)))
+        shaken = Motion((Pose(0.5), Vibrate((0, 0, 1), 1.0, frequency, 20.0, fade=0.05)))
         recording, _ = both("sensor-lag", base=Scenario(shaken), sensor="accelerometer", cutoff_hz=8.0, order=order)
         inside = recording.accelerometer[500:1800, 2]
         # 8 Hz over 13 s is a whole number of periods; 8 fine steps per sample leave sinc² 1e-4.
         assert abs(inside.std() - np.sqrt(0.5)) < 1e-3, order
-    alias = Motion((Hold(0.5), Vibrate((0, 0, 1), 1.0, 95.0, 10.0, fade=0.05)))
+    alias = Motion((Pose(0.5), Vibrate((0, 0, 1), 1.0, 95.0, 10.0, fade=0.05)))
     plain, _ = simulate(Scenario(alias))
     filtered, _ = both("sensor-lag", base=Scenario(alias), sensor="accelerometer", cutoff_hz=20.0, order=4)
     assert plain.accelerometer[200:900, 2].std() > 0.9
@@ -194,7 +194,7 @@ def test_a_butterworth_filter_is_3_db_down_at_its_corner_and_stops_what_would_al
 
 def test_a_moving_proof_mass_rings_at_its_resonance():
     mass = replace(Accelerometer().mass, moves=True, resonance_hz=(20.0,) * 3, quality=(3.0,) * 3)
-    shaken = Motion((Hold(0.5), Vibrate((0, 0, 1), 0.5, 20.0, 20.0, fade=0.05)))
+    shaken = Motion((Pose(0.5), Vibrate((0, 0, 1), 0.5, 20.0, 20.0, fade=0.05)))
     recording, truth = simulate(Scenario(shaken, accelerometer=Accelerometer(mass=mass)))
     assert "sensor-lag" in truth.effects
     # Transfer at resonance is Q; the sinc² of 160 Hz fine steps at 20 Hz... is 5 % at 8 per sample of 100 Hz: 0.2 %.
@@ -203,13 +203,13 @@ def test_a_moving_proof_mass_rings_at_its_resonance():
 
 def test_hysteresis_leaves_an_offset_with_the_sign_of_the_way_it_came():
     there_and_back = Motion(
-        (Hold(2.0), MoveTo((1, 0, 0), 2.0), Hold(2.0), MoveTo((1, 0, 1), 2.0), Hold(2.0)),
+        (Pose(2.0), MoveTo((1, 0, 0), 2.0), Pose(2.0), MoveTo((1, 0, 1), 2.0), Pose(2.0)),
         start=attitude_with_up((0.0, 0.0, 1.0)),
     )
     recording, truth = both("accel-hysteresis", base=Scenario(there_and_back), offset_m_s2=0.02, width_m_s2=1.0)
     error = recording.accelerometer - truth.specific_force_m_s2
     g = truth.gravity_m_s2
-    middle = [(h.start + h.stop) // 2 for h in truth.holds]
+    middle = [(h.start + h.stop) // 2 for h in truth.poses]
     assert np.abs(error[middle[0]]).max() == 0.0
     # x rose from 0 to g: it lags below; z fell: it lags above. Then x falls and z rises by more than twice the play.
     assert np.allclose(error[middle[1]], [-0.02, 0.0, 0.02], atol=1e-12)
@@ -218,17 +218,17 @@ def test_hysteresis_leaves_an_offset_with_the_sign_of_the_way_it_came():
 
 
 def test_creep_decays_after_a_turn_with_its_time_constant():
-    turned = Motion((Hold(2.0), MoveTo((1, 0, 0), 0.1), Hold(30.0)), start=attitude_with_up((0.0, 0.0, 1.0)))
+    turned = Motion((Pose(2.0), MoveTo((1, 0, 0), 0.1), Pose(30.0)), start=attitude_with_up((0.0, 0.0, 1.0)))
     recording, truth = both("accel-hysteresis", base=Scenario(turned), creep_fraction=1e-3, creep_tau_s=8.0)
     error = (recording.accelerometer - truth.specific_force_m_s2)[:, 0]
-    hold = truth.holds[1]
-    t = recording.time_s[hold.start : hold.stop] - 2.05
+    pose = truth.poses[1]
+    t = recording.time_s[pose.start : pose.stop] - 2.05
     # The move lasts 0.1 s about its middle: second order in 0.1/8.
-    assert np.abs(error[hold.start : hold.stop] + 1e-3 * truth.gravity_m_s2 * np.exp(-t / 8.0)).max() < 1e-5
+    assert np.abs(error[pose.start : pose.stop] + 1e-3 * truth.gravity_m_s2 * np.exp(-t / 8.0)).max() < 1e-5
 
 
 def test_vibration_rectifies_into_an_offset_and_rest_does_not():
-    base = Scenario(Motion((Hold(3.0), Vibrate((0, 0, 1), 2.0, 30.0, 10.0), Hold(3.0))))
+    base = Scenario(Motion((Pose(3.0), Vibrate((0, 0, 1), 2.0, 30.0, 10.0), Pose(3.0))))
     scenario = replace(base, gyroscope=Gyroscope(rectification=(1e-3, 0.0, 0.0)))
     recording, _ = simulate(scenario)
     calm, shaken = recording.gyroscope[50:250, 0], recording.gyroscope[400:1200, 0]
@@ -268,10 +268,10 @@ def test_jitter_moves_the_instants_and_a_clock_error_the_stamps():
 
 def test_the_earth_turns_with_the_attitude():
     _, truth = both("earth-rate", latitude_deg=60.0, heading_deg=30.0)
-    hold = truth.holds[0]
-    assert np.isclose(np.linalg.norm(truth.angular_rate_rad_s[hold.start]), 7.292115e-5)
+    pose = truth.poses[0]
+    assert np.isclose(np.linalg.norm(truth.angular_rate_rad_s[pose.start]), 7.292115e-5)
     up = truth.specific_force_m_s2 / truth.gravity_m_s2
-    vertical = [truth.angular_rate_rad_s[h.start + 1] @ up[h.start + 1] for h in truth.holds]
+    vertical = [truth.angular_rate_rad_s[h.start + 1] @ up[h.start + 1] for h in truth.poses]
     assert np.allclose(vertical, 7.292115e-5 * np.sin(np.pi / 3.0))
 
 
@@ -335,14 +335,14 @@ def test_a_left_handed_triad_has_a_negative_determinant_and_one_axis_reversed():
     ("effect_id", "sensor"), [("accel-bias-repeatability", "accelerometer"), ("gyro-bias-repeatability", "gyroscope")]
 )
 def test_scattered_zeros_are_constant_in_a_pose_and_drawn_anew_after_a_move(effect_id, sensor):
-    base = Scenario(hand_session(40, hold_s=1.0))
+    base = Scenario(hand_session(40, pose_s=1.0))
     sigma = np.array([0.01, 0.02, 0.04])
     recording, truth = both(effect_id, base=base, sigma=tuple(sigma))
     clean, _ = simulate(base, seed=5)
     added = getattr(recording, sensor) - getattr(clean, sensor)
-    holds = [added[s.start : s.stop] for s in truth.segments if s.kind == "hold"]
-    assert max(np.ptp(part, axis=0).max() for part in holds) < 1e-12
-    zeros = np.array([part[0] for part in holds])
+    poses = [added[s.start : s.stop] for s in truth.segments if s.kind == "pose"]
+    assert max(np.ptp(part, axis=0).max() for part in poses) < 1e-12
+    zeros = np.array([part[0] for part in poses])
     # 40 draws: their deviation is known to 11 %; four of these.
     assert np.all(np.abs(np.log(zeros.std(axis=0) / sigma)) < 0.45)
     assert np.abs(np.diff(added, axis=0)).max() < 0.02  # goes over within the move, no step

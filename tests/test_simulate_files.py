@@ -9,7 +9,7 @@ from trihedron.files.output import OutputError
 from trihedron.files.truth import read_truth, write_truth
 from trihedron.pipeline import read
 from trihedron.simulate import (
-    Hold,
+    Pose,
     Turn,
     profile_by_name,
     read_scenario,
@@ -42,7 +42,7 @@ noise = { N = 1e-3, K = [1e-5, 0, 0] }
 mass = { moves = true, resonance_hz = 120 }
 
 [[step]]
-kind = "hold"
+kind = "pose"
 duration_s = 2
 [[step]]
 kind = "turn"
@@ -65,7 +65,7 @@ def written(tmp_path, text):
 def test_a_scenario_file_says_the_same_as_python(tmp_path):
     scenario = read_scenario(written(tmp_path, EXAMPLE))
     assert scenario.name == "bench"
-    assert scenario.motion.steps == (Hold(2.0), Turn((0.0, 0.0, 1.0), 90.0, 1.5))
+    assert scenario.motion.steps == (Pose(2.0), Turn((0.0, 0.0, 1.0), 90.0, 1.5))
     assert scenario.motion.table_tilt_deg == (0.1, -0.2)
     accel, gyro = profile_by_name("adis").unit(7)
     assert scenario.accelerometer.S == accel.S
@@ -93,7 +93,7 @@ def test_a_scenario_file_says_the_same_as_python(tmp_path):
         ("[accelerometer]\nb = [1, 2]", "accelerometer.b must hold 3 values"),
         ("[accelerometer]\nunit = 'stone'", "accelerometer.unit is one of"),
         ("[[step]]\nkind = 'jump'", "is of kind 'jump'"),
-        ("[[step]]\nkind = 'hold'", "missing 1 required positional argument"),
+        ("[[step]]\nkind = 'pose'", "missing 1 required positional argument"),
         ("session = { kind = 'tango' }", "no session is of kind 'tango'"),
         ("session = { kind = 'hand', n = 3 }", "there is no 'n'; there are kind, n_poses"),
         ("[[effect]]\nid = 'gremlin'", "no effect is called 'gremlin'"),
@@ -121,7 +121,7 @@ def test_a_log_reads_back_as_it_was_simulated(tmp_path, suffix):
             recording.accelerometer_unit,
             recording.gyroscope_unit,
         )
-        # Stamps are written to the nanosecond.
+        # Timestamps are written to the nanosecond.
         assert np.abs(again.time_s - recording.time_s).max() < 1e-9
         if recording.temperature_degc is not None:
             assert np.abs(again.temperature_degc - recording.temperature_degc).max() < 1e-9

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trihedron import _core
-from trihedron.simulate import Disturb, Hold, Motion, MoveTo, Oscillate, Turn, Vibrate, hand_session
+from trihedron.simulate import Disturb, Motion, MoveTo, Oscillate, Pose, Turn, Vibrate, hand_session
 from trihedron.simulate.motion import attitude_with_up, plan_motion, up_in_body
 
 G = 9.81
@@ -30,16 +30,16 @@ def matrices(q):
 def busy_motion():
     return Motion(
         (
-            Hold(0.5),
+            Pose(0.5),
             MoveTo(
                 (1, 0.2, 0.3), 1.5, heading_deg=70, wobble_deg=9, travel_m=(0.2, -0.1, 0.3), arm_m=(0.1, 0.02, -0.3)
             ),
-            Hold(0.3),
+            Pose(0.3),
             Turn((0, 0.6, 0.8), -720, 4.0, arm_m=(0.2, 0.1, 0), wobble_deg=2),
             Oscillate((1, 0, 0), 20, 1.3, 2.0, arm_m=(0.0, 0.3, 0.1)),
             Vibrate((0, 1, 1), 1.5, 4.0, 1.0, high_hz=9.0, n_lines=5),
             Disturb(),
-            Hold(0.5),
+            Pose(0.5),
         ),
         start=attitude_with_up((0.3, -0.2, 1.0)),
     )
@@ -84,7 +84,7 @@ def test_specific_force_integrates_to_the_travel_within_1e_9():
     travel = np.array([0.3, -0.2, 0.1])
     arm = np.array([0.1, 0.05, -0.2])
     motion = Motion(
-        (MoveTo((1, 1, 0), 1.7, heading_deg=40, wobble_deg=8, travel_m=tuple(travel), arm_m=tuple(arm)), Hold(0.2)),
+        (MoveTo((1, 1, 0), 1.7, heading_deg=40, wobble_deg=8, travel_m=tuple(travel), arm_m=tuple(arm)), Pose(0.2)),
         start=attitude_with_up((0.1, 0.2, 1.0)),
     )
     plan = plan_motion(motion, np.random.default_rng(1))
@@ -105,7 +105,7 @@ def test_specific_force_integrates_to_the_travel_within_1e_9():
 
 def test_a_move_ends_with_the_asked_direction_up_and_a_turn_leaves_it():
     motion = Motion(
-        (MoveTo((0.2, -3.0, 1.0), 1.0, heading_deg=100), Hold(1.0), Turn((0.2, -3.0, 1.0), 450, 3.0), Hold(1.0))
+        (MoveTo((0.2, -3.0, 1.0), 1.0, heading_deg=100), Pose(1.0), Turn((0.2, -3.0, 1.0), 450, 3.0), Pose(1.0))
     )
     plan = plan_motion(motion, np.random.default_rng(0))
     q, *_ = plan.evaluate(np.array([1.5, 5.5]), G)
@@ -117,7 +117,7 @@ def test_a_move_ends_with_the_asked_direction_up_and_a_turn_leaves_it():
 def test_a_hold_shows_gravity_and_nothing_else():
     plan = plan_motion(hand_session(), np.random.default_rng(0))
     for label in plan.labels:
-        if label.kind == "hold":
+        if label.kind == "pose":
             q, w, a, f = plan.evaluate(np.linspace(label.start_s + 1e-9, label.stop_s - 1e-9, 7), G)
             assert not w.any()
             assert not a.any()
@@ -129,6 +129,6 @@ def test_a_motion_without_steps_or_with_a_step_of_no_duration_is_refused():
     with pytest.raises(ValueError, match="at least one step"):
         plan_motion(Motion(()), np.random.default_rng(0))
     with pytest.raises(ValueError, match="must last a positive time"):
-        plan_motion(Motion((Hold(0.0),)), np.random.default_rng(0))
+        plan_motion(Motion((Pose(0.0),)), np.random.default_rng(0))
     with pytest.raises(ValueError, match="not all zero"):
         plan_motion(Motion((MoveTo((0, 0, 0)),)), np.random.default_rng(0))

@@ -1,4 +1,4 @@
-"""A twin repeats its original: pose means, moves, stamps, noise spectrum, converter."""
+"""A twin repeats its original: pose means, moves, timestamps, noise spectrum, ADC."""
 
 from dataclasses import replace
 
@@ -15,12 +15,12 @@ WINDOW = 128
 OCTAVES = ((2, 4), (4, 8), (8, 16), (16, 32), (32, 65))
 
 
-def spectrum(readings, holds):
-    """(65, 3) periodogram averaged over all windows inside the holds."""
+def spectrum(readings, poses):
+    """(65, 3) periodogram averaged over all windows inside the poses."""
     taper = np.hanning(WINDOW)[:, None]
     total, count = np.zeros((WINDOW // 2 + 1, 3)), 0
-    for hold in holds:
-        for k in range(hold.start, hold.stop - WINDOW, WINDOW // 2):
+    for pose in poses:
+        for k in range(pose.start, pose.stop - WINDOW, WINDOW // 2):
             block = readings[k : k + WINDOW]
             total += np.abs(np.fft.rfft((block - block.mean(axis=0)) * taper, axis=0)) ** 2
             count += 1
@@ -28,8 +28,8 @@ def spectrum(readings, holds):
     return total / count
 
 
-def means(readings, holds):
-    return np.array([readings[hold.samples()].mean(axis=0) for hold in holds])
+def means(readings, poses):
+    return np.array([readings[pose.samples()].mean(axis=0) for pose in poses])
 
 
 def compare(recording, gravity):
@@ -51,14 +51,14 @@ def test_the_twin_of_a_real_recording_looks_like_it(real_data, which, gravity, a
     else:
         recording = read(real_data / which / "imu0.log", rate_hz=100)
     segments, calibration, copy, truth = compare(recording, gravity)
-    holds = segments.holds
+    poses = segments.poses
     assert np.array_equal(copy.time_s, recording.time_s - recording.time_s[0])
-    assert len(truth.holds) == len(holds)
+    assert len(truth.poses) == len(poses)
 
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     # Pose means: what the calibration leaves unexplained, plus the slow noise of both.
-    apart = (means(recording.accelerometer, holds) - means(copy.accelerometer, holds)) @ accel.S.T
-    unexplained = np.linalg.norm(means(correct(recording.accelerometer, accel.S, accel.b), holds), axis=1) - gravity
+    apart = (means(recording.accelerometer, poses) - means(copy.accelerometer, poses)) @ accel.S.T
+    unexplained = np.linalg.norm(means(correct(recording.accelerometer, accel.S, accel.b), poses), axis=1) - gravity
     slow = 0.02
     assert np.sqrt(np.mean(apart**2)) < 2.0 * np.sqrt(np.mean(unexplained**2)) + slow
 
@@ -71,7 +71,7 @@ def test_the_twin_of_a_real_recording_looks_like_it(real_data, which, gravity, a
 
     for name, factor in (("accelerometer", accel_factor), ("gyroscope", gyro_factor)):
         original, twin_of_it = getattr(recording, name), getattr(copy, name)
-        ratio = spectrum(twin_of_it, holds) / spectrum(original, holds)
+        ratio = spectrum(twin_of_it, poses) / spectrum(original, poses)
         for low, high in OCTAVES:
             octave = np.exp(np.mean(np.log(ratio[low:high]), axis=0))
             assert np.all(octave < factor), (name, low, octave)
@@ -88,8 +88,8 @@ def test_the_twin_of_a_simulation_has_its_noise_and_poses():
     assert np.allclose(scenario.accelerometer.noise.N, truth.noise["accelerometer"]["N"], rtol=0.1)
     assert np.allclose(scenario.gyroscope.noise.N, truth.noise["gyroscope"]["N"], rtol=0.1)
     assert (scenario.accelerometer.adc.lsb, scenario.gyroscope.adc.lsb) == (1.0, 1.0)
-    for hold in segments.holds:
-        middle = (hold.start + hold.stop) // 2
+    for pose in segments.poses:
+        middle = (pose.start + pose.stop) // 2
         pair = again.specific_force_m_s2[middle], truth.specific_force_m_s2[middle]
         # A pose mean is known to N/√t = 2e-3 m/s² per axis, and b and S with it.
         assert np.linalg.norm(pair[0] - pair[1]) < 0.02

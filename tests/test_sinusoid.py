@@ -14,7 +14,7 @@ def explained(t, x, f):
 @pytest.mark.parametrize("n", [3, 511, 512, 5000])
 def test_every_frequency_of_the_grid_is_plain_least_squares(n):
     rng = np.random.default_rng(n)
-    # Uneven stamps with a hole, far from zero: phases of thousands of turns.
+    # Uneven timestamps with a hole, far from zero: phases of thousands of turns.
     t = 4000.0 + np.sort(rng.uniform(0.0, 20.0, n)) + np.where(np.arange(n) > n // 2, 7.0, 0.0)
     x = np.sin(2 * np.pi * 3.1 * t) + rng.normal(size=n)
     found = _core.sinusoid_power(t, x, start_hz=2.9, step_hz=0.011, count=41)

@@ -45,7 +45,7 @@ def opened(path):
 def test_segments_of_pieces_are_those_of_the_whole_to_the_last_bit(whole, path, piece, monkeypatch):
     monkeypatch.setattr(streaming, "PIECE_ROWS", piece)
     found, wanted = streaming.segment_file(opened(path)), trihedron.segment(whole)
-    assert found.holds == wanted.holds
+    assert found.poses == wanted.poses
     assert found.moves == wanted.moves
     for name in ("accelerometer_mean", "gyroscope_mean", "accelerometer_sigma_mean", "gyroscope_sigma_mean"):
         np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name))
@@ -55,7 +55,7 @@ def test_segments_of_pieces_are_those_of_the_whole_to_the_last_bit(whole, path, 
 def test_a_log_on_disk_is_calibrated_as_the_whole_is(whole, path):
     found = streaming.calibrate_file(opened(path), gravity_m_s2=G).calibration
     wanted = trihedron.calibrate(whole, gravity_m_s2=G).calibration
-    # The same rows but those between the edges of holds and moves: none here.
+    # The same rows but those between the edges of poses and moves: none here.
     np.testing.assert_allclose(found.accelerometer.S, wanted.accelerometer.S, rtol=0, atol=1e-12)
     np.testing.assert_allclose(found.gyroscope.S, wanted.gyroscope.S, rtol=0, atol=1e-9)
 
@@ -102,13 +102,13 @@ def test_memory_stays_bounded(tmp_path):
         "low = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
         "log = streaming.log_on_disk(sys.argv[1], columns='ax,ay,az,gx,gy,gz', rate_hz=1000.0)\n"
         "segments = streaming.segment_file(log)\n"
-        "print(segments.n_holds, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - low) / 1024)\n"
+        "print(segments.n_poses, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - low) / 1024)\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", script, str(tmp_path / "long.npy")], capture_output=True, text=True, check=True
     )
-    holds, megabytes = done.stdout.split()
-    assert int(holds) == 1
+    poses, megabytes = done.stdout.split()
+    assert int(poses) == 1
     # A piece is 2^18 rows: 12 MB as float64, twice; 17 000 blocks of 1 kB: 17 MB; what arithmetic needs beside them.
     assert float(megabytes) < 75.0
 
@@ -119,7 +119,7 @@ def test_the_command_streams_and_says_what_it_needs(whole, path, tmp_path, capsy
     assert main(["calibrate", str(path), *said, "--gravity", str(G), "-o", str(out)]) == 0
     assert main(["segment", str(path), *said, "--json"]) == 0
     document = json.loads(capsys.readouterr().out.split("\n{", 1)[1].join(["{", ""]))
-    assert len(document["holds"]) == 20
+    assert len(document["poses"]) == 20
     assert main(["apply", str(out), str(path), *said, "-o", str(tmp_path / "si.npy")]) == 0
     assert np.load(tmp_path / "si.npy", mmap_mode="r").shape == (whole.n_samples, 7)
     capsys.readouterr()

@@ -8,8 +8,8 @@ from trihedron.diagnose.effects.contract import rate_only
 from trihedron.diagnose.effects.thermal_shapes import thermal_bias_variants
 
 
-def context(temperature, rate, n_holds=10):
-    return SimpleNamespace(temperature=temperature, temperature_rate=rate, obs=SimpleNamespace(n_holds=n_holds))
+def context(temperature, rate, n_poses=10):
+    return SimpleNamespace(temperature=temperature, temperature_rate=rate, obs=SimpleNamespace(n_holds=n_poses))
 
 
 def on_axes(values):
@@ -41,5 +41,5 @@ def test_the_gap_between_branches_is_twice_the_parameter():
 
 def test_taken_off_another_log_every_shape_exists():
     t = np.linspace(0.0, 1.0, 20)
-    made = thermal_bias_variants(context(t, np.full(20, 0.01), n_holds=0), on_axes, rate_only, "rad/s")
+    made = thermal_bias_variants(context(t, np.full(20, 0.01), n_poses=0), on_axes, rate_only, "rad/s")
     assert labels(made) == ["linear", "quadratic", "rate", "hysteresis"]

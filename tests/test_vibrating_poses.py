@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.records import Hold, Recording, Segments
+from trihedron.records import Pose, Recording, Segments
 from trihedron.session import lines_at_rest
 from trihedron.session.lines_at_rest import means_beside_lines
 from trihedron.simulate import hand_session, simulate
@@ -38,7 +38,7 @@ def poses(seed, n_poses, amplitude, colour=0.0):
     mean = np.array([x[a:b].mean(axis=0) for a, b in pairwise(edges)])
     error = SIGMA / np.sqrt(lengths)[:, None] * np.ones(3)
     segments = Segments(
-        holds=tuple(Hold(k, int(a), int(b), int(a), int(b)) for k, (a, b) in enumerate(pairwise(edges))),
+        poses=tuple(Pose(k, int(a), int(b), int(a), int(b)) for k, (a, b) in enumerate(pairwise(edges))),
         moves=(), accelerometer_sigma=np.full(3, SIGMA), gyroscope_sigma=None, accelerometer_mean=mean,
         gyroscope_mean=None, accelerometer_sigma_mean=error, gyroscope_sigma_mean=None, n_averaged=lengths,
         time_mid_s=0.5 * (edges[:-1] + edges[1:]) / RATE_HZ, duration_s=lengths / RATE_HZ,
@@ -76,7 +76,7 @@ def session(seed, shaken_share, gain, rate_line):
     recording, truth = simulate(_of(profile_by_name("tactical"), hand_session(24, layout=seed), "session", seed), seed)
     rng = np.random.default_rng(seed)
     force, rate, t = recording.accelerometer.copy(), recording.gyroscope.copy(), recording.time_s
-    rests = [part for part in truth.segments if part.kind == "hold"]
+    rests = [part for part in truth.segments if part.kind == "pose"]
     f = rng.uniform(0.12, 0.35) * recording.rate_hz
     for k in rng.choice(len(rests), round(shaken_share * len(rests)), replace=False):
         here = slice(rests[k].start, rests[k].stop)

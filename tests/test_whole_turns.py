@@ -41,7 +41,7 @@ def test_the_reading_half_a_turn_on_is_that_of_the_opposite_lean(arm):
     scores = []
     for seed in range(20):
         _, opposite = found(on_a_table(np.random.default_rng([41, seed]), arm=arm))
-        assert opposite.hold.tolist() == [0]
+        assert opposite.pose.tolist() == [0]
         sigma = np.sqrt(np.diagonal(opposite.noise, axis1=1, axis2=2))
         scores.append(((opposite.values - [*(-LEAN), G]) / sigma)[0, :2])
     # 40 scores: no more scatter than stated (1 + 3 √(2/40)), and not bars without meaning.

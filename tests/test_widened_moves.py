@@ -1,4 +1,4 @@
-"""Moves that miss more than their samples' noise, or that lost samples: what the error bars carry, and what not."""
+"""Moves that miss more than their samples' noise, or that lost samples: what the uncertainties carry, and what not."""
 
 import sys
 from pathlib import Path
@@ -81,9 +81,9 @@ def test_smooth_motion_is_not_fast_because_samples_between_are_missing():
     kept = np.ones(len(t), dtype=bool)
     kept[510:690:19] = False
     stop = int(np.count_nonzero(kept[:700]))
-    ranges, holds = ((500, stop),), [(0, 480), (stop + 20, stop + 480)]
-    seen = unresolved_variance(rate[kept], ranges, holds, 0.01, np.zeros(3), t[kept])
-    blind = unresolved_variance(rate[kept], ranges, holds, 0.01, np.zeros(3))
+    ranges, poses = ((500, stop),), [(0, 480), (stop + 20, stop + 480)]
+    seen = unresolved_variance(rate[kept], ranges, poses, 0.01, np.zeros(3), t[kept])
+    blind = unresolved_variance(rate[kept], ranges, poses, 0.01, np.zeros(3))
     white = 1e-6 * 0.01 * 2.0
     assert np.all(seen < 0.1 * white)
     assert np.any(blind > white)
@@ -108,7 +108,7 @@ def test_a_move_far_from_the_others_is_left_out_and_all_that_miss_alike_are_not(
 
 
 def test_nine_poses_are_as_certain_as_their_moves_let_them_be():
-    """Nine lengths of gravity tell no scatter of the zero from none: moves that are not bent do."""
+    """Nine lengths of gravity tell no scatter of the bias from none: moves that are not bent do."""
     scores = []
     for seed in range(6):
         f, w, rate, truth, _ = hand(850100 + seed, n_poses=9)

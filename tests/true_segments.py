@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from trihedron.records import Hold, Move, Segments
+from trihedron.records import Move, Pose, Segments
 
 
 def segments_from_truth(recording, truth, trim_s=0.05):
-    """Holds as they were made, edges trimmed, means with the standard error of white noise."""
+    """Poses as they were made, edges trimmed, means with the standard error of white noise."""
     trim = max(1, round(trim_s * recording.rate_hz))
-    holds, edges = [], []
+    poses, edges = [], []
     for segment in truth.segments:
-        if segment.kind == "hold" and segment.stop - segment.start > 3 * trim:
-            holds.append(Hold(len(holds), segment.start + trim, segment.stop - trim, segment.start, segment.stop))
+        if segment.kind == "pose" and segment.stop - segment.start > 3 * trim:
+            poses.append(Pose(len(poses), segment.start + trim, segment.stop - trim, segment.start, segment.stop))
             edges.append((segment.start + trim, segment.stop - trim))
     moves = tuple(Move(i, i, i + 1, edges[i][1], edges[i + 1][0]) for i in range(len(edges) - 1))
     counts = np.array([b - a for a, b in edges])
@@ -31,7 +31,7 @@ def segments_from_truth(recording, truth, trim_s=0.05):
     sigma_g, mean_g, error_g = statistics(recording.gyroscope)
     middle = np.array([0.5 * (recording.time_s[a] + recording.time_s[b - 1]) for a, b in edges])
     return Segments(
-        holds=tuple(holds),
+        poses=tuple(poses),
         moves=moves,
         accelerometer_sigma=sigma_a,
         gyroscope_sigma=sigma_g,

@@ -15,26 +15,26 @@ ARTICLE_CONSTANTS = np.array(
 """Published constants of the article, V/(m/s²) and V, rows x, y, z."""
 
 
-def covariance_of_hold_means(start, hold, *, white=0.0, quantisation=0.0, walk=0.0, slope=0.0, gauss_markov=()):
-    """Covariance of means over holds, from the integrals by hand: noise starts at ``start[0]``, ``slope`` is constant.
+def covariance_of_pose_means(start, pose, *, white=0.0, quantisation=0.0, walk=0.0, slope=0.0, gauss_markov=()):
+    """Covariance of means over poses, from the integrals by hand: noise starts at ``start[0]``, ``slope`` is constant.
 
     ``gauss_markov`` lists pairs (inverse correlation time, standard deviation).
     """
     n = len(start)
-    mid = start - start[0] + hold / 2
+    mid = start - start[0] + pose / 2
     c = slope**2 * np.outer(mid, mid)
     for i in range(n):
-        c[i, i] += white**2 / hold[i] + 2 * (quantisation / hold[i]) ** 2 + walk**2 * (mid[i] - hold[i] / 6)
+        c[i, i] += white**2 / pose[i] + 2 * (quantisation / pose[i]) ** 2 + walk**2 * (mid[i] - pose[i] / 6)
         for beta, sigma in gauss_markov:
-            x = beta * hold[i]
+            x = beta * pose[i]
             c[i, i] += sigma**2 * 2 * (x - 1 + np.exp(-x)) / x**2
         for j in range(i):
             both = walk**2 * mid[j]
-            gap = start[i] - start[j] - hold[j]
+            gap = start[i] - start[j] - pose[j]
             if gap < 1e-9:
-                both -= quantisation**2 / hold[i] / hold[j]
+                both -= quantisation**2 / pose[i] / pose[j]
             for beta, sigma in gauss_markov:
-                x, y = beta * hold[i], beta * hold[j]
+                x, y = beta * pose[i], beta * pose[j]
                 both += sigma**2 * np.exp(-beta * gap) * (1 - np.exp(-x)) / x * (1 - np.exp(-y)) / y
             c[i, j] += both
             c[j, i] += both

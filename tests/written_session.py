@@ -23,7 +23,7 @@ def simulated(motion, seed=3):
 
 @pytest.fixture(scope="module")
 def recording():
-    return simulated(hand_session(n_poses=16, hold_s=3.0, move_s=1.5, first_hold_s=5.0))
+    return simulated(hand_session(n_poses=16, pose_s=3.0, move_s=1.5, first_pose_s=5.0))
 
 
 @pytest.fixture(scope="module")

@@ -14,10 +14,10 @@ STEP_S = 0.25
 
 @dataclass(frozen=True)
 class Session:
-    """What is drawn. Sizes are rms over the session in the unit of the zeros (°/s), per axis."""
+    """What is drawn. Sizes are rms over the session in the unit of the biases (°/s), per axis."""
 
     n_poses: int = 25
-    hold_s: float = 6.0
+    pose_s: float = 6.0
     move_s: float = 4.0
     noise: float = 0.004
     """Standard error of a whole pose's mean, white."""
@@ -57,10 +57,10 @@ def draw(session: Session, seed: int) -> Zeros:
     """One session."""
     rng = np.random.default_rng(seed)
     h = session.n_poses
-    holds = session.hold_s * rng.uniform(0.8, 1.3, h)
+    poses = session.pose_s * rng.uniform(0.8, 1.3, h)
     moves = session.move_s * rng.uniform(0.6, 1.6, h)
-    begin = np.cumsum(np.r_[0.0, (holds + moves)[:-1]])
-    clock = np.arange(0.0, begin[-1] + holds[-1] + STEP_S, STEP_S)
+    begin = np.cumsum(np.r_[0.0, (poses + moves)[:-1]])
+    clock = np.arange(0.0, begin[-1] + poses[-1] + STEP_S, STEP_S)
     n, x = len(clock), clock / clock[-1]
     up = rng.normal(0, 1, (h, 3))
     up /= np.linalg.norm(up, axis=1, keepdims=True)
@@ -85,14 +85,14 @@ def draw(session: Session, seed: int) -> Zeros:
             if session.bump and i == h // 3:
                 jump += session.bump
             for half in (0, 1):
-                a = begin[i] + half * holds[i] / 2
-                t = np.arange(a, a + holds[i] / 2, STEP_S / 5)
+                a = begin[i] + half * poses[i] / 2
+                t = np.arange(a, a + poses[i] / 2, STEP_S / 5)
                 inside = np.interp(t, clock, path) + jump
-                true = session.noise * np.sqrt(2.0 * session.hold_s / holds[i])
+                true = session.noise * np.sqrt(2.0 * session.pose_s / poses[i])
                 row.append(inside.mean() + true * rng.normal())
                 errors.append(true * session.stated)
-                middles.append(a + holds[i] / 4)
-                lengths.append(holds[i] / 2)
+                middles.append(a + poses[i] / 4)
+                lengths.append(poses[i] / 2)
                 pose.append(i)
         values.append(row)
         sigma.append(errors)

@@ -15,7 +15,7 @@ from blind_trial.visibility import ideal_sigma
 from trihedron.records import Recording
 from trihedron.simulate import Scenario, hand_session, simulate
 from trihedron.simulate.effects import with_effect
-from trihedron.simulate.motion import Hold, Motion, MoveTo, Turn
+from trihedron.simulate.motion import Motion, MoveTo, Pose, Turn
 from trihedron.simulate.profiles import Profile, profile_by_name
 
 GRADES = ("mpu", "adis", "tactical")
@@ -51,12 +51,12 @@ def grade_profile(grade: str) -> Profile:
 
 def table_session(layout: int, rng: np.random.Generator) -> Motion:
     """Poses by hand, then four to six turns against a wall on each of two faces."""
-    hand = hand_session(20, hold_s=float(rng.uniform(3.5, 6.0)), layout=layout)
+    hand = hand_session(20, pose_s=float(rng.uniform(3.5, 6.0)), layout=layout)
     steps = list(hand.steps)
     for face in ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)):
-        steps += [MoveTo(face, 3.0, wobble_deg=3.0), Hold(4.0, name="on the table")]
+        steps += [MoveTo(face, 3.0, wobble_deg=3.0), Pose(4.0, name="on the table")]
         for angle in (90.0, 90.0, -180.0, 180.0, -90.0, -90.0)[: int(rng.integers(4, 7))]:
-            steps += [Turn(face, angle, max(1.2, abs(angle) / 70.0), name="turn"), Hold(3.5, name="on the table")]
+            steps += [Turn(face, angle, max(1.2, abs(angle) / 70.0), name="turn"), Pose(3.5, name="on the table")]
     return replace(hand, steps=tuple(steps))
 
 
@@ -80,11 +80,11 @@ def make(job: Job) -> tuple[Recording, float, dict[str, Any]]:
         motion = table_session(layout, rng)
     else:
         # Mixed products of the axes show only in poses that are neither faces nor edges (the first 18 are).
-        least, hold = (30 if job.foreign == "accel-cross-product" else 20), float(rng.uniform(3.5, 8.0))
+        least, pose = (30 if job.foreign == "accel-cross-product" else 20), float(rng.uniform(3.5, 8.0))
         n = int(rng.integers(least, least + 13))
         # Only a brisk hand takes an accelerometer beyond 1 g.
         travel = 0.6 if "accel-saturation" in job.effects else 0.1
-        motion = hand_session(n, hold_s=hold, layout=layout, move_s=float(rng.uniform(1.6, 2.6)), travel_m=travel)
+        motion = hand_session(n, pose_s=pose, layout=layout, move_s=float(rng.uniform(1.6, 2.6)), travel_m=travel)
     healthy = Scenario(motion, "blind", accelerometer, gyroscope, profile.clock)
     session = Session(profile, accelerometer, moves_of(motion))
     scenario, sizes = healthy, {}
@@ -108,7 +108,7 @@ def make(job: Job) -> tuple[Recording, float, dict[str, Any]]:
 
 
 def true_saturations(recording: Recording, scenario: Scenario, drawn: tuple[str, ...]) -> list[str]:
-    """Saturations that nobody drew: three readings in a row at the end of a converter's range."""
+    """Saturations that nobody drew: three readings in a row at the end of an ADC's range."""
     out = []
     for effect, raw, adc in (
         ("accel-saturation", recording.accelerometer, scenario.accelerometer.adc),

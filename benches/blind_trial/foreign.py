@@ -33,7 +33,7 @@ class Foreign:
     def added_to(
         self, log: Recording, truth: Truth, scenario: Scenario, session: Any, rng: np.random.Generator, scale: float
     ) -> Recording:
-        """The log of an instrument that also does this; readings are put back on the converter's steps."""
+        """The log of an instrument that also does this; readings are put back on the LSB grid."""
         part = getattr(scenario, self.sensor)
         directions, gain = sense_axes(part.S, self.sensor)
         motion = truth.angular_rate_rad_s if self.sensor == "gyroscope" else truth.specific_force_m_s2
@@ -41,7 +41,7 @@ class Foreign:
         extra = scale * self.signal(truth, motion @ directions.T, noise, rng)
         raw = getattr(log, self.sensor)
         if part.adc.lsb > 0.0:
-            # What a converter has rounded already would round less than half a step away: nothing would be added.
+            # What an ADC has rounded already would round less than half a step away: nothing would be added.
             raw = raw + part.adc.lsb * rng.uniform(-0.5, 0.5, raw.shape)
         raw = raw + extra * gain
         if part.adc.lsb > 0.0:

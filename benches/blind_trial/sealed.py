@@ -32,10 +32,10 @@ def per_axis(symbol: str, values: Any) -> Sealed:
     return {f"{symbol}_{axis}": float(v) for axis, v in zip(AXES, three, strict=True)}
 
 
-def hold_mean(values: FloatArray, truth: Truth) -> float:
+def pose_mean(values: FloatArray, truth: Truth) -> float:
     """Mean over the poses of the mean of each: what the diagnosis counts logged channels from."""
-    holds = [part for part in truth.segments if part.kind == "hold" and part.stop > part.start]
-    return float(np.mean([values[p.start : p.stop].mean() for p in holds]))
+    poses = [part for part in truth.segments if part.kind == "pose" and part.stop > part.start]
+    return float(np.mean([values[p.start : p.stop].mean() for p in poses]))
 
 
 def _thermal_bias(size: dict[str, Any], _s: Scenario, _r: Recording, _t: Truth) -> Sealed:
@@ -45,7 +45,7 @@ def _thermal_bias(size: dict[str, Any], _s: Scenario, _r: Recording, _t: Truth) 
 def _thermal_scale(size: dict[str, Any], scenario: Scenario, log: Recording, truth: Truth) -> Sealed:
     # f (1 + k t) = f (1 + k t0) (1 + k' (t - t0)): counted from the mean temperature t0, k' = k / (1 + k t0).
     assert log.temperature_degc is not None
-    t0 = hold_mean(log.temperature_degc, truth) - scenario.environment.temperature.reference_degc
+    t0 = pose_mean(log.temperature_degc, truth) - scenario.environment.temperature.reference_degc
     k = np.asarray(size["per_k"])
     return per_axis("scale_per_kelvin", k / (1.0 + k * t0))
 
@@ -53,7 +53,7 @@ def _thermal_scale(size: dict[str, Any], scenario: Scenario, log: Recording, tru
 def _supply(size: dict[str, Any], scenario: Scenario, log: Recording, truth: Truth) -> Sealed:
     # raw (1 + r (v/v_n - 1)), counted from the mean voltage; the offset of the raw reading is scaled as well.
     assert log.supply_v is not None
-    relative = hold_mean(log.supply_v, truth) / scenario.environment.supply.nominal_v
+    relative = pose_mean(log.supply_v, truth) / scenario.environment.supply.nominal_v
     r = size["ratiometric"]
     k = r * relative / (1.0 + r * (relative - 1.0))
     accel = scenario.accelerometer
@@ -88,7 +88,7 @@ def _lag(size: dict[str, Any], _s: Scenario, _r: Recording, _t: Truth) -> Sealed
 
 
 def _losses(_size: dict[str, Any], _s: Scenario, log: Recording, truth: Truth) -> Sealed:
-    # Where the log's rows jump, by the log's own stamps: those have closed over the gaps.
+    # Where the log's rows jump, by the log's own timestamps: those have closed over the gaps.
     gaps = np.diff(truth.kept) - 1
     at = np.flatnonzero(gaps > 0)
     named = {f"lost_at_{log.time_s[k]:.2f}s": float(gaps[k]) for k in at}

@@ -140,7 +140,7 @@ SAME_SIGNATURE: tuple[frozenset[str], ...] = tuple(
         ("gyro-thermal-bias", "gyro-thermal-scale", "gyro-bias-drift"),
         # Both move the proof masses: the simulator has one place for each.
         ("lever-arm", "accel-size-effect"),
-        # Clipped moves are left out of the fit, and the fast ones are what shows a scale that depends on the rate.
+        # Clipped moves are excluded from the fit, and the fast ones are what shows a scale that depends on the rate.
         ("gyro-saturation", "gyro-scale-nonlinearity"),
         ("disturbed-pose", "vibration-rectification"),
         ("turn-angle-error", "table-tilt"),

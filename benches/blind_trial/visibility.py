@@ -79,7 +79,7 @@ def _noncentrality(force: FloatArray, rate: FloatArray, truth: Truth, scenario: 
         duration = part.stop_s - part.start_s
         if part.stop - part.start < 5:
             continue
-        if part.kind in ("hold", "vibration"):
+        if part.kind in ("pose", "vibration"):
             u = up[part.start]
             lengths.append(float(force[cut].mean(axis=0) @ u))
             rows_f.append([u[i] * u[j] for i in range(3) for j in range(i + 1)] + list(u))

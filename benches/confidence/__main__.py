@@ -1,7 +1,7 @@
 """``python benches/confidence [--sessions N] [--asked] [NAME ...]``: do 95 % intervals hold, whatever the session?
 
 One line per setting: sessions answered and trusted (no serious finding), those refused or marked; over the trusted ones
-the share of parameters within 1.96 σ (accelerometer 9, gyro scale 9, gyro zero 3), rms z, the median and the largest
+the share of parameters within 1.96 σ (accelerometer 9, gyro scale 9, gyro bias 3), rms z, the median and the largest
 error of the gyro's scale in per cent of it, and the largest of them in σ.
 """
 
@@ -153,7 +153,7 @@ def session(name, make, options, seed):
     except ValueError as error:
         row["codes"] = [str(error)[:60]]
         return row
-    row["holds"] = result.segments.n_holds == len(motion.rests)
+    row["holds"] = result.segments.n_poses == len(motion.rests)
     row["codes"] = sorted({f.code.value for f in result.findings if f.severity.value != "note"})
     if result.gyroscope is None:
         return row

@@ -17,7 +17,7 @@ FACTORS = {
     "bits": (10, 12, 14, 16),
     "grade": ("industrial", "consumer", "poor"),
     "poses": (12, 18, 30),
-    "hold_s": (2.0, 4.0, 8.0),
+    "pose_s": (2.0, 4.0, 8.0),
     "move_s": (0.6, 2.0, 8.0, 25.0),
     "path": ("free", "axis by axis"),
     "tremor_deg_s": (0.0, 2.0),
@@ -40,7 +40,7 @@ PER_SAMPLE = {25.0: 24, 100.0: 6, 400.0: 2}
 
 @dataclass(frozen=True)
 class Session:
-    """Stamps (n,), readings (n, 3) of both sensors in counts, the rate [Hz], the truth, and one entry a pose."""
+    """Timestamps (n,), readings (n, 3) of both sensors in counts, the rate [Hz], the truth, and one entry a pose."""
 
     time_s: np.ndarray
     force: np.ndarray
@@ -59,7 +59,7 @@ def drawn(seed):
 def session(seed, **levels):
     """One session at the levels given; the other factors as a careful hand has them."""
     of = {
-        **{"rate_hz": 100.0, "bits": 16, "grade": "consumer", "poses": 18, "hold_s": 4.0, "move_s": 2.0},
+        **{"rate_hz": 100.0, "bits": 16, "grade": "consumer", "poses": 18, "pose_s": 4.0, "move_s": 2.0},
         **{"path": "free", "tremor_deg_s": 2.0, "sampling": "points", "stamps": "exact", "drift": "none"},
         **{"support": "rigid", "outlier": "none"},
         **levels,
@@ -107,7 +107,7 @@ def _motion(of, rng):
             shake = of["tremor_deg_s"] * DEG * np.sin(2.0 * np.pi * rng.uniform(5, 10) * t + rng.uniform(0, 6.3, 3))
             push = 0.3 * min(1.0, 4.0 / of["move_s"] ** 2) * rng.normal(size=3)
             add(w + shake * law / 1.875, push * np.sin(2.0 * np.pi * u) * law / 1.875, False)
-        n = round(of["hold_s"] * rng.uniform(0.9, 1.3) / dt)
+        n = round(of["pose_s"] * rng.uniform(0.9, 1.3) / dt)
         t = np.arange(n)[:, None] * dt
         w, a = np.zeros((n, 3)), np.zeros((n, 3))
         if of["support"] == "settling" and k:

@@ -62,11 +62,11 @@ class Path:
         return f[::FINE], 0.5 * (w[:-1] + w[1:])[::FINE], SimpleNamespace(rests=self.rests, turns=[])
 
 
-def robot(seed, rate_hz=100.0, hold_s=3.0, n_poses=20, speed_deg_s=90.0, **sensor):
+def robot(seed, rate_hz=100.0, pose_s=3.0, n_poses=20, speed_deg_s=90.0, **sensor):
     """Axis after axis at one speed behind ramps; the arm rings at 12 to 25 Hz where it stops."""
     rng = np.random.default_rng([502, seed])
     path = Path(rate_hz, rng, 0.25)
-    path.rest(hold_s)
+    path.rest(pose_s)
     for _ in range(n_poses - 1):
         for _ in range(rng.integers(1, 3)):
             axis = path.end.apply(np.eye(3)[rng.integers(3)]) + rng.normal(size=3) * 0.02
@@ -76,7 +76,7 @@ def robot(seed, rate_hz=100.0, hold_s=3.0, n_poses=20, speed_deg_s=90.0, **senso
             progress = np.cumsum(np.clip(np.minimum(u, 1.0 - u) / 0.25, 0.0, 1.0))
             path.turn(axis, progress / progress[-1], angle)
         path.rock(0.5, 0.08, rng.uniform(12.0, 25.0), 0.15 * DEG, rng)
-        path.rest(hold_s * rng.uniform(0.8, 1.3))
+        path.rest(pose_s * rng.uniform(0.8, 1.3))
     return finished(path, rate_hz, seed, sensor)
 
 

@@ -1,4 +1,4 @@
-"""What the two sensors make of a motion: misaligned, offset, noisy, rounded to the steps of a converter."""
+"""What the two sensors make of a motion: misaligned, offset, noisy, rounded to the LSB."""
 
 from dataclasses import dataclass
 

@@ -27,21 +27,21 @@ def directions(n, rng):
     return [d + 0.06 * rng.normal(size=3) for d in chosen]
 
 
-def hand(seed, n_poses=18, move_s=2.0, hold_s=4.0, rate_hz=100.0, law=None, **sensor):
+def hand(seed, n_poses=18, move_s=2.0, pose_s=4.0, rate_hz=100.0, law=None, **sensor):
     """Counts, rate and truth of a session of poses set down by hand."""
     rng = np.random.default_rng([11, seed])
     # A brisk hand reaches a thousand degrees a second, and is given a gyro that follows it.
     sensor.setdefault("gyro_range", np.radians(500.0 if move_s >= 1.0 else 2000.0))
     targets = [attitude(d, rng.uniform(0, 2 * np.pi)) for d in directions(n_poses, rng)]
-    steps = [Step(hold_s)]
+    steps = [Step(pose_s)]
     for k, target in enumerate(targets[1:]):
         which = law or ("minimum-jerk", "gaussian")[k % 2]
-        steps += [Step(move_s * rng.uniform(0.8, 1.25), to=target, law=which), Step(hold_s * rng.uniform(0.85, 1.3))]
+        steps += [Step(move_s * rng.uniform(0.8, 1.25), to=target, law=which), Step(pose_s * rng.uniform(0.85, 1.3))]
     motion, per = move(steps, targets[0], rng, rate_hz, tremor=np.radians(2.0) * min(1.0, 2.0 / move_s))
     return (*read_out(motion, per, rng, **sensor), motion)
 
 
-def table(seed, turns=(90, -90), rate_deg_s=90.0, tilt_deg=1.0, hold_s=4.0, rate_hz=100.0, bases=FACES, **sensor):
+def table(seed, turns=(90, -90), rate_deg_s=90.0, tilt_deg=1.0, pose_s=4.0, rate_hz=100.0, bases=FACES, **sensor):
     """Faces set down by hand on a table that is not level, turned there by known angles at a constant rate."""
     rng = np.random.default_rng([12, seed])
     sensor.setdefault("gyro_range", np.radians(500.0 if rate_deg_s < 300.0 else 2000.0))
@@ -54,9 +54,9 @@ def table(seed, turns=(90, -90), rate_deg_s=90.0, tilt_deg=1.0, hold_s=4.0, rate
             first = target
         else:
             steps.append(Step(2.0, to=target))
-        steps.append(Step(hold_s * rng.uniform(0.85, 1.3)))
+        steps.append(Step(pose_s * rng.uniform(0.85, 1.3)))
         for angle in turns:
-            steps += [Step(abs(angle) / rate_deg_s / 0.92, turn=angle), Step(hold_s * rng.uniform(0.85, 1.3))]
+            steps += [Step(abs(angle) / rate_deg_s / 0.92, turn=angle), Step(pose_s * rng.uniform(0.85, 1.3))]
     motion, per = move(steps, first, rng, rate_hz, tilt=tilt, tremor=np.radians(2.0))
     return (*read_out(motion, per, rng, **sensor), motion)
 

@@ -129,7 +129,7 @@ def xsens_mt_manager() -> Layout:
 
 @layout
 def ardupilot_csv() -> Layout:
-    """mavlogdump.py --format csv --types IMU of a vehicle with two IMUs: one row per IMU, told apart by column I."""
+    """mavlogdump.py --format csv --types IMU of a vehicle with two IMUs: one row per IMU, separated by column I."""
     first, second = session(50, 1), session(50, 2)
     head = "timestamp,TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,T,GH,AH,GHz,AHz\n"
     lines = []

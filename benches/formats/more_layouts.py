@@ -60,7 +60,7 @@ def plotjuggler() -> Layout:
 
 @layout
 def bagpy() -> Layout:
-    """bagpy's message_by_topic: Time, then every field by its path, stamps in seconds and nanoseconds apart."""
+    """bagpy's message_by_topic: Time, then every field by its path, timestamps in seconds and nanoseconds apart."""
     s = session(100)
     a, w = _si(s)
     names = ["Time", "header.seq", "header.stamp.secs", "header.stamp.nsecs", "header.frame_id"]

@@ -1,4 +1,4 @@
-"""A short session whose readings are known: six still poses and the turns between them, both sensors in SI."""
+"""A short session whose readings are known: six poses and the turns between them, both sensors in SI."""
 
 from __future__ import annotations
 

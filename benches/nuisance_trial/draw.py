@@ -62,16 +62,16 @@ def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
     values = {}
     columns = {}
     # -- the flaw, at the level of the mechanism ----------------------------------------------------------------------
-    at_hold = np.zeros(n_fine, dtype=int)  # the pose last begun
-    for k, (a, _) in enumerate(motion.holds):
-        at_hold[int(a * fine_hz) :] = k
+    at_pose = np.zeros(n_fine, dtype=int)  # the pose last begun
+    for k, (a, _) in enumerate(motion.poses):
+        at_pose[int(a * fine_hz) :] = k
     if flaw == "vibration-rectification":
         own_poses = rng.choice(n_poses, max(3, n_poses // 4), replace=False)
         level = rng.uniform(0.5, 1.5)
         f, phase = rng.uniform(0.11, 0.4) * rate_hz, rng.uniform(0, 6.28)
         shape, direction = np.zeros(n_fine), rng.normal(size=3)
         for k in own_poses:
-            a, b = motion.holds[k]
+            a, b = motion.poses[k]
             inside = (t >= a) & (t < b)
             shape[inside] = np.clip(np.minimum(t[inside] - a, b - t[inside]) / 0.1, 0.0, 1.0)
         shake = level * shape[:, None] * np.sin(2 * np.pi * f * t + phase)[:, None] * direction
@@ -142,7 +142,7 @@ def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
         zero_force = rng.normal(size=(n_poses, 3)) * np.exp(rng.uniform(np.log(0.001), np.log(0.01)))
         zero_rate = rng.normal(size=(n_poses, 3)) * np.exp(rng.uniform(np.log(0.01), np.log(0.1))) * DEG
         truth["scatter"] = [float(zero_force.std()), float(zero_rate.std() / DEG)]
-    force, rate = force + zero_force[at_hold], rate + zero_rate[at_hold]
+    force, rate = force + zero_force[at_pose], rate + zero_rate[at_pose]
     if here["warm"]:
         curve = np.exp(-t / duration / rng.uniform(0.1, 0.4))[:, None]
         force = force + curve * rng.normal(size=3) * 0.004
@@ -155,7 +155,7 @@ def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
         f = rng.uniform(0.06, 0.45) * rate_hz
         values |= {"frequency": np.array([f])} if flaw == "periodic-interference" else {}
         rate = rate + line * np.sin(2 * np.pi * f * t)[:, None] * rng.normal(size=3)
-    # -- the part: axes, filter, noise, converter ---------------------------------------------------------------------
+    # -- the part: axes, filter, noise, ADC ---------------------------------------------------------------------
     force, rate = (np.apply_along_axis(np.convolve, 0, x, np.ones(over) / over, "same") for x in (force, rate))
     force[:over], force[-over:], rate[:over], rate[-over:] = force[over], force[-over - 1], rate[over], rate[-over - 1]
     when = np.arange(over, n_fine - over, over)

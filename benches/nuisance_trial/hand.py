@@ -56,7 +56,7 @@ class Motion:
     t: np.ndarray
     C: np.ndarray
     position: np.ndarray
-    holds: list
+    poses: list
 
 
 def rotations(vectors):
@@ -80,7 +80,7 @@ def random_pose(rng):
 
 def session(rng, fine_hz, n_poses, pose_s, move_s, how):
     """A session of poses and moves; ``how`` says what the support and the hand do besides."""
-    parts_t, parts_C, parts_p, holds, bumps = [], [], [], [], []
+    parts_t, parts_C, parts_p, poses, bumps = [], [], [], [], []
     now, C, p = 0.0, random_pose(rng), np.zeros(3)
     bumped = set(rng.choice(n_poses, how["bumps"], replace=False).tolist()) if how["bumps"] else set()
     for k in range(n_poses):
@@ -110,7 +110,7 @@ def session(rng, fine_hz, n_poses, pose_s, move_s, how):
         held = rotations(lean) @ C
         parts_C.append(held)
         parts_p.append(p + place)
-        holds.append((now, now + n / fine_hz))
+        poses.append((now, now + n / fine_hz))
         now += n / fine_hz
         C = held[-1]
         p = p + place[-1]
@@ -132,7 +132,7 @@ def session(rng, fine_hz, n_poses, pose_s, move_s, how):
         parts_p.append(p + law(x)[:, None] * step + lift[:, None] * rng.normal(size=3) * 0.5 * how["reach"])
         now += n / fine_hz
         C, p = rotations(turn[None])[0] @ C, p + step
-    return Motion(np.concatenate(parts_t), np.concatenate(parts_C), np.concatenate(parts_p), holds), bumps
+    return Motion(np.concatenate(parts_t), np.concatenate(parts_C), np.concatenate(parts_p), poses), bumps
 
 
 def rotation_vector(R):

@@ -1,6 +1,6 @@
 """Constants of one axis from pose after pose: scalar updates of four constants and a walking zero, all of them kept.
 
-Everyone runs the same filter (white noise of the means, a random walk of the zero between poses); ours besides keeps it
+Everyone runs the same filter (white noise of the means, a random walk of the bias between poses); ours besides keeps it
 factored, so that it stays positive, and the innovations.
 """
 
@@ -42,7 +42,7 @@ def rows_of(force):
 
 
 def begun():
-    # The walk begins with the first hold.
+    # The walk begins with the first pose.
     return np.diag([PRIOR_SIGMA**2] * 4 + [WALK**2 * HOLD_S])
 
 

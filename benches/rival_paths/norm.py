@@ -13,7 +13,7 @@ START = np.array([1.0, 0, 0, 1, 0, 1, 0, 0, 0])
 
 
 def data(n):
-    """(n, 3) means of still poses; of more than 10 000 they are raw samples of fifty."""
+    """(n, 3) means of poses; of more than 10 000 they are raw samples of fifty."""
     rng = np.random.default_rng(0)
     poses = 50 if n > 10_000 else n
     up = rng.standard_normal((poses, 3))

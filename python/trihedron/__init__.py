@@ -48,6 +48,7 @@ from typing import TYPE_CHECKING, Any
 from trihedron.threads import cap_threads
 
 if TYPE_CHECKING:
+    from trihedron.errors import RefusedError
     from trihedron.estimate.attitude import integrate_rate
     from trihedron.estimate.noise import identify_noise
     from trihedron.files.calibration import read_calibration
@@ -97,7 +98,6 @@ if TYPE_CHECKING:
     )
     from trihedron.records.diagnosis import Diagnosis
     from trihedron.records.truth import Truth
-    from trihedron.refused import RefusedError
 
     __version__: str
 
@@ -152,7 +152,7 @@ __all__ = [
 ]
 
 _HOME = {"Diagnosis": "trihedron.records.diagnosis", "Truth": "trihedron.records.truth"}
-_HOME |= {"RefusedError": "trihedron.refused"}
+_HOME |= {"RefusedError": "trihedron.errors"}
 _HOME |= {"integrate_rate": "trihedron.estimate.attitude"}
 _HOME |= {"fleet": "trihedron.fleet"}
 _HOME |= {"identify_noise": "trihedron.estimate.noise", "read_calibration": "trihedron.files.calibration"}

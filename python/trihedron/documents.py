@@ -9,8 +9,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from trihedron.printable import one_line
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
+from trihedron.sanitise import one_line
 
 MOST_BYTES = 64_000_000
 """A diagnosis of a day's log with all its curves has 3 MB."""

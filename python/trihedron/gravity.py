@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 EARTH_RATE_RAD_S = 7.292115e-5
 """Rotation of the Earth against inertial space (WGS 84)."""

@@ -156,7 +156,7 @@ def model_of_numbers(
 ) -> tuple[FloatArray, FloatArray, FloatArray | None, FloatArray | None]:
     """``(S_a, b_a, S_g, b_g)`` in frame ``lower``: the inverse of :func:`numbers_of`.
 
-    ``S = (K N)⁻¹``, ``b = -S (k ∘ zero)``. Rows of N_a follow from the angles, n_1 along axis 1 and n_2 in the plane of
+    ``S = (K N)⁻¹``, ``b = -S (k ∘ zero)``. Rows of N_a follow from the angles, n_1 along X and n_2 in the plane of
     axes 1 and 2; ``N_g = √(Gram of its angles) · R · U_a``.
     """
     N_a = _lower_axes(numbers[6:9], anchor.signs)

@@ -18,8 +18,8 @@ from itertools import product
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records.calibration import Calibration, Frame, SensorCalibration
-from trihedron.refused import RefusedError
 
 
 def correct(readings: FloatArray, S: FloatArray, b: FloatArray) -> FloatArray:

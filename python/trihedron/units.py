@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from enum import Enum
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 """Conventional value that defines the unit ``g``. It is not the gravity at anybody's desk."""

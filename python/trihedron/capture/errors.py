@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 
 class CaptureError(RefusedError):

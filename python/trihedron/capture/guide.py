@@ -18,7 +18,7 @@ from trihedron.records.guiding import Accuracy, Examination, GuideView, Phase
 Examine = Callable[[], Examination]
 
 FIRST_HOLD_S = 6.0
-"""The first hold also measures the noise."""
+"""The first pose also measures the noise."""
 
 SAME_POSE_DEG = 15.0
 N_CHECKS = 3
@@ -90,7 +90,7 @@ class Guide:
             detail=detail,
             is_still=self._stillness.still_for_s > 0.0,
             held_s=self._stillness.still_for_s,
-            hold_s=self._asked_s,
+            pose_s=self._asked_s,
             n_poses=0 if self.examination is None else len(self.examination.poses_up),
             n_checks=len(self._checks),
             up_now=self._up(),
@@ -108,7 +108,7 @@ class Guide:
             if self._is_taken and not self._has_moved():
                 return
             self._is_taken = False
-            if self.phase is Phase.HOLD:
+            if self.phase is Phase.POSE:
                 self.phase = Phase.MOVE
             return
         if self._is_taken:
@@ -116,7 +116,7 @@ class Guide:
                 return
             self._is_taken = False
         if self.phase is Phase.MOVE:
-            self.phase = Phase.HOLD
+            self.phase = Phase.POSE
         if still_s >= self._asked_s:
             self._take()
 
@@ -134,11 +134,11 @@ class Guide:
         before = 0 if self.examination is None else len(self.examination.poses_up)
         examination = self._examine()
         self.examination = examination
-        self._asked_s = examination.hold_s
+        self._asked_s = examination.pose_s
         if len(examination.poses_up) <= before and before:
             self._remark = "This pose is not long enough yet: hands off."
             self._asked_s = self._stillness.still_for_s + RETRY_HOLD_S
-            if self._stillness.still_for_s > 3.0 * examination.hold_s:
+            if self._stillness.still_for_s > 3.0 * examination.pose_s:
                 self._remark = "This pose was counted before: turn the board on."
                 self._accepted()
             return
@@ -173,7 +173,7 @@ class Guide:
         if up is not None:
             self._checks.append(up)
         self._accepted()
-        self._asked_s = self.examination.hold_s if self.examination else FIRST_HOLD_S
+        self._asked_s = self.examination.pose_s if self.examination else FIRST_HOLD_S
         if len(self._checks) >= self._n_checks:
             self.phase, self._target = Phase.DONE, None
         else:

@@ -1,6 +1,6 @@
 """Still or moving, at once: the spread of a quarter of a second against the calmest so far.
 
-The segmentation of the whole log decides later which poses count; this is for the eye and the ear while one holds on.
+The segmentation of the whole log decides later which poses count; this is for the eye and the ear while one poses on.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ MEAN_SHIFT = 2.5
 
 CALM_QUANTILE = 0.1
 SHAKY = 1.8
-"""Times the calmest spread, during a whole hold: a table that vibrates, or a hand."""
+"""Times the calmest spread, during a whole pose: a table that vibrates, or a hand."""
 
 
 class Stillness:
@@ -56,7 +56,7 @@ class Stillness:
         if len(self._spreads) > 4000:
             del self._spreads[::2]
         calm = np.quantile(np.array(self._spreads), CALM_QUANTILE, axis=0)
-        # A coarse converter may show no spread at all where it stands still.
+        # A coarse ADC may show no spread at all where it stands still.
         calm = np.maximum(calm, 0.05 * np.median(np.array(self._spreads), axis=0) + 1e-12)
         is_still = bool(np.all(spread <= LOUDER * calm + _step(rows)))
         if self._before is not None:
@@ -73,6 +73,6 @@ class Stillness:
 
 
 def _step(rows: FloatArray) -> FloatArray:
-    """One step of the converter per axis, where readings are whole numbers."""
+    """One LSB per axis, where readings are whole numbers."""
     whole = np.all(rows == np.round(rows), axis=0)
     return np.where(whole, 1.0, 0.0)

@@ -14,7 +14,7 @@ __all__ = ["facts_in", "facts_of"]
 
 
 def facts_of(accelerometer: FloatArray | None, gyroscope: FloatArray | None, rate_hz: float) -> RecordingFacts:
-    """What raw readings (n, 3) of the sensors that are there, sampled at a rate, say of their converters."""
+    """What raw readings (n, 3) of the sensors that are there, sampled at a rate, say of their ADCs."""
     named = {"accelerometer": accelerometer, "gyroscope": gyroscope}
     present = {name: readings for name, readings in named.items() if readings is not None}
     return facts_in(present, look(present, rate_hz))

@@ -9,17 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts.lines import lines_of_holds, without_lines
+from trihedron.channel_facts.lines import lines_of_poses, without_lines
 from trihedron.channel_facts.low_pass import Spectrum, undisturbed
-from trihedron.channel_facts.pooled import Pooled, pooled_logarithm, robust_holds
+from trihedron.channel_facts.pooled import Pooled, pooled_logarithm, robust_poses
 from trihedron.channel_facts.step import converter_step
+from trihedron.errors import RefusedError
 from trihedron.ranges import ranges_of
-from trihedron.records.hold_noise import HoldLine
-from trihedron.refused import RefusedError
+from trihedron.records.pose_noise import PoseLine
 from trihedron.transforms import cosine_transform
 
 SHORTEST = 32
-"""Readings of a hold that is used: fewer hold no octave below the uppermost two."""
+"""Readings of a pose that is used: fewer hold no octave below the uppermost two."""
 LEAST_DITHER = 0.4
 """Noise over step below which the rounding is not noise of step²/12 any more, and what lies under it is hidden."""
 LAGS = 8
@@ -31,26 +31,26 @@ FEWER = 4.0 / 3.0
 
 @dataclass(frozen=True, eq=False)
 class AxisAtRest:
-    """Holds of one axis without disturbed ones and lines, and what is pooled over them."""
+    """Poses of one axis without disturbed ones and lines, and what is pooled over them."""
 
     parts: list[FloatArray]
     step: float
-    lines: tuple[HoldLine, ...]
+    lines: tuple[PoseLine, ...]
     pooled: Pooled
     spectrum: Spectrum
 
     @classmethod
-    def of(cls, x: FloatArray, rate_hz: float, holds: Sequence[tuple[int, int]], name: str) -> AxisAtRest:
-        parts = [run for start, stop in holds for run in _unbroken(x[start:stop])]
+    def of(cls, x: FloatArray, rate_hz: float, poses: Sequence[tuple[int, int]], name: str) -> AxisAtRest:
+        parts = [run for start, stop in poses for run in _unbroken(x[start:stop])]
         if not parts:
             raise RefusedError(f"{name}: no hold has {SHORTEST} readings in a row; hold still for longer")
         step = converter_step(np.concatenate(parts))
         power = _Power.of(parts)
-        keep = robust_holds(power.variance, power.dof)
+        keep = robust_poses(power.variance, power.dof)
         parts = [part for part, kept in zip(parts, keep, strict=True) if kept]
         # A line is stated as one; it is neither white noise nor a filter's corner.
         spectrum = _segments(parts, rate_hz)
-        lines = lines_of_holds(*spectrum, rate_hz)
+        lines = lines_of_poses(*spectrum, rate_hz)
         if lines:
             parts = without_lines(parts, lines, rate_hz)
             spectrum = _segments(parts, rate_hz)
@@ -67,7 +67,7 @@ class AxisAtRest:
 
     @property
     def total(self) -> float:
-        """Half the mean squared difference of a typical hold."""
+        """Half the mean squared difference of a typical pose."""
         return math.exp(self.pooled.mean)
 
     @property
@@ -76,7 +76,7 @@ class AxisAtRest:
         return self.total > 0.0 and self.dithers(self.total - self.rounding)
 
     def dithers(self, variance: float) -> bool:
-        """Whether a variance of one reading spreads over the steps of the converter."""
+        """Whether a variance of one reading spreads over the LSB."""
         return self.step == 0.0 or variance > (LEAST_DITHER * self.step) ** 2
 
 
@@ -93,7 +93,7 @@ class _Power:
 
     @classmethod
     def of(cls, parts: Sequence[FloatArray]) -> _Power:
-        """Of holds (n,) each; the correlation and the kurtosis of differences are those of all holds together."""
+        """Of holds (n,) each; the correlation and the kurtosis of differences are those of all poses together."""
         squares = [np.diff(part) ** 2 for part in parts]
         mean = np.array([float(s.mean()) for s in squares])
         count = np.array([len(s) for s in squares], dtype=np.float64)
@@ -109,7 +109,7 @@ class _Power:
 
 
 def _segments(parts: Sequence[FloatArray], rate_hz: float, *, most: bool = False) -> tuple[FloatArray, FloatArray, int]:
-    """Frequencies (k,), mean power (k,) and number of segments of one length that most holds have.
+    """Frequencies (k,), mean power (k,) and number of segments of one length that most poses have.
 
     With ``most``, of half that length where more readings are in such segments by a third.
     """

@@ -17,14 +17,14 @@ LEADS_UP = 0.01
 """Part of the span next to the wall in which those values lie."""
 
 EQUAL = 0.5 / math.sqrt(math.pi)
-"""Chance, for each step of the converter over the noise, that neighbours of independent noise are one code."""
+"""Chance, for each LSB over the noise, that neighbours of independent noise are one code."""
 LEAST_EQUAL = 0.01
 """Rows are written twice now and then, be it once in a hundred."""
 
 NOISE_ALONE = 20.0
 """Standard deviations of the noise within which all readings of a log at rest lie; motion of no more is none."""
 CARRIED = 0.5
-"""Noise over steps of the converter from which it carries the readings from one code to the next: below, a pose or a
+"""Noise over LSB from which it carries the readings from one code to the next: below, a pose or a
 value that is held looks like an end of the noise."""
 ABRUPT = 0.6
 """A tail thins out towards its end: so much of the readings within a step and a half, on the end, is a cut."""
@@ -35,7 +35,7 @@ FEWEST_CUT, LEAST_SHARE = 10, 1e-3
 BY_CHANCE = 1e-6
 """Chance that readings crowd on the outermost code of a sensor, or repeat there, in a healthy recording."""
 DITHERED = 1.5
-"""Steps of the converter over the noise (rounding in it) up to which the top of a smooth motion spreads over codes."""
+"""LSB over the noise (rounding in it) up to which the top of a smooth motion spreads over codes."""
 NEAR, NEIGHBOURS = 3, 40
 """Codes next to the outermost one: a slow peak reads all of the first few more often than those far below, a quick one
 all alike."""

@@ -31,7 +31,7 @@ TO_SIGMA = 1.4826
 class End:
     """The largest or smallest ``value`` of an axis of ``readings`` (n, 3), read ``count`` times.
 
-    ``span`` is the distance of the axis' two ends, ``noise`` that of one sample at rest, ``steps`` (3,) converters'.
+    ``span`` is the distance of the axis' two ends, ``noise`` that of one sample at rest, ``steps`` (3,) ADCs'.
     """
 
     readings: FloatArray
@@ -45,7 +45,7 @@ class End:
 
     @property
     def step(self) -> float:
-        """The step of this axis' converter; too few codes show none, then its neighbours'."""
+        """The step of this axis' ADC; too few codes show none, then its neighbours'."""
         return float(self.steps[self.axis] or np.max(self.steps))
 
     @property
@@ -99,7 +99,7 @@ class End:
     def moving_runs(self) -> IntArray:
         """The runs (k, 2) without those in which every channel stands still: they are poses, or steady turns.
 
-        A converter coarser than the noise shows either as one code, whatever it is. Whoever drives a sensor beyond its
+        An ADC coarser than the noise shows either as one code, whatever it is. Whoever drives a sensor beyond its
         limit moves the other axes meanwhile, and noise that moves their last digit is no standstill.
         """
         others = [k for k in range(3) if k != self.axis]

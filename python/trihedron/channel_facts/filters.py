@@ -8,9 +8,9 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts.at_rest import AxisAtRest
 from trihedron.channel_facts.low_pass import low_passes
 from trihedron.channel_facts.quiet import Windows, look
+from trihedron.errors import RefusedError
 from trihedron.ranges import Range, ranges_of
 from trihedron.records.channel_facts import LowPass
-from trihedron.refused import RefusedError
 
 IN_A_ROW = 16
 """Windows that follow one another where a log has too many to be looked at all: stretches of eight seconds."""

@@ -18,7 +18,7 @@ FEWEST_JUMPS = 20
 def new_readings(readings: FloatArray, noise: FloatArray, step: FloatArray) -> IntArray | None:
     """Rows of a triad (n, 3) that hold a new reading, ``None`` where every row does.
 
-    ``noise`` (3,) of one sample at rest and ``step`` (3,) of the converter, in the unit of the readings.
+    ``noise`` (3,) of one sample at rest and ``step`` (3,) of the ADC, in the unit of the readings.
     """
     change = np.abs(np.diff(readings, axis=0))
     same = ~np.any(change, axis=1)

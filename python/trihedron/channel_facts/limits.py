@@ -1,4 +1,4 @@
-"""Limits of a converter or a sensor: extreme values that readings end at, never a nominal range. The only place that
+"""Limits of an ADC or a sensor: extreme values that readings end at, never a nominal range. The only place that
 looks for them.
 
 A value is a limit by several kinds of evidence that healthy readings give too seldom to matter: peaks that were
@@ -37,7 +37,7 @@ Extremes = list[tuple[float, int, float, int]]
 def find_limits(
     readings: FloatArray, noise: FloatArray, step: FloatArray, extremes: Extremes | None = None
 ) -> tuple[Limit, ...]:
-    """Limits of a triad (n, 3) with ``noise`` (3,) of one sample at rest and ``step`` (3,) of the converter; its
+    """Limits of a triad (n, 3) with ``noise`` (3,) of one sample at rest and ``step`` (3,) of the ADC; its
     ``extremes`` where they are known.
     """
     found = _limits(readings, noise, step, extremes)

@@ -1,4 +1,4 @@
-"""Lines that the holds of a session have in common, and the poses without them."""
+"""Lines that the poses of a session have in common, and the poses without them."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from scipy.special import chdtri
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts.pooled import as_measured, root_of
-from trihedron.records.hold_noise import HoldLine
+from trihedron.records.pose_noise import PoseLine
 
 LINE_CHANCE = 1e-4
-"""Probability that the holds of one axis show a line by chance."""
+"""Probability that the poses of one axis show a line by chance."""
 LONGEST_PIECE = 4096
 """Readings of a piece that a line is taken off at once: the frequency is known to a sixteenth of a period in it."""
 FINER = 16
 """Frequencies tried per ordinate: half of one away from its middle a line loses 1/250 of its amplitude at most."""
 
 
-def lines_of_holds(frequency: FloatArray, power: FloatArray, count: int, rate_hz: float) -> tuple[HoldLine, ...]:
+def lines_of_poses(frequency: FloatArray, power: FloatArray, count: int, rate_hz: float) -> tuple[PoseLine, ...]:
     """Ordinates above their neighbourhood, of the lowest eight of which no period was seen often."""
     n = len(power)
     level = np.array([np.median(power[max(0, i - 16) : i + 17]) for i in range(n)])
@@ -30,7 +30,7 @@ def lines_of_holds(frequency: FloatArray, power: FloatArray, count: int, rate_hz
     limit = float(chdtri(count, LINE_CHANCE / n)) / count
     # The neighbourhood's median is itself known to 1.25/√33 of a deviation.
     limit *= 1.0 + 3.0 * 1.25 * math.sqrt(2.0 / count / 33.0)
-    out: list[HoldLine] = []
+    out: list[PoseLine] = []
     taken = np.zeros(n, dtype=bool)
     taken[:8] = True
     for i in np.argsort(-ratio).tolist():
@@ -46,12 +46,12 @@ def lines_of_holds(frequency: FloatArray, power: FloatArray, count: int, rate_hz
         square = 2.0 * max(excess, float(power[i] - floor)) * rate_hz / (n + 1)
         sigma_log = math.sqrt(2.0 / count) * math.sqrt(1.0 + 7.0 * (floor / max(excess, floor)) ** 2)
         amplitude = root_of(as_measured(square, sigma_log, math.inf), 1.0)
-        out.append(HoldLine(float(frequency[i]), amplitude, float(ratio[i])))
+        out.append(PoseLine(float(frequency[i]), amplitude, float(ratio[i])))
     return tuple(sorted(out, key=lambda line: line.frequency_hz))
 
 
-def without_lines(parts: Sequence[FloatArray], lines: Sequence[HoldLine], rate_hz: float) -> list[FloatArray]:
-    """Holds (n,) each, less sinusoids at the frequencies of ``lines``, of each piece's own size and phase.
+def without_lines(parts: Sequence[FloatArray], lines: Sequence[PoseLine], rate_hz: float) -> list[FloatArray]:
+    """Poses (n,) each, less sinusoids at the frequencies of ``lines``, of each piece's own size and phase.
 
     What is left is scaled for the two degrees of freedom that a line takes: white noise keeps its power.
     """

@@ -12,7 +12,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.records.channel_facts import LowPass
-from trihedron.records.hold_noise import Measured
+from trihedron.records.pose_noise import Measured
 
 EARNED = 16.0
 """Drop of the deviance that a corner must earn: it is searched over a grid and five shapes."""
@@ -49,7 +49,7 @@ MISFIT = 3.0
 class Spectrum:
     """Mean power (k,) at frequencies (k,) of ``count`` segments of one axis, two-sided densities.
 
-    ``rounding`` is the density that the converter's steps add, ``scatter`` by how much the poses' power differs;
+    ``rounding`` is the density that the LSB add, ``scatter`` by how much the poses' power differs;
     ``slow`` are the powers of 1/f that lie beneath: flicker and walk, or what leaks from below where that was cut off.
     """
 
@@ -96,7 +96,7 @@ class Spectrum:
     def weights(self, axes: int) -> FloatArray:
         """Ordinates of each bin, but for what is believed of a model's shape; its error is that of all ``axes``."""
         _, _, count = self.bins
-        # Bands of an eighth of the spectrum weigh no more than the tolerance and the scatter of holds allow.
+        # Bands of an eighth of the spectrum weigh no more than the tolerance and the scatter of poses allow.
         error = TOLERANCE**2 * axes + self.scatter**2 / max(self.count, 1)
         cap = 2.0 / error / (len(self.power) / 8.0)
         return np.minimum(count, cap * count / self.count)

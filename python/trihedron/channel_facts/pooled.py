@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.records.hold_noise import Measured, Ratio
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
+from trihedron.records.pose_noise import Measured, Ratio
 
 MOST_LEFT_OUT = 0.25
-"""Share of holds that may be left out for noise far above the rest's: a disturbed hold, not another sensor."""
+"""Share of holds that may be excluded for noise far above the rest's: a disturbed pose, not another sensor."""
 UNKNOWN = 50.0
 """Logarithm beyond which an interval says no more: 21 decades either way."""
 FAR = 5.0
@@ -22,7 +22,7 @@ FAR = 5.0
 
 @dataclass(frozen=True)
 class Pooled:
-    """Mean logarithm over holds, its standard error with the degrees of freedom of that, and the poses' own scatter."""
+    """Mean logarithm over poses, its standard error with the degrees of freedom of that, and the poses' own scatter."""
 
     mean: float
     sigma: float
@@ -30,7 +30,7 @@ class Pooled:
     scatter: float
 
 
-def robust_holds(variance: FloatArray, dof: FloatArray) -> npt.NDArray[np.bool_]:
+def robust_poses(variance: FloatArray, dof: FloatArray) -> npt.NDArray[np.bool_]:
     """(k,) holds whose noise is not far above the rest's; at most a quarter is excluded, the worst first."""
     keep = np.asarray(variance > 0.0)
     if np.count_nonzero(keep) < 4:

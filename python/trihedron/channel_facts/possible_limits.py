@@ -1,4 +1,4 @@
-"""Limits that noise covers: what ends ahead of the converter (a pickup, an amplifier) has no last code."""
+"""Limits that noise covers: what ends ahead of the ADC (a pickup, an amplifier) has no last code."""
 
 from __future__ import annotations
 

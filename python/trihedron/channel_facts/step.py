@@ -1,4 +1,4 @@
-"""The step of a converter, from the values that occur: the only place that looks for it."""
+"""The LSB, from the values that occur: the only place that looks for it."""
 
 from __future__ import annotations
 

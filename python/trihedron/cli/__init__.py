@@ -37,9 +37,9 @@ from trihedron.cli.segment import segment
 from trihedron.cli.simulate import simulate
 from trihedron.cli.speech import spell_out
 from trihedron.cli.verify import verify
+from trihedron.errors import RefusedError
 from trihedron.interruption import SENTENCE, Interrupted, status_of
-from trihedron.printable import printable
-from trihedron.refused import RefusedError
+from trihedron.sanitise import printable
 
 # In the order in which they are used.
 COMMANDS = (
@@ -201,7 +201,7 @@ def _make_writable() -> None:
 
 
 def _memory_sentence() -> str:
-    from trihedron.read.room import KEPT_FREE, available_memory_bytes, rows_that_fit
+    from trihedron.read.memory_limit import KEPT_FREE, available_memory_bytes, rows_that_fit
 
     left = available_memory_bytes()
     if left is None:

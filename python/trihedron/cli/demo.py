@@ -11,7 +11,7 @@ import typer
 
 from trihedron.cli.options import Force
 from trihedron.cli.output import leave, put, step, style
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 FOLDER = "trihedron-demo"
 

@@ -21,7 +21,7 @@ def kalman(
         Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
         typer.Option(
             metavar="FILE",
-            help="Pose table with header: pitch,roll in degrees or fx,fy,fz; also hold, or start,stop. "
+            help="Pose table with header: pitch,roll in degrees or fx,fy,fz; also pose, or start,stop. "
             "Without it the length of gravity is used.",
         ),
     ] = None,

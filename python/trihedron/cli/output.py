@@ -17,7 +17,7 @@ import typer
 from trihedron.cli.provenance import with_provenance
 from trihedron.cli.speech import speaks_unicode
 from trihedron.files.output import OutputError, check_free, write_whole
-from trihedron.printable import printable
+from trihedron.sanitise import printable
 
 if TYPE_CHECKING:
     from trihedron.records import Calibration, Finding

@@ -32,7 +32,7 @@ def view_as_json(view: GuideView, lost: int = 0) -> str:
         "detail": view.detail,
         "still": view.is_still,
         "held": round(view.held_s, 2),
-        "hold": round(view.hold_s, 2),
+        "pose": round(view.pose_s, 2),
         "poses": view.n_poses,
         "checks": view.n_checks,
         "events": view.n_events,

@@ -16,7 +16,7 @@ def plan(
         str, typer.Option(metavar="LIST", help="Known turns about every axis, in degrees: '90,-90' or '1440,-1440'.")
     ] = "90,-90",
     turn_time: Annotated[float, typer.Option(metavar="S", help="How long a turn takes.")] = 2.0,
-    hold: Annotated[
+    pose_time: Annotated[
         float, typer.Option(metavar="S", help="Length of a pose, and of the stretch without rotation.")
     ] = 4.0,
     gyro_noise: Annotated[float, typer.Option(metavar="X", help="White noise of the gyro [deg/s/√Hz].")] = 0.005,
@@ -35,7 +35,7 @@ def plan(
     planned = make_plan(
         turns_deg=numbers("--turns", turns),
         turn_s=turn_time,
-        hold_s=hold,
+        pose_s=pose_time,
         gyroscope_density=units.radians_from_degrees(gyro_noise),
         accelerometer_density=units.m_s2_from_micro_g(accel_noise),
         sigma_turn_rad=units.radians_from_degrees(turn_error),

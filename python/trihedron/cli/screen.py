@@ -20,7 +20,7 @@ POSE, HERE, TARGET = "o", "@", "X"
 
 
 def hemispheres(view: GuideView, width: int = 17, height: int = 9) -> list[str]:
-    """Where up pointed in the body: two discs seen from axis 3, its upper half left and its lower half right."""
+    """Where up pointed in the body: two discs seen from Z, its upper half left and its lower half right."""
     discs = [[[" "] * width for _ in range(height)] for _ in range(2)]
     for disc in discs:
         for i in range(height):
@@ -66,9 +66,9 @@ def screen(view: GuideView, width: int = 80, height: int = 24, *, lost: int = 0,
     inner = width - 4
     state = Text("STILL " if view.is_still else "MOVING", style=f"{STRONG} {GOOD if view.is_still else DIM}")
     head = Text.assemble(state, "  ", Text(view.instruction, style=STRONG))
-    full = bar(view.held_s / max(view.hold_s, 0.1), inner - 24)
-    hold = f"pose  [{full}] {min(view.held_s, 99.9):4.1f} of {view.hold_s:.0f} s"
-    lines: list[Text] = [head, Text(view.detail, style=DIM), Text(hold)]
+    full = bar(view.held_s / max(view.pose_s, 0.1), inner - 24)
+    pose = f"pose  [{full}] {min(view.held_s, 99.9):4.1f} of {view.pose_s:.0f} s"
+    lines: list[Text] = [head, Text(view.detail, style=DIM), Text(pose)]
     angle = view.degrees_to_target
     if angle is not None and view.phase in (Phase.MOVE, Phase.CHECK):
         lines[1].append(f"  ({angle:.0f} degrees to go)")

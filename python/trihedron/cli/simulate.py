@@ -124,7 +124,7 @@ def simulate(
         serve_recording(recording, known, serve, protocol, faults, speed=speed, baud=baud, link=link)
         return
     typer.echo(f"{output}: {recording.n_samples} samples, {recording.duration_s:.1f} s at {recording.rate_hz:.4g} Hz")
-    typer.echo(f"{len(known.holds)} poses, {len(known.moves)} moves, |g| {known.gravity_m_s2:.6g} m/s²")
+    typer.echo(f"{len(known.poses)} poses, {len(known.moves)} moves, |g| {known.gravity_m_s2:.6g} m/s²")
     for name, parameters in known.effects.items():
         from trihedron.report.simulation import in_rows
 

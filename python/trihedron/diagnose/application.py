@@ -20,9 +20,9 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
+from trihedron.errors import RefusedError
 from trihedron.records import Recording
 from trihedron.records.words import words
-from trihedron.refused import RefusedError
 
 N_ITERATIONS = 2
 """Effects are per mille of the motion: the second pass of the fixed point leaves their square."""

@@ -146,7 +146,7 @@ class Context:
         """(n, 3) specific force along each accelerometer's axis at every sample: the fitted pose in holds."""
         obs, twin = self.obs, self.fitted.twin
         force = obs.raw_force @ twin.accel_S.T + twin.accel_b
-        for i, hold in enumerate(obs.segments.holds):
+        for i, hold in enumerate(obs.segments.poses):
             force[hold.start : hold.stop] = twin.gravity * twin.up[i]
         finite = np.where(np.isfinite(force), force, 0.0)
         out: FloatArray = finite @ np.linalg.inv(self.accel_axes).T
@@ -198,7 +198,7 @@ class Context:
         obs, S = self.obs, self.fitted.twin.accel_S
         out: FloatArray = np.einsum("ij,hjk,ik->hi", S, obs.hold_scatter, S)
         for i in np.flatnonzero(np.isnan(out).any(axis=1)):
-            out[i] = np.nanvar(obs.raw_force[obs.segments.holds[i].samples()] @ S.T, axis=0)
+            out[i] = np.nanvar(obs.raw_force[obs.segments.poses[i].samples()] @ S.T, axis=0)
         return out
 
     def si_per_raw(self, sensor: str) -> FloatArray:
@@ -233,7 +233,7 @@ class Context:
 
         inside = np.array(
             [rough(obs.raw_force[hold.start : hold.stop] @ self.fitted.twin.accel_S.T).mean(axis=0)
-             for hold in obs.segments.holds]
+             for hold in obs.segments.poses]
         )  # fmt: skip
         quiet = np.quantile(inside, 0.1, axis=0)
         passed = (inside - quiet).sum() / max(float((holds - floor).sum()), 1e-300)

@@ -30,11 +30,11 @@ from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_twin
 from trihedron.diagnose.session.twin import NO_DISTORTION, Prior, Twin
 from trihedron.diagnose.verdict import accounted_for, verdict_of
+from trihedron.errors import RefusedError
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Candidate, Diagnosis
 from trihedron.records.domains import DomainTest
 from trihedron.records.progress import Progress
-from trihedron.refused import RefusedError
 from trihedron.session.noise import Strengths
 
 LARGEST_ALPHA = 0.5

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 Form = Literal["matrices", "quaternions", "vectors"]
 """How attitudes are written."""
@@ -66,7 +66,7 @@ def integrate_rate(
     Notes
     -----
     Equation (5.3) of ``docs/model-gyroscope.md``. Errors of a million steps are some 1e-13 rad of arithmetic; what
-    limits an attitude is the zero of the gyro, which adds its error times the time.
+    limits an attitude is the bias of the gyro, which adds its error times the time.
 
     Examples
     --------

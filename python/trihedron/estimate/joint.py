@@ -46,13 +46,13 @@ def calibrate_joint(
 ) -> Calibration:
     """Fit ``S_f, b_f, S_ω`` to the norm of every hold and the rotation of every move at once (equations 5.7, 5.8).
 
-    The noise of a hold's mean enters its norm and both neighbouring moves, with its full covariance. The frame is that
+    The noise of a pose's mean enters its norm and both neighbouring moves, with its full covariance. The frame is that
     of ``accelerometer``, which is also the start: nothing in the data turns the trihedron as a whole.
 
     Parameters
     ----------
     recording, segments : Recording, Segments
-        Raw readings of both sensors, their still poses and moves.
+        Raw readings of both sensors, their poses and moves.
     accelerometer : SensorCalibration
         Solution of the accelerometer alone (its quality tells how far its residual exceeds the noise).
     gravity_m_s2, gravity_source : float, str
@@ -71,7 +71,7 @@ def calibrate_joint(
     measured, aligned, options = measured_and_aligned(recording, segments, part, gravity_m_s2, options)
     is_determined = aligned.fit.rank == len(aligned.fit.singular_values)
     if frame == "case" or options.is_offset_free or not is_determined:
-        # Moves that leave directions open, or a zero hidden inside a step of the converter: the moves alone are judged.
+        # Moves that leave directions open, or a bias hidden inside an LSB: the moves alone are judged.
         return _by_moves_alone(recording, measured, accelerometer, part, aligned, options, gravity_m_s2, gravity_source)
     answer = _by_session(recording, segments, measured, accelerometer, aligned, options, gravity_m_s2, gravity_source)
     return in_frame(answer, frame)
@@ -300,7 +300,7 @@ def _norm_quality(
     gravity_m_s2: float,
     n_parameters: int,
 ) -> FitQuality:
-    """Norm residual of every hold at the joint solution; what was held out stays that of the accelerometer alone."""
+    """Norm residual of every pose at the joint solution; what was held out stays that of the accelerometer alone."""
     S = np.asarray(aligned.fit.accelerometer_scale)
     force = measured.reading @ S.T + np.asarray(aligned.fit.accelerometer_bias)
     norm = np.linalg.norm(force, axis=1)

@@ -6,7 +6,7 @@ from trihedron import probability
 from trihedron.records.calibration import SensorCalibration
 
 FALSE_ALARM = 1e-3
-"""Chance that a sound recording is taken for one whose moves contradict its still poses."""
+"""Chance that a sound recording is taken for one whose moves contradict its poses."""
 
 
 def pull_allowed(alone: SensorCalibration) -> float:
@@ -18,7 +18,7 @@ def pull_allowed(alone: SensorCalibration) -> float:
 
 
 def pull_on_accelerometer(alone: SensorCalibration, joint: SensorCalibration) -> float:
-    """By how much the moves raise χ² of the still poses' norms: χ² with at most 9 degrees of freedom if both agree.
+    """By how much the moves raise χ² of the poses' norms: χ² with at most 9 degrees of freedom if both agree.
 
     A bias that drifts raises it, and contradicts nothing: it counts in units of what one bias for the session misses.
     """

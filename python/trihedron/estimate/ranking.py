@@ -50,7 +50,7 @@ def rms_interval(errors: FloatArray) -> Interval:
 
 
 def with_bias_of_log(calibration: Calibration, segments: Segments, gravity_m_s2: float) -> Calibration:
-    """The calibration with the biases that its file does not hold taken from the still poses of the log."""
+    """The calibration with the biases that its file does not hold taken from the poses of the log."""
     without = calibration.extensions.get("without_bias", ())
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     if "accelerometer" in without and segments.accelerometer_mean is not None:  # type: ignore[operator]
@@ -76,7 +76,7 @@ def suspicions_of(
 ) -> tuple[Suspicion, ...]:
     """The mistake in the accelerometer's and in the gyro's part, where undoing one makes it fit."""
     assert segments.accelerometer_mean is not None
-    means, zero = segments.accelerometer_mean, np.zeros((segments.n_holds, 3))
+    means, zero = segments.accelerometer_mean, np.zeros((segments.n_poses, 3))
 
     def norm(S: FloatArray, b: FloatArray) -> float:
         sensor = replace(own.accelerometer, S=S, b=b)

@@ -34,7 +34,7 @@ class Misses:
 
 
 def accelerometer_suspicion(S: FloatArray, b: FloatArray, norm: Misses, gravity_m_s2: float) -> Suspicion | None:
-    """Of the accelerometer by the length of gravity at rest; no still pose knows how the triad as a whole is turned."""
+    """Of the accelerometer by the length of gravity at rest; no pose knows how the triad as a whole is turned."""
     tried = [*_common(S, b), *_units(S, b, STANDARD_GRAVITY_M_S2), *_axes(S, b)]
     best = _best(tried, norm, norm.rms(S, b))
     # A gravity is a factor that may be anything the Earth has; it is fitted, so it comes last.

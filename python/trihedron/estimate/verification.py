@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.aligned_moves import denies_cut
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.session.carried import Carried, carried
@@ -23,7 +24,6 @@ from trihedron.records import (
     Severity,
     Verification,
 )
-from trihedron.refused import RefusedError
 from trihedron.session.averaging import broadening
 
 FALSE_ALARM = 1e-3
@@ -49,14 +49,14 @@ def verify_calibration(
     Raises
     ------
     ValueError
-        When the recording has no accelerometer or no still pose.
+        When the recording has no accelerometer or no pose.
     """
     if recording.accelerometer is None or segments.accelerometer_mean is None:
         raise RefusedError("verification needs the accelerometer: gravity is what a calibration is tested against")
-    if segments.n_holds == 0:
+    if segments.n_poses == 0:
         raise RefusedError("verification needs poses, and none was found: keep the sensor still for some seconds")
     accelerometer = calibration.accelerometer
-    noise = _variance(segments.norm_sigma, segments.n_holds)
+    noise = _variance(segments.norm_sigma, segments.n_poses)
     error, error_noise, error_sigma = norm_error(accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)
     empty = np.zeros(0)
     moves = Carriage(empty, empty, empty, np.zeros(0, dtype=np.int64), ())
@@ -122,7 +122,7 @@ def _worse_than_none(
     """Where readings taken at their unit's word serve better: whatever the file states of its uncertainty."""
     error, angle = errors
     assert segments.accelerometer_mean is not None
-    noise = _variance(segments.norm_sigma, segments.n_holds)
+    noise = _variance(segments.norm_sigma, segments.n_poses)
     bare, _, _ = norm_error(without.accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)
     pairs = {"rest": (error, bare)}
     gyroscope = without.gyroscope
@@ -173,7 +173,7 @@ def _variance(sigma: FloatArray | None, n: int) -> FloatArray:
 @dataclass(frozen=True, eq=False)
 class Carriage:
     """Angles (m,) [deg] between gravity carried through moves and gravity measured after them, the noise of that, and
-    the same with the calibration's uncertainty; ``which`` (m,) moves these are and which were left out."""
+    the same with the calibration's uncertainty; ``which`` (m,) moves these are and which were excluded."""
 
     angle_deg: FloatArray
     noise_deg: FloatArray
@@ -185,7 +185,7 @@ class Carriage:
 def _carried(
     calibration: Calibration, gyroscope: SensorCalibration, recording: Recording, segments: Segments
 ) -> Carriage:
-    """The figure that a calibration publishes of its own session (docs/model-session.md), with a zero per pose, here
+    """The figure that a calibration publishes of its own session (docs/model-session.md), with a bias per pose, here
     with S and b held at the calibration's; of the same moves: not of those that were at the gyro's limit for long."""
     accelerometer = calibration.accelerometer
 

@@ -25,7 +25,7 @@ def judge_parameters(known: Calibration, own: Calibration | None, segments: Segm
     """Differences (file less log) of parameters that do not depend on the frame, with both standard uncertainties.
 
     ``own`` is the calibration of the log itself, ``None`` where it cannot carry one: then the gyro's bias alone is
-    judged, by the still poses, as it always is. A stated covariance of several sessions includes their repeatability.
+    judged, by the poses, as it always is. A stated covariance of several sessions includes their repeatability.
     """
     numbers, sigma, anchor = _numbers(known)
     n = len(numbers)

@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.documents import DocumentError, of_path, parse_json, read_text
+from trihedron.errors import RefusedError
 from trihedron.files.output import write_whole
 from trihedron.records import (
     PARAMETER_NAMES,
@@ -29,7 +30,6 @@ from trihedron.records import (
     SensorCalibration,
 )
 from trihedron.records.plain import as_plain, from_plain
-from trihedron.refused import RefusedError
 
 FORMAT = "trihedron calibration"
 FORMAT_VERSION = 1

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.files.output import write_whole
-from trihedron.refused import RefusedError
 
 EVERY_S = 30.0
 """Between two times of keeping: what a stopped run does again, and far longer than writing takes."""

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.documents import DocumentError, of_path, parse_json, read_text
+from trihedron.errors import RefusedError
 from trihedron.files.calibration import plain
 from trihedron.records.diagnosis import SCHEMA_VERSION, Diagnosis
-from trihedron.refused import RefusedError
 
 
 class DiagnosisFileError(RefusedError):

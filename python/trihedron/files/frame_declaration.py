@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.documents import DocumentError, check_values, of_path, read_text
+from trihedron.errors import RefusedError
 from trihedron.records.frame_declaration import (
     CHECKSUM_SIZES,
     CHECKSUMS,
@@ -16,7 +17,6 @@ from trihedron.records.frame_declaration import (
     FrameField,
     Role,
 )
-from trihedron.refused import RefusedError
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -12,8 +12,8 @@ import polars as pl
 
 from trihedron.arrays import FloatArray
 from trihedron.files.output import OutputError, write_whole
-from trihedron.forked import check_tables
 from trihedron.records.recording import Recording
+from trihedron.subprocesses import check_tables
 
 LOG_SUFFIXES = (".csv", ".npz", ".parquet")
 _TIMES = ("t [s]", "time_s")

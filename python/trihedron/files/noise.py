@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.documents import DocumentError, of_path, parse_json, read_text
+from trihedron.errors import RefusedError
 from trihedron.files.formats.contract import NoiseFigure, SensorNoise
-from trihedron.refused import RefusedError
 
 _SENSORS = {"m/s^2": "accelerometer", "rad/s": "gyroscope"}
 

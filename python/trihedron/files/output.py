@@ -11,9 +11,9 @@ import stat
 from collections.abc import Iterable
 from pathlib import Path
 
+from trihedron.errors import RefusedError
 from trihedron.files.special import is_stream, write_stream
 from trihedron.files.temporary import Temporary, clear_leftovers
-from trihedron.refused import RefusedError
 
 
 class OutputError(RefusedError):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.errors import RefusedError
 from trihedron.records import Calibration, SensorCalibration
-from trihedron.refused import RefusedError
 
 LARGEST_CONDITION = 100.0
 """Of S with its columns at one length: two axes 0.6 degrees apart. Beyond it the matrix is a mistake, not a sensor."""

@@ -12,8 +12,8 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT, Item
 
 from trihedron.documents import DocumentError, of_path, read_text
+from trihedron.errors import RefusedError
 from trihedron.files.output import write_whole
-from trihedron.refused import RefusedError
 
 
 def improved_scenario(

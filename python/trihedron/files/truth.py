@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from trihedron.errors import RefusedError
 from trihedron.files.output import OutputError, write_whole
 from trihedron.records.truth import TrueSegment, Truth
-from trihedron.refused import RefusedError
 
 _ARRAYS = (
     "accelerometer_time_s",

@@ -13,8 +13,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from trihedron.errors import RefusedError
 from trihedron.read import devices_of
-from trihedron.refused import RefusedError
 
 ENDINGS = (
     *(".csv", ".tsv", ".txt", ".log", ".dat", ".npz", ".npy", ".parquet", ".zip", ".gz", ".bag", ".mcap", ".db3"),

@@ -11,6 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
+from trihedron.errors import RefusedError
 from trihedron.files.calibration import plain
 from trihedron.files.output import write_whole
 from trihedron.fleet.logs import Job, find_jobs
@@ -18,7 +19,6 @@ from trihedron.fleet.summary import FleetResult, summarise
 from trihedron.fleet.table import write_tables
 from trihedron.fleet.work import Row, work
 from trihedron.records.progress import Progress
-from trihedron.refused import RefusedError
 
 RESULTS = "results"
 DEATHS = 3

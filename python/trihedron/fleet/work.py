@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from trihedron.errors import REFUSALS, RefusedError
 from trihedron.fleet.logs import program
 from trihedron.records.checked import WrongTypeError
-from trihedron.refused import REFUSALS, RefusedError
 
 Row = dict[str, Any]
 REFUSED: tuple[type[Exception], ...] = (*REFUSALS, WrongTypeError, OSError)
@@ -94,7 +94,7 @@ def _row(result: Any) -> Row:
         "n_samples": result.recording.n_samples,
         "duration_s": result.recording.duration_s,
         "rate_hz": result.recording.rate_hz,
-        "n_poses": result.segments.n_holds,
+        "n_poses": result.segments.n_poses,
         "is_trustworthy": result.is_trustworthy,
         "gravity_m_s2": calibration.gravity_m_s2,
         "accelerometer_unit": accel.raw_unit,

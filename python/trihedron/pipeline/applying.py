@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Protocol
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.files.calibration import read_calibration
 from trihedron.files.calibration import write_calibration as write_file
 from trihedron.files.plausible import require_plausible
@@ -17,7 +18,6 @@ from trihedron.pipeline.results import CheckResult
 from trihedron.pipeline.temperature import check_range, thermally_corrected
 from trihedron.records import Calibration, Finding, FindingCode, Recording, SensorCalibration, Severity
 from trihedron.records.words import words
-from trihedron.refused import RefusedError
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit
 

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from numbers import Integral, Real
 from typing import Any
 
+from trihedron.errors import RefusedError
 from trihedron.records.checked import WrongTypeError, number_of, numbers_of, said
-from trihedron.refused import RefusedError
 
 MOST_WHOLE = 2**63 - 1
 """What the core takes as a whole number."""
@@ -29,7 +29,7 @@ RANGES: dict[str, tuple[float, float, str]] = {
     "sigma_angle_deg": (0.0, 180.0, "degrees"),
     "sigma_turn_rad": (0.0, 3.2, "rad"),
     "turn_s": (1e-3, 1e6, "s"),
-    "hold_s": (1e-3, 1e6, "s"),
+    "pose_s": (1e-3, 1e6, "s"),
     "seconds": (1e-3, 1e9, "s"),
     "wait_s": (0.0, 1e9, "s"),
     "gyroscope_density": (1e-15, 1e3, "rad/s/√Hz, a positive number"),

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.reference import moves_along
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
@@ -24,7 +25,6 @@ from trihedron.read.reference import of_recording
 from trihedron.records import Calibration, Finding, FindingCode, Recording
 from trihedron.records.reference import AgainstReference
 from trihedron.records.words import words
-from trihedron.refused import REFUSALS, RefusedError
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit, rate_to_si
 
@@ -57,12 +57,12 @@ def beside(
     found = held_against(recording, reference, gravity, columns=columns, given=given)
     segments = segment(recording)
     try:
-        if segments.n_holds < FEWEST_POSES:
-            raise RefusedError(f"{segments.n_holds} poses are too few for a model of their own")
+        if segments.n_poses < FEWEST_POSES:
+            raise RefusedError(f"{segments.n_poses} poses are too few for a model of their own")
         result = ordinary()
     except REFUSALS as error:
         if found.kind == ANOTHER_UNIT:
-            # What two gyros tell apart may be either's: with no poses nobody says whose.
+            # What two gyros separate may be either's: with no poses nobody says whose.
             found = replace(found, findings=(*found.findings, _shared(found)))
         values = diagnosis_by(found, recording, gravity, given, alpha)
         calibration = (

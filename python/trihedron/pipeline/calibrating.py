@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
+from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm, shared_rounding
 from trihedron.estimate.accelerometer.bending import with_bending
 from trihedron.estimate.accelerometer.face_poses import faces_up
@@ -36,7 +37,6 @@ from trihedron.records import Calibration, Finding, FindingCode, Frame, Recordin
 from trihedron.records.plain import as_plain
 from trihedron.records.progress import Progress
 from trihedron.records.words import words
-from trihedron.refused import REFUSALS, RefusedError
 from trihedron.sensor_model import in_frame
 from trihedron.units import rate_to_si
 
@@ -181,10 +181,10 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
 
 
 def _as_they_weigh(segments: Segments) -> Found:
-    """Findings of the segmentation; that holds creep is serious for a calibration where it is no exception."""
+    """Findings of the segmentation; that holds settling is serious for a calibration where it is no exception."""
     return tuple(
         replace(finding, severity=Severity.SERIOUS)
-        if finding.code is FindingCode.POSE_SETTLING and finding.numbers["holds"] > MOST_CREEPING * segments.n_holds
+        if finding.code is FindingCode.POSE_SETTLING and finding.numbers["poses"] > MOST_CREEPING * segments.n_poses
         else finding
         for finding in segments.findings
     )
@@ -196,9 +196,9 @@ def _require_poses(recording: Recording, segments: Segments) -> None:
             f"{recording.source}: a gyro alone cannot be calibrated by gravity; log the accelerometer as well, "
             "or name its columns with --columns."
         )
-    if segments.n_holds < 3:
+    if segments.n_poses < 3:
         found = {0: "no pose was found", 1: "only one pose was found"}.get(
-            segments.n_holds, f"only {segments.n_holds} poses were found"
+            segments.n_poses, f"only {segments.n_poses} poses were found"
         )
         grave = [finding.seen for finding in segments.findings if finding.severity is not Severity.NOTE]
         why = grave[0] + " " if grave else ""

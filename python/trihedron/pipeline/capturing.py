@@ -28,6 +28,7 @@ from trihedron.capture import (
     list_ports,
     open_source,
 )
+from trihedron.errors import RefusedError
 from trihedron.files.frame_declaration import read_frame_declaration
 from trihedron.files.output import check_free
 from trihedron.pipeline.reading import read
@@ -36,7 +37,6 @@ from trihedron.read.columns import Columns, find_columns
 from trihedron.read.table import Table
 from trihedron.records import Recording
 from trihedron.records.frame_declaration import FrameDeclaration
-from trihedron.refused import RefusedError
 
 Cells = npt.NDArray[np.float64]
 

@@ -29,7 +29,7 @@ def carried_misses(own: Calibration, recording: Recording, segments: Segments) -
     checked = verify_calibration(own, recording, segments, own.gravity_m_s2, own.gravity_source)
     t = recording.time_s
     cut = np.asarray(recording.facts.of("gyroscope").at_limits(len(t)).any(axis=1))
-    sound = np.array([not cut[a.stop : b.start].any() for a, b in pairwise(segments.holds)], dtype=np.bool_)
-    lasts = [float(t[min(b.start, len(t) - 1)] - t[a.stop - 1]) for a, b in pairwise(segments.holds)]
+    sound = np.array([not cut[a.stop : b.start].any() for a, b in pairwise(segments.poses)], dtype=np.bool_)
+    lasts = [float(t[min(b.start, len(t) - 1)] - t[a.stop - 1]) for a, b in pairwise(segments.poses)]
     told = sound[checked.moves]
     return CarriedMisses(radians_from_degrees(1.0) * checked.angle_deg[told], np.array(lasts)[checked.moves][told])

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from trihedron.errors import REFUSALS
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.reading import AnyRecording, recording_of, segment
 from trihedron.pipeline.results import CheckResult
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress
 from trihedron.records.words import Words, words
-from trihedron.refused import REFUSALS
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 

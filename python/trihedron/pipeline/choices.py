@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from trihedron.errors import RefusedError
 from trihedron.gravity import normal_gravity
 from trihedron.records import Finding, FindingCode
-from trihedron.refused import RefusedError
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 

@@ -9,7 +9,7 @@ from trihedron.estimate.noise import ratio_of
 from trihedron.estimate.noise.correlation_time import correlation_time
 from trihedron.pipeline.comparing_noise import Sampled, Sensor
 from trihedron.records.diagnosis import NoiseDifference
-from trihedron.records.hold_noise import Measured
+from trihedron.records.pose_noise import Measured
 
 TESTS = 48.0
 """Shares of alpha: what numbers (a half), noise (three eighths) and slow noise (a twelfth) leave, for two sensors."""
@@ -21,7 +21,7 @@ SENSORS: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
 
 
 def correlation_times(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
-    """A row for each sensor whose noise forgets within the holds of both logs; a time used for both is named."""
+    """A row for each sensor whose noise forgets within the poses of both logs; a time used for both is named."""
     times = {
         sensor: (correlation_time(model.noise[sensor]), correlation_time(recording.noise[sensor]))
         for sensor in SENSORS

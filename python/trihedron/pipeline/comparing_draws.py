@@ -8,7 +8,7 @@ from typing import Literal
 
 from trihedron.arrays import FloatArray
 from trihedron.records.diagnosis import NoiseDifference
-from trihedron.records.hold_noise import HoldNoise
+from trihedron.records.pose_noise import PoseNoise
 
 Sensor = Literal["accelerometer", "gyroscope"]
 
@@ -22,7 +22,7 @@ _NAMES = {"accelerometer": "accelerometer", "gyroscope": "gyro"}
 
 
 def uniform_for_normal(
-    sensor: Sensor, model: FloatArray, recording: FloatArray, n: int, noise: Sequence[HoldNoise]
+    sensor: Sensor, model: FloatArray, recording: FloatArray, n: int, noise: Sequence[PoseNoise]
 ) -> Iterator[NoiseDifference]:
     """Uniform noise for normal: the excess kurtosis (3,) of ``n`` differences tells, where steps are finer."""
     middle = 0.5 * (NORMAL_EXCESS + UNIFORM_EXCESS)

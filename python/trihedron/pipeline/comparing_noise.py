@@ -12,13 +12,13 @@ from scipy.stats import chi2
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.against import FittedModel
-from trihedron.estimate.noise import noise_of_holds, ratio_of
+from trihedron.errors import REFUSALS
+from trihedron.estimate.noise import noise_of_poses, ratio_of
 from trihedron.pipeline.comparing_draws import one_draw_for_all, uniform_for_normal
-from trihedron.records import Hold, Recording
+from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
-from trihedron.records.hold_noise import HoldNoise, Measured
+from trihedron.records.pose_noise import Measured, PoseNoise
 from trihedron.records.sampling import StampKind
-from trihedron.refused import REFUSALS
 
 Sensor = Literal["accelerometer", "gyroscope"]
 
@@ -28,20 +28,20 @@ numbers, a twelfth on slow noise."""
 LEAST_RATIO = 1.05
 """White noise of one part differs by 5 % over 30 K (its resistors' noise goes with the root of temperature)."""
 LEAST_STEP_RATIO = math.sqrt(2.0)
-"""Ranges of a converter come in powers of two: halfway between two of them."""
+"""Ranges of an ADC come in powers of two: halfway between two of them."""
 DIGITS = 0.1
-"""Steps of a tenth of the noise add a thousandth to its variance: whether they are a converter's changes nothing."""
+"""Steps of a tenth of the noise add a thousandth to its variance: whether they are an ADC's changes nothing."""
 LEAST_SEEN_STEP = 1e-2
-"""Of the noise: hardly a converter has a hundred codes to a standard deviation; sums of readings and what was taken off
+"""Of the noise: hardly an ADC has a hundred codes to a standard deviation; sums of readings and what was taken off
 them come that near to a grid, and steps as fine cannot be told from the digits of a file."""
 FEWEST_ALIKE = 2
-"""Axes with one step, of which a converter shows."""
+"""Axes with one step, of which an ADC shows."""
 LEAST_CORNER_RATIO = 1.2
 """Filters are chosen from lists whose neighbours differ by 1.5 to 2; within a fifth they are the same entry."""
 LEAST_RATE_RATIO = 1.02
 """Oscillators of cheap parts are specified to 1 to 2 %."""
 LEAST_OCTAVE_RATIO = 1.5
-"""Octaves below the white floor hold a few periods a hold each: smaller differences belong to the day."""
+"""Octaves below the white floor hold a few periods a pose each: smaller differences belong to the day."""
 LEAST_JITTER = 0.05
 """Scatter of the timestamps, in steps, from which on it matters to a session (0.05 of 10 ms is 0.5 ms)."""
 PERFECT_CLOCK = 1e-6
@@ -55,7 +55,7 @@ UNLIKE_BY_CHANCE = 0.01
 RESEMBLES = 1.06
 """A ratio this near to √rate, or to its inverse, is taken for it."""
 SHOWS = 0.5
-"""Noise of half a converter step moves its last digit in every third reading: it cannot be overlooked."""
+"""Noise of half an ADC step moves its last digit in every third reading: it cannot be overlooked."""
 _AXES = ("x", "y", "z")
 _SCATTERED = (StampKind.LATE, StampKind.SCATTERED)
 
@@ -67,7 +67,7 @@ class Sampled:
     ``likeness`` is the smallest correlation, in size, of the noise of any two axes.
     """
 
-    noise: dict[Sensor, tuple[HoldNoise, ...]]
+    noise: dict[Sensor, tuple[PoseNoise, ...]]
     excess: dict[Sensor, FloatArray]
     n_differences: dict[Sensor, int]
     likeness: dict[Sensor, float]
@@ -75,10 +75,10 @@ class Sampled:
     jitter_steps: float
 
 
-def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> Sampled:
+def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> Sampled:
     """Noise inside poses of a recording, by the scale of its own fit."""
-    holds = [(pose.start, pose.stop) for pose in poses]
-    noise: dict[Sensor, tuple[HoldNoise, ...]] = {}
+    ranges = [(pose.start, pose.stop) for pose in poses]
+    noise: dict[Sensor, tuple[PoseNoise, ...]] = {}
     excess: dict[Sensor, FloatArray] = {}
     count: dict[Sensor, int] = {}
     likeness: dict[Sensor, float] = {}
@@ -91,10 +91,10 @@ def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> 
             continue
         si = readings / np.linalg.norm(np.linalg.inv(S), axis=1)
         try:
-            noise[sensor] = noise_of_holds(si, recording.rate_hz, holds)
+            noise[sensor] = noise_of_poses(si, recording.rate_hz, ranges)
         except REFUSALS:
             continue  # no hold is long enough: nothing to compare
-        differences = np.concatenate([np.diff(si[a:b], axis=0) for a, b in holds if b - a > 2])
+        differences = np.concatenate([np.diff(si[a:b], axis=0) for a, b in ranges if b - a > 2])
         differences = differences[np.isfinite(differences).all(axis=1)]
         centred = differences - differences.mean(axis=0)
         power = np.maximum((centred**2).mean(axis=0), 1e-150)
@@ -160,7 +160,7 @@ def _value(figure: Measured | None) -> float | None:
     return None if figure is None else figure.value
 
 
-def _white(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) -> NoiseDifference | None:
+def _white(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> NoiseDifference | None:
     unit = "m/s^2/sqrt(Hz)" if sensor == "accelerometer" else "rad/s/sqrt(Hz)"
     if m.white is None or r.white is None or not (m.white.value > 0.0 and r.white.value > 0.0):
         if (m.white is None) == (r.white is None):
@@ -169,8 +169,8 @@ def _white(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) 
     return _measured(sensor, axis, "N", (m.white, r.white), unit, LEAST_RATIO, alpha)
 
 
-def _hidden(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, unit: str) -> NoiseDifference:
-    """One side shows no noise: hidden by its converter, or, where noise like the other's would show, not there."""
+def _hidden(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, unit: str) -> NoiseDifference:
+    """One side shows no noise: hidden by its ADC, or, where noise like the other's would show, not there."""
     quiet, loud = (m, r) if m.white is None or not m.white.value > 0.0 else (r, m)
     side, other = ("model", "recording") if quiet is m else ("recording", "model")
     assert loud.white is not None
@@ -237,8 +237,8 @@ def _are_even(white: Sequence[Measured | None]) -> bool:
 def _step(
     sensor: Sensor,
     axis: str,
-    model: tuple[HoldNoise, Sequence[HoldNoise]],
-    recording: tuple[HoldNoise, Sequence[HoldNoise]],
+    model: tuple[PoseNoise, Sequence[PoseNoise]],
+    recording: tuple[PoseNoise, Sequence[PoseNoise]],
 ) -> Iterator[NoiseDifference]:
     """One axis of either side, with all axes of its sensor."""
     m, r = model[0], recording[0]
@@ -257,17 +257,17 @@ def _step(
         return
     ratio = m.step / r.step
     levels = [one.reading_sigma for one in (m, r) if one.reading_sigma > 0.0]
-    # Steps far below the noise are as likely the digits of a file as a converter's.
+    # Steps far below the noise are as likely the digits of a file as an ADC's.
     is_seen = not levels or max(m.step, r.step) > DIGITS * min(levels)
     is_far = max(ratio, 1.0 / ratio) > LEAST_STEP_RATIO and is_seen
     remark = f"The resolution (LSB) of the {name} is {ratio:.3g} times the recording's." if is_far else ""
     yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, ratio, None, unit, None, is_far, remark)
 
 
-def _shows_steps(one: HoldNoise, axes: Sequence[HoldNoise]) -> bool:
-    """Whether readings go in steps: a distance of numbers far below the noise is that of chance, not of a converter.
+def _shows_steps(one: PoseNoise, axes: Sequence[PoseNoise]) -> bool:
+    """Whether readings go in steps: a distance of numbers far below the noise is that of chance, not of an ADC.
 
-    Nor is one that no other axis has: the axes of a sensor share a converter.
+    Nor is one that no other axis has: the axes of a sensor share an ADC.
     """
     alike = sum(max(one.step, other.step) < LEAST_STEP_RATIO * min(one.step, other.step) for other in axes)
     if one.step > 0.0 and alike < min(FEWEST_ALIKE, len(axes)):
@@ -275,7 +275,7 @@ def _shows_steps(one: HoldNoise, axes: Sequence[HoldNoise]) -> bool:
     return one.step > LEAST_SEEN_STEP * one.reading_sigma
 
 
-def _corner(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) -> Iterator[NoiseDifference]:
+def _corner(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> Iterator[NoiseDifference]:
     if m.corner_hz is not None and r.corner_hz is not None:
         yield _measured(sensor, axis, "bandwidth", (m.corner_hz, r.corner_hz), "Hz", LEAST_CORNER_RATIO, alpha)
         return
@@ -292,7 +292,7 @@ def _corner(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float)
     )
 
 
-def _octaves(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) -> Iterator[NoiseDifference]:
+def _octaves(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> Iterator[NoiseDifference]:
     """Octave by octave; significant where it differs otherwise than white noise and filter do."""
     if m.white is None or r.white is None:
         return

@@ -11,7 +11,7 @@ import numpy as np
 from trihedron.estimate.noise import ratio_of
 from trihedron.pipeline.comparing_noise import Sampled, Sensor
 from trihedron.records.diagnosis import NoiseDifference
-from trihedron.records.hold_noise import HoldNoise, Measured
+from trihedron.records.pose_noise import Measured, PoseNoise
 
 SHARE = 1.0 / 24.0
 """Of alpha: what white noise, corners, octaves, slow noise and the numbers leave."""
@@ -43,7 +43,7 @@ class WhiteAndQuantisation:
         return Measured(value, value * math.exp(-1.96 * log), value * math.exp(1.96 * log), log)
 
 
-def white_and_quantisation(axis: HoldNoise) -> WhiteAndQuantisation | None:
+def white_and_quantisation(axis: PoseNoise) -> WhiteAndQuantisation | None:
     """Least squares of N² + 4 Q² rate sin²(πf/rate) to the densities of the octaves, errors relative to the model.
 
     The first difference over the time step of white noise of variance Q² is what rounding of an integral leaves: an
@@ -92,7 +92,7 @@ def quantisation_noise(model: Sampled, recording: Sampled, *, alpha: float) -> t
     )
 
 
-def _axis(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) -> Iterator[NoiseDifference]:
+def _axis(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> Iterator[NoiseDifference]:
     made, seen = white_and_quantisation(m), white_and_quantisation(r)
     if made is None or seen is None or not (made.is_shown or seen.is_shown):
         return

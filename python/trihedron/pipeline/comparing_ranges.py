@@ -19,10 +19,10 @@ SENSOR = {"accel-saturation": "accelerometer", "gyro-saturation": "gyroscope"}
 def stated_ranges(
     scenario: Scenario, effects: Iterable[AcceptedEffect], recording: Recording
 ) -> tuple[AcceptedEffect, ...]:
-    """Those of a ``recording``'s effects that are the end of a range which the scenario states too.
+    """Those of a ``recording``'s effects that are the range limit which the scenario states too.
 
     A peak of one sample that was cut is not driven again: samples fall elsewhere on it. What the scenario says of its
-    converter and of its saturation needs no peak to show it.
+    ADC and of its saturation needs no peak to show it.
     """
     return tuple(e for e in effects if e.id in SENSOR and _states(scenario, e, recording))
 

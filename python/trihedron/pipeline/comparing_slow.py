@@ -17,7 +17,7 @@ from trihedron.pipeline.comparing_noise import Sensor
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, NoiseTerm
 from trihedron.records.domains import Domain
-from trihedron.records.hold_noise import Measured
+from trihedron.records.pose_noise import Measured
 from trihedron.segment import resegment
 from trihedron.sensor_model import correct
 
@@ -83,7 +83,7 @@ def _rows(
 
 
 def _drifts(found: Diagnosis, sensor: Sensor, *, but_curve: bool = False) -> bool:
-    """Whether the zeros of a recording's sensor move in a way that has another name, or that nothing explains.
+    """Whether the biases of a recording's sensor move in a way that has another name, or that nothing explains.
 
     ``but_curve``: a free curve through them is compared as the walk that the other side's is.
     """
@@ -164,8 +164,8 @@ def _poses(shown_s: FloatArray, recording: Recording, segments: Segments) -> _Po
     t = recording.time_s
     best: tuple[float, _Poses] | None = None
     for poses in (cut, segments if cut.whole is None else cut.whole):
-        begin = np.array([t[hold.start] for hold in poses.holds])
-        end = np.array([t[hold.stop - 1] for hold in poses.holds])
+        begin = np.array([t[pose.start] for pose in poses.poses])
+        end = np.array([t[pose.stop - 1] for pose in poses.poses])
         away = np.abs(np.subtract.outer(shown_s, 0.5 * (begin + end)))
         nearest = np.argmin(away, axis=1)
         missed = float(away[np.arange(len(nearest)), nearest].max())

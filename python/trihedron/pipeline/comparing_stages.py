@@ -9,7 +9,7 @@ from trihedron.diagnose.against import FittedModel
 from trihedron.pipeline.comparing_noise import Sampled, Sensor, sampled
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import NoiseDifference, Stage, StageDomain
-from trihedron.records.hold_noise import HoldNoise
+from trihedron.records.pose_noise import PoseNoise
 
 DECIBEL = 20.0 / math.log(10.0)
 FEWEST_HOLDS = 4
@@ -34,8 +34,8 @@ def with_noise_stage(
     that is no number, as of a model without any noise.
     """
     given = own = None
-    if segments.n_holds >= FEWEST_HOLDS:
-        taught, seen = (sampled(recording, segments.holds[first::2], fit) for first in (0, 1))
+    if segments.n_poses >= FEWEST_HOLDS:
+        taught, seen = (sampled(recording, segments.poses[first::2], fit) for first in (0, 1))
         given, own = _misfit(model, seen), _misfit(taught, seen)
     if given is not None and not any(one.significant and one.term in NOISE_IN_HOLDS for one in compared):
         own = given
@@ -66,7 +66,7 @@ def _misfit(model: Sampled, seen: Sampled) -> float | None:
     return math.sqrt(sum(squares) / len(squares)) if squares else None
 
 
-def _ratios(model: HoldNoise, seen: HoldNoise) -> list[float]:
+def _ratios(model: PoseNoise, seen: PoseNoise) -> list[float]:
     """Root of the ratio of densities, octave by octave."""
     by_low = {octave.low_hz: octave.density.value for octave in model.octaves}
     return [

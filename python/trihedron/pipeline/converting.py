@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from typing import Any
 
+from trihedron.errors import RefusedError
 from trihedron.files.log import write_recording
 from trihedron.pipeline.reading import read, recording_of
 from trihedron.records import Recording
-from trihedron.refused import RefusedError
 
 
 def convert(log: Any, output: str | os.PathLike[str], *, overwrite: bool = False, **options: Any) -> Recording:

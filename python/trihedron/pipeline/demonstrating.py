@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.files.calibration import plain, write_calibration
 from trihedron.files.output import write_whole
 from trihedron.gravity import normal_gravity
@@ -20,7 +21,6 @@ from trihedron.pipeline.reading import read, segment
 from trihedron.pipeline.results import CalibrationResult, VerificationResult
 from trihedron.pipeline.verifying import verify
 from trihedron.records import PARAMETER_NAMES, Calibration, Comparison, Recording, Segments, Truth
-from trihedron.refused import RefusedError
 from trihedron.report import calibration_report, demonstration_report, verification_report
 from trihedron.report.document import Document
 from trihedron.report.page import to_html

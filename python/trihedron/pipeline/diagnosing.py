@@ -11,6 +11,7 @@ from typing import Any
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.against import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open
+from trihedron.errors import REFUSALS, RefusedError
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.beside import beside, shared_log
@@ -33,7 +34,6 @@ from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.records.progress import Progress
-from trihedron.refused import REFUSALS, RefusedError
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, read_scenario
 
@@ -267,7 +267,7 @@ def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha
     except REFUSALS as error:
         raise RefusedError(f"the simulated recording cannot be calibrated: {error}") from None
     diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=tell)
-    noise = sampled(recording, result.segments.holds, model_of_diagnosis(diagnosis))
+    noise = sampled(recording, result.segments.poses, model_of_diagnosis(diagnosis))
     frames = () if of_world is None else (of_world,)
     return _Free(result.calibration, result.segments, diagnosis, noise, recording, frames, scenario)
 
@@ -280,7 +280,7 @@ def _frames(
 
 
 def _protocol(simulated: Segments, segments: Segments) -> tuple[Finding, ...]:
-    n, m = simulated.n_holds, segments.n_holds
+    n, m = simulated.n_poses, segments.n_poses
     if n == m:
         return ()
     finding = Finding.of(FindingCode.PROTOCOL_DIFFERS, n_simulated=n, n_real=m)
@@ -314,7 +314,7 @@ def _noise(
     simulated: _Free, found: Diagnosis, recording: Recording, segments: Segments, alpha: float
 ) -> tuple[NoiseDifference, ...]:
     """Noise and slow noise of the simulation against those of the recording."""
-    ours = sampled(recording, segments.holds, model_of_diagnosis(found))
+    ours = sampled(recording, segments.poses, model_of_diagnosis(found))
     theirs = (simulated.diagnosis, simulated.recording, simulated.segments)
     return (
         *compare_noise(simulated.sampled, ours, alpha=alpha),

@@ -17,10 +17,10 @@ from trihedron.diagnose.session.starting_point import (
     extended_sensor,
     is_open,
 )
+from trihedron.errors import REFUSALS
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, LinearModel
-from trihedron.refused import REFUSALS
 from trihedron.units import acceleration_to_si, rate_to_si
 
 Calibrated = Callable[[], Calibration]
@@ -47,10 +47,10 @@ def at_rest(
 
 def _is_rest(recording: Recording, segments: Segments, calibrated: Calibrated) -> bool:
     mean = segments.accelerometer_mean
-    if mean is None or segments.n_holds < FEWEST_POSES:
+    if mean is None or segments.n_poses < FEWEST_POSES:
         return True
     up = mean / np.linalg.norm(mean, axis=1, keepdims=True)
-    lasts = np.array([hold.stop - hold.start for hold in segments.holds], dtype=np.float64)
+    lasts = np.array([pose.stop - pose.start for pose in segments.poses], dtype=np.float64)
     of_orientations = []
     free = np.ones(len(up), dtype=bool)
     while free.any():
@@ -58,7 +58,7 @@ def _is_rest(recording: Recording, segments: Segments, calibrated: Calibrated) -
         near = free & (np.arccos(np.clip(up @ up[first], -1.0, 1.0)) < SAME_POSE_RAD)
         of_orientations.append(float(lasts[near].sum()))
         free &= ~near
-    # Counts about the middle of a converter's range all point the same way: there the fit alone tells.
+    # Counts about the middle of an ADC's range all point the same way: there the fit alone tells.
     is_known = acceleration_to_si(recording.accelerometer_unit) is not None
     if is_known and len(of_orientations) <= TWO_ORIENTATIONS:
         return _turns(recording, segments) <= MOST_TURNS
@@ -161,4 +161,4 @@ def _calibration(model: LinearModel, gravity_m_s2: float, source: str) -> Calibr
 
 def _too_few(recording: Recording, segments: Segments) -> Finding:
     lasts = float(recording.time_s[-1] - recording.time_s[0])
-    return Finding.of(FindingCode.NOT_FIT, "few-orientations", duration_s=lasts, n_holds=segments.n_holds)
+    return Finding.of(FindingCode.NOT_FIT, "few-orientations", duration_s=lasts, n_poses=segments.n_poses)

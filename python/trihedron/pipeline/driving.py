@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import REFUSALS
 from trihedron.files.log import write_recording
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.carried_misses import CarriedMisses, carried_misses
 from trihedron.pipeline.reading import read
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.refused import REFUSALS
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, simulate, twin_scenario
 
@@ -113,7 +113,7 @@ class MovedAlike:
 def flicker_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
     """Flicker of the accelerometer [m/s²] with which lengths of gravity miss no more than the recording's.
 
-    Octaves inside holds of seconds take a slow line or a hand's tremor for flicker, which wanders on between poses: the
+    Octaves inside poses of seconds take a slow line or a hand's tremor for flicker, which wanders on between poses: the
     lengths of gravity in them show how much of it may. ``None`` where they ask for no less.
     """
     part, seen = better.accelerometer, beside.poses

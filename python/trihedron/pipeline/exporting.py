@@ -7,12 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from trihedron.documents import DocumentError, of_path, read_text
+from trihedron.errors import RefusedError
 from trihedron.files.formats import ExportOptions, any_calibration, export_files
 from trihedron.files.noise import noise_figures, read_noise
 from trihedron.files.output import check_free, write_whole
 from trihedron.pipeline.applying import AnyCalibration, calibration_of
 from trihedron.records import Noise
-from trihedron.refused import RefusedError
 from trihedron.report.noise_files import noise_record
 
 

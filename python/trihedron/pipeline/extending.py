@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from trihedron.errors import RefusedError
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.diagnosing import diagnose
 from trihedron.pipeline.results import CalibrationResult
@@ -17,7 +18,6 @@ from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import Domain
 from trihedron.records.progress import Progress
 from trihedron.records.words import words
-from trihedron.refused import RefusedError
 
 
 def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress | None = None) -> CalibrationResult:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from trihedron.channel_facts.at_rest import SHORTEST as SHORTEST_HOLD
+from trihedron.errors import RefusedError
 from trihedron.estimate.kalman import (
     NormFrame,
     calibrate_session,
@@ -15,11 +16,10 @@ from trihedron.estimate.kalman import (
     check_same_gravity,
     noise_from_identified,
 )
-from trihedron.estimate.noise import identify_noise, noise_of_holds
+from trihedron.estimate.noise import identify_noise, noise_of_poses
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of
-from trihedron.printable import one_line
 from trihedron.read import read_axis_noise, read_pose_table, read_recording
 from trihedron.records import (
     AxisNoise,
@@ -35,7 +35,7 @@ from trihedron.records import (
 from trihedron.records.noise import Noise
 from trihedron.records.presented import Presented
 from trihedron.records.progress import Progress
-from trihedron.refused import RefusedError
+from trihedron.sanitise import one_line
 
 NoiseSource = AxisNoise | Sequence[AxisNoise] | Noise | str | os.PathLike[str]
 
@@ -161,15 +161,15 @@ def _settle_noise(
 
 
 def _check_converter(given: Sequence[AxisNoise], recording: Recording, segments: Segments) -> None:
-    """Refuse the noise of a static log that another converter wrote."""
+    """Refuse the noise of a static log that another ADC wrote."""
     readings = recording.accelerometer
-    if readings is None or not segments.holds:
+    if readings is None or not segments.poses:
         return
-    windows = [(hold.start, hold.stop) for hold in segments.holds if hold.stop - hold.start >= SHORTEST_HOLD]
+    windows = [(pose.start, pose.stop) for pose in segments.poses if pose.stop - pose.start >= SHORTEST_HOLD]
     if not windows:
         return
-    inside = noise_of_holds(readings, recording.rate_hz, windows)
-    # Codes between the poses count too: inside a hold a coarse converter shows one.
+    inside = noise_of_poses(readings, recording.rate_hz, windows)
+    # Codes between the poses count too: inside a hold a coarse ADC shows one.
     steps = recording.facts.of("accelerometer").step.tolist()
     octaves = [axis.octaves for axis in inside]
     check_same_converter(given, steps, octaves, recording.rate_hz, recording.source)

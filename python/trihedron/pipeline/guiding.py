@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import REFUSALS
 from trihedron.estimate.accelerometer.poses import ENTRIES, design_rows, parameter_names, pose_in_words
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.planning_poses import (
@@ -26,7 +27,6 @@ from trihedron.pipeline.results import CalibrationResult, VerificationResult
 from trihedron.pipeline.verifying import verify
 from trihedron.records import Calibration, FindingCode, Recording, Segments, Severity
 from trihedron.records.guiding import LEAST_POSES, Accuracy, Examination, Uncertain
-from trihedron.refused import REFUSALS
 from trihedron.sensor_model import in_frame
 from trihedron.units import (
     STANDARD_GRAVITY_M_S2,
@@ -86,7 +86,7 @@ def examine(
         next_words=pose_in_words(best),
         why=_why(uncertain),
         poses_needed=needed,
-        hold_s=_hold_s(known, accuracy, segments),
+        pose_s=_pose_s(known, accuracy, segments),
         warnings=(*_doubts(calibration), *_warnings(recording, segments))[:4],
         rate_hz=recording.rate_hz,
         doubts=_doubts(calibration),
@@ -136,7 +136,7 @@ def conclude(
     if cut_s is None or cut_s >= recording.time_s[-1]:
         return result, None
     # The last pose of the calibration is where the first move of the check starts.
-    last = before.time_s[result.segments.holds[-1].start] + before.time_s[0] if result.segments.n_holds else cut_s
+    last = before.time_s[result.segments.poses[-1].start] + before.time_s[0] if result.segments.n_poses else cut_s
     held_back = part_of(recording, float(last), np.inf)
     segments = segment(held_back)
     # A check of three poses is no calibration: that it has few is as it should be.
@@ -152,7 +152,7 @@ def _means(segments: Segments) -> FloatArray:
 
 
 def _calibration(recording: Recording, segments: Segments, gravity: float) -> Calibration | None:
-    if segments.n_holds < 6:
+    if segments.n_poses < 6:
         return None
     try:
         made = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
@@ -182,7 +182,7 @@ def _rough_model(
         return np.zeros(3), np.eye(3)
     lowest, highest = float(np.nanmin(readings)), float(np.nanmax(readings))
     if lowest >= 0.0:
-        # A converter without sign: zero lies near the middle of its range.
+        # An ADC without sign: zero lies near the middle of its range.
         bits = max(int(np.ceil(np.log2(highest + 1.0))), 1)
         return np.full(3, 2.0 ** (bits - 1)), np.eye(3)
     if len(means) >= 6:
@@ -227,9 +227,9 @@ def _known(
     sigma = float(np.hypot(np.sqrt(2.0) * pose, 0.0 if not np.isfinite(noise) else noise))
     information = np.eye(9) / PRIOR**2
     for move in segments.moves:
-        path = path_of(recording, segments, S, move.hold_before, move.hold_after, move.start, move.stop)
-        path = shortest_path(up[move.hold_before], up[move.hold_after]) if path is None else path
-        design = move_rows(path, up[move.hold_after]) / sigma
+        path = path_of(recording, segments, S, move.pose_before, move.pose_after, move.start, move.stop)
+        path = shortest_path(up[move.pose_before], up[move.pose_after]) if path is None else path
+        design = move_rows(path, up[move.pose_after]) / sigma
         information += design.T @ design
     gyroscope: FloatArray = np.asarray(np.linalg.inv(information), dtype=np.float64)
     return Known(up, accelerometer, gyroscope, pose, sigma)
@@ -292,9 +292,9 @@ def _why(uncertain: tuple[Uncertain, ...]) -> str:
     return f"Worst is {worst.sensor} {worst.name}: {100 * worst.now:.2g} %, wanted {100 * worst.wanted:.2g} %{then}."
 
 
-def _hold_s(known: Known, accuracy: Accuracy, segments: Segments) -> float:
+def _pose_s(known: Known, accuracy: Accuracy, segments: Segments) -> float:
     """Long enough that one pose is known to a few times what is wanted; noise falls with the root of the time."""
-    held = float(np.median(segments.duration_s)) if segments.n_holds else USUAL_HOLD_S
+    held = float(np.median(segments.duration_s)) if segments.n_poses else USUAL_HOLD_S
     excess = known.pose_sigma / (HOLDS_PER_GOAL * accuracy.accelerometer)
     return float(np.clip(held * excess**2, SHORTEST_HOLD_S, LONGEST_HOLD_S))
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.errors import RefusedError
 from trihedron.estimate.noise.from_curve import identify_curve
 from trihedron.estimate.noise.grid import readings_of, refuse_size_of_a_unit
 from trihedron.estimate.noise.identify import identify_noise
@@ -21,7 +22,6 @@ from trihedron.read.allan_table import read_allan_table
 from trihedron.read.chunks import open_chunks
 from trihedron.read.errors import ReadError
 from trihedron.records import Noise, TermName
-from trihedron.refused import RefusedError
 from trihedron.units import (
     AccelerationUnit,
     RateUnit,

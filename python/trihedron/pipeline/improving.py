@@ -21,7 +21,7 @@ from trihedron.pipeline.comparing_ranges import SENSOR
 from trihedron.pipeline.driving import MovedAlike, bias_in_moves, bias_of_poses, flicker_of_poses
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records.diagnosis import AcceptedEffect
-from trihedron.records.hold_noise import HoldNoise
+from trihedron.records.pose_noise import PoseNoise
 from trihedron.simulate import (
     NoiseTerms,
     Scenario,
@@ -108,10 +108,10 @@ def _unlike(better: Scenario, beside: MovedAlike) -> dict[str, float]:
     return {key: ratio for key, ratio in ratios.items() if not AIMED_AT[0] <= ratio <= AIMED_AT[1]}
 
 
-def _of_holds(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
+def _of_poses(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
     """Noise inside the recording's poses as terms and a low-pass, sensor by sensor: what its octaves show."""
     recording = found.recording
-    seen = sampled(recording, found.segments.holds, model_of_diagnosis(found)).noise
+    seen = sampled(recording, found.segments.poses, model_of_diagnosis(found)).noise
     out = {}
     for name, axes in seen.items():
         # The same octaves on all axes; at most those below half the rate.
@@ -147,7 +147,7 @@ def white_and_quantisation_of(seen: Sampled, name: str) -> dict[str, list[float]
     }
 
 
-def _low_pass(axes: Sequence[HoldNoise]) -> Smoother | float | None:
+def _low_pass(axes: Sequence[PoseNoise]) -> Smoother | float | None:
     """The low-pass whose gain is that of the filter seen on all axes, none where none was seen.
 
     Where axes show unlike ones that colour is a hand's or a stand's too: roughly the corner [Hz] of most of them, for
@@ -164,7 +164,7 @@ def _low_pass(axes: Sequence[HoldNoise]) -> Smoother | float | None:
     return low_pass_like(frequency_hz, gain_of(frequency_hz, *seen[0], rate), 1.0 / rate)
 
 
-def _white(axes: Sequence[HoldNoise]) -> list[tuple[float, float] | None]:
+def _white(axes: Sequence[PoseNoise]) -> list[tuple[float, float] | None]:
     """N of every axis with its relative error, where all axes show one filter or none.
 
     What lies below a corner of an axis' own is its motion.
@@ -191,7 +191,7 @@ def _numbers(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosi
         tables[name] |= {"S": np.array(fit["S"]), "b": np.array(fit["b"]), "unit": str(fit["raw_unit"])}
         readings = getattr(found.recording, name)
         if readings is not None and getattr(given, name).unit.value != fit["raw_unit"]:
-            # Codes of another unit: the converter is that of the recording.
+            # Codes of another unit: the ADC is that of the recording.
             tables[name]["adc"] = {"lsb": found.recording.facts.of(name).common_step}
 
 
@@ -202,10 +202,10 @@ def _gravity(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosi
 
 
 def _ranges(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> set[str]:
-    """Ranges of the recording's converters, where its readings end at them exactly; the effects that say so already.
+    """Ranges of the recording's ADCs, where its readings end at them exactly; the effects that say so already.
 
     An end that no reading came to is where the other one is. Channels with limits of their own, and limits that noise
-    has blurred, are none of a converter: those stay an effect.
+    has blurred, are none of an ADC: those stay an effect.
     """
     out = set()
     for effect, name in SENSOR.items():
@@ -234,7 +234,7 @@ def _ranges(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosis
 
 
 def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:
-    holds = _of_holds(found)
+    poses = _of_poses(found)
     for name in ("accelerometer", "gyroscope"):
         differing = [n for n in found.noise_compared if n.significant and n.sensor == name]
         terms: dict[str, list[float]] = {}
@@ -247,8 +247,8 @@ def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisR
             elif n.term == "resolution" and n.recording is not None:
                 tables[name].setdefault("adc", {})["lsb"] = n.recording
         # A scenario without noise is wrong where the recording shows some, however its poses happen to be found.
-        if name in holds and (not any(had.N) or any(n.term in ("octave", "bandwidth") for n in differing)):
-            noise, low_pass = holds[name]
+        if name in poses and (not any(had.N) or any(n.term in ("octave", "bandwidth") for n in differing)):
+            noise, low_pass = poses[name]
             terms["N"] = list(noise.N)
             if low_pass.corner_hz > 0.0:
                 tables[name]["noise_filter"] = {"corner_hz": low_pass.corner_hz, "order": low_pass.order}
@@ -258,7 +258,7 @@ def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisR
                 terms["B"] = list(noise.B)
         if "Q" in terms:
             # What rises with frequency is in the white noise of neighbours: both from one fit, and no low-pass.
-            seen = sampled(found.recording, found.segments.holds, model_of_diagnosis(found))
+            seen = sampled(found.recording, found.segments.poses, model_of_diagnosis(found))
             both = white_and_quantisation_of(seen, name)
             if both:
                 terms |= both

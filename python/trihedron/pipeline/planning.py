@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from trihedron.errors import RefusedError
 from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
 from trihedron.estimate.gyroscope.turn_design import (
     PlannedMove,
@@ -15,7 +16,6 @@ from trihedron.estimate.gyroscope.turn_design import (
     design_zero_first,
 )
 from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan, PoseWorth, TurnPlan
-from trihedron.refused import RefusedError
 from trihedron.units import STANDARD_GRAVITY_M_S2, m_s2_from_micro_g, radians_from_degrees
 
 POSE_SETS = ("6 faces", "9 poses", "12 edges", "18 poses: faces and edges", "26 poses: faces, edges and corners")
@@ -25,7 +25,7 @@ def plan(
     *,
     turns_deg: Sequence[float] = (90.0, -90.0),
     turn_s: float = 2.0,
-    hold_s: float = 4.0,
+    pose_s: float = 4.0,
     gyroscope_density: float = radians_from_degrees(0.005),
     accelerometer_density: float = m_s2_from_micro_g(150.0),
     sigma_turn_rad: float = 0.0,
@@ -54,28 +54,28 @@ def plan(
     ValueError
         When a figure is not positive or the turns determine nothing.
     """
-    for name, value in (("turn time", turn_s), ("hold", hold_s), ("accelerometer noise", accelerometer_density)):
+    for name, value in (("turn time", turn_s), ("pose", pose_s), ("accelerometer noise", accelerometer_density)):
         if not value > 0.0:
             raise RefusedError(f"the {name} must be a positive number, got {value:g}")
         if not 1e-15 < value < 1e9:
             raise RefusedError(f"a {name} of {value:g} is that of no experiment")
     angles = [radians_from_degrees(angle) for angle in turns_deg if angle != 0.0] * 3
     axes = [axis for axis in range(3) for angle in turns_deg if angle != 0.0]
-    arguments = (axes, angles, [turn_s] * len(angles), hold_s, gyroscope_density, sigma_turn_rad)
+    arguments = (axes, angles, [turn_s] * len(angles), pose_s, gyroscope_density, sigma_turn_rad)
     both, first = design_least_squares(*arguments), design_zero_first(*arguments)
-    sigma = accelerometer_density / math.sqrt(hold_s) / gravity_m_s2
+    sigma = accelerometer_density / math.sqrt(pose_s) / gravity_m_s2
     angle_noise = math.hypot(math.sqrt(2.0) * sigma, gyroscope_density * math.sqrt(turn_s))
     return ExperimentPlan(
         gyroscope_density=gyroscope_density,
         accelerometer_density=accelerometer_density,
         gravity_m_s2=gravity_m_s2,
-        hold_s=hold_s,
+        pose_s=pose_s,
         sigma_turn_rad=sigma_turn_rad,
         turns=TurnPlan(
             n_turns=len(axes) // 3,
             angles_deg=tuple(float(angle) for angle in turns_deg if angle != 0.0),
             duration_s=turn_s,
-            zero_s=hold_s,
+            zero_s=pose_s,
             scale=float(both.scale.max()),
             zero=both.zero,
             scale_zero_first=float(first.scale.max()),

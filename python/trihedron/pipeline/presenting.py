@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from trihedron.errors import RefusedError
 from trihedron.files.calibration import calibration_document, plain
 from trihedron.files.output import OutputError, write_whole
 from trihedron.pipeline.filtering import KalmanResult
@@ -16,7 +17,6 @@ from trihedron.pipeline.sessions import SessionsResult
 from trihedron.records import AllanCurve, Calibration, Noise, Recording, Segments, Verification
 from trihedron.records.plan import ExperimentPlan
 from trihedron.records.ranking import Ranking
-from trihedron.refused import RefusedError
 from trihedron.report import document, frames, machine, summaries
 from trihedron.report.calibration import calibration_report
 from trihedron.report.check import check_report
@@ -83,7 +83,7 @@ _KINDS: dict[type, _Shown] = {
     Noise: _Shown(noise_report, noise_record, frames.noise_columns),
     AllanCurve: _Shown(summaries.curve_summary, machine.curve_record, frames.curve_columns),
     Recording: _Shown(summaries.recording_summary, machine.recording_record, frames.recording_columns),
-    Segments: _Shown(summaries.segments_summary, machine.holds_record, frames.segments_columns),
+    Segments: _Shown(summaries.segments_summary, machine.poses_record, frames.segments_columns),
     ExperimentPlan: _Shown(plan_report, plan_record),
 }
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from trihedron.errors import RefusedError
 from trihedron.estimate.ranking import densities, rms_interval, suspicions_of, with_bias_of_log
 from trihedron.estimate.verification import verify_calibration
 from trihedron.files.formats import any_calibration
@@ -20,7 +21,6 @@ from trihedron.pipeline.verifying import own_calibration
 from trihedron.records import Calibration, Recording, Segments, Verification
 from trihedron.records.progress import Progress
 from trihedron.records.ranking import Ranked, Ranking
-from trihedron.refused import RefusedError
 from trihedron.units import AccelerationUnit, RateUnit, acceleration_to_si, rate_to_si
 
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy.typing as npt
 
+from trihedron.errors import RefusedError
 from trihedron.pipeline.wording import finding_in_python, in_python
 from trihedron.read import ReadError, read_recording
 from trihedron.records import Recording, Segments
 from trihedron.records.checked import WrongTypeError, number_of
 from trihedron.records.progress import Progress
-from trihedron.refused import RefusedError
 from trihedron.units import AccelerationUnit, RateUnit
 
 AnyRecording = object
@@ -179,7 +179,7 @@ def segment(recording: AnyRecording, *, progress: Progress | None = None) -> Seg
     Examples
     --------
     >>> poses = trihedron.segment(recording)
-    >>> poses.accelerometer_mean.shape == (poses.n_holds, 3)
+    >>> poses.accelerometer_mean.shape == (poses.n_poses, 3)
     True
     """
     recording = recording_of(recording)

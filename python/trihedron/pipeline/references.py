@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.reference import fit_references
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import AnyRecording, recording_of
 from trihedron.pipeline.referring import AnyReference, calibration_by, motion_of
 from trihedron.records import Calibration, Frame, Recording
 from trihedron.records.reference import AgainstReference, FitToReference
-from trihedron.refused import RefusedError
 
 
 @dataclass(frozen=True, eq=False)

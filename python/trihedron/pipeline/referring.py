@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.diagnose.against import FittedModel, compare_numbers, model_of_calibration
+from trihedron.errors import RefusedError
 from trihedron.estimate.reference import ACCEPTED, fit_reference
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.reading import read
@@ -27,7 +28,6 @@ from trihedron.records.diagnosis import (
 )
 from trihedron.records.domains import DomainTest
 from trihedron.records.reference import AgainstReference, Estimate, ReferenceMotion
-from trihedron.refused import RefusedError
 from trihedron.sensor_model import in_frame
 from trihedron.units import acceleration_to_si
 
@@ -206,7 +206,7 @@ def parameters_of(found: AgainstReference, given: Calibration, alpha: float) -> 
     covariance[12:, 12:] = fit.covariance
     covariance[:12, :12] = model.covariance[:12, :12] if force is None else force.covariance
     S, b = (model.accel_S, model.accel_b) if force is None else (force.S, force.b)
-    # Zeros wander from one day to the next by what nobody measured here: only the fit's own error is known.
+    # Biases wander from one day to the next by what nobody measured here: only the fit's own error is known.
     seen = FittedModel(
         S, b, model.accel_unit, fit.S, fit.b, model.gyro_unit or "counts", covariance, np.zeros(3), np.zeros(3)
     )

@@ -11,12 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.capture.guide import Guide
+from trihedron.errors import RefusedError
 from trihedron.pipeline.guiding import conclude, examine, part_of
 from trihedron.pipeline.reading import AnyRecording, recording_of
 from trihedron.pipeline.results import CalibrationResult, VerificationResult
 from trihedron.records import Recording
 from trihedron.records.guiding import Accuracy, GuideView
-from trihedron.refused import RefusedError
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 STEP_S = 0.25

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from trihedron.printable import one_line
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity, Verification
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.presented import Presented
 from trihedron.records.published import published_figures
 from trihedron.records.reference import AgainstReference
+from trihedron.sanitise import one_line
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,7 +43,7 @@ class CalibrationResult(Presented):
 
     def __repr__(self) -> str:
         sensors = "accelerometer" if self.gyroscope is None else "accelerometer and gyroscope"
-        return f"<CalibrationResult of {one_line(self.recording.source)}: {sensors}, {self.segments.n_holds} poses>"
+        return f"<CalibrationResult of {one_line(self.recording.source)}: {sensors}, {self.segments.n_poses} poses>"
 
     def __str__(self) -> str:
         from trihedron.report import calibration_report, to_text

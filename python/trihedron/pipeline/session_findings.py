@@ -15,7 +15,7 @@ from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 FEW = 5
 """Below so many groups the 95 % interval of a spread is wider than a factor of five from end to end."""
 WIDE_RANGE_DEGC = 10.0
-"""Temperatures further apart than this move the zeros of parts by more than their other repeatability (0.1 to 1 mg and
+"""Temperatures further apart than this move the biases of parts by more than their other repeatability (0.1 to 1 mg and
 0.01 to 0.05 °/s per °C)."""
 
 _KINDS = ("bias", "scale", "misalignment", "alignment")

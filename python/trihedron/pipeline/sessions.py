@@ -12,6 +12,7 @@ from typing import get_args
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import REFUSALS, RefusedError
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.reading import AnyRecording, recording_of
@@ -22,7 +23,6 @@ from trihedron.records.presented import Presented
 from trihedron.records.progress import Progress
 from trihedron.records.sessions import By, Session, SessionsModel
 from trihedron.records.words import Words, words
-from trihedron.refused import REFUSALS, RefusedError
 from trihedron.sensor_model import in_frame
 
 BYS: tuple[By, ...] = get_args(By)
@@ -259,7 +259,7 @@ def _temperature(result: CalibrationResult) -> tuple[float, float, float, int]:
     if T is None:
         return math.nan, math.nan, math.nan, 0
     means = [
-        float(np.nanmean(T[h.start : h.stop])) for h in result.segments.holds if np.isfinite(T[h.start : h.stop]).any()
+        float(np.nanmean(T[h.start : h.stop])) for h in result.segments.poses if np.isfinite(T[h.start : h.stop]).any()
     ]
     if not means:
         return math.nan, math.nan, math.nan, 0

@@ -15,15 +15,15 @@ from typing import Any, cast
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.files.calibration import calibration_text
 from trihedron.files.checkpoint import Checkpoint, made_of
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.results import CalibrationResult
 from trihedron.read import ChunkedLog, open_chunks
-from trihedron.records import Hold, Move, Recording, Segments
+from trihedron.records import Move, Pose, Recording, Segments
 from trihedron.records.progress import Progress
-from trihedron.refused import RefusedError
 from trihedron.segment import BlockSums, segment_blocks
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit
@@ -31,7 +31,7 @@ from trihedron.units import AccelerationUnit, RateUnit
 PIECE_ROWS = 1 << 18
 KEPT_S = 60.0
 """Of a pose longer than twice this, a minute at either end goes into the fit: the mean and its error are those of the
-whole hold, and the bias next to a move is read off the readings next to it."""
+whole pose, and the bias next to a move is read off the readings next to it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Triad:
 
 @dataclass(frozen=True)
 class EvenTime:
-    """Stamps of an even clock, made when they are asked for: stands for an array (n,)."""
+    """Timestamps of an even clock, made when they are asked for: stands for an array (n,)."""
 
     n: int
     rate_hz: float
@@ -177,7 +177,7 @@ def calibrate_file(
     progress: Progress | None = None,
     **options: Any,
 ) -> CalibrationResult:
-    """Calibrate a log on disk from the statistics of its holds and the rows of its moves; options as for ``calibrate``.
+    """Calibrate a log on disk from the statistics of its poses and the rows of its moves; options as for ``calibrate``.
 
     ``checkpoint`` as in :func:`segment_file`, whose pass over the log is what takes long. The same as
     :func:`trihedron.calibrate` of the whole, where no hold is longer than two minutes.
@@ -192,15 +192,15 @@ def calibrate_file(
 def condensed(log: LogOnDisk, segments: Segments) -> tuple[Recording, Segments]:
     """The rows of moves and of the ends of poses, at their own times, and the segments counted in them.
 
-    Means, errors and durations remain those of whole holds.
+    Means, errors and durations remain those of whole poses.
     """
     kept = max(round(KEPT_S * log.rate_hz), 1)
     ranges: list[tuple[int, int]] = []
-    for hold in segments.holds:
-        if hold.stop - hold.start <= 2 * kept:
-            ranges.append((hold.outer_start, hold.outer_stop))
+    for pose in segments.poses:
+        if pose.stop - pose.start <= 2 * kept:
+            ranges.append((pose.outer_start, pose.outer_stop))
         else:
-            ranges += [(hold.outer_start, hold.start + kept), (hold.stop - kept, hold.outer_stop)]
+            ranges += [(pose.outer_start, pose.start + kept), (pose.stop - kept, pose.outer_stop)]
     ranges += [(move.start, move.stop) for move in segments.moves]
     edges = [0, log.n_samples] if not ranges else None
     joined = _joined([(edges[0], edges[1])] if edges else ranges)
@@ -223,26 +223,26 @@ def condensed(log: LogOnDisk, segments: Segments) -> tuple[Recording, Segments]:
         log.gyroscope_unit,
         source=log.source,
     )
-    holds = tuple(_moved_hold(hold, place, kept) for hold in segments.holds)
-    moves = tuple(Move(m.index, m.hold_before, m.hold_after, place(m.start), place(m.stop)) for m in segments.moves)
-    return recording, replace(segments, holds=holds, moves=moves)
+    poses = tuple(_moved_pose(pose, place, kept) for pose in segments.poses)
+    moves = tuple(Move(m.index, m.pose_before, m.pose_after, place(m.start), place(m.stop)) for m in segments.moves)
+    return recording, replace(segments, poses=poses, moves=moves)
 
 
-def _moved_hold(hold: Hold, place: Any, kept: int) -> Hold:
+def _moved_pose(pose: Pose, place: Any, kept: int) -> Pose:
     disturbed = tuple(
         (place(a), place(b))
-        for a, b in hold.disturbed
-        if hold.stop - hold.start <= 2 * kept or b <= hold.start + kept or a >= hold.stop - kept
+        for a, b in pose.disturbed
+        if pose.stop - pose.start <= 2 * kept or b <= pose.start + kept or a >= pose.stop - kept
     )
-    stop = place(hold.stop - 1) + 1
-    return Hold(
-        hold.index,
-        place(hold.start),
+    stop = place(pose.stop - 1) + 1
+    return Pose(
+        pose.index,
+        place(pose.start),
         stop,
-        place(hold.outer_start),
-        max(place(hold.outer_stop - 1) + 1, stop),
+        place(pose.outer_start),
+        max(place(pose.outer_stop - 1) + 1, stop),
         disturbed,
-        hold.is_unsteady,
+        pose.is_unsteady,
     )
 
 

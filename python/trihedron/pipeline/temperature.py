@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records import Calibration, Finding, FindingCode, Recording
-from trihedron.refused import RefusedError
 from trihedron.thermal_model import parameters_at
 
 KNOTS = 257

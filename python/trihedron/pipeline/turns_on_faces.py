@@ -7,18 +7,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from trihedron.errors import RefusedError
 from trihedron.estimate.accelerometer import OppositeHeadings, opposite_headings
 from trihedron.estimate.gyroscope import Turn
 from trihedron.records import Recording, Segments
 from trihedron.records.segments import Move
-from trihedron.refused import RefusedError
 
 
 def _moves_on_faces(segments: Segments, up: np.ndarray[tuple[int], np.dtype[np.int64]]) -> list[Move]:
     return [
         move
         for move in segments.moves
-        if move.stop - move.start >= 2 and up[move.hold_before] == up[move.hold_after] != 0
+        if move.stop - move.start >= 2 and up[move.pose_before] == up[move.pose_after] != 0
     ]
 
 
@@ -41,7 +41,7 @@ def turns_on_faces(
     """The moves that begin and end on the same face, as turns about the axis that points up."""
     moves = _moves_on_faces(segments, up)
     if turns_deg is None:
-        return [Turn(move.start, move.stop, face=int(up[move.hold_before])) for move in moves]
+        return [Turn(move.start, move.stop, face=int(up[move.pose_before])) for move in moves]
     if len(turns_deg) != len(moves):
         raise RefusedError(
             f"{len(turns_deg)} turns were given and {len(moves)} were found between poses on the same face: "
@@ -51,9 +51,9 @@ def turns_on_faces(
         Turn(
             move.start,
             move.stop,
-            abs(int(up[move.hold_before])) - 1,
-            math.radians(angle) * np.sign(up[move.hold_before]),
-            face=int(up[move.hold_before]),
+            abs(int(up[move.pose_before])) - 1,
+            math.radians(angle) * np.sign(up[move.pose_before]),
+            face=int(up[move.pose_before]),
         )
         for move, angle in zip(moves, turns_deg, strict=True)
         if angle != 0.0
@@ -62,4 +62,4 @@ def turns_on_faces(
 
 def resting_spans(segments: Segments) -> list[tuple[int, int]]:
     """Half-open ranges of the static poses: turns by nothing, which tell the bias."""
-    return [(hold.start, hold.stop) for hold in segments.holds if hold.stop - hold.start >= 2]
+    return [(pose.start, pose.stop) for pose in segments.poses if pose.stop - pose.start >= 2]

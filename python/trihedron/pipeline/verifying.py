@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from trihedron.errors import REFUSALS
 from trihedron.estimate.verification import verify_calibration
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, doubted, without_effects
 from trihedron.pipeline.calibrating import calibrate
@@ -12,7 +13,6 @@ from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of
 from trihedron.pipeline.results import VerificationResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, Severity, Verification
 from trihedron.records.progress import Progress
-from trihedron.refused import REFUSALS
 from trihedron.units import mg_from_m_s2
 
 

@@ -14,11 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError, from_os_error
-from trihedron.read.room import check_memory, check_unpacked
+from trihedron.read.memory_limit import check_memory, check_unpacked
 from trihedron.read.table import Table
-from trihedron.refused import RefusedError
 
 _BLOCK_NAMES = ("counts", "data", "imu", "raw", "samples", "arr_0")
 # NumPy evaluates a header as Python text, so a damaged one fails in the ways of a parser.

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from trihedron.errors import RefusedError
 from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError
@@ -19,7 +20,6 @@ from trihedron.read.onboard import Parameters, said_of
 from trihedron.read.table import StatedClock, Table
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
 from trihedron.records import Finding, FindingCode, Onboard
-from trihedron.refused import RefusedError
 
 _PARAMETERS = re.compile(r"INS_(ACC|GYR|TCAL)|AHRS_(ORIENTATION|CUSTOM_)")
 """What the readings have been through is told by these (the INS library of ArduPilot)."""

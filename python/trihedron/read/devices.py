@@ -1,4 +1,4 @@
-"""Several devices or sensors in one table: told apart, listed with their counts, and never merged without a word."""
+"""Several devices or sensors in one table: separated, listed with their counts, and never merged without a word."""
 
 from __future__ import annotations
 

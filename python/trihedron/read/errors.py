@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from trihedron.forked import check_tables
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
+from trihedron.subprocesses import check_tables
 
 
 class ReadError(RefusedError):

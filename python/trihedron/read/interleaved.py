@@ -35,7 +35,7 @@ def _takes_turns(parts: FloatArray, k: int) -> bool:
     n = parts.shape[1] // k
     noise = np.sqrt(np.mean((parts[:, k:] - parts[:, :-k]) ** 2, axis=1) / 2.0)
     change = np.abs(np.diff(parts, axis=1))
-    # Readings that toggle between two steps of the converter are one sensor's.
+    # Readings that toggle between two LSB are one sensor's.
     step = np.where(change > 0.0, change, np.inf).min(axis=(0, 1))
     step = np.where(np.isfinite(step), step, 0.0)
     quiet = np.argsort(noise.sum(axis=1), kind="stable")[: max(len(parts) // 2, 8)]

@@ -12,7 +12,7 @@ from trihedron.read.errors import ReadError
 from trihedron.records import Finding, FindingCode, Severity
 
 SAME_TICK = 0.02
-"""Stamps closer than this part of a step are the same tick: the reading is taken as it is."""
+"""Timestamps closer than this part of a step are the same tick: the reading is taken as it is."""
 NEIGHBOUR_STEPS = 1.5
 """Two readings further apart than this have a gap between them, and nothing is made up inside a gap."""
 FASTER = 1.2

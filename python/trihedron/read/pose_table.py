@@ -20,7 +20,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "x": ("fx", "ux", "x"),
     "y": ("fy", "uy", "y"),
     "z": ("fz", "uz", "z"),
-    "hold": ("hold", "pose", "index"),
+    "pose": ("pose", "index"),
     "start": ("start", "t0", "from"),
     "stop": ("stop", "end", "t1", "to"),
 }
@@ -31,7 +31,7 @@ def read_pose_table(path: str | os.PathLike[str], *, gravity_m_s2: float, sigma_
 
     Columns, in any order, units in brackets or after an underscore ignored: ``pitch`` and/or ``roll`` in degrees
     (``pitch_rad`` in radians), or ``fx, fy, fz``, the direction that points up in the body, of any length. Optional:
-    ``hold``, the number (from 1) of the pose in the log; ``start`` and ``stop`` [s], when it was held.
+    ``pose``, the number (from 1) of the pose in the log; ``start`` and ``stop`` [s], when it was held.
 
     Parameters
     ----------
@@ -55,12 +55,12 @@ def read_pose_table(path: str | os.PathLike[str], *, gravity_m_s2: float, sigma_
         if len(bad):
             raise ReadError(f"{file}, {table.place(int(bad[0]))}: {role} is missing; give every pose its value.")
     poses = _attitudes(file, table, found, gravity_m_s2, sigma_angle_deg)
-    hold = None
-    if "hold" in found:
-        numbers = table.columns[found["hold"]]
-        hold = np.round(numbers).astype(np.int64) - 1
-        if np.any(hold < 0) or np.any(np.abs(numbers - hold - 1) > 1e-9):
-            raise ReadError(f"{file}: column {table.label(found['hold'])} must count poses from 1, in whole numbers.")
+    pose = None
+    if "pose" in found:
+        numbers = table.columns[found["pose"]]
+        pose = np.round(numbers).astype(np.int64) - 1
+        if np.any(pose < 0) or np.any(np.abs(numbers - pose - 1) > 1e-9):
+            raise ReadError(f"{file}: column {table.label(found['pose'])} must count poses from 1, in whole numbers.")
     start = table.columns[found["start"]] if "start" in found else None
     stop = table.columns[found["stop"]] if "stop" in found else None
     if (start is None) != (stop is None):
@@ -68,7 +68,7 @@ def read_pose_table(path: str | os.PathLike[str], *, gravity_m_s2: float, sigma_
     if start is not None and stop is not None and np.any(stop <= start):
         row = int(np.flatnonzero(stop <= start)[0])
         raise ReadError(f"{file}, {table.place(row)}: the pose stops before it starts.")
-    return replace(poses, hold=hold, start_s=start, stop_s=stop)
+    return replace(poses, pose=pose, start_s=start, stop_s=stop)
 
 
 def _find(file: Path, table: Table) -> dict[str, int]:

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.errors import RefusedError
 from trihedron.read.archive import DAMAGE, header
 from trihedron.read.errors import ReadError, from_os_error
-from trihedron.refused import RefusedError
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from trihedron.read.archive import read_npy
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.errors import ReadError, check_readable, from_os_error
 from trihedron.read.kitti import oxts_folder, read_kitti
-from trihedron.read.refused import refuse_foreign
 from trihedron.read.table import Table
+from trihedron.read.unsupported import refuse_foreign
 from trihedron.read.zipped import read_zip
 from trihedron.records.progress import Progress
 

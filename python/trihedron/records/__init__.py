@@ -38,7 +38,7 @@ from trihedron.records.noise import (
 from trihedron.records.onboard import Onboard
 from trihedron.records.recording import Recording
 from trihedron.records.sampling import Sampling, StampKind
-from trihedron.records.segments import Hold, Move, Segments
+from trihedron.records.segments import Move, Pose, Segments
 from trihedron.records.truth import TrueSegment, Truth
 from trihedron.records.verification import Verification
 
@@ -58,7 +58,6 @@ __all__ = [
     "FitQuality",
     "Frame",
     "GaussMarkov",
-    "Hold",
     "KalmanCalibration",
     "LiveEstimate",
     "Move",
@@ -68,6 +67,7 @@ __all__ = [
     "NormKalmanCalibration",
     "Observability",
     "Onboard",
+    "Pose",
     "PoseTable",
     "Recording",
     "Sampling",

@@ -9,12 +9,12 @@ from typing import Literal, get_args
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.printable import one_line
+from trihedron.errors import RefusedError
 from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, numbers_of, said
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
-from trihedron.refused import RefusedError
+from trihedron.sanitise import one_line
 
 Frame = Literal["lower", "symmetric", "case"]
 """Body frame Mz: ``lower`` (S_f lower triangular), ``symmetric`` (S_f symmetric), ``case`` (S_f full)."""

@@ -1,4 +1,4 @@
-"""What a log's readings say of the converters that wrote them, measured once."""
+"""What a log's readings say of the ADCs that wrote them, measured once."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.errors import RefusedError
 from trihedron.records.frozen import Frozen
-from trihedron.records.hold_noise import Measured
-from trihedron.refused import RefusedError
+from trihedron.records.pose_noise import Measured
 
 SAME_STEP = 0.02
-"""Part by which one step of three converters may be measured differently where text has cut its digits."""
+"""Part by which one step of three ADCs may be measured differently where text has cut its digits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Limit(Frozen):
     """One channel's end of range: ``value`` in raw units and its standard error ``sigma``, 0 where readings show it
     exactly; ``runs`` (k, 2) of readings that lie there, the first sample of each and the one behind its last.
-    ``is_word``: the value is the code at the end of a converter's word."""
+    ``is_word``: the value is the code at the end of an ADC's word."""
 
     axis: int
     value: float
@@ -50,7 +50,7 @@ class LowPass:
 class ChannelFacts(Frozen):
     """One sensor's three channels, raw units.
 
-    ``step`` (3,) of the converter, 0 where readings lie on no grid; ``noise`` (3,) of one sample in the quietest half
+    ``step`` (3,) of the ADC, 0 where readings lie on no grid; ``noise`` (3,) of one sample in the quietest half
     seconds of the log, 0 where it has none; ``limits`` that readings were cut off at.
     """
 

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 LONGEST_SHOWN = 60
 """Characters of a wrong value that a sentence repeats."""

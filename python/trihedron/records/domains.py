@@ -43,7 +43,7 @@ class DomainResiduals(Frozen, Plain):
 
     ``before`` (n, k) and ``after`` (m, k) at ``time_before_s`` (n,), ``time_after_s`` (m,) (middle of pose or move),
     with ``sigma_before`` (n,), ``sigma_after`` (m,) the noise predicted for one number. An effect that leaves moves
-    out or splits poses makes n and m differ. ``channels`` (k,) names the columns, ``kind`` is ``hold`` or ``move``.
+    out or splits poses makes n and m differ. ``channels`` (k,) names the columns, ``kind`` is ``pose`` or ``move``.
     """
 
     domain: Domain

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 FieldType = Literal["u8", "i8", "u16", "i16", "u32", "i32", "u64", "i64", "f32", "f64"]
 FIELD_TYPES: tuple[FieldType, ...] = get_args(FieldType)

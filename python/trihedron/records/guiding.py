@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 LEAST_POSES = 12
 """Nine numbers of the accelerometer, and three poses more than numbers: residuals that can contradict it."""
@@ -77,7 +77,7 @@ class Examination:
     next_words: str
     why: str
     poses_needed: int | None = None
-    hold_s: float = 4.0
+    pose_s: float = 4.0
     warnings: tuple[str, ...] = ()
     rate_hz: float = 0.0
     noise: str = ""
@@ -97,7 +97,7 @@ class Phase(Enum):
     """What the guide waits for."""
 
     BEGIN = "begin"
-    HOLD = "hold"
+    POSE = "pose"
     MOVE = "move"
     CHECK = "check"
     DONE = "done"
@@ -112,7 +112,7 @@ class GuideView:
     detail: str
     is_still: bool
     held_s: float
-    hold_s: float
+    pose_s: float
     n_poses: int
     n_checks: int
     up_now: FloatArray | None

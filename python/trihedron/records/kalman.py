@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen
-from trihedron.refused import RefusedError
 from trihedron.units import radians_from_degrees
 
 CONSTANT_NAMES: tuple[str, ...] = ("kx", "ky", "kz", "U0")
@@ -26,7 +26,7 @@ class AxisNoise:
 
     ``quantisation`` Q [u·s] of the integrated output, ``white`` N [u/√Hz], ``flicker`` B [u], ``walk`` K [u/√s],
     ``ramp`` R [u/s]; ``gauss_markov`` [u] is the standard deviation of a first-order process seen as such, with
-    correlation time ``gauss_markov_time_s``. ``resolution`` is one step of the converter [u] and ``sample_sigma`` the
+    correlation time ``gauss_markov_time_s``. ``resolution`` is one LSB [u] and ``sample_sigma`` the
     noise of one sample before it [u], which decides how much of the rounding error averages out (0: none of it).
     """
 
@@ -74,7 +74,7 @@ class PoseTable:
     specific_force: FloatArray
     sigma_m_s2: float = 0.0
     source: str = "memory"
-    hold: npt.NDArray[np.int64] | None = None
+    pose: npt.NDArray[np.int64] | None = None
     start_s: FloatArray | None = None
     stop_s: FloatArray | None = None
 
@@ -127,7 +127,7 @@ class PoseTable:
             raise RefusedError(f"sigma_m_s2 must be zero or positive, got {self.sigma_m_s2}")
         f.setflags(write=False)
         object.__setattr__(self, "specific_force", f)
-        for name in ("hold", "start_s", "stop_s"):
+        for name in ("pose", "start_s", "stop_s"):
             column = getattr(self, name)
             if column is not None and np.shape(column) != (len(f),):
                 raise RefusedError(f"{name} must have one entry per pose ({len(f)}), got shape {np.shape(column)}")
@@ -223,7 +223,7 @@ class KalmanCalibration(Frozen):
     references: FloatArray
     readings: FloatArray
     start_s: FloatArray
-    hold_s: FloatArray
+    pose_s: FloatArray
     residual_m_s2: FloatArray
     findings: tuple[Finding, ...] = ()
     extensions: MappingProxyType[str, object] = field(default_factory=lambda: MappingProxyType({}))

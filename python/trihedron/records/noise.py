@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.printable import one_line
+from trihedron.errors import RefusedError
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
-from trihedron.refused import RefusedError
+from trihedron.sanitise import one_line
 
 AllanKind = Literal["overlapping", "non-overlapping", "modified", "hadamard", "total"]
 
@@ -132,7 +132,7 @@ class NoiseTerm:
 class SlowPair:
     """Whether the log shows slow noise at all: ``evidence`` is the rise of the deviance without B and K together.
 
-    ``is_present`` without either of the two being named: slow noise is there, flicker and walk cannot be told apart.
+    ``is_present`` without either of the two being named: slow noise is there, flicker and walk cannot be separated.
     """
 
     evidence: float

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_origin
 
 import numpy as np
 
+from trihedron.errors import RefusedError
 from trihedron.records.frozen import thawed
-from trihedron.refused import RefusedError
 
 if TYPE_CHECKING:
     from cattrs import Converter

@@ -63,7 +63,7 @@ class ExperimentPlan(Presented):
     gyroscope_density: float
     accelerometer_density: float
     gravity_m_s2: float
-    hold_s: float
+    pose_s: float
     sigma_turn_rad: float
     turns: TurnPlan
     poses: tuple[PosePlan, ...]

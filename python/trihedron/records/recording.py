@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import CORE_MEMORY, FloatArray
-from trihedron.printable import one_line
+from trihedron.errors import RefusedError
 from trihedron.records.channel_facts import Limit, LowPass, RecordingFacts
 from trihedron.records.checked import all_of, kind_of, number_of, numbers_of, word_of
 from trihedron.records.finding import Finding
@@ -19,7 +19,7 @@ from trihedron.records.frozen import freeze
 from trihedron.records.onboard import Onboard
 from trihedron.records.presented import Presented
 from trihedron.records.sampling import UNJUDGED, Sampling
-from trihedron.refused import RefusedError
+from trihedron.sanitise import one_line
 from trihedron.units import AccelerationUnit, RateUnit
 
 
@@ -160,7 +160,7 @@ class Recording(Presented):
             kind_of(name, getattr(self, name), str)
         freeze(self)
 
-    def with_distinct_stamps(self) -> Recording:
+    def with_distinct_timestamps(self) -> Recording:
         """This recording with no two samples at one instant: shared timestamps are spread (:func:`spread_stamps`)."""
         distinct = spread_stamps(self.time_s, 1.0 / self.rate_hz)
         return self if distinct is self.time_s else self.with_same_readings(time_s=distinct)
@@ -213,7 +213,7 @@ class Recording(Presented):
 
     @cached_property
     def facts(self) -> RecordingFacts:
-        """What the readings say of the converters behind them: found when first asked for, which the reader does."""
+        """What the readings say of the ADCs behind them: found when first asked for, which the reader does."""
         # How facts are found is a room of its own; a record only carries them.
         from trihedron.channel_facts import facts_of
 

@@ -9,9 +9,9 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records.finding import Finding
 from trihedron.records.plain import Layout, Plain
-from trihedron.refused import RefusedError
 
 
 @dataclass(frozen=True, eq=False)

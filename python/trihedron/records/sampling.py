@@ -28,7 +28,7 @@ class Sampling:
 
     ``period_s`` with standard error ``sigma_period_s``; ``stamp_error_s`` rms of the timestamps about the even clock;
     ``is_even``: ``time_s`` is that even clock and not the timestamps; ``n_lost`` samples and ``n_losses`` places, where
-    ``counts_losses`` (else unknown); ``followed`` the share of the stamps' scatter that the readings follow (1: samples
+    ``counts_losses`` (else unknown); ``followed`` share of the timestamps' scatter which readings follow (1: samples
     were taken when timestamped, 0: evenly) with ``sigma_followed`` (infinite without motion).
     """
 

@@ -15,13 +15,13 @@ from trihedron.records.presented import Presented
 
 
 @dataclass(frozen=True)
-class Hold:
+class Pose:
     """One pose.
 
     ``[start, stop)`` are the samples that may be averaged: edges trimmed, so that no motion leaks in.
     ``[outer_start, outer_stop)`` is the stretch as detected, before trimming. ``disturbed`` are sub-ranges
     ``(start, stop)`` inside ``[start, stop)`` that were bumped and are excluded from means. ``is_unsteady`` says that
-    the hold nowhere comes down to the sensor's own noise: held in the hand, or on a support that shakes.
+    the pose nowhere comes down to the sensor's own noise: held in the hand, or on a support that shakes.
     """
 
     index: int
@@ -63,28 +63,28 @@ class Move:
     """
 
     index: int
-    hold_before: int
-    hold_after: int
+    pose_before: int
+    pose_after: int
     start: int
     stop: int
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Segments(Presented):
-    """Holds and moves of one recording, and the sensor noise that decided them.
+    """Poses and moves of one recording, and the sensor noise that decided them.
 
     ``accelerometer_sigma`` and ``gyroscope_sigma`` (3,) are the white noise of one sample in raw units, measured inside
-    the poses; ``accelerometer_mean`` / ``gyroscope_mean`` (n_holds, 3) the mean raw reading of each pose, with
-    ``accelerometer_sigma_mean`` / ``gyroscope_sigma_mean`` (n_holds, 3) the standard error of each mean (not assuming
-    whiteness: slow noise inside a pose raises it). ``n_averaged`` (n_holds,) counts the samples behind each mean,
-    ``time_mid_s`` (n_holds,) and ``duration_s`` (n_holds,) say when and how long. ``whole`` are the poses before they
+    the poses; ``accelerometer_mean`` / ``gyroscope_mean`` (n_poses, 3) the mean raw reading of each pose, with
+    ``accelerometer_sigma_mean`` / ``gyroscope_sigma_mean`` (n_poses, 3) the standard error of each mean (not assuming
+    whiteness: slow noise inside a pose raises it). ``n_averaged`` (n_poses,) counts the samples behind each mean,
+    ``time_mid_s`` (n_poses,) and ``duration_s`` (n_poses,) say when and how long. ``whole`` are the poses before they
     were cut at bumps, each averaged over all of its samples; ``None`` where nothing was cut.
-    ``accelerometer_up`` (n_holds, 3) is the vertical in raw units (unit vectors, by whose direction |f| grows fastest)
-    and ``accelerometer_sigma_up`` (n_holds,) the standard error of the mean along it, NaN where only those of the axes
+    ``accelerometer_up`` (n_poses, 3) is the vertical in raw units (unit vectors, by whose direction |f| grows fastest)
+    and ``accelerometer_sigma_up`` (n_poses,) the standard error of the mean along it, NaN where only those of the axes
     are known: a body that settles turns gravity across itself, its length stays; ``None`` where no vertical is known.
     """
 
-    holds: tuple[Hold, ...]
+    poses: tuple[Pose, ...]
     moves: tuple[Move, ...]
     accelerometer_sigma: FloatArray | None
     gyroscope_sigma: FloatArray | None
@@ -101,16 +101,16 @@ class Segments(Presented):
     accelerometer_sigma_up: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        all_of("holds", self.holds, Hold)
+        all_of("poses", self.poses, Pose)
         all_of("moves", self.moves, Move)
         all_of("findings", self.findings, Finding)
         kind_of("whole", self.whole, Segments, type(None))
         for field in fields(self):
             value = getattr(self, field.name)
-            is_array = field.name not in ("holds", "moves", "findings", "whole")
+            is_array = field.name not in ("poses", "moves", "findings", "whole")
             if is_array and not (value is None and "None" in str(field.type)):
                 object.__setattr__(self, field.name, numbers_of(field.name, value))
-        n = len(self.holds)
+        n = len(self.poses)
         for name in ("accelerometer_mean", "gyroscope_mean", "accelerometer_sigma_mean", "gyroscope_sigma_mean",
                      "accelerometer_up"):  # fmt: skip
             value = getattr(self, name)
@@ -119,18 +119,18 @@ class Segments(Presented):
         if self.accelerometer_sigma_up is not None and self.accelerometer_sigma_up.shape != (n,):
             raise ValueError(f"accelerometer_sigma_up must have shape ({n},), got {self.accelerometer_sigma_up.shape}")
         for move in self.moves:
-            if not (0 <= move.hold_before < n and 0 <= move.hold_after < n and move.start <= move.stop):
+            if not (0 <= move.pose_before < n and 0 <= move.pose_after < n and move.start <= move.stop):
                 raise ValueError(f"move {move.index} does not join two poses")
         freeze(self)
 
     @property
-    def n_holds(self) -> int:
+    def n_poses(self) -> int:
         """Number of poses."""
-        return len(self.holds)
+        return len(self.poses)
 
     @property
     def norm_sigma(self) -> FloatArray | None:
-        """(n_holds, 3) standard errors of the accelerometer's means for what asks of their length alone.
+        """(n_poses, 3) standard errors of the accelerometer's means for what asks of their length alone.
 
         Alike on three axes where the error along the vertical is known: that is all that enters |f|.
         """
@@ -141,8 +141,8 @@ class Segments(Presented):
         return out
 
     def __repr__(self) -> str:
-        poses = f"{self.n_holds} pose{'' if self.n_holds == 1 else 's'}"
+        poses = f"{self.n_poses} pose{'' if self.n_poses == 1 else 's'}"
         moves = f"{len(self.moves)} move{'' if len(self.moves) == 1 else 's'}"
-        held = f" ({self.duration_s.sum():.1f} s still)" if self.n_holds else ""
+        held = f" ({self.duration_s.sum():.1f} s still)" if self.n_poses else ""
         said = f", {len(self.findings)} findings" if self.findings else ""
         return f"<Segments: {poses}{held}, {moves}{said}>"

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from trihedron.arrays import FloatArray
 from trihedron.records.frozen import Frozen
 
-SegmentKind = Literal["hold", "move", "turn", "disturbance", "vibration", "oscillation", "table-turn"]
+SegmentKind = Literal["pose", "move", "turn", "disturbance", "vibration", "oscillation", "table-turn"]
 """What the body did: stood still; went to another pose; turned about a body axis; was pushed; was shaken; swung;
 was carried on a turning table."""
 
@@ -84,11 +84,11 @@ class Truth(Frozen):
     kept: npt.NDArray[np.int64] | None = None
 
     @property
-    def holds(self) -> tuple[TrueSegment, ...]:
+    def poses(self) -> tuple[TrueSegment, ...]:
         """The stretches in which the body stood still."""
-        return tuple(segment for segment in self.segments if segment.kind == "hold")
+        return tuple(segment for segment in self.segments if segment.kind == "pose")
 
     @property
     def moves(self) -> tuple[TrueSegment, ...]:
         """Everything between poses."""
-        return tuple(segment for segment in self.segments if segment.kind != "hold")
+        return tuple(segment for segment in self.segments if segment.kind != "pose")

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.printable import one_line
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.presented import Presented
+from trihedron.sanitise import one_line
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from trihedron.sensor_model import other_form, other_form_jacobian
 class Axes:
     """What the numbers of one sensor say about its axes.
 
-    ``sensitivity`` (3,) in raw unit per SI unit, ``zero`` (3,) raw reading at true zero, ``skew_rad`` (3,) by which the
+    ``sensitivity`` (3,) in raw unit per SI unit, ``zero`` (3,) raw reading at true bias, ``skew_rad`` (3,) by which the
     angles between axes 1-2, 1-3, 2-3 exceed a right angle; each with its standard error.
     """
 

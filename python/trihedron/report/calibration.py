@@ -117,7 +117,7 @@ def _result(calibration: Calibration, segments: Segments | None, recording: Reco
     if recording is not None:
         facts.append(("recording", f"{duration(recording.duration_s)} at {plain_number(recording.rate_hz, 4)} Hz"))
     if segments is not None:
-        facts.append(("motion", f"{how_many(segments.n_holds, 'pose')}, {how_many(len(segments.moves), 'move')}"))
+        facts.append(("motion", f"{how_many(segments.n_poses, 'pose')}, {how_many(len(segments.moves), 'move')}"))
     facts.append(("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"))
     facts.append(("frame", calibration.frame))
     blocks: list[Block] = [Facts(tuple(facts))]

@@ -62,7 +62,7 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
         is_out = quality.weights == 0.0
     moves = segments.moves if segments is not None and len(segments.moves) == n else None
     names = [
-        f"move {k}" + ("" if moves is None else f" (pose {moves[k].hold_before} → {moves[k].hold_after})")
+        f"move {k}" + ("" if moves is None else f" (pose {moves[k].pose_before} → {moves[k].pose_after})")
         for k in range(n)
     ]
     told = [

@@ -28,7 +28,7 @@ def residual_tables(calibration: Calibration, segments: Segments | None) -> list
 
 
 def _pose_table(sensor: SensorCalibration, quality: FitQuality, segments: Segments | None) -> Table:
-    is_known = segments is not None and segments.n_holds == len(quality.residual)
+    is_known = segments is not None and segments.n_poses == len(quality.residual)
     rows = []
     for k, (residual, sigma) in enumerate(zip(quality.residual, quality.sigma, strict=True)):
         row = [str(k)]
@@ -69,7 +69,7 @@ def _move_table(quality: FitQuality, segments: Segments | None) -> Table:
     for k, angle in enumerate(quality.angle_deg):
         row = [str(k)]
         if moves is not None:
-            row.append(f"{moves[k].hold_before} → {moves[k].hold_after}")
+            row.append(f"{moves[k].pose_before} → {moves[k].pose_after}")
         held = quality.held_out_angle_deg
         is_out = quality.weights is not None and len(quality.weights) > k and quality.weights[k] == 0.0
         row += [

@@ -128,7 +128,7 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class Disc:
-    """Directions on a hemisphere seen along axis 3 (Lambert's equal-area projection), radius one at the rim.
+    """Directions on a hemisphere seen along Z (Lambert's equal-area projection), radius one at the rim.
 
     ``points`` are (x, y, label, what is said, kind), kind one of ``taken``, ``wanted``.
     """

@@ -10,7 +10,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 from trihedron.report.chart import Band, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, panels
 

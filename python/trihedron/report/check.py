@@ -46,7 +46,7 @@ def _headlines(segments: Segments, calibration: Calibration | None) -> list[Head
             continue
         scale = _expected_cells(sensor)[0]
         out.append(Headline(f"expected {name} scale uncertainty", scale, "", "1 σ, worst axis"))
-    out.append(Headline("poses", str(segments.n_holds), "", how_many(len(segments.moves), "move")))
+    out.append(Headline("poses", str(segments.n_poses), "", how_many(len(segments.moves), "move")))
     return out
 
 

@@ -6,7 +6,7 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 if TYPE_CHECKING:
     from trihedron.report.figures import ShownFigure

@@ -34,7 +34,7 @@ def draw_signals(recording: Recording, segments: Segments | None = None) -> Figu
     figure, axes = panels(len(present), 1, (9.5, 1.0 + 1.9 * len(present)), share_x=True)
     for axis, (readings, label) in zip(axes, present, strict=True):
         if segments is not None:
-            _shade_holds(axis, recording, segments)
+            _shade_poses(axis, recording, segments)
         for k in range(3):
             time, values = _envelope(recording.time_s, readings[:, k])
             axis.plot(time, values, color=AXIS_COLOURS[k], linewidth=0.7, label="XYZ"[k])
@@ -47,7 +47,7 @@ def draw_signals(recording: Recording, segments: Segments | None = None) -> Figu
     return figure
 
 
-def draw_holds(segments: Segments) -> Figure:
+def draw_pose_means(segments: Segments) -> Figure:
     """Mean readings of every pose over time, in the unit of the log."""
     pairs = [("accelerometer", segments.accelerometer_mean), ("gyroscope", segments.gyroscope_mean)]
     present = [(name, means) for name, means in pairs if means is not None]
@@ -108,7 +108,7 @@ def draw_poses(sensor: SensorCalibration, means: FloatArray) -> Figure:
     for axis, sign, title in ((axes[0], 1.0, "+Z above the horizon"), (axes[1], -1.0, "+Z below the horizon")):
         _hemisphere(axis, title)
         for k, direction in enumerate(up):
-            # A pose with level axis 3 lies on the rim of both.
+            # A pose with level Z lies on the rim of both.
             if sign * direction[2] < -1e-2:
                 continue
             x, y = _equal_area(direction * np.array([1.0, 1.0, sign]))
@@ -159,14 +159,14 @@ def png(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def _shade_holds(axis: Axes, recording: Recording, segments: Segments) -> None:
-    for hold in segments.holds:
-        axis.axvspan(recording.time_s[hold.start], recording.time_s[hold.stop - 1], color=SHADE, linewidth=0, zorder=0)
+def _shade_poses(axis: Axes, recording: Recording, segments: Segments) -> None:
+    for pose in segments.poses:
+        axis.axvspan(recording.time_s[pose.start], recording.time_s[pose.stop - 1], color=SHADE, linewidth=0, zorder=0)
 
 
 def _mark_disturbances(axes: Sequence[Axes], recording: Recording, segments: Segments) -> None:
-    for hold in segments.holds:
-        for first, last in hold.disturbed:
+    for pose in segments.poses:
+        for first, last in pose.disturbed:
             for axis in axes:
                 start, stop = recording.time_s[first], recording.time_s[min(last, recording.n_samples) - 1]
                 axis.axvspan(start, stop, color=ACCENT, alpha=0.35, linewidth=0, zorder=0)
@@ -185,7 +185,7 @@ def _envelope(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, Float
 
 
 def _equal_area(direction: FloatArray) -> tuple[float, float]:
-    """Lambert's azimuthal projection of a unit vector about +axis 3, scaled so that the equator has radius one."""
+    """Lambert's azimuthal projection of a unit vector about +Z, scaled so that the equator has radius one."""
     factor = 1.0 / np.sqrt(1.0 + max(float(direction[2]), 0.0))
     return float(direction[0] * factor), float(direction[1] * factor)
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.errors import RefusedError
 from trihedron.records import (
     PARAMETER_NAMES,
     AllanCurve,
@@ -20,7 +21,6 @@ from trihedron.records import (
     Verification,
 )
 from trihedron.records.diagnosis import Diagnosis
-from trihedron.refused import RefusedError
 from trihedron.report.noise_units import PER_UNIT
 
 Columns = dict[str, Sequence[Any] | npt.NDArray[Any]]
@@ -73,13 +73,13 @@ def recording_columns(recording: Recording) -> Columns:
 def segments_columns(segments: Segments) -> Columns:
     """A row per pose: samples, duration, mean readings with standard errors in the unit of the log."""
     columns: Columns = {
-        "pose": [hold.index for hold in segments.holds],
-        "start": [hold.start for hold in segments.holds],
-        "stop": [hold.stop for hold in segments.holds],
+        "pose": [pose.index for pose in segments.poses],
+        "start": [pose.start for pose in segments.poses],
+        "stop": [pose.stop for pose in segments.poses],
         "time_mid_s": segments.time_mid_s,
         "duration_s": segments.duration_s,
         "n_averaged": segments.n_averaged,
-        "is_unsteady": [hold.is_unsteady for hold in segments.holds],
+        "is_unsteady": [pose.is_unsteady for pose in segments.poses],
     }
     for name in ("accelerometer_mean", "accelerometer_sigma_mean", "gyroscope_mean", "gyroscope_sigma_mean"):
         values = getattr(segments, name)

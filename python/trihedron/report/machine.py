@@ -6,10 +6,10 @@ import json
 from typing import Any
 
 from trihedron.files.calibration import calibration_document, plain
-from trihedron.printable import printable_json
 from trihedron.records import AllanCurve, Calibration, Finding, Recording, Segments, Verification
 from trihedron.records.published import published_figures
 from trihedron.report.channels import channels_record
+from trihedron.sanitise import printable_json
 
 
 def recording_record(recording: Recording) -> dict[str, Any]:
@@ -38,14 +38,14 @@ def curve_record(curve: AllanCurve) -> dict[str, Any]:
     return {name: getattr(curve, name) for name in (*names, *arrays)}
 
 
-def holds_record(segments: Segments) -> dict[str, Any]:
+def poses_record(segments: Segments) -> dict[str, Any]:
     """Poses, moves and noise without the recording that they were found in."""
-    holds = [
+    poses = [
         {
-            "start": hold.start,
-            "stop": hold.stop,
-            "disturbed": [list(part) for part in hold.disturbed],
-            "is_unsteady": hold.is_unsteady,
+            "start": pose.start,
+            "stop": pose.stop,
+            "disturbed": [list(part) for part in pose.disturbed],
+            "is_unsteady": pose.is_unsteady,
             "time_mid_s": float(segments.time_mid_s[k]),
             "duration_s": float(segments.duration_s[k]),
             "n_averaged": int(segments.n_averaged[k]),
@@ -54,43 +54,43 @@ def holds_record(segments: Segments) -> dict[str, Any]:
             "gyroscope_mean": _row(segments.gyroscope_mean, k),
             "gyroscope_sigma_mean": _row(segments.gyroscope_sigma_mean, k),
         }
-        for k, hold in enumerate(segments.holds)
+        for k, pose in enumerate(segments.poses)
     ]
     return {
         "accelerometer_sigma": _row(segments.accelerometer_sigma),
         "gyroscope_sigma": _row(segments.gyroscope_sigma),
-        "holds": holds,
+        "poses": poses,
         "moves": [dict(vars(move)) for move in segments.moves],
         "findings": [finding.to_dict() for finding in segments.findings],
     }
 
 
 def segments_record(recording: Recording, segments: Segments) -> dict[str, Any]:
-    """Holds with their means, moves, noise."""
-    holds = [
+    """Poses with their means, moves, noise."""
+    poses = [
         {
-            "start": hold.start,
-            "stop": hold.stop,
-            "start_s": float(recording.time_s[hold.start]),
-            "stop_s": float(recording.time_s[hold.stop - 1]),
-            "disturbed": [list(part) for part in hold.disturbed],
+            "start": pose.start,
+            "stop": pose.stop,
+            "start_s": float(recording.time_s[pose.start]),
+            "stop_s": float(recording.time_s[pose.stop - 1]),
+            "disturbed": [list(part) for part in pose.disturbed],
             "n_averaged": int(segments.n_averaged[k]),
             "accelerometer_mean": _row(segments.accelerometer_mean, k),
             "accelerometer_sigma_mean": _row(segments.accelerometer_sigma_mean, k),
             "gyroscope_mean": _row(segments.gyroscope_mean, k),
             "gyroscope_sigma_mean": _row(segments.gyroscope_sigma_mean, k),
         }
-        for k, hold in enumerate(segments.holds)
+        for k, pose in enumerate(segments.poses)
     ]
     moves = [
-        {"start": move.start, "stop": move.stop, "hold_before": move.hold_before, "hold_after": move.hold_after}
+        {"start": move.start, "stop": move.stop, "pose_before": move.pose_before, "pose_after": move.pose_after}
         for move in segments.moves
     ]
     return {
         "recording": recording_record(recording),
         "accelerometer_sigma": _row(segments.accelerometer_sigma),
         "gyroscope_sigma": _row(segments.gyroscope_sigma),
-        "holds": holds,
+        "poses": poses,
         "moves": moves,
         "findings": [finding.to_dict() for finding in segments.findings],
     }

@@ -14,9 +14,9 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
-from trihedron.printable import one_line, printable
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 from trihedron.report.drawing import NoFiguresError
+from trihedron.sanitise import one_line, printable
 
 KINDS: dict[type, str] = {
     Paragraph: "paragraph",

@@ -7,7 +7,6 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.printable import printable
 from trihedron.records import Calibration
 from trihedron.records.reference import AgainstReference, Estimate, FitToReference, ReferenceError
 from trihedron.report.calibration import calibration_report
@@ -15,6 +14,7 @@ from trihedron.report.document import Block, Document, Facts, Picture, Section, 
 from trihedron.report.drawing import later
 from trihedron.report.many_charts import residual_chart
 from trihedron.report.numbers import engineering_exponent, plain_number, power_of_ten, with_sigma
+from trihedron.sanitise import printable
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 SECONDS_PER_HOUR = 3600.0

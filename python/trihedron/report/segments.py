@@ -22,18 +22,18 @@ def segments_report(recording: Recording, segments: Segments) -> Document:
         subtitle=recording.source,
         verdict=verdict_of(
             findings,
-            f"{how_many(segments.n_holds, 'pose')}, {how_many(len(segments.moves), 'move')}.",
-            f"{how_many(segments.n_holds, 'pose')}, {how_many(len(segments.moves), 'move')}",
+            f"{how_many(segments.n_poses, 'pose')}, {how_many(len(segments.moves), 'move')}.",
+            f"{how_many(segments.n_poses, 'pose')}, {how_many(len(segments.moves), 'move')}",
             "NOT FIT",
         ),
         is_trustworthy=not any(finding.severity.value == "serious" for finding in findings),
         sections=(
             Section("Result", (Facts(recording_facts(recording, segments)),)),
             Section("Findings", (findings_block(findings),)),
-            Section("Poses", (hold_table(recording, segments),)),
+            Section("Poses", (pose_table(recording, segments),)),
         ),
         headlines=(
-            Headline("poses", str(segments.n_holds), "", f"{duration(_still_s(segments))} in all"),
+            Headline("poses", str(segments.n_poses), "", f"{duration(_still_s(segments))} in all"),
             Headline("moves between them", str(len(segments.moves))),
         ),
         lead=signals_picture(recording, segments),
@@ -58,16 +58,16 @@ def recording_facts(recording: Recording, segments: Segments) -> tuple[tuple[str
             )
         facts.append((name, words))
     still_s = _still_s(segments)
-    poses, moves = how_many(segments.n_holds, "pose"), how_many(len(segments.moves), "move")
+    poses, moves = how_many(segments.n_poses, "pose"), how_many(len(segments.moves), "move")
     facts.append(("found", f"{poses} ({duration(still_s)} in all), {moves}"))
     return tuple(facts)
 
 
 def _still_s(segments: Segments) -> float:
-    return float(np.sum(segments.duration_s)) if segments.n_holds else 0.0
+    return float(np.sum(segments.duration_s)) if segments.n_poses else 0.0
 
 
-def hold_table(recording: Recording, segments: Segments) -> Table:
+def pose_table(recording: Recording, segments: Segments) -> Table:
     """Every pose with its means."""
     head = ["pose", "from [s]", "to [s]"]
     columns: list[tuple[list[str], str]] = []
@@ -80,18 +80,18 @@ def hold_table(recording: Recording, segments: Segments) -> Table:
         for axis in range(3):
             cells = [
                 with_sigma(float(mean[k, axis]), float("nan") if sigma is None else float(sigma[k, axis]))
-                for k in range(segments.n_holds)
+                for k in range(segments.n_poses)
             ]
             columns.append((cells, f"{label}_{'xyz'[axis]} [{unit_in_print(unit)}]"))
     head += [title for _, title in columns]
     rows = tuple(
         (
             str(k),
-            f"{recording.time_s[hold.start]:.2f}",
-            f"{recording.time_s[hold.stop - 1]:.2f}",
+            f"{recording.time_s[pose.start]:.2f}",
+            f"{recording.time_s[pose.stop - 1]:.2f}",
             *(cells[k] for cells, _ in columns),
         )
-        for k, hold in enumerate(segments.holds)
+        for k, pose in enumerate(segments.poses)
     )
     return Table(tuple(head), rows, "Mean readings ± their standard error; disturbed stretches excluded")
 

@@ -14,12 +14,12 @@ from trihedron.report.numbers import unit_in_print
 def signals_chart(recording: Recording, segments: Segments) -> Chart:
     """Both sensors over time, holds shaded, bumps marked."""
     time_s = recording.time_s
-    spans = [Span(float(time_s[h.start]), float(time_s[h.stop - 1]), "pose") for h in segments.holds]
+    spans = [Span(float(time_s[h.start]), float(time_s[h.stop - 1]), "pose") for h in segments.poses]
     last = recording.n_samples - 1
     bumps = [
         Span(float(time_s[a]), float(time_s[min(b, last)]), "disturbed, excluded", "warn")
-        for hold in segments.holds
-        for a, b in hold.disturbed
+        for pose in segments.poses
+        for a, b in pose.disturbed
     ]
     return _signals(recording, (*spans, *bumps))
 
@@ -27,7 +27,7 @@ def signals_chart(recording: Recording, segments: Segments) -> Chart:
 def truth_chart(recording: Recording, truth: Truth) -> Chart:
     """Both sensors of a simulation over time, shaded where the body truly stood still."""
     time_s, last = recording.time_s, recording.n_samples - 1
-    spans = [Span(float(time_s[min(h.start, last)]), float(time_s[min(h.stop - 1, last)]), "hold") for h in truth.holds]
+    spans = [Span(float(time_s[min(h.start, last)]), float(time_s[min(h.stop - 1, last)]), "pose") for h in truth.poses]
     return _signals(recording, tuple(spans))
 
 

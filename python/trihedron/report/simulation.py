@@ -23,12 +23,12 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
         ("length", f"{duration(recording.duration_s)}, {how_many(recording.n_samples, 'sample')}"),
         ("rate", f"{plain_number(recording.rate_hz, 5)} Hz"),
         ("gravity", f"{truth.gravity_m_s2:.5f} m/s²"),
-        ("motion", f"{how_many(len(truth.holds), 'pose')}, {how_many(len(truth.moves), 'move')}"),
+        ("motion", f"{how_many(len(truth.poses), 'pose')}, {how_many(len(truth.moves), 'move')}"),
     )
     return Document(
         title="Simulation",
         subtitle=recording.source,
-        verdict=f"{how_many(len(truth.holds), 'pose')} and {how_many(len(truth.moves), 'move')} of an instrument with "
+        verdict=f"{how_many(len(truth.poses), 'pose')} and {how_many(len(truth.moves), 'move')} of an instrument with "
         f"{effects}; the log contains none of what follows.",
         is_trustworthy=True,
         sections=(
@@ -37,7 +37,7 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
             Section("True parameters", (_linear(recording, truth), *_noise(truth))),
         ),
         headlines=(
-            Headline("holds", str(len(truth.holds)), "", how_many(len(truth.moves), "move")),
+            Headline("poses", str(len(truth.poses)), "", how_many(len(truth.moves), "move")),
             Headline("effects", str(n), "", ", ".join(truth.effects) or "the linear model and noise"),
         ),
         lead=Picture(

@@ -40,23 +40,23 @@ def recording_summary(recording: Recording) -> Document:
 
 
 def segments_summary(segments: Segments) -> Document:
-    """Holds and moves without the recording: how many, how long, their mean readings."""
-    found = f"{how_many(segments.n_holds, 'pose')}, {how_many(len(segments.moves), 'move')}."
-    still_s = float(np.sum(segments.duration_s)) if segments.n_holds else 0.0
+    """Poses and moves without the recording: how many, how long, their mean readings."""
+    found = f"{how_many(segments.n_poses, 'pose')}, {how_many(len(segments.moves), 'move')}."
+    still_s = float(np.sum(segments.duration_s)) if segments.n_poses else 0.0
     return Document(
         title="Poses and moves",
         subtitle=f"{duration(still_s)} still in all",
         verdict=verdict_of(segments.findings, found, found.removesuffix("."), "NOT FIT"),
         is_trustworthy=not any(finding.severity is Severity.SERIOUS for finding in segments.findings),
         sections=(
-            Section("Poses", (_holds(segments),)),
+            Section("Poses", (_poses(segments),)),
             Section("Findings", (findings_block(segments.findings),)),
-            Section("Figures", (Picture("holds", "Mean readings.", later("figures", "draw_holds", segments)),)),
+            Section("Figures", (Picture("poses", "Mean readings.", later("figures", "draw_pose_means", segments)),)),
         ),
     )
 
 
-def _holds(segments: Segments) -> Table:
+def _poses(segments: Segments) -> Table:
     head, columns = ["pose", "middle [s]", "length [s]"], []
     for letter, mean, sigma in (
         ("a", segments.accelerometer_mean, segments.accelerometer_sigma_mean),
@@ -69,7 +69,7 @@ def _holds(segments: Segments) -> Table:
             ]
     rows = tuple(
         (str(k), f"{segments.time_mid_s[k]:.1f}", f"{segments.duration_s[k]:.1f}", *(column[k] for column in columns))
-        for k in range(segments.n_holds)
+        for k in range(segments.n_poses)
     )
     return Table(tuple(head), rows, "Mean readings in the unit of the log ± their standard error")
 

@@ -7,10 +7,10 @@ import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from trihedron.printable import one_line, printable
 from trihedron.records import Finding
 from trihedron.report.ascii import ascii_of
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
+from trihedron.sanitise import one_line, printable
 
 WIDTH = 100
 """Columns of a report that goes into a file, a pipe or a notebook."""

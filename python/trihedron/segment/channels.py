@@ -18,13 +18,13 @@ BLOCK_SAMPLES = 5
 """Fewer readings have no useful variance: slow logs get longer blocks."""
 WINDOW_BLOCKS = 5
 """Stillness is judged over five blocks (half a second): long enough to see a turn of 1 deg/s in gravity, and shorter
-than the shortest hold by half."""
+than the shortest pose by half."""
 USUALLY_STILL = 0.1
 """Quantile of a log's windows that stands for stillness before it is found."""
 
 FINEST = 1e-7
-"""Part of a channel's span that stands for its step where it is finer: no converter has 23 bits of what it measures,
-and a simulated channel without noise or converter would be seen to move by any change of its last digit."""
+"""Part of a channel's span that stands for its step where it is finer: no ADC has 23 bits of what it measures,
+and a simulated channel without noise or ADC would be seen to move by any change of its last digit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Channels:
     """Blocks of ``length`` samples, accelerometer axes first, then gyro axes.
 
     ``mean``, ``variance`` (m, c) in raw units; ``is_valid`` (m,) is false where readings are missing or time jumps;
-    ``quantum`` (c,) is the converter's step; ``is_gyroscope`` (c,).
+    ``quantum`` (c,) is the LSB; ``is_gyroscope`` (c,).
     """
 
     length: int

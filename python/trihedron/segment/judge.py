@@ -9,14 +9,14 @@ import numpy as np
 from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.ranges import Range, ranges_of
-from trihedron.records import Finding, FindingCode, Hold, Recording
+from trihedron.records import Finding, FindingCode, Pose, Recording
 from trihedron.segment.channels import Channels
 from trihedron.segment.noise import MeanNoise
 from trihedron.segment.range_ends import RangeEnd, is_cut
 from trihedron.segment.runs import MIN_HOLD_S, Run, means_of
 
 CREEP_CHANCE = 1e-3
-"""Chance that some steady hold of a log is called creeping though none is."""
+"""Chance that some steady pose of a log is called settling though none is."""
 POSES_FOR_NINE = 9
 """A norm fit of nine parameters needs nine poses in different directions, and more to check itself."""
 
@@ -25,10 +25,10 @@ def judge_runs(
     recording: Recording,
     channels: Channels,
     runs: list[Run],
-    holds: tuple[Hold, ...],
+    poses: tuple[Pose, ...],
     noise: MeanNoise,
 ) -> list[Finding]:
-    """Creep, bumps and unsteadiness of single holds, each named by its number and time."""
+    """Settling, bumps and unsteadiness of single poses, each named by its number and time."""
     found: list[Finding] = []
     sizes = _creep_sizes(channels, runs, noise, CREEP_CHANCE / max(len(runs), 1))
     creeping = [(size, k) for k, size in enumerate(sizes.tolist()) if size > 0.0]
@@ -37,36 +37,36 @@ def judge_runs(
         found.append(
             Finding.of(
                 FindingCode.POSE_SETTLING,
-                holds=len(creeping),
-                worst_hold=k + 1,
-                worst_s=_start_s(recording, holds[k]),
+                poses=len(creeping),
+                worst_pose=k + 1,
+                worst_s=_start_s(recording, poses[k]),
                 worst_sigmas=worst,
                 which=_named([c for _, c in creeping]),
             )
         )
-    bumped = [k for k, hold in enumerate(holds) if hold.disturbed]
+    bumped = [k for k, pose in enumerate(poses) if pose.disturbed]
     if bumped:
-        n = sum(len(holds[k].disturbed) for k in bumped)
-        lost = sum((b - a) for k in bumped for a, b in holds[k].disturbed) / recording.rate_hz
-        first = holds[bumped[0]]
+        n = sum(len(poses[k].disturbed) for k in bumped)
+        lost = sum((b - a) for k in bumped for a, b in poses[k].disturbed) / recording.rate_hz
+        first = poses[bumped[0]]
         found.append(
             Finding.of(
                 FindingCode.POSE_DISTURBED,
                 disturbances=n,
-                holds=len(bumped),
+                poses=len(bumped),
                 which=_named(bumped),
                 left_out_s=lost,
                 first_s=recording.time_s[first.disturbed[0][0]],
             )
         )
-    unsteady = [k for k, hold in enumerate(holds) if hold.is_unsteady]
+    unsteady = [k for k, pose in enumerate(poses) if pose.is_unsteady]
     if unsteady:
         found.append(
             Finding.of(
                 FindingCode.POSE_UNSTEADY,
-                holds=len(unsteady),
+                poses=len(unsteady),
                 which=_named(unsteady),
-                first_s=_start_s(recording, holds[unsteady[0]]),
+                first_s=_start_s(recording, poses[unsteady[0]]),
             )
         )
     return found
@@ -123,7 +123,7 @@ def without_cut(
         return runs, []
     start_s = float(recording.time_s[first[0].first * channels.length])
     said = Finding.of(
-        FindingCode.POSE_AT_RANGE_LIMIT, holds=len(runs) - len(kept), first_s=start_s, reading=first[1].reading
+        FindingCode.POSE_AT_RANGE_LIMIT, poses=len(runs) - len(kept), first_s=start_s, reading=first[1].reading
     )
     return kept, [said]
 
@@ -132,14 +132,14 @@ def judge_log(
     recording: Recording,
     channels: Channels,
     runs: list[Run],
-    holds: tuple[Hold, ...],
+    poses: tuple[Pose, ...],
     turning: BoolArray,
 ) -> list[Finding]:
     """Whether the log as a whole rests where it should."""
     found: list[Finding] = []
     duration = recording.duration_s
     if not runs:
-        found.append(Finding.of(FindingCode.NOT_STATIC, duration_s=duration, holds=0))
+        found.append(Finding.of(FindingCode.NOT_STATIC, duration_s=duration, poses=0))
         return found
     # Shorter stretches are the ends of moves, not turns of their own.
     turns = [(a, b) for a, b in ranges_of(turning) if b - a >= channels.blocks(MIN_HOLD_S)]
@@ -148,17 +148,17 @@ def judge_log(
         found.append(
             Finding.of(FindingCode.SLOW_TURN, turning_s=total, first_s=recording.time_s[turns[0][0] * channels.length])
         )
-    if holds[0].start / recording.rate_hz > 1.0 and recording.n_samples:
-        found.append(Finding.of(FindingCode.NO_INITIAL_POSE, first_hold_s=_start_s(recording, holds[0])))
-    if len(holds) < POSES_FOR_NINE:
-        found.append(Finding.of(FindingCode.FEW_POSES, holds=len(holds), duration_s=duration, needed=POSES_FOR_NINE))
+    if poses[0].start / recording.rate_hz > 1.0 and recording.n_samples:
+        found.append(Finding.of(FindingCode.NO_INITIAL_POSE, first_pose_s=_start_s(recording, poses[0])))
+    if len(poses) < POSES_FOR_NINE:
+        found.append(Finding.of(FindingCode.FEW_POSES, poses=len(poses), duration_s=duration, needed=POSES_FOR_NINE))
     return found
 
 
-def _start_s(recording: Recording, hold: Hold) -> float:
-    return float(recording.time_s[hold.start])
+def _start_s(recording: Recording, pose: Pose) -> float:
+    return float(recording.time_s[pose.start])
 
 
 def _named(indices: list[int]) -> list[int]:
-    """Holds as reports count them."""
+    """Poses as reports count them."""
     return [k + 1 for k in sorted(indices)]

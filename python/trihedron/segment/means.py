@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.records import Hold, Recording
+from trihedron.records import Pose, Recording
 from trihedron.segment.channels import Channels
 from trihedron.segment.noise import MeanNoise, split_by_halves
 from trihedron.segment.runs import Run, means_of
@@ -17,14 +17,14 @@ from trihedron.segment.vertical import along, noise_along, upright
 from trihedron.units import acceleration_to_si
 
 PIECE = 1 << 18
-"""Rows of a hold that are read at a time."""
+"""Rows of a pose that are read at a time."""
 OCTAVES = 4
-"""A hold's own excess noise is judged on stretches from a half down to a sixteenth of it: the four octaves that weigh
+"""A pose's own excess noise is judged on stretches from a half down to a sixteenth of it: the four octaves that weigh
 in the error of its mean."""
 
 
 @dataclass(frozen=True, eq=False)
-class HoldMeans:
+class PoseMeans:
     """``mean``, ``sigma`` (h, c) raw units; ``n_averaged`` (h,) finite samples.
 
     ``up`` (h, 3), ``sigma_up`` (h,) the accelerometer's vertical and its mean's standard error along it, or ``None``.
@@ -37,18 +37,18 @@ class HoldMeans:
     sigma_up: FloatArray | None = None
 
 
-def average_holds(
-    recording: Recording, channels: Channels, runs: list[Run], holds: tuple[Hold, ...], noise: MeanNoise
-) -> HoldMeans:
+def average_poses(
+    recording: Recording, channels: Channels, runs: list[Run], poses: tuple[Pose, ...], noise: MeanNoise
+) -> PoseMeans:
     """Means over the samples of each pose; their variances are the pooled law times the pose's own excess.
 
     The excess of a pose is the ratio of its own two-sample variances to the pooled law over the four coarsest octaves;
-    being uncertain, it is drawn towards 1 by as many degrees of freedom as the ratios' scatter over holds leaves room
-    for (empirical Bayes). An unsteady hold is taken at its own word, axis by axis.
+    being uncertain, it is drawn towards 1 by as many degrees of freedom as the ratios' scatter over poses leaves room
+    for (empirical Bayes). An unsteady pose is taken at its own word, axis by axis.
     """
     n_channels = channels.mean.shape[1]
     mean, n_averaged = _sample_means(
-        [a for a in (recording.accelerometer, recording.gyroscope) if a is not None], holds
+        [a for a in (recording.accelerometer, recording.gyroscope) if a is not None], poses
     )
     ratio, freedom = _excess(channels, runs, noise)
     steady = np.array([not run.is_unsteady for run in runs], dtype=bool)
@@ -61,7 +61,7 @@ def average_holds(
     duration = np.array([sum(b - a for a, b in run.quiet_ranges()) * channels.step_s for run in runs])
     rounding = rounding_bias_variance(channels, runs)
     variance = noise.variance(duration[:, None]) * shrunk + rounding
-    out = HoldMeans(mean, np.sqrt(variance), n_averaged)
+    out = PoseMeans(mean, np.sqrt(variance), n_averaged)
     up = (
         upright(mean[:, :3], has_unit=acceleration_to_si(recording.accelerometer_unit) is not None)
         if recording.accelerometer is not None and runs
@@ -84,23 +84,23 @@ def _shrunk(ratio: FloatArray, freedom: FloatArray, steady: npt.NDArray[np.bool_
     return np.where(steady[:, None], pulled, np.maximum(ratio, 1.0))
 
 
-def _sample_means(triads: list[FloatArray], holds: tuple[Hold, ...]) -> tuple[FloatArray, IntArray]:
+def _sample_means(triads: list[FloatArray], poses: tuple[Pose, ...]) -> tuple[FloatArray, IntArray]:
     """(h, c) means over the samples of each pose, and (h,) how many of them are finite in every sensor."""
-    parts = [(k, a, b) for k, hold in enumerate(holds) for a, b in hold.undisturbed()]
+    parts = [(k, a, b) for k, pose in enumerate(poses) for a, b in pose.undisturbed()]
     owner, begins, ends = np.array(parts, dtype=np.int64).reshape(-1, 3).T.copy()
     spans = np.column_stack([begins, ends])
-    n_rows = np.bincount(owner, spans[:, 1] - spans[:, 0], len(holds)).astype(np.int64)
+    n_rows = np.bincount(owner, spans[:, 1] - spans[:, 0], len(poses)).astype(np.int64)
     # A log on disk stands for its arrays, and is read in parts.
     if all(isinstance(a, np.ndarray) and a.flags.c_contiguous and a.dtype == np.float64 for a in triads):
-        found = [_core.means_by_owner(a, spans, owner, len(holds)) for a in triads]
+        found = [_core.means_by_owner(a, spans, owner, len(poses)) for a in triads]
         if all(np.array_equal(count, n_rows) for _, count in found):
             return np.hstack([means for means, _ in found]), n_rows
-    mean = np.empty((len(holds), 3 * len(triads)))
-    n_averaged = np.zeros(len(holds), dtype=np.int64)
-    for k, hold in enumerate(holds):
+    mean = np.empty((len(poses), 3 * len(triads)))
+    n_averaged = np.zeros(len(poses), dtype=np.int64)
+    for k, pose in enumerate(poses):
         sums = [_Sum() for _ in triads]
-        for first, last in hold.undisturbed():
-            # In pieces: a hold of hours is not copied as a whole.
+        for first, last in pose.undisturbed():
+            # In pieces: a pose of hours is not copied as a whole.
             for start in range(first, last, PIECE):
                 readings = [triad[start : min(start + PIECE, last)] for triad in triads]
                 finite = [np.asarray(np.isfinite(r).all(axis=1)) for r in readings]
@@ -137,12 +137,12 @@ def _excess(channels: Channels, runs: list[Run], noise: MeanNoise) -> tuple[Floa
     owner = np.array([k for _, k in ranges], dtype=np.int64)
     halves = split_by_halves(channels.mean, [r for r, _ in ranges])
     coarse = halves.depth < OCTAVES
-    hold, square = owner[halves.stretch[coarse]], halves.square[coarse]
+    pose, square = owner[halves.stretch[coarse]], halves.square[coarse]
     duration = halves.size[coarse, None] * channels.step_s
     expected = noise.variance(duration) + 1e-6 * channels.quantisation_variance
     relative = square / np.where(expected > 0.0, expected, 1.0)
-    freedom = np.bincount(hold, minlength=len(runs)).astype(np.float64)
-    total = np.column_stack([np.bincount(hold, column, len(runs)) for column in relative.T])
+    freedom = np.bincount(pose, minlength=len(runs)).astype(np.float64)
+    total = np.column_stack([np.bincount(pose, column, len(runs)) for column in relative.T])
     ratio = np.where(freedom[:, None] > 0.0, total / np.maximum(freedom, 1.0)[:, None], 1.0)
     return ratio, freedom
 
@@ -152,7 +152,7 @@ def _prior_freedom(ratio: FloatArray, freedom: FloatArray) -> float:
     seen = freedom > 0.0
     if seen.sum() < 2:
         return 1e3
-    # E[(r-1)^2] = 2/ν of sampling + 2/ν0 of real differences; the median keeps one odd hold from deciding.
+    # E[(r-1)^2] = 2/ν of sampling + 2/ν0 of real differences; the median keeps one odd pose from deciding.
     spread = float(np.mean(np.minimum((ratio[seen] - 1.0) ** 2, 4.0)))
     real = spread - float(np.mean(2.0 / freedom[seen]))
     return float(np.clip(2.0 / max(real, 1e-9), 1.0, 1e3))
@@ -161,11 +161,11 @@ def _prior_freedom(ratio: FloatArray, freedom: FloatArray) -> float:
 NORMAL_AT, NORMAL_WEIGHT = np.array([-np.sqrt(3.0), 0.0, np.sqrt(3.0)]), np.array([1.0, 4.0, 1.0]) / 6.0
 """Three points that stand for a normal number (Gauss and Hermite)."""
 FEWEST_PHASES = 6
-"""Codes, a step of the converter and more apart in the rms, from which on places inside a step are any."""
+"""Codes, an LSB and more apart in the rms, from which on places inside a step are any."""
 HARMONICS = np.arange(1, 61)
 """Of a period of one step: with noise of 3 % of a step the sixtieth is down to a thousandth."""
 NOISE_TRIED = np.concatenate([[0.0], np.linspace(0.03, 1.0, 98)])
-"""Noise of one reading in steps of the converter."""
+"""Noise of one reading in LSB."""
 BIAS_VARIANCE = np.where(
     NOISE_TRIED > 0.0,
     np.sum(np.exp(-4.0 * (np.pi * np.outer(NOISE_TRIED, HARMONICS)) ** 2) / (2.0 * (np.pi * HARMONICS) ** 2), axis=1),
@@ -188,7 +188,7 @@ def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
 
     The mean of a rounded Gaussian of deviation σ is off by the sum over k of (q/πk) exp(-2π²k²σ²/q²) sin(2πkx/q): q/√12
     rms without noise, a fifth of it at σ = 0.28 q (Widrow and Kollár 2008, ch. 4). σ follows from what the readings
-    scatter by, which depends on the place in a step as well: many holds apart have all places, a bias has one.
+    scatter by, which depends on the place in a step as well: many poses apart have all places, a bias has one.
     """
     if not runs:
         return np.zeros(channels.mean.shape[1])
@@ -201,13 +201,13 @@ def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
     is_hidden = noise < q2 / 4.0
     left = np.interp(np.sqrt(np.where(is_hidden, 0.0, noise) / q2), NOISE_TRIED, BIAS_VARIANCE)
     if len(runs) >= FEWEST_PHASES:
-        by_hold = means_of(channels.variance, parts) / q2
+        by_pose = means_of(channels.variance, parts) / q2
         for axis in np.flatnonzero(is_hidden & (mean.var(axis=0) > q2)):
             # Holds that read one code (a face, turned on its table) show one place inside a step, once.
             place = np.unique(np.round(mean[:, axis] / np.sqrt(q2[axis])), return_inverse=True)[1]
             n = int(place.max()) + 1
             if n >= FEWEST_PHASES:
-                left[axis] = _mean_bias(np.bincount(place, by_hold[:, axis]) / np.bincount(place))
+                left[axis] = _mean_bias(np.bincount(place, by_pose[:, axis]) / np.bincount(place))
     left = left * q2
     out: FloatArray = np.where(channels.quantum > 0.0, left, 0.0)
     return out

@@ -22,7 +22,7 @@ TELLS_CODES_APART = 0.6
 """Noise over step from which a reading never keeps one code by itself: half a second of it has at least two codes with
 all but one chance in a billion."""
 CUT = 0.01
-"""Share of a pose's readings at the end of the range from which its mean is that of a cut distribution: by less than
+"""Share of a pose's readings at the range limit from which its mean is that of a cut distribution: by less than
 0.4 % of a reading's noise below it, a tenth of the error of a mean of 700 readings."""
 
 
@@ -48,7 +48,7 @@ def range_ends(channels: Channels, limits: Sequence[tuple[int, Limit]]) -> tuple
     out: list[RangeEnd] = []
     for c, limit in limits:
         noise = 0.0 if channels.is_gyroscope[c] else _usual_noise(channels, c)
-        # A gyro at rest is at no end of its range, and a channel without noise has no tail to be cut.
+        # A gyro at rest is at no range limit, and a channel without noise has no tail to be cut.
         if noise > 0.0:
             step, rounding = float(channels.quantum[c]), float(channels.quantisation_variance[c])
             margin = max(NEAR * float(np.sqrt(noise)), step)

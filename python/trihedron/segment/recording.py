@@ -1,4 +1,4 @@
-"""One recording into holds and moves: the composition of the room."""
+"""One recording into poses and moves: the composition of the room."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import numpy as np
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.quantiles import quantiles
 from trihedron.ranges import ranges_of
-from trihedron.records import Finding, Hold, Move, Recording, Segments
+from trihedron.records import Finding, Move, Pose, Recording, Segments
 from trihedron.records.channel_facts import Limit
 from trihedron.records.progress import Progress
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
 from trihedron.segment.floor import Activity, measure_activity
 from trihedron.segment.judge import judge_log, judge_runs, without_cut
-from trihedron.segment.means import average_holds
+from trihedron.segment.means import average_poses
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
 from trihedron.segment.range_ends import range_ends
 from trihedron.segment.runs import (
@@ -83,7 +83,7 @@ def segment_blocks(
     progress: Progress | None = None,
 ) -> Segments:
     """The same from blocks that were made already, with the (channel, limit) that readings were seen to end at; of the
-    recording itself only rows of holds are read."""
+    recording itself only rows of poses are read."""
     report = progress or (lambda _done, _text: None)
     if channels.is_valid.sum() < WINDOW_BLOCKS:
         return _nothing_found(recording, channels)
@@ -153,9 +153,9 @@ def _describe(
     steady = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
     pooled = steady or [r for run in runs for r in run.quiet_ranges()]
     noise = pool_mean_noise(channels, pooled) if pooled else _no_noise(channels)
-    holds = tuple(_hold(k, run, runs, channels, recording.n_samples) for k, run in enumerate(runs))
-    moves = tuple(Move(k, k, k + 1, before.stop, after.start) for k, (before, after) in enumerate(pairwise(holds)))
-    means = average_holds(recording, channels, runs, holds, noise)
+    poses = tuple(_pose(k, run, runs, channels, recording.n_samples) for k, run in enumerate(runs))
+    moves = tuple(Move(k, k, k + 1, before.stop, after.start) for k, (before, after) in enumerate(pairwise(poses)))
+    means = average_poses(recording, channels, runs, poses, noise)
     if pooled:
         white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0)
     else:
@@ -163,24 +163,24 @@ def _describe(
     sigma = np.sqrt(np.maximum(white, channels.quantisation_variance))
     time_s = recording.time_s
     findings: list[Finding] = [
-        *judge_runs(recording, channels, runs, holds, noise),
-        *judge_log(recording, channels, runs, holds, turning),
+        *judge_runs(recording, channels, runs, poses, noise),
+        *judge_log(recording, channels, runs, poses, turning),
     ]
     return _assemble(
         recording,
-        holds,
+        poses,
         moves,
         sigma,
         (means.mean, means.sigma),
         means.n_averaged,
-        np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in holds], dtype=np.float64),
-        np.array([time_s[h.stop - 1] - time_s[h.start] + 1.0 / recording.rate_hz for h in holds], dtype=np.float64),
+        np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in poses], dtype=np.float64),
+        np.array([time_s[h.stop - 1] - time_s[h.start] + 1.0 / recording.rate_hz for h in poses], dtype=np.float64),
         tuple(findings),
         (means.up, means.sigma_up),
     )
 
 
-def _hold(index: int, run: Run, runs: list[Run], channels: Channels, n_samples: int) -> Hold:
+def _pose(index: int, run: Run, runs: list[Run], channels: Channels, n_samples: int) -> Pose:
     m = channels.length
     # Quiet blocks are centres of quiet windows: the window reaches two blocks further on either side.
     reach = WINDOW_BLOCKS // 2
@@ -190,7 +190,7 @@ def _hold(index: int, run: Run, runs: list[Run], channels: Channels, n_samples: 
     outer_stop = min(run.outer_last + reach, upper, channels.n_blocks)
     stop = run.last * m
     bumps = tuple((a * m, b * m) for a, b in run.bumps)
-    return Hold(
+    return Pose(
         index,
         run.first * m,
         min(stop, n_samples),
@@ -217,7 +217,7 @@ def _nothing_found(recording: Recording, channels: Channels) -> Segments:
 
 def _assemble(
     recording: Recording,
-    holds: tuple[Hold, ...],
+    poses: tuple[Pose, ...],
     moves: tuple[Move, ...],
     sigma: FloatArray,
     means: tuple[FloatArray, FloatArray],
@@ -237,7 +237,7 @@ def _assemble(
         return None if which is None else np.ascontiguousarray(values[..., which])
 
     return Segments(
-        holds=holds,
+        poses=poses,
         moves=moves,
         accelerometer_sigma=part(sigma, accelerometer),
         gyroscope_sigma=part(sigma, gyroscope),

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.ranges import ranges_of
-from trihedron.records import Hold, Move, Recording, Segments
+from trihedron.records import Move, Pose, Recording, Segments
 from trihedron.segment.shaken import is_shaken_by_a_support
 
 RESTING = 1e-3
@@ -21,29 +21,29 @@ def resegment(recording: Recording, segments: Segments, shortest_s: float = 0.3)
 
     A bump inside a pose turns the body; averaged over, it contradicts the moves on both sides. Cut there, the gyro
     carries the attitude across it like across any move. A pose that vibrates is no rest, but its slow part stands
-    still: it becomes a hold of its own, so that a bias that follows the vibration can be seen.
+    still: it becomes a pose of its own, so that a bias that follows the vibration can be seen.
 
     The answer's ``whole`` are the poses as they were found, each averaged over whatever happened in it.
     """
     shortest = max(int(shortest_s * recording.rate_hz), 8)
     spans: list[tuple[int, int, int]] = []
     was_bumped = False
-    for i, hold in enumerate(segments.holds):
-        cuts = [(a, b) for a, b in hold.disturbed if b > a]
-        first = hold.start
+    for i, pose in enumerate(segments.poses):
+        cuts = [(a, b) for a, b in pose.disturbed if b > a]
+        first = pose.start
         pieces: list[tuple[int, int]] = []
         for a, b in cuts:
             pieces.append((first, a))
             first = b
-        pieces.append((first, hold.stop))
+        pieces.append((first, pose.stop))
         kept = [(a, b) for a, b in pieces if b - a >= shortest]
         was_bumped |= bool(cuts)
         if not kept:
-            kept = [(hold.start, hold.stop)]
+            kept = [(pose.start, pose.stop)]
         spans += [(a, b, i) for a, b in kept]
     shaken = [*_shaken(recording, segments), *_drifting(recording, segments)]
     merged = _in_pieces(recording, sorted([*spans, *((a, b, -1) for a, b in shaken)]))
-    if len(merged) == segments.n_holds and not shaken and not was_bumped:
+    if len(merged) == segments.n_poses and not shaken and not was_bumped:
         return segments
     return replace(_segments_of(recording, segments, merged), whole=_averaged_whole(recording, segments))
 
@@ -96,18 +96,18 @@ def _drifting(recording: Recording, segments: Segments, block_s: float = 60.0) -
 
 def _averaged_whole(recording: Recording, segments: Segments) -> Segments:
     """The poses as they were found, averaged over all of their samples, with the bumps that were seen in them."""
-    spans = [(hold.start, hold.stop, i) for i, hold in enumerate(segments.holds)]
+    spans = [(pose.start, pose.stop, i) for i, pose in enumerate(segments.poses)]
     out = _segments_of(recording, segments, spans)
-    holds = tuple(replace(new, disturbed=old.disturbed) for new, old in zip(out.holds, segments.holds, strict=True))
-    return replace(out, holds=holds)
+    poses = tuple(replace(new, disturbed=old.disturbed) for new, old in zip(out.poses, segments.poses, strict=True))
+    return replace(out, poses=poses)
 
 
 def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int, int, int]]) -> Segments:
     def is_unsteady(source: int) -> bool:
-        return source < 0 or segments.holds[source].is_unsteady
+        return source < 0 or segments.poses[source].is_unsteady
 
-    holds = tuple(Hold(k, a, b, a, b, is_unsteady=is_unsteady(source)) for k, (a, b, source) in enumerate(spans))
-    moves = tuple(Move(k, k, k + 1, holds[k].stop, holds[k + 1].start) for k in range(len(holds) - 1))
+    poses = tuple(Pose(k, a, b, a, b, is_unsteady=is_unsteady(source)) for k, (a, b, source) in enumerate(spans))
+    moves = tuple(Move(k, k, k + 1, poses[k].stop, poses[k + 1].start) for k in range(len(poses) - 1))
 
     def statistics(values: FloatArray | None, sigma: FloatArray | None, old: FloatArray | None):  # type: ignore[no-untyped-def]
         if values is None or sigma is None or old is None:
@@ -118,7 +118,7 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
         colour = np.median(old / (sigma / np.sqrt(np.maximum(segments.n_averaged, 1))[:, None]), axis=0)
         for k, (a, b, source) in enumerate(spans):
             n = b - a
-            if source >= 0 and n == segments.holds[source].stop - segments.holds[source].start:
+            if source >= 0 and n == segments.poses[source].stop - segments.poses[source].start:
                 mean[k] = np.nanmean(values[a:b], axis=0)
                 error[k] = old[source]
             else:
@@ -137,7 +137,7 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
     t = recording.time_s
     same = np.array(
         [
-            source >= 0 and holds[k].stop - holds[k].start == segments.holds[source].stop - segments.holds[source].start
+            source >= 0 and poses[k].stop - poses[k].start == segments.poses[source].stop - segments.poses[source].start
             for k, (_, _, source) in enumerate(spans)
         ]
     )
@@ -145,7 +145,7 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
     up, error_up = segments.accelerometer_up, segments.accelerometer_sigma_up
     return replace(
         segments,
-        holds=holds,
+        poses=poses,
         moves=moves,
         accelerometer_mean=accel_mean,
         accelerometer_sigma_mean=accel_error,

@@ -1,4 +1,4 @@
-"""From quiet blocks to holds, still counted in blocks."""
+"""From quiet blocks to poses, still counted in blocks."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from trihedron.segment.noise import MeanNoise
 MIN_HOLD_S = 1.0
 """A hand that hesitates stops for a few tenths of a second; a person who holds, holds a second."""
 SEEN_S = 0.8
-"""What is left to see of the shortest hold at the noise floor: its ends share their blocks with the moves."""
+"""What is left to see of the shortest pose at the noise floor: its ends share their blocks with the moves."""
 SET_DOWN_S = 0.5
 """A sensor set down for a second comes to rest, and leaves, in less than this; a hand that calms down takes longer."""
 FAR_SHORTER = 0.1
-"""Of the usual hold: who holds for half a minute does not set down for a second, but hesitates."""
+"""Of the usual pose: who holds for half a minute does not set down for a second, but hesitates."""
 BUMP_S = 2.0
 """A push and the ringing after it last less than this; what lasts longer is a move even if the pose comes back."""
 RETURN = 0.3
@@ -29,13 +29,13 @@ RETURN = 0.3
 CLEAN_EDGE = 2e-3
 """Chance that a clean stretch at an end is trimmed, where it costs some tenths of a second."""
 EDGE_BLOCKS = [2**k for k in range(16)]
-"""Stretches at an end of a hold that are compared with its middle."""
+"""Stretches at an end of a pose that are compared with its middle."""
 CREEP_PART = 0.02
-"""A creeping support turns slower than this part of the speed of the log's own moves."""
+"""A settling support turns slower than this part of the speed of the log's own moves."""
 SAME_POSE = 1e-3
 """Chance that two stretches of one pose are called two poses."""
 SWAY_RAD = 0.02
-"""About one degree, the tremor and sway of a hand that tries to hold still: an unsteady hold keeps within it."""
+"""About one degree, the tremor and sway of a hand that tries to hold still: an unsteady pose keeps within it."""
 ONE_WAY = 0.5
 """Share of a hand's mean square rate above which its mean makes it a turn: all of it in a slow move, next to nothing in
 a tremor of several swings."""
@@ -141,7 +141,7 @@ def long_enough(channels: Channels, runs: list[Run], shortest_s: float) -> list[
 def set_down(channels: Channels, runs: list[Run], loose: BoolArray, taken: list[Run]) -> list[Run]:
     """Short stretches between moves on either side: poses of a second, not calm moments of a longer one or of a hand.
 
-    ``loose`` (m,) as of :func:`loose_blocks`, ``taken`` what is a hold already.
+    ``loose`` (m,) as of :func:`loose_blocks`, ``taken`` what is a pose already.
     """
     most, found = channels.blocks(SET_DOWN_S), []
     usual = float(np.median([run.last - run.first for run in taken])) if taken else 0.0
@@ -202,7 +202,7 @@ def means_of(values: FloatArray, parts: list[list[Range]]) -> FloatArray:
 
 
 def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravity: float | None) -> list[Run]:
-    """Holds that never come down to the noise floor: long calm stretches whose attitude stays within a hand's sway.
+    """Poses that never come down to the noise floor: long calm stretches whose attitude stays within a hand's sway.
 
     ``gravity`` is the accelerometer's reading of |g| in raw units; without it an angle has no scale, and none is found.
     """
@@ -211,7 +211,7 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
         return []
     free = loose.copy()
     for run in steady:
-        # A calm fringe of a steady hold is its settling, not another pose.
+        # A calm fringe of a steady pose is its settling, not another pose.
         free[slice(*grown(free, (run.first, run.last)))] = False
     attitude = channels.mean[:, accelerometer] / gravity
     zero = (
@@ -266,7 +266,7 @@ class EdgeNoise:
 
     @classmethod
     def of(cls, channels: Channels, noise: MeanNoise) -> EdgeNoise:
-        """The same for all holds of a log."""
+        """The same for all poses of a log."""
         live = np.asarray(noise.variance(1.0) > 0.0)
         duration_s = np.array(EDGE_BLOCKS, dtype=np.float64)[:, None] * channels.step_s
         limit = float(probability.chdtri(int(live.sum()), CLEAN_EDGE))

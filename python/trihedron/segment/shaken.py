@@ -19,7 +19,7 @@ SMOOTH_S = 1.0
 """Raised cosine over which a shaking of some hertz and more averages out of the attitude, and a carried body's way
 of speeding up and slowing down does not."""
 CALM_RAD_S = SWAY_RAD / 1.0
-"""A hand's sway in one second, the shortest hold: faster is a turn."""
+"""A hand's sway in one second, the shortest pose: faster is a turn."""
 SUPPORT_RAD = SWAY_RAD / 2.0
 """A support that shakes does not sway as a hand does: twice what is left of strong shaking by the smoothing."""
 LINE_SHARE = 0.8
@@ -55,7 +55,7 @@ def find_shaken(
     both cases the way turned by the gyro and the smoothed attitude of the accelerometer stay where they are.
 
     ``scales`` are the reading of |g| and radians per second per reading of the gyro, to a factor of two; without
-    either, or without a steady hold that tells the gyro's bias, none is added. ``free`` (m,) are blocks to look in.
+    either, or without a steady pose that tells the gyro's bias, none is added. ``free`` (m,) are blocks to look in.
     """
     gyro = channels.is_gyroscope
     steady = [part for run in taken if not run.is_unsteady for part in run.quiet_ranges()]
@@ -73,7 +73,7 @@ def find_shaken(
     seen_calm = _poses(channels, seen, calm & free & channels.is_valid, settled, SEEN_S)
     spans = [(run.first * channels.length, run.last * channels.length) for run in seen_calm]
     lines = [run for run, span in zip(seen_calm, spans, strict=True) if is_shaken_by_a_support(recording, span, white)]
-    # Where a line beats, a part of the pose is calm enough to be an unsteady hold of its own.
+    # Where a line beats, a part of the pose is calm enough to be an unsteady pose of its own.
     parts = [run for run in taken if any(_is_part(run, whole) for whole in lines)]
     kept = [run for run in taken if run not in parts]
     lines = [run for run in lines if not any(run.first < one.last and one.first < run.last for one in kept)]

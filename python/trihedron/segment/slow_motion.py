@@ -129,9 +129,9 @@ def cut_slow_motion(
 ) -> BoolArray:
     """Quiet blocks without the slow motion in them.
 
-    The stretch of a range that drifts is motion if it runs on to the end of the range, where a move begins, or changes
+    The stretch of a range that drifts is motion if it runs on to the range limit, where a move begins, or changes
     the reading by more than ``limit_raw`` (a hand's sway). What is left inside a range is a pose where it lasts
-    ``shortest`` blocks; a range of which nothing is left, and that keeps within ``limit_raw``, is a hold that creeps.
+    ``shortest`` blocks; a range of which nothing is left, and that keeps within ``limit_raw``, is a pose that settles.
     """
     out = quiet.copy()
     for first, last in ranges:

@@ -1,4 +1,4 @@
-"""Roughly how many radians a raw gyro reading is worth: enough to tell a support that creeps from a body that turns."""
+"""Roughly how many radians a gyro reading is worth: enough to know a support that settles from a body that turns."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ def turning_blocks(
 
     The zero is where the windows of one second are densest, for turns may take most of the time; its scatter is theirs,
     or that of the poses' nearest windows where that is larger: a bias that depends on the pose is no turn. Where the
-    accelerometer sees the tilt too, and the whole turn stays within ``SWAY_RAD`` by both sensors, the pose creeps and
+    accelerometer sees the tilt too, and the whole turn stays within ``SWAY_RAD`` by both sensors, the pose settles and
     remains a pose: a table that leans a little shows as small a tilt, but the gyro tells how far it turns.
     """
     out = np.zeros(len(quiet), dtype=bool)

@@ -12,7 +12,7 @@ from trihedron.segment.noise import MeanNoise, pool_mean_noise
 from trihedron.segment.runs import Run
 
 FEWEST_ON_ELLIPSOID = 9
-"""Holds from which the ellipsoid of their readings (six numbers) is fitted."""
+"""Poses from which the ellipsoid of their readings (six numbers) is fitted."""
 MOST_UNEVEN = 3.0
 """Ratio of the axes' sensitivities above which such an ellipsoid is no accelerometer's: its poses lie in a plane."""
 WORST_CONDITION = 50.0

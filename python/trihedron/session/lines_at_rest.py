@@ -50,7 +50,7 @@ def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segmen
     A²/2(2πf)². A move that begins or ends in it does not begin or end at rest.
     """
     changed: dict[str, FloatArray] = {}
-    swing = np.zeros((segments.n_holds, 2, 3))
+    swing = np.zeros((segments.n_poses, 2, 3))
     both = (("accelerometer", recording.accelerometer), ("gyroscope", recording.gyroscope))
     for s, (sensor, readings) in enumerate(both):
         mean, error = getattr(segments, f"{sensor}_mean"), getattr(segments, f"{sensor}_sigma_mean")
@@ -61,7 +61,7 @@ def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segmen
         # How far errors of means exceed white noise: a line does not change what slow noise there is.
         colour = np.maximum(np.median(error / np.maximum(white, 1e-300), axis=0), 1.0)
         new_mean, new_error = mean.copy(), error.copy()
-        for k, hold in enumerate(segments.holds):
+        for k, hold in enumerate(segments.poses):
             part = readings[hold.start : hold.stop]
             if hold.disturbed or len(part) < FEWEST_SAMPLES or not np.isfinite(part).all():
                 continue

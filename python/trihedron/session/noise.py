@@ -8,10 +8,10 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.errors import RefusedError
 from trihedron.quantiles import medians
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-from trihedron.refused import RefusedError
 from trihedron.session.aliasing import unresolved_variance
 from trihedron.session.coloured_noise import coloured_variance
 from trihedron.session.flicker import expected_scatter, expected_scatter_of_axes
@@ -85,7 +85,7 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
         np.asarray(segments.accelerometer_sigma) * np.sqrt(step_s),
         None if not has_rate else np.asarray(segments.gyroscope_sigma) * np.sqrt(step_s),
     )
-    spans = [(hold.start, hold.stop) for hold in segments.holds]
+    spans = [(hold.start, hold.stop) for hold in segments.poses]
     lasts = np.array([(stop - start) * step_s for start, stop in spans])
     moves_last = np.array([recording.time_s[b - 1] - recording.time_s[a] for a, b in ranges])
     variances = np.zeros((len(ranges), 2, 3))

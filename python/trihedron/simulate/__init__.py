@@ -1,10 +1,10 @@
-"""Simulation of the instrument: motion, mechanism, noise, converter. Produces the same records as reading a file."""
+"""Simulation of the instrument: motion, mechanism, noise, ADC. Produces the same records as reading a file."""
 
 from trihedron.simulate.accelerometer import Accelerometer, Hysteresis, ProofMass
 from trihedron.simulate.diagnosed import diagnosed_sizes, with_diagnosed_effects
 from trihedron.simulate.effects import EFFECT_IDS, effects_of, with_effect
 from trihedron.simulate.gyroscope import Gyroscope, SenseMode
-from trihedron.simulate.motion import Disturb, Hold, Motion, MoveTo, Oscillate, Replay, Turn, Vibrate
+from trihedron.simulate.motion import Disturb, Motion, MoveTo, Oscillate, Pose, Replay, Turn, Vibrate
 from trihedron.simulate.named import list_scenarios, scenario_by_name
 from trihedron.simulate.noise import NoiseTerms, make_noise
 from trihedron.simulate.profiles import PROFILES, Profile, profile_by_name
@@ -36,7 +36,6 @@ __all__ = [
     "Environment",
     "Filter",
     "Gyroscope",
-    "Hold",
     "Hysteresis",
     "Interference",
     "Loss",
@@ -44,6 +43,7 @@ __all__ = [
     "MoveTo",
     "NoiseTerms",
     "Oscillate",
+    "Pose",
     "Profile",
     "ProofMass",
     "Replay",

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 from trihedron.simulate.noise import NoiseTerms
 from trihedron.simulate.readout import IDENTITY, NO_MATRIX, NONE, Adc, Electronics, Matrix, Smoother, Triple, sense_axes
 from trihedron.units import AccelerationUnit

@@ -10,7 +10,7 @@ from trihedron.arrays import FloatArray
 from trihedron.simulate.motion.plan import Label
 from trihedron.simulate.noise import Triple
 
-RESTS = frozenset({"hold", "disturbance", "vibration"})
+RESTS = frozenset({"pose", "disturbance", "vibration"})
 """Kinds of steps that leave the attitude: a knocked pose is the same pose."""
 
 

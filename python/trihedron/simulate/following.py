@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records import Recording, Truth
-from trihedron.simulate.motion import Hold, Motion, MoveTo, Step, attitude_with_up
+from trihedron.simulate.motion import Motion, MoveTo, Pose, Step, attitude_with_up
 from trihedron.simulate.noise import stream
 from trihedron.simulate.run import simulate
 from trihedron.simulate.scenario import Scenario
@@ -21,15 +21,15 @@ class FollowingHand:
     heading and some travel. The noise of what was already recorded stays when the session grows.
     """
 
-    def __init__(self, scenario: Scenario, seed: int, *, miss_deg: float = 8.0, first_hold_s: float = 6.0) -> None:
+    def __init__(self, scenario: Scenario, seed: int, *, miss_deg: float = 8.0, first_pose_s: float = 6.0) -> None:
         self._scenario, self._seed, self._miss = scenario, seed, np.radians(miss_deg)
         self._rng = stream(seed, "hand that follows")
         start = self._missed(np.array([0.0, 0.0, 1.0]))
         self._start = attitude_with_up(start)
-        self._steps: list[Step] = [Hold(first_hold_s, name="pose 1")]
+        self._steps: list[Step] = [Pose(first_pose_s, name="pose 1")]
         self.n_poses = 1
 
-    def go(self, up: FloatArray, hold_s: float) -> None:
+    def go(self, up: FloatArray, pose_s: float) -> None:
         """To a pose with ``up`` (3,) of the body upwards, and hold it."""
         rng = self._rng
         x, y, z = (float(v) for v in self._missed(np.asarray(up)))
@@ -45,7 +45,7 @@ class FollowingHand:
         )
         self.n_poses += 1
         # A person takes a moment to notice that it is enough.
-        self._steps.append(Hold(hold_s + float(rng.uniform(0.2, 0.8)), name=f"pose {self.n_poses}"))
+        self._steps.append(Pose(pose_s + float(rng.uniform(0.2, 0.8)), name=f"pose {self.n_poses}"))
 
     def session(self) -> tuple[Recording, Truth]:
         """Everything recorded so far, and the truth."""

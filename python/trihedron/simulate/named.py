@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.gyroscope import Gyroscope
-from trihedron.simulate.motion import Hold, Motion, Turn
+from trihedron.simulate.motion import Motion, Pose, Turn
 from trihedron.simulate.profiles import ADIS, ANALOG_6DOF, MPU, TACTICAL, Profile
 from trihedron.simulate.scenario import Environment, Scenario
 from trihedron.simulate.sessions import (
@@ -49,7 +49,7 @@ def _hand_session() -> Scenario:
 
 
 def _linear() -> Scenario:
-    """The hand session without noise and converter: what a perfect estimator inverts exactly."""
+    """The hand session without noise and ADC: what a perfect estimator inverts exactly."""
     accelerometer, gyroscope = MPU.unit(1)
     accel = Accelerometer(accelerometer.S, accelerometer.b, accelerometer.unit)
     gyro = Gyroscope(gyroscope.S, gyroscope.b, gyroscope.unit)
@@ -58,7 +58,7 @@ def _linear() -> Scenario:
 
 def _tactical() -> Scenario:
     """36 poses by hand with a lever arm to the wrist, tactical unit, Earth turning."""
-    scenario = _of(TACTICAL, hand_session(36, hold_s=10.0, first_hold_s=60.0, arm_m=0.15), "hand-session-tactical")
+    scenario = _of(TACTICAL, hand_session(36, pose_s=10.0, first_pose_s=60.0, arm_m=0.15), "hand-session-tactical")
     return replace(scenario, environment=Environment(gravity_m_s2=0.0, latitude_deg=55.7, earth_rate=True))
 
 
@@ -74,12 +74,12 @@ def _table_turns() -> Scenario:
 
 def _manual() -> Scenario:
     """The laboratory manual's example: 18 poses, then turns by ±8π on three faces, 10-bit ADC, 50 Hz."""
-    poses = poses_in_order([*FACES, *EDGES], hold_s=6.0, move_s=3.0, wobble_deg=4.0)
+    poses = poses_in_order([*FACES, *EDGES], pose_s=6.0, move_s=3.0, wobble_deg=4.0)
     steps = list(poses.steps)
     for face in FACES[::2]:
-        steps += poses_in_order([face], hold_s=4.0, move_s=3.0, arrive=True).steps
+        steps += poses_in_order([face], pose_s=4.0, move_s=3.0, arrive=True).steps
         for angle in (1440.0, -1440.0):
-            steps += [Turn(face, angle, 16.0, ramp=0.25, wobble_deg=0.4), Hold(4.0, "rest")]
+            steps += [Turn(face, angle, 16.0, ramp=0.25, wobble_deg=0.4), Pose(4.0, "rest")]
     profile = ANALOG_6DOF
     motion = Motion(tuple(steps), start=poses.start)
     return Scenario(motion, "manual-example", profile.accelerometer, profile.gyroscope, profile.clock)
@@ -91,7 +91,7 @@ def _rest() -> Scenario:
 
 
 def _rest_manual() -> Scenario:
-    """Two hours at rest, the manual's unit with a finer converter, for Allan curves."""
+    """Two hours at rest, the manual's unit with a finer ADC, for Allan curves."""
     accel, gyro = ANALOG_6DOF.accelerometer, ANALOG_6DOF.gyroscope
     accel = replace(accel, adc=replace(accel.adc, lsb=0.0))
     gyro = replace(gyro, adc=replace(gyro.adc, lsb=0.0))
@@ -106,7 +106,7 @@ def _rest_industrial() -> Scenario:
 def _dividing_head() -> Scenario:
     """324 poses of an optical dividing head, industrial part on a 12-bit ADC."""
     scenario = _of(ADIS, dividing_head(), "dividing-head")
-    step = 0.11 * math.sqrt(12.0)  # the published converter's own noise of 0.11 m/s² as the rms of its rounding
+    step = 0.11 * math.sqrt(12.0)  # the published ADC's own noise of 0.11 m/s² as the rms of its rounding
     accel = scenario.accelerometer
     lsb = step / float(np.abs(np.diag(np.asarray(accel.S))).mean())
     return replace(scenario, accelerometer=replace(accel, adc=replace(accel.adc, lsb=lsb)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 Triple: TypeAlias = tuple[float, float, float]
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.printable import meant
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
+from trihedron.sanitise import meant
 from trihedron.simulate.accelerometer import Accelerometer, ProofMass
 from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.noise import NoiseTerms, stream

@@ -1,4 +1,4 @@
-"""What both sensors share behind the moving part: electronics, filter, converter. Zero means: not there."""
+"""What both sensors share behind the moving part: electronics, filter, ADC. Zero means: not there."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.signal import lfilter, lfilter_zi
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 Triple: TypeAlias = tuple[float, float, float]
 Matrix: TypeAlias = tuple[Triple, Triple, Triple]
@@ -23,7 +23,7 @@ NO_MATRIX: Matrix = (NONE, NONE, NONE)
 
 @dataclass(frozen=True)
 class Adc:
-    """Converter, raw units: step ``lsb`` (0: none), range ``[low, high]``.
+    """ADC, raw units: step ``lsb`` (0: none), range ``[low, high]``.
 
     ``dead_band`` is the half-width around the bias inside which nothing moves; of every ``missing_every`` codes
     one is never given (0: none is missing).

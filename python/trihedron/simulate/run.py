@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records.recording import Recording
 from trihedron.records.truth import TrueSegment, Truth
-from trihedron.refused import RefusedError
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.bias_repeatability import bias_in_moves, bias_of_poses
 from trihedron.simulate.effects import effects_of

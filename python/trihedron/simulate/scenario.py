@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.gravity import earth_rate_north_up, normal_gravity
-from trihedron.refused import RefusedError
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.motion import Motion

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.documents import DocumentError, check_values, of_path, read_text
-from trihedron.printable import meant
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
+from trihedron.sanitise import meant
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.gyroscope import Gyroscope
-from trihedron.simulate.motion import LEVEL, Disturb, Hold, Motion, MoveTo, Oscillate, Turn, Vibrate, attitude_with_up
+from trihedron.simulate.motion import LEVEL, Disturb, Motion, MoveTo, Oscillate, Pose, Turn, Vibrate, attitude_with_up
 from trihedron.simulate.named import SESSIONS
 from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.scenario import Clock, Environment, Scenario
@@ -29,7 +29,7 @@ else:  # pragma: no cover
     import tomli as tomllib
 
 _STEPS: dict[str, type[Any]] = {
-    "hold": Hold,
+    "pose": Pose,
     "move": MoveTo,
     "turn": Turn,
     "oscillate": Oscillate,
@@ -73,7 +73,7 @@ def read_scenario(path: str | Path) -> Scenario:
 _TABLES = {"clock": Clock, "environment": Environment, "accelerometer": Accelerometer, "gyroscope": Gyroscope}
 
 _MOST_POSES = 100_000
-"""Poses of a session: three days of holds of two seconds."""
+"""Poses of a session: three days of poses of two seconds."""
 
 
 def scenario_from_table(table: Mapping[str, Any], name: str = "scenario") -> Scenario:

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trihedron.refused import RefusedError
-from trihedron.simulate.motion import Hold, Motion, MoveTo, Step, Turn, attitude_with_up
+from trihedron.errors import RefusedError
+from trihedron.simulate.motion import Motion, MoveTo, Pose, Step, Turn, attitude_with_up
 from trihedron.simulate.noise import stream
 
 FACES: tuple[tuple[float, float, float], ...] = (
@@ -30,9 +30,9 @@ EDGES: tuple[tuple[float, float, float], ...] = tuple(
 
 def hand_session(
     n_poses: int = 24,
-    hold_s: float = 4.0,
+    pose_s: float = 4.0,
     move_s: float = 2.0,
-    first_hold_s: float = 20.0,
+    first_pose_s: float = 20.0,
     wobble_deg: float = 6.0,
     travel_m: float = 0.1,
     arm_m: float = 0.0,
@@ -67,14 +67,14 @@ def hand_session(
                     arm_m=(arm_m, 0.0, 0.0),
                 )
             )
-        duration = first_hold_s if count == 0 else hold_s * float(rng.uniform(0.8, 1.3))
-        steps.append(Hold(duration, name=f"pose {count + 1}"))
+        duration = first_pose_s if count == 0 else pose_s * float(rng.uniform(0.8, 1.3))
+        steps.append(Pose(duration, name=f"pose {count + 1}"))
     return Motion(tuple(steps), start=attitude_with_up(directions[order[0]]))
 
 
 def poses_in_order(
     ups: Sequence[tuple[float, float, float]],
-    hold_s: float = 5.0,
+    pose_s: float = 5.0,
     move_s: float = 3.0,
     wobble_deg: float = 3.0,
     arrive: bool = False,
@@ -86,20 +86,20 @@ def poses_in_order(
     for count, up in enumerate(ups):
         if count or arrive:
             steps.append(MoveTo(up, move_s, wobble_deg=wobble_deg))
-        steps.append(Hold(hold_s, name="up " + " ".join(f"{c:+.0f}" for c in up)))
+        steps.append(Pose(pose_s, name="up " + " ".join(f"{c:+.0f}" for c in up)))
     return Motion(tuple(steps), start=attitude_with_up(ups[0]))
 
 
-def six_faces(repeats: int = 1, hold_s: float = 5.0, move_s: float = 3.0) -> Motion:
+def six_faces(repeats: int = 1, pose_s: float = 5.0, move_s: float = 3.0) -> Motion:
     """The cube on each of its faces in turn, ``repeats`` times round."""
     if not (isinstance(repeats, int) and repeats >= 1):
         raise RefusedError(f"repeats must be a whole number of at least 1 round, got {repeats!r}")
-    return poses_in_order(FACES * repeats, hold_s, move_s)
+    return poses_in_order(FACES * repeats, pose_s, move_s)
 
 
 def table_turns(
     turns_deg: tuple[float, ...] = (90.0, -90.0, 180.0, -180.0, 360.0, -360.0),
-    hold_s: float = 3.0,
+    pose_s: float = 3.0,
     speed_deg_s: float = 90.0,
     faces: tuple[tuple[float, float, float], ...] = FACES[::2],
     error_deg: float = 0.0,
@@ -114,19 +114,19 @@ def table_turns(
     if not speed_deg_s > 0.0:
         raise RefusedError(f"speed_deg_s must be positive, got {speed_deg_s!r}")
     rng = stream(layout, "table turns")
-    steps: list[Step] = [Hold(10.0, name="rest")]
+    steps: list[Step] = [Pose(10.0, name="rest")]
     for count, face in enumerate(faces):
         if count:
-            steps += [MoveTo(face, 3.0, wobble_deg=3.0), Hold(hold_s, name="rest")]
+            steps += [MoveTo(face, 3.0, wobble_deg=3.0), Pose(pose_s, name="rest")]
         for turn in turns_deg:
             duration = max(1.0, abs(turn) / speed_deg_s * 1.25)
             error = error_deg * float(rng.standard_normal())
             turned = Turn(face, turn, duration, error_deg=error, name=f"turn {turn:+g} deg")
-            steps += [turned, Hold(hold_s, name="rest")]
+            steps += [turned, Pose(pose_s, name="rest")]
     return Motion(tuple(steps), start=attitude_with_up(faces[0]))
 
 
-def dividing_head(hold_s: float = 2.0, move_s: float = 1.0) -> Motion:
+def dividing_head(pose_s: float = 2.0, move_s: float = 1.0) -> Motion:
     """The 324 poses of an optical dividing head: pitch 0..350 deg by 10, roll 0..80 deg by 10.
 
     Hold ``pitch P roll R``: up in the body is ``(-sin P, cos P sin R, cos P cos R)``.
@@ -139,7 +139,7 @@ def dividing_head(hold_s: float = 2.0, move_s: float = 1.0) -> Motion:
             up = (-math.sin(p), math.cos(p) * math.sin(r), math.cos(p) * math.cos(r))
             if steps:
                 steps.append(MoveTo(up, move_s))
-            steps.append(Hold(hold_s, name=f"pitch {pitch} roll {roll}"))
+            steps.append(Pose(pose_s, name=f"pitch {pitch} roll {roll}"))
     return Motion(tuple(steps), start=attitude_with_up(start))
 
 
@@ -151,9 +151,9 @@ def rate_table(
     arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Motion:
     """Constant rates of both signs about each body axis, reached and left by smooth ramps; the axis stands upright."""
-    steps: list[Step] = [Hold(5.0, name="rest")]
+    steps: list[Step] = [Pose(5.0, name="rest")]
     for axis in axes:
-        steps += [MoveTo(axis, 3.0), Hold(3.0, name="rest")]
+        steps += [MoveTo(axis, 3.0), Pose(3.0, name="rest")]
         for rate in rates_deg_s:
             for sign in (1.0, -1.0):
                 duration = plateau_s + 2.0 * ramp_s
@@ -161,11 +161,11 @@ def rate_table(
                 name = f"rate {sign * rate:+g} deg/s"
                 steps += [
                     Turn(axis, angle, duration, ramp=ramp_s / duration, arm_m=arm_m, name=name),
-                    Hold(2.0, name="rest"),
+                    Pose(2.0, name="rest"),
                 ]
     return Motion(tuple(steps))
 
 
 def long_rest(duration_s: float = 3600.0, up: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Motion:
     """Stand still, for Allan variance."""
-    return Motion((Hold(duration_s, name="rest"),), start=attitude_with_up(up))
+    return Motion((Pose(duration_s, name="rest"),), start=attitude_with_up(up))

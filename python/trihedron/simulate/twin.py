@@ -1,6 +1,6 @@
-"""The twin: a real recording repeated as a simulation, from its poses, moves, instants, noise and converter.
+"""The twin: a real recording repeated as a simulation, from its poses, moves, instants, noise and ADC.
 
-Poses are the directions of gravity that the calibrated holds show; moves are replayed from the calibrated rates and
+Poses are the directions of gravity that the calibrated poses show; moves are replayed from the calibrated rates and
 accelerations, turned by a slow level rotation so that each ends in the pose that follows. What the calibration does not
 explain is therefore what differs between the recording and its twin.
 """
@@ -14,15 +14,15 @@ from scipy.linalg import solveh_banded
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.refused import RefusedError
 from trihedron.sensor_model import correct
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.gyroscope import Gyroscope
-from trihedron.simulate.motion import Hold, Motion, Quaternion, Replay, Step, attitude_with_up, shortest_turn
+from trihedron.simulate.motion import Motion, Pose, Quaternion, Replay, Step, attitude_with_up, shortest_turn
 from trihedron.simulate.readout import Adc, Matrix, Triple, sense_axes
 from trihedron.simulate.scenario import Clock, Environment, Scenario
-from trihedron.simulate.twin_noise import noise_of_holds
+from trihedron.simulate.twin_noise import noise_of_poses
 from trihedron.simulate.unclipped import unclipped
 
 # Knots of a replayed move: wider ones would blunt the jolt of setting the case down. The price is that the recording's
@@ -40,7 +40,7 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
     """
     if recording.accelerometer is None or recording.gyroscope is None or calibration.gyroscope is None:
         raise RefusedError("a twin needs both sensors in the recording and in the calibration")
-    if not segments.holds:
+    if not segments.poses:
         raise RefusedError("a twin needs at least one pose; the recording has none")
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     time_s = recording.time_s
@@ -49,7 +49,7 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
     # A motion that left a sensor's range leaves it again.
     beyond = (unclipped(readings[0], facts.of("accelerometer")), unclipped(readings[1], facts.of("gyroscope")))
     motion = _motion(time_s, beyond, segments, calibration)
-    holds = [(hold.start, hold.stop) for hold in segments.holds]
+    poses = [(pose.start, pose.stop) for pose in segments.poses]
     dt = 1.0 / recording.rate_hz
     parts: list[dict[str, object]] = []
     for sensor, raw, known, name in (
@@ -59,7 +59,7 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
         step = known.common_step
         S, b = _matrix(sensor.S), _triple(sensor.b)
         _, gain = sense_axes(S, name)
-        noise, low_pass = noise_of_holds(raw / gain, holds, dt, step / gain)
+        noise, low_pass = noise_of_poses(raw / gain, poses, dt, step / gain)
         parts.append(
             {
                 "S": S,
@@ -86,19 +86,19 @@ def _motion(
     assert gyro is not None  # twin_scenario has looked
     force = correct(readings[0], calibration.accelerometer.S, calibration.accelerometer.b)
     rate = correct(readings[1], gyro.S, gyro.b)
-    holds = segments.holds
-    ups = [_unit(force[hold.samples()].mean(axis=0)) for hold in holds]
-    still = [rate[hold.samples()].mean(axis=0) for hold in holds]
+    poses = segments.poses
+    ups = [_unit(force[pose.samples()].mean(axis=0)) for pose in poses]
+    still = [rate[pose.samples()].mean(axis=0) for pose in poses]
     g = calibration.gravity_m_s2
-    begin = [float(time_s[hold.start]) for hold in holds]
-    end = [float(time_s[hold.stop - 1]) for hold in holds]
+    begin = [float(time_s[pose.start]) for pose in poses]
+    end = [float(time_s[pose.stop - 1]) for pose in poses]
     start = attitude = attitude_with_up(ups[0])
     step_s = float(np.median(np.diff(time_s)))
     steps: list[Step] = []
-    for i in range(len(holds)):
+    for i in range(len(poses)):
         first = float(time_s[0]) if i == 0 else begin[i]
-        steps.append(Hold(max(end[i] - first, step_s), name=f"pose {i + 1}"))
-        is_last = i + 1 == len(holds)
+        steps.append(Pose(max(end[i] - first, step_s), name=f"pose {i + 1}"))
+        is_last = i + 1 == len(poses)
         stop_s = float(time_s[-1]) + step_s if is_last else begin[i + 1]
         if stop_s - end[i] < 2.0 * step_s:
             continue

@@ -26,22 +26,22 @@ FLICKER_EARNS = 6.63
 NEAR = 0.3
 """In the logarithm: neighbours of the corners that are tried differ by about as much."""
 HIDDEN = 1e-2
-"""Power gain below which a converter's rounding and what leaks hide the shape of a filter."""
+"""Power gain below which an ADC's rounding and what leaks hide the shape of a filter."""
 LOWEST, HIGHEST = 5e-3, 2.0
 """Of the rate: corners that are seen at all (a 64th of Nyquist, four times Nyquist)."""
 SHAPES = 0.1
 """Relative error of a density that two terms and a low-pass do not follow: lines, sharper filters."""
 
 
-def noise_of_holds(
-    signal: FloatArray, holds: Sequence[tuple[int, int]], dt: float, step: FloatArray | float = 0.0
+def noise_of_poses(
+    signal: FloatArray, poses: Sequence[tuple[int, int]], dt: float, step: FloatArray | float = 0.0
 ) -> tuple[NoiseTerms, Smoother]:
     """Terms per axis of (n, 3) readings inside the poses ``[start, stop)``, and the low-pass all axes share.
 
-    ``step`` of the converter is taken off. What is longer than a third of a pose cannot be told and is excluded.
+    ``step`` of the ADC is taken off. What is longer than a third of a pose cannot be told and is excluded.
     """
     steps = np.broadcast_to(np.asarray(step, dtype=np.float64), (3,))
-    measured = [_pooled(signal[:, k], holds, float(steps[k])) for k in range(3)]
+    measured = [_pooled(signal[:, k], poses, float(steps[k])) for k in range(3)]
     filters = [Smoother(), *(Smoother(part / dt, order) for order in _ORDERS for part in _CORNERS)]
     windows = [_windows(axis[0]) for axis in measured]
     powers = [_power(low_pass, dt) for low_pass in filters]
@@ -155,14 +155,14 @@ def _non_negative(design: FloatArray, density: FloatArray, relative: FloatArray)
     return solution, float(misfit) ** 2 + 2.0 * float(np.sum(np.log(model)))
 
 
-def _pooled(x: FloatArray, holds: Sequence[tuple[int, int]], step: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _pooled(x: FloatArray, poses: Sequence[tuple[int, int]], step: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Cluster sizes, Allan variances over all poses, and their degrees of freedom."""
-    longest = max(stop - start for start, stop in holds)
+    longest = max(stop - start for start, stop in poses)
     clusters, variances, freedom = [], [], []
     m = 1
     while 3 * m <= longest:
         total, count, independent = 0.0, 0, 0.0
-        for start, stop in holds:
+        for start, stop in poses:
             n = stop - start
             if n < 3 * m:
                 continue

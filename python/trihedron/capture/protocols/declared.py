@@ -7,8 +7,8 @@ import struct
 from trihedron.capture.protocols.checksums import CHECKSUM_OF
 from trihedron.capture.protocols.contract import Frame
 from trihedron.capture.protocols.framing import MORE, FramedDecoder
+from trihedron.errors import RefusedError
 from trihedron.records.frame_declaration import CHECKSUM_SIZES, SIZES, FrameDeclaration
-from trihedron.refused import RefusedError
 
 _CODES = {"u8": "B", "i8": "b", "u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "i64": "q"}
 _CODES |= {"f32": "f", "f64": "d"}

@@ -1,7 +1,7 @@
 """SparkFun boards: the 6DOF v4's binary frame and its text, and the Razor's tagged text lines.
 
 6DOF v4: the letter A, a sample count, three accelerometers, pitch, roll and yaw rate, the letter Z; two bytes each,
-high byte first, readings of a ten-bit converter. There is no checksum. Razor: one line per sensor, ``#A-R=x,y,z``.
+high byte first, readings of a ten-bit ADC. There is no checksum. Razor: one line per sensor, ``#A-R=x,y,z``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from trihedron.capture.protocols.framing import MORE, FramedDecoder, LineFedDeco
 _LENGTH = 16
 _FRAME = struct.Struct(">x7Hx")
 _HIGHEST = 1023
-"""Of a ten-bit converter: what exceeds it is no frame."""
+"""Of a ten-bit ADC: what exceeds it is no frame."""
 
 # The count wraps at 2^15 in some firmware and at 2^16 in other: modulo 2^15 it is right for both.
 _COUNT_MODULUS = 1 << 15
@@ -40,7 +40,7 @@ class SixDofDecoder(FramedDecoder):
         return _LENGTH if len(data) - at >= _LENGTH else MORE
 
     def is_sound(self, data: bytearray, at: int, length: int) -> bool:
-        """Z at its place and nothing above the converter's range."""
+        """Z at its place and nothing above the ADC's range."""
         return data[at + length - 1] == 0x5A and max(data[at + 3 : at + length - 1 : 2]) <= _HIGHEST >> 8
 
     def decode(self, frame: bytes) -> Frame:

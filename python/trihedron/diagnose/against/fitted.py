@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records import Calibration
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import Domain, DomainTest
-from trihedron.refused import RefusedError
 
 PUBLISHED_DIGITS = 1e-6
 """A calibration without error bars is taken at its last printed digits: this share of each number."""

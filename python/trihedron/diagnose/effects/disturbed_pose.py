@@ -107,12 +107,12 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
 def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
     """Poses that shake throughout: the level of one half, not that of the other poses, predicts the other half."""
     scatter = hold_scatter(obs)
-    own = np.array([not hold.is_unsteady for hold in obs.segments.holds])
+    own = np.array([not hold.is_unsteady for hold in obs.segments.poses])
     loud = own[:, None] & (scatter.ratio > LOUD) & (scatter.p_value * scatter.p_value.size < SHAKES_P)
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     found, before, after = [], [], []
     for i in np.flatnonzero(loud.any(axis=1)):
-        hold = obs.segments.holds[i]
+        hold = obs.segments.poses[i]
         steps = np.diff(x[hold.start : hold.stop][:, loud[i]], axis=0)
         early, late = (np.nanvar(half, axis=0) for half in np.array_split(steps, 2))
         usual = np.nanvar(steps, axis=0) / scatter.ratio[i, loud[i]]
@@ -174,7 +174,7 @@ class DisturbedPose(DirectEffect):
         if not bumped and not restless:
             return None
         t = obs.time_s
-        holds = obs.segments.holds
+        holds = obs.segments.poses
         spans = tuple(bumped) + tuple((float(t[holds[i].start]), float(t[holds[i].stop - 1])) for i in restless)
         # A nuisance that the twin has already cut out: it ranks behind whatever the fit gains by.
         strength = 10.0 * (len(bumped) + len(restless))

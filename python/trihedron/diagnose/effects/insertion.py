@@ -74,10 +74,10 @@ def insert_samples(recording: Recording, segments: Segments, losses: dict[int, i
             outer_stop=at(hold.outer_stop - 1) + 1,
             disturbed=tuple((at(a), at(b - 1) + 1) for a, b in hold.disturbed),
         )
-        for hold in segments.holds
+        for hold in segments.poses
     )
     moves = tuple(
-        replace(move, start=holds[move.hold_before].stop, stop=holds[move.hold_after].start) for move in segments.moves
+        replace(move, start=holds[move.pose_before].stop, stop=holds[move.pose_after].start) for move in segments.moves
     )
     mid = np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in holds])
-    return mended, replace(segments, holds=holds, moves=moves, time_mid_s=mid, whole=None)
+    return mended, replace(segments, poses=holds, moves=moves, time_mid_s=mid, whole=None)

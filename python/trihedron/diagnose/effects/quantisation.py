@@ -164,7 +164,7 @@ class Quantisation(DirectEffect):
         raw = obs.raw_force if c < 3 else obs.raw_rate
         assert raw is not None
         x = np.round(raw[:, c % 3], 9)
-        holds = [x[hold.samples()] for hold in obs.segments.holds]
+        holds = [x[hold.samples()] for hold in obs.segments.poses]
         holds = [values[np.isfinite(values)] for values in holds]
         if min(len(values) for values in holds) < FEWEST_READINGS:
             return None

@@ -84,7 +84,7 @@ def with_settling(context: Context, found: Settling) -> Observations:
     """
     obs = context.obs
     assert obs.hold_rate_sigma is not None
-    lasts = np.array([hold.stop - hold.start for hold in obs.segments.holds]) / obs.recording.rate_hz
+    lasts = np.array([hold.stop - hold.start for hold in obs.segments.poses]) / obs.recording.rate_hz
     fades = np.exp(-lasts / found.tau_s)
     mean = found.tau_s * (1.0 - fades) / lasts
     turned = found.rate_rad_s * found.tau_s
@@ -156,7 +156,7 @@ def _directions(context: Context) -> list[_Direction]:
     if obs.raw_rate is None or noise is None:
         return []
     out = []
-    for i, hold in enumerate(obs.segments.holds):
+    for i, hold in enumerate(obs.segments.poses):
         n = (hold.stop - hold.start) // N_BLOCKS
         if n < 2:
             continue

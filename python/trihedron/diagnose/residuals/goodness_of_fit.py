@@ -94,7 +94,7 @@ def _inside_poses(fitted: Fit, label: int) -> tuple[float, float, Where]:
     k = 0 if label == STATIC_ACCEL else 1
     found = jumps_in_poses(fitted.line.obs)
     holds, t = found.holds[k], fitted.line.obs.time_s
-    parts = [fitted.line.obs.segments.holds[i] for i in holds]
+    parts = [fitted.line.obs.segments.poses[i] for i in holds]
     spans = tuple((float(t[hold.start]), float(t[hold.stop - 1])) for hold in parts)
     return found.p_value[k], found.ratio[k], Where((), tuple(f"pose {i}" for i in holds), spans)
 
@@ -170,7 +170,7 @@ def locate(fitted: Fit, label: int, n_most: int = 5) -> Where:
     t = obs.time_s
     spans = []
     for s in heavy:
-        first, last = (obs.segments.holds[s].start, obs.segments.holds[s].stop) if is_hold else obs.move_ranges[s]
+        first, last = (obs.segments.poses[s].start, obs.segments.poses[s].stop) if is_hold else obs.move_ranges[s]
         spans.append((float(t[first]), float(t[last - 1])))
     kind = "pose" if is_hold else "move"
     return Where(channels, tuple(f"{kind} {s}" for s in heavy), tuple(spans))

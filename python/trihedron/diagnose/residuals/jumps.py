@@ -65,8 +65,8 @@ def jumps_in_poses(obs: Observations) -> Jumps:
     the largest is the p-value.
     A step at which the other sensor reads a motion is a pose that slipped.
     """
-    still = np.array([not hold.is_unsteady for hold in obs.segments.holds])
-    still &= np.array([hold.stop - hold.start >= LEAST_SAMPLES for hold in obs.segments.holds])
+    still = np.array([not hold.is_unsteady for hold in obs.segments.poses])
+    still &= np.array([hold.stop - hold.start >= LEAST_SAMPLES for hold in obs.segments.poses])
     which = np.flatnonzero(still)
     p, ratio, holds = [1.0, 1.0], [1.0, 1.0], [np.zeros(0, dtype=np.intp)] * 2
     if len(which) < FEWEST_POSES:
@@ -94,7 +94,7 @@ def _block_means(obs: Observations, raw: FloatArray, which: npt.NDArray[np.intp]
     """(poses, blocks, axes) means of equal stretches, over the noise that neighbours show, whatever the length."""
     out = []
     for i in which:
-        values = raw[obs.segments.holds[i].samples()]
+        values = raw[obs.segments.poses[i].samples()]
         lasts = np.sqrt(len(values) / obs.recording.rate_hz)
         short, n_longer = divmod(len(values), N_BLOCKS)
         first = short * np.arange(N_BLOCKS) + np.minimum(np.arange(N_BLOCKS), n_longer)

@@ -77,7 +77,7 @@ def hold_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
     if quiet.sum() < 3:
         quiet[:] = True
     for i in np.flatnonzero(quiet):
-        keep = obs.segments.holds[i].samples()
+        keep = obs.segments.poses[i].samples()
         if len(keep) < SHORTEST:
             continue
         # Contiguous part only: a line keeps its phase across it.
@@ -268,7 +268,7 @@ def hold_scatter(obs: Observations) -> HoldScatter:
     """Variance of first differences per hold over the median of all: blind to slow drift, sharp on shaking."""
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     ratio, dof = [], []
-    for hold in obs.segments.holds:
+    for hold in obs.segments.poses:
         part = x[hold.start : hold.stop]
         steps = np.diff(part, axis=0)
         own = np.var(steps, axis=0)
@@ -289,7 +289,7 @@ def judge_within_holds(obs: Observations, alpha: float) -> DomainTest:
     scatter = hold_scatter(obs)
     n_looks = scatter.p_value.size
     # A pose that was found shaking is said to, and weighed by its own scatter: nothing is left to explain.
-    steady = np.array([not hold.is_unsteady for hold in obs.segments.holds])
+    steady = np.array([not hold.is_unsteady for hold in obs.segments.poses])
     loud = np.where(steady[:, None] & (scatter.ratio > LOUD), scatter.p_value, 1.0)
     p_scatter = float(min(1.0, loud.min() * n_looks)) if n_looks else 1.0
     lines = [line for line in find_lines(obs) if line.has_size]
@@ -302,7 +302,7 @@ def judge_within_holds(obs: Observations, alpha: float) -> DomainTest:
     if disagrees:
         holds = np.flatnonzero(loud.min(axis=1) * n_looks < alpha)[:8]
         t = obs.time_s
-        spans = tuple((float(t[obs.segments.holds[i].start]), float(t[obs.segments.holds[i].stop - 1])) for i in holds)
+        spans = tuple((float(t[obs.segments.poses[i].start]), float(t[obs.segments.poses[i].stop - 1])) for i in holds)
         strong = [line for line in lines if line.p_value < alpha]
         loud_channels = [CHANNELS[c] for c in np.flatnonzero(loud.min(axis=0) * n_looks < alpha)]
         channels = tuple(dict.fromkeys([line.channel for line in strong] + loud_channels))

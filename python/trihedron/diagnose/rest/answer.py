@@ -1,4 +1,4 @@
-"""The diagnosis of a log that holds one or two orientations (docs/rest.md)."""
+"""The diagnosis of a log that holds one or two orientations (docs/static-logs.md)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.zeros.curve import DriftCurve, smooth_curve
 from trihedron.diagnose.zeros.evidence import KIND_LIMIT, examine
 from trihedron.diagnose.zeros.process import ZeroReadings
-from trihedron.records import Hold, Recording
+from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
 from trihedron.records.domains import Domain, DomainTest, HeldOut, Where
 from trihedron.records.words import effect_words, experiment_for, why_not
@@ -305,7 +305,7 @@ def _lines(
         slow = np.stack([np.interp(t, pieces.time_s, m) for m in means.T], axis=1)
         return np.asarray(values - slow)
 
-    holds = tuple(Hold(k, a, b, a, b) for k, (a, b) in enumerate(pieces.spans))
+    holds = tuple(Pose(k, a, b, a, b) for k, (a, b) in enumerate(pieces.spans))
     force = quick(recording.accelerometer, pieces.force)
     rate = None if recording.gyroscope is None or pieces.rate is None else quick(recording.gyroscope, pieces.rate)
     samples = cast(Observations, _Samples(recording, t, force, rate, SimpleNamespace(holds=holds)))

@@ -1,4 +1,4 @@
-"""Zeros of one or two orientations against a logged temperature: shape, branches, what stays (docs/rest.md)."""
+"""Zeros of one or two orientations against a logged temperature: shape, branches, what stays (docs/static-logs.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A long log cut into still pieces, whatever its segmentation makes of a zero that drifts (docs/rest.md)."""
+"""A long log cut into still pieces, whatever its segmentation makes of a zero that drifts (docs/static-logs.md)."""
 
 from __future__ import annotations
 

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records import Recording, Segments
-from trihedron.refused import RefusedError
 from trihedron.session.averaging import broadening
 from trihedron.session.lines_at_rest import means_beside_lines
 from trihedron.session.noise import Along, along_gradient, measure_noise
@@ -96,7 +96,7 @@ class Observations:
     @cached_property
     def _still(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], FloatArray]:
         """Samples of all holds one after the other, the first of each among them, and how many each has."""
-        samples = [hold.samples() for hold in self.segments.holds]
+        samples = [hold.samples() for hold in self.segments.poses]
         lengths = np.array([len(one) for one in samples])
         return np.concatenate(samples), np.cumsum(lengths) - lengths, lengths.astype(np.float64)
 
@@ -121,7 +121,7 @@ class Observations:
         """(holds, parts, 3) the same over that many equal parts."""
 
         def of(raw: FloatArray) -> FloatArray:
-            every = [np.array_split(raw[hold.start : hold.stop], parts) for hold in self.segments.holds]
+            every = [np.array_split(raw[hold.start : hold.stop], parts) for hold in self.segments.poses]
             return np.array([[np.nanmean(part, axis=0) for part in of_hold] for of_hold in every])
 
         return of(self.raw_force), None if self.raw_rate is None else of(self.raw_rate)
@@ -130,7 +130,7 @@ class Observations:
     def hold_scatter(self) -> FloatArray:
         """(holds, 3, 3) covariance of raw accelerometer readings inside every hold; NaN where some are missing."""
         out = np.empty((self.n_holds, 3, 3))
-        for i, hold in enumerate(self.segments.holds):
+        for i, hold in enumerate(self.segments.poses):
             away = self.raw_force[hold.start : hold.stop]
             away = away - away.mean(axis=0)
             out[i] = away.T @ away / len(away)
@@ -168,17 +168,17 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
     ValueError
         When the recording has no accelerometer or fewer than two still poses: there is nothing to hold a twin against.
     """
-    recording = recording.with_distinct_stamps()
+    recording = recording.with_distinct_timestamps()
     segments, swing = means_beside_lines(recording, segments)
     if recording.accelerometer is None or segments.accelerometer_mean is None:
         raise RefusedError("a diagnosis needs accelerometer readings: this recording has none")
-    if segments.n_holds < 2:
+    if segments.n_poses < 2:
         raise RefusedError(
-            f"a diagnosis needs still poses to hold the model against: {segments.n_holds} found, at least 2 are needed"
+            f"a diagnosis needs still poses to hold the model against: {segments.n_poses} found, at least 2 are needed"
         )
     t = recording.time_s
     whole = segments if segments.whole is None else segments.whole
-    bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for hold in whole.holds for a, b in hold.disturbed)
+    bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for hold in whole.poses for a, b in hold.disturbed)
     force_origin = segments.accelerometer_mean.mean(axis=0)
     rate_origin = np.zeros(3)
     raw_rate = hold_rate = None
@@ -195,10 +195,10 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         is_short = recording.time_s[stop - 1] - recording.time_s[start] <= LONGEST_MOVE_S
         if finite and is_short and stop - start >= 3:
             ranges.append((start, stop))
-            holds.append((move.hold_before, move.hold_after))
+            holds.append((move.pose_before, move.pose_after))
     noise = measure_noise(recording, segments, ranges)
     if noise.rate_sigma is not None:
-        lasts = np.array([t[hold.stop - 1] - t[hold.start] for hold in segments.holds])
+        lasts = np.array([t[hold.stop - 1] - t[hold.start] for hold in segments.poses])
         swing = swing + np.stack([np.zeros_like(noise.rate_sigma), _turned_at_ends(noise.rate_sigma, lasts)], axis=1)
     unresolved = [own + swing[list(ends)].sum(axis=0) for own, ends in zip(noise.unresolved, holds, strict=True)]
     return Observations(
@@ -214,7 +214,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         hold_rate=hold_rate,
         hold_force_sigma=noise.force_sigma,
         hold_rate_sigma=noise.rate_sigma,
-        hold_time_s=np.array([0.5 * (t[hold.start] + t[hold.stop - 1]) for hold in segments.holds]),
+        hold_time_s=np.array([0.5 * (t[hold.start] + t[hold.stop - 1]) for hold in segments.poses]),
         move_ranges=tuple(ranges) if raw_rate is not None else (),
         move_holds=np.array(holds if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
         force_density=noise.force_density,

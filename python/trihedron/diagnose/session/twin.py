@@ -147,7 +147,7 @@ class Linearisation:
             slices.append(slice(first, first + stop - start))
             first += stop - start
         parts = [np.arange(start, stop) for start, stop in self.obs.move_ranges]
-        mid = np.array([(hold.start + hold.stop) // 2 for hold in self.obs.segments.holds], dtype=np.intp)
+        mid = np.array([(hold.start + hold.stop) // 2 for hold in self.obs.segments.poses], dtype=np.intp)
         return Trajectory(force, rate, attitude, tuple(slices), np.concatenate([mid, *parts]))
 
     def columns(self, distortion: Distortion) -> FloatArray:

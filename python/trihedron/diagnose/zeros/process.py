@@ -1,4 +1,4 @@
-"""One Gaussian process for a zero from pose to pose: scatter, walk, drift (docs/zeros.md, eq. Z.1-Z.4).
+"""One Gaussian process for a zero from pose to pose: scatter, walk, drift (docs/bias-repeatability.md, eq. Z.1-Z.4).
 
 Per axis ``y = X θ + e``, flat prior on θ, ``V = φ² diag σ² + σ_s² (ones within a pose) + σ_w² W + σ_d² D``; W is a
 random walk, D an integrated walk whose initial slope is random too, both scaled so that σ_w and σ_d are the expected

@@ -1,4 +1,4 @@
-"""Accelerometer triad from still poses: method 1 (faces of the case) and method 2 (norm of gravity, any pose)."""
+"""Accelerometer triad from poses: method 1 (faces of the case) and method 2 (norm of gravity, any pose)."""
 
 from trihedron.estimate.accelerometer.ellipsoid import ellipsoid
 from trihedron.estimate.accelerometer.face_placements import shared_rounding

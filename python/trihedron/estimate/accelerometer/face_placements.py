@@ -1,4 +1,4 @@
-"""Holds that follow each other on one face: one placement of the case, turned on its table in between."""
+"""Poses that follow each other on one face: one placement of the case, turned on its table in between."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Placements:
 
 
 def shared_rounding(segments: Segments, step: FloatArray) -> FloatArray | None:
-    """Variance (3,) [raw²] of hold means that readings at one place inside a converter's step share.
+    """Variance (3,) [raw²] of pose means that readings at one place inside an LSB share.
 
     Where noise does not dither the ``step`` (3,), what the best of the means keeps is the rounding.
     """
@@ -43,7 +43,7 @@ def shared_rounding(segments: Segments, step: FloatArray) -> FloatArray | None:
 
 
 def placements(values: FloatArray, noise: FloatArray, faces: IntArray, shared: FloatArray | None = None) -> Placements:
-    """Merge the holds of every placement.
+    """Merge the poses of every placement.
 
     ``shared`` (3,) raw² is the part of the noise that equal readings share (rounding): an axis that is up reads alike
     at every heading, one that lies level at every return to a heading.
@@ -86,7 +86,7 @@ def placements(values: FloatArray, noise: FloatArray, faces: IntArray, shared: F
 
 
 def _headings(values: FloatArray, noise: FloatArray) -> npt.NDArray[np.intp]:
-    """(n,) number of the heading of each hold (n, 2): that of the first one before it which it repeats within noise."""
+    """(n,) number of the heading of each pose (n, 2): that of the first one before it which it repeats within noise."""
     limit = float(probability.chdtri(2, verdict.SIGNIFICANCE))
     out = np.zeros(len(values), dtype=np.intp)
     first: list[int] = []

@@ -1,4 +1,4 @@
-"""Which axis of the case points up in a still pose."""
+"""Which axis of the case points up in a pose."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.errors import RefusedError
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.words import Words, words
-from trihedron.refused import RefusedError
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 LARGEST_TILT_DEG = 20.0

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.accelerometer import face_poses, face_tilt, inputs, verdict
 from trihedron.estimate.accelerometer.face_placements import placements
 from trihedron.estimate.accelerometer.norm import norm_residual
@@ -18,7 +19,6 @@ from trihedron.estimate.accelerometer.whole_turns import OppositeHeadings, with_
 from trihedron.records.calibration import FitQuality, Frame, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.words import words
-from trihedron.refused import REFUSALS, RefusedError
 from trihedron.sensor_model import other_form, other_form_jacobian, reframing
 from trihedron.units import AccelerationUnit, degrees_from_radians
 
@@ -56,7 +56,7 @@ def calibrate_faces(
     or in closed form from the means of the six faces (eq. 7 and 8).
 
     Faces that contradict each other beyond their noise were not level: the tilt per pose that makes them consistent is
-    estimated, reported (TABLE_TILT) and carried into weights and error bars as a horizontal error of each pose. A tilt
+    estimated, reported (TABLE_TILT) and carried into weights and uncertainties as a horizontal error per pose. A tilt
     that is common to all poses in the case's own axes cannot be seen by this method; it turns Mz against the case.
 
     Parameters
@@ -137,7 +137,7 @@ def _estimate_placements(
         return _estimate(values[used], noise[used], faces[used], g, closed=closed)
     spread = placed.noise
     # Readings half a turn apart have opposite tilts: none is in their mean.
-    is_cancelled = opposite is not None and len(opposite.hold) == len(placed.means)
+    is_cancelled = opposite is not None and len(opposite.pose) == len(placed.means)
     if placed.scatter is not None:
         S_a, _, _ = _least_squares(placed.means, placed.noise, placed.faces, g)
         tilt2 = placed.scatter / (g**2 * float(np.mean(np.sum(S_a**2, axis=0))))
@@ -153,9 +153,9 @@ def _estimate_placements(
 
 def _with_doubt(estimate: _Estimate, tilt2: float, g: float) -> _Estimate:
     """A tilted face reads ``g cos t``: the scale may be short by the mean square tilt per component, to second order,
-    and the zero off by as much of g: misalignments by which the tilt reaches an axis that is up are known to it only.
+    and the bias off by as much of g: misalignments by which the tilt reaches an axis that is up are known to it only.
 
-    It is not corrected, for what scatters need not be a tilt; the error bars contain it.
+    It is not corrected, for what scatters need not be a tilt; the uncertainties contain it.
     """
     scale = np.concatenate([estimate.S_a.ravel(), np.zeros(3)])
     covariance = estimate.covariance + np.outer(scale, scale) * tilt2**2

@@ -1,4 +1,4 @@
-"""Method 2: ``|S a' + b| = |g|`` in every still pose, free of case and table (docs/model.md, section 3)."""
+"""Method 2: ``|S a' + b| = |g|`` in every pose, free of case and table (docs/model.md, section 3)."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.accelerometer import inputs, verdict
 from trihedron.estimate.accelerometer.poses import ENTRIES, PoseDesign
 from trihedron.records.calibration import FitQuality, Frame, SensorCalibration
 from trihedron.records.finding import Finding
 from trihedron.records.words import words
-from trihedron.refused import RefusedError
 from trihedron.sensor_model import reframing
 from trihedron.units import AccelerationUnit
 
@@ -47,7 +47,7 @@ def calibrate_norm(
     axis_signs: npt.ArrayLike | None = None,
     start: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
-    """Accelerometer triad from the mean readings of still poses, whatever their orientation.
+    """Accelerometer triad from the mean readings of poses, whatever their orientation.
 
     Minimises ``Σ ρ(((|S a' + b| - |g|)/σ)²)`` with ``σ² = uᵀ S Σ Sᵀ u``, the noise of the mean along gravity (eq. 12).
 
@@ -56,13 +56,13 @@ def calibrate_norm(
     means : (n, 3)
         Mean raw reading of each pose.
     sigma_means : (3,), (n, 3) or (n, 3, 3)
-        Standard errors of the means in raw units, or their covariances. They decide weights and error bars.
+        Standard errors of the means in raw units, or their covariances. They decide weights and uncertainties.
     gravity_m_s2 : float
         |g| where the recording was made. A relative error of |g| is the same relative error of every scale.
     raw_unit : AccelerationUnit
         Unit of ``means``; only kept in the result and used to question implausible scales.
     frame : "lower" or "symmetric"
-        Body frame. (``case`` needs method 1: still poses do not know the case.)
+        Body frame. (``case`` needs method 1: poses do not know the case.)
     loss, loss_scale
         Robust loss and its scale in standard errors; the default scales keep 95 % efficiency on Gaussian noise.
     objective : "norm" or "squared"
@@ -112,15 +112,15 @@ def calibrate_norm_samples(
     loss_scale: float | None = None,
     axis_signs: npt.ArrayLike | None = None,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
-    """The same from every raw sample of every still pose, in one parallel pass (10⁶ samples in a fraction of a second).
+    """The same from every raw sample of every pose, in one parallel pass (10⁶ samples in a fraction of a second).
 
-    Each sample is charged with ``n_pose`` times the variance of its pose's mean, so that slow noise inside a hold,
+    Each sample is charged with ``n_pose`` times the variance of its pose's mean, so that slow noise inside a pose,
     which averaging does not remove, is not mistaken for information. A robust loss rejects single samples, not poses.
 
     Parameters
     ----------
     samples : (n, 3)
-        Raw readings of the still poses.
+        Raw readings of the poses.
     pose_of_sample : (n,) of int
         Index of the pose of each sample, 0 … n_poses - 1.
     sigma_means : (3,), (n_poses, 3) or (n_poses, 3, 3)

@@ -1,4 +1,4 @@
-"""What still poses in given directions determine, in words, and which pose to add next.
+"""What poses in given directions determine, in words, and which pose to add next.
 
 In the truth's own coordinates a small error of the model is ``δf = M f + z`` with M lower triangular; a pose with
 gravity reaction along the unit vector u sees ``uᵀδf = g Σ_{j≥k} M_jk u_j u_k + zᵀu``. These nine functions of direction

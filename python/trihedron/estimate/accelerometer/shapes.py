@@ -2,7 +2,7 @@
 
 A reading that is not linear along its axis moves |f| by the force along that axis times a curve of it: f³ of a reading
 quadratic in force, f⁴ of a cubic one, |f|³ where both directions have unlike scales. The nine parameters hold f², and
-imitate a part of these: S is then wrong by far more than the residual says, whose χ² alone widens its error bars.
+imitate a part of these: S is then wrong by far more than the residual says, whose χ² alone widens its uncertainties.
 """
 
 from __future__ import annotations
@@ -91,18 +91,18 @@ def shape_of(
 
 
 def verticals(fitted: SensorCalibration, reading: FloatArray) -> FloatArray:
-    """Unit verticals (n, 3) of still poses by their mean readings (n, 3)."""
+    """Unit verticals (n, 3) of poses by their mean readings (n, 3)."""
     up: FloatArray = reading @ fitted.S.T + fitted.b
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     return up
 
 
 def shape_findings(calibration: Calibration, segments: Segments) -> tuple[Finding, ...]:
-    """The shape in a calibration's residual of still poses, as a finding that says what it does to S and b."""
+    """The shape in a calibration's residual of poses, as a finding that says what it does to S and b."""
     fitted, reading = calibration.accelerometer, segments.accelerometer_mean
     if fitted.quality is None or reading is None or len(fitted.quality.residual) != len(reading):
         return ()
-    seen, is_known = fitted.quality, np.isfinite(fitted.quality.residual)  # a pose that was left out misses nothing
+    seen, is_known = fitted.quality, np.isfinite(fitted.quality.residual)  # a pose that was excluded misses nothing
     up = verticals(fitted, reading)[is_known]
     scale = max(seen.covariance_scale, seen.chi2 / seen.dof if seen.dof > 0 else 1.0, 1.0)
     shape = shape_of(up, seen.residual[is_known], seen.sigma[is_known], calibration.gravity_m_s2, scale)

@@ -18,11 +18,11 @@ FEWEST = 60
 
 @dataclass(frozen=True, eq=False)
 class OppositeHeadings:
-    """Readings (k, 3), raw, that a case would show half a turn from hold ``hold`` (k,), and their covariances."""
+    """Readings (k, 3), raw, that a case would show half a turn from pose ``hold`` (k,), and their covariances."""
 
     values: FloatArray
     noise: FloatArray
-    hold: IntArray
+    pose: IntArray
 
 
 def opposite_headings(
@@ -41,26 +41,26 @@ def opposite_headings(
     last, placed = -1, -1
     for move, angle in zip(moves, turns_deg, strict=True):
         # Turns that follow each other without the case being set down anew are of one placement.
-        placed = placed if move.hold_before == last else move.hold_before
-        last = move.hold_after
+        placed = placed if move.pose_before == last else move.pose_before
+        last = move.pose_after
         if angle == 0.0 or angle % 360.0 != 0.0 or move.stop - move.start < FEWEST:
             continue
         rows = slice(move.start, move.stop)
-        zero = 0.5 * (segments.gyroscope_mean[move.hold_before] + segments.gyroscope_mean[move.hold_after])
-        rest = 0.5 * (mean[move.hold_before] + mean[move.hold_after])
+        zero = 0.5 * (segments.gyroscope_mean[move.pose_before] + segments.gyroscope_mean[move.pose_after])
+        rest = 0.5 * (mean[move.pose_before] + mean[move.pose_after])
         one = _first_harmonic(recording.time_s[rows], force[rows] - rest, gyro[rows] - zero, np.radians(angle))
         if one is not None:
             found.setdefault(placed, []).append(one)
     if not found:
         return None
-    holds = np.array(list(found), dtype=np.int64)
-    lean = np.array([np.mean([a for a, _ in found[k]], axis=0) for k in holds.tolist()])
+    poses = np.array(list(found), dtype=np.int64)
+    lean = np.array([np.mean([a for a, _ in found[k]], axis=0) for k in poses.tolist()])
     # Turns of one placement hear one uneven table: their errors are not averaged.
-    variance = np.array([np.mean([v for _, v in found[k]], axis=0) for k in holds.tolist()])
-    at_rest = np.asarray(sigma)[holds] ** 2
+    variance = np.array([np.mean([v for _, v in found[k]], axis=0) for k in poses.tolist()])
+    at_rest = np.asarray(sigma)[poses] ** 2
     # The mean of both headings is as uncertain as the hold and A: it stands in both.
     noise = 3.0 * at_rest + 4.0 * variance
-    return OppositeHeadings(mean[holds] - 2.0 * lean, np.einsum("ni,ij->nij", noise, np.eye(3)), holds)
+    return OppositeHeadings(mean[poses] - 2.0 * lean, np.einsum("ni,ij->nij", noise, np.eye(3)), poses)
 
 
 def _first_harmonic(
@@ -102,9 +102,9 @@ def with_opposite(
     used = np.flatnonzero(faces)
     if opposite is None:
         return values[used], noise[used], faces[used]
-    at = np.searchsorted(used, opposite.hold, side="right")
+    at = np.searchsorted(used, opposite.pose, side="right")
     return (
         np.insert(values[used], at, opposite.values, axis=0),
         np.insert(noise[used], at, opposite.noise, axis=0),
-        np.insert(faces[used], at, faces[opposite.hold]),
+        np.insert(faces[used], at, faces[opposite.pose]),
     )

@@ -1,4 +1,4 @@
-"""Gyro calibration: known turns (method 1) and moves between still poses (method 2)."""
+"""Gyro calibration: known turns (method 1) and moves between poses (method 2)."""
 
 from trihedron.estimate.gyroscope.alignment import MoveOptions
 from trihedron.estimate.gyroscope.gravity_scale import GravityScale, scale_by_gravity

@@ -31,7 +31,7 @@ DENIED = 0.1
 """Part of what peaks that were cut would be short of by which gravity is missed, and they were not."""
 
 LEFT, MOST_PASSES = 0.01, 12
-"""What is to be left of the error of a zero inside its step after fitting it and the readings at rest that stand for it
+"""What is to be left of the error of a bias inside its step after fitting it and the readings at rest that stand for it
 in turn: a pass leaves the part of a move that is still, a tenth where all axes turn, two thirds where one does."""
 
 
@@ -40,9 +40,9 @@ def measured_and_aligned(
 ) -> tuple[MoveMeasurements, Aligned, MoveOptions]:
     """Moves of a session, their alignment, and the options that suit them.
 
-    A machine that always turns at one speed, seen through a converter coarser than its noise, ends at one code, as a
+    A machine that always turns at one speed, seen through an ADC coarser than its noise, ends at one code, as a
     gyro at its limit does. Had peaks been cut there, the readings as they are would fall short by what bridges them.
-    Where gravity is carried far better than that, nothing was cut, unless the code is the end of a converter's word.
+    Where gravity is carried far better than that, nothing was cut, unless the code is the end of an ADC's word.
     """
     session = _Session(recording, segments, part, gravity_m_s2, options)
     measured, aligned = session.aligned_as_cut_or_not()

@@ -10,11 +10,11 @@ import numpy as np
 from trihedron import _core
 from trihedron._core import AlignmentFit
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.probability import MEDIAN_CHI2, chdtrc, chdtri
 from trihedron.quantiles import median
 from trihedron.records.calibration import SensorCalibration
-from trihedron.refused import RefusedError
 
 RateDegree = Literal[0, 1, 3]
 """Degree of the rate polynomial over a sample: 0 constant, 1 linear, 3 coning-corrected."""
@@ -41,8 +41,8 @@ class MoveOptions:
 
     ``rate_degree`` of the rate polynomial over a sample (0 constant, 1 linear, 3 coning-corrected); ``is_robust``
     screens moves whose residual is far beyond the others'; ``is_offset_free`` adds a constant rate inside the moves
-    that the holds do not show (3 parameters); ``is_attitude_removed``
-    subtracts a zero reading that follows specific force (``None``: where the holds show one); ``n_folds`` for
+    that the poses do not show (3 parameters); ``is_attitude_removed``
+    subtracts a bias that follows specific force (``None``: where the poses show one); ``n_folds`` for
     held-out prediction, 0 for none; ``nominal_scale`` (3, 3) or a number, rad/s per raw unit, where the moves cannot
     tell it.
     """
@@ -55,7 +55,7 @@ class MoveOptions:
     nominal_scale: FloatArray | float | None = None
 
     def suited_to(self, measured: MoveMeasurements) -> MoveOptions:
-        """With a constant rate offset where a coarse converter hides the zero from the holds."""
+        """With a constant rate offset where a coarse ADC hides the bias from the poses."""
         return replace(self, is_offset_free=True) if np.any(measured.is_undithered) else self
 
     def nominal(self) -> FloatArray | None:
@@ -241,7 +241,7 @@ def assemble(
     outliers: tuple[int, ...],
     inflation: float,
 ) -> Aligned:
-    """Covariance of (S_f, b_f, S_ω, b_ω) from that of the fit, of the zero readings and of a fixed accelerometer.
+    """Covariance of (S_f, b_f, S_ω, b_ω) from that of the fit, of the biases and of a fixed accelerometer.
 
     ``b_ω = −S_ω z̄ + offset``, so ``δb = −δS_ω z̄ − S_ω δz̄ + δoffset``. The fit's own error is independent of ``z̄`` and
     of the accelerometer, whose errors it follows: what widens or narrows it leaves these alone, and the whole positive.

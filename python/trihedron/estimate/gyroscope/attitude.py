@@ -1,4 +1,4 @@
-"""A zero reading that follows gravity (g-sensitivity): found in the holds, removed from the moves."""
+"""A bias that follows gravity (g-sensitivity): found in the poses, removed from the moves."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ FALSE_ALARM = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class AttitudeDependence:
-    """``z(f) = z₀ + A f``: the raw zero reading (n, 3) of the holds against their specific force.
+    """``z(f) = z₀ + A f``: the raw bias (n, 3) of the poses against their specific force.
 
     ``A`` (3, 3) in raw unit per m/s²; ``zero`` (3,) is ``z₀`` with ``cov_zero`` variances (3,); ``p_value`` of ``A =
-    0``; ``scatter_before``, ``scatter_after`` (3,) the standard deviation of the hold zeros without and with it, raw.
+    0``; ``scatter_before``, ``scatter_after`` (3,) the standard deviation of the pose biases without and with it, raw.
     """
 
     A: FloatArray
@@ -34,7 +34,7 @@ class AttitudeDependence:
 
 
 def attitude_dependence(zero: FloatArray, var_zero: FloatArray, force: FloatArray) -> AttitudeDependence | None:
-    """Regress the hold zeros on specific force (n, 3), m/s²; ``None`` with fewer than 9 holds or poses in one plane.
+    """Regress the pose biases on specific force (n, 3), m/s²; ``None`` with fewer than 9 poses or poses in one plane.
 
     The three axes share one F test: 9 slopes against what is left of 3 n numbers.
     """
@@ -56,7 +56,7 @@ def attitude_dependence(zero: FloatArray, var_zero: FloatArray, force: FloatArra
         chi2_mean += float(np.sum(weight * (zero[:, axis] - mean) ** 2))
         chi2_line += float(np.sum(weight * rest**2))
     ratio = ((chi2_mean - chi2_line) / 9.0) / max(chi2_line / (3.0 * (n - 4)), 1e-300)
-    # Where noise alone explains the holds, a significant ratio of two tiny numbers means nothing.
+    # Where noise alone explains the poses, a significant ratio of two tiny numbers means nothing.
     p_value = float(fdtrc(9, 3 * (n - 4), ratio)) if chi2_mean > 3.0 * (n - 1) else 1.0
     left = float(np.sqrt(chi2_line / (n - 4) / max(chi2_mean / (n - 1), 1e-300)))
     return AttitudeDependence(A, z0, var_z0, p_value, left)

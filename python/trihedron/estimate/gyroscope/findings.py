@@ -153,7 +153,7 @@ def _drift_findings(measured: MoveMeasurements, S: FloatArray) -> list[Finding]:
     return [
         Finding.of(
             FindingCode.GYRO_BIAS_DRIFT,
-            "holds",
+            "poses",
             change_rad_s=change[axis],
             axis=axis + 1,
             times=np.sqrt(measured.zero_excess[axis] / dof),

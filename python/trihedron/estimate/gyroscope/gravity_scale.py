@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import REFUSALS
 from trihedron.estimate.gyroscope.alignment import MoveOptions
 from trihedron.estimate.gyroscope.moves import calibrate_moves
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-from trihedron.refused import REFUSALS
 
 LARGEST_DOUBT = 0.1
 """Relative standard error above which a scale by gravity is not used: three of them still exclude half and twice."""

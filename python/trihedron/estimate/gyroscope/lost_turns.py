@@ -20,27 +20,27 @@ MOST_STEPS = 3.0
 """What a move misses beyond so many of its usual steps is no sample or two that were lost."""
 MANY = 0.3
 """Losses a move from which on the moves without any no longer decide the fit: a move left out is then not the odd
-one. Below, what was left out was left out rightly."""
+one. Below, what was excluded was excluded rightly."""
 EVEN = 1e-4
-"""Scatter of the stamps, in steps, up to which they may have been made from the number of the row."""
+"""Scatter of the timestamps, in steps, up to which they may have been made from the number of the row."""
 NOISE_DOF = 100.0
 """The predicted noise is itself measured in the recording: to about 7 %, as 100 degrees of freedom give."""
 CERTAIN, DOUBTFUL = 1e-3, 0.05
 """Chance of the misses by noise alone below which losses are asked for: where all moves were fitted, and where some
-were left out. A loss in each move is shared out among the nine numbers of a scale, the moves that lost more are left
+were excluded. A loss in each move is shared out among the nine numbers of a scale, the moves that lost more are left
 out, and what remains looks nearly sound (sessions wrong by 20 standard errors had χ² of 1.7 per degree of freedom)."""
 POINTS = 100
 """Instants of a move at which one of two samples may have been lost: a turn bends little from one to the next."""
 STRONG = 20.0
 """Odds that are strong evidence (Kass, Raftery 1995): a fall that ends between two samples misses by parts of one."""
 OWN_CLOCK = 1.5
-"""Distance of stamps from a straight line, in spreads of their steps, from which on a clock made them: rounding a
+"""Distance of timestamps from a straight line, in spreads of their steps, from which on a clock made them: rounding a
 line leaves them within one spread of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class PossibleLosses:
-    """``carried``: share of the samples that the error bars carry; ``possible``: with every move that was left out.
+    """``carried``: share of the samples that the uncertainties carry; ``possible``: with every move that was excluded.
 
     ``scatter``: the variance of what moves miss, those left out with them where the share counts them, over that by
     noise: a sample lost in some moves and none in others bends the scale's other elements by so much.
@@ -72,7 +72,7 @@ def relative_sigma(covariance: FloatArray, S: FloatArray) -> float:
 
 
 def could_be_remade(time_s: FloatArray, nominal_step_s: float) -> bool:
-    """Whether stamps may have been made from the number of the row, rounded or not: a loss then leaves no trace.
+    """Whether timestamps may have been made from the number of the row, rounded or not: a loss then leaves no trace.
 
     A clock of its own, however rounded, leaves a straight line by more than one spread of its steps; a loss is a gap in
     it.
@@ -89,12 +89,12 @@ def could_be_remade(time_s: FloatArray, nominal_step_s: float) -> bool:
 
 
 def asks_for_losses(chi2: float, dof: float, n_left_out: int) -> bool:
-    """Whether misses of the moves in use are beyond noise, a little being enough where other moves were left out."""
+    """Whether misses of the moves in use are beyond noise, a little being enough where other moves were excluded."""
     return dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < (DOUBTFUL if n_left_out else CERTAIN)
 
 
 def left_out_as_by_losses(time_s: FloatArray, measured: MoveMeasurements, aligned: Aligned) -> bool:
-    """Whether moves that were left out miss gravity rather by a sample or two that are lost than by a knock.
+    """Whether moves that were excluded miss gravity rather by a sample or two that are lost than by a knock.
 
     A sample lost at ``t`` leaves ``h ω(t)`` out of the turn, and gravity behind the move off by ``h R(t) (ω × f)(t)``,
     carried from ``t`` to the end. The density of the miss, over all instants at which one sample or two may have been
@@ -151,17 +151,17 @@ def losses_that_fit(
     dof: float,
     used: BoolArray,
 ) -> PossibleLosses:
-    """Part of the samples that could be missing though the stamps are even, where moves miss beyond their noise.
+    """Part of the samples that could be missing though the timestamps are even, where moves miss beyond their noise.
 
     A lost sample takes ``ω h`` from its turn. Samples lost at random with share ``p`` take ``p ∫ω dt`` in the mean,
     which nothing tells from a scale, and scatter by the variance ``p h ∫ω² dt``, which the moves show: ``p`` follows
     from how far gravity after the moves misses beyond its noise (docs/model-session.md, 11.17). That the excess has
-    another cause is the commoner case; the error bars must carry that it has this one.
+    another cause is the commoner case; the uncertainties must carry that it has this one.
 
     Parameters
     ----------
     time_s, measured : (n,), MoveMeasurements
-        Stamps, moves.
+        Timestamps, moves.
     S, gravity_m_s2 : (3, 3), float
         The gyro's scale in rad/s per raw unit, |g|.
     missed : (m,), (m,)

@@ -10,6 +10,7 @@ import numpy as np
 from trihedron import _core
 from trihedron._core import Moves
 from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, Clipped, bridge_clipping, clipped_time
 from trihedron.estimate.gyroscope.rounding import (
@@ -25,7 +26,6 @@ from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
-from trihedron.refused import RefusedError
 from trihedron.session.averaging import Averaging
 
 GAP_STEPS = 5.0
@@ -39,17 +39,17 @@ the correlation that an anti-alias filter leaves between samples."""
 class MoveMeasurements:
     """Everything the alignment needs, in raw units of each sensor.
 
-    ``reading``, ``zero`` (n, 3) are the hold means of accelerometer and gyro, ``var_reading``, ``var_zero`` (n, 3) the
-    variances of these means; ``links`` (m, 2) the holds each move joins, ``edges`` (m, 2) its samples;
+    ``reading``, ``zero`` (n, 3) are the pose means of accelerometer and gyro, ``var_reading``, ``var_zero`` (n, 3) the
+    variances of these means; ``links`` (m, 2) the poses each move joins, ``edges`` (m, 2) its samples;
     ``noise_density`` (3,) the angle random walk in raw unit · √s; ``var_zero_walk`` (3,) the variance by which the
-    true zero reading changes from hold to hold; ``clipped_s`` (m,) is the time in each move that the gyro spent at
-    its limit. ``attitude`` is the dependence of the zero reading on specific force where it was removed: ``rate``
-    (samples, 3) are the raw gyro readings without it, and so are the zeros. ``zero_weights`` (n, 3) make the
-    session's zero reading ``zero_mean`` (3,) of variance ``var_zero_mean`` (3,). ``is_undithered`` (3,) are the axes
-    whose zero lies hidden inside a step of the converter. ``zero_read``, ``var_zero_read`` (n, 3) are the zeros as each
-    hold alone shows them, ``var_reading_noise`` (n, 3) the variance of the hold means by noise alone,
+    true bias changes from pose to pose; ``clipped_s`` (m,) is the time in each move that the gyro spent at
+    its limit. ``attitude`` is the dependence of the bias on specific force where it was removed: ``rate``
+    (samples, 3) are the raw gyro readings without it, and so are the biases. ``zero_weights`` (n, 3) make the
+    session's bias ``zero_mean`` (3,) of variance ``var_zero_mean`` (3,). ``is_undithered`` (3,) are the axes
+    whose zero lies hidden inside an LSB. ``zero_read``, ``var_zero_read`` (n, 3) are the biases as each
+    hold alone shows them, ``var_reading_noise`` (n, 3) the variance of the pose means by noise alone,
     ``reading_variance`` (samples, 3) that of gyro readings which were bridged or rounded; ``still`` (3,) the part of
-    the moves' samples in which an axis stands at its zero, so that an offset fitted to moves does not act there;
+    the moves' samples in which an axis stands at its bias, so that an offset fitted to moves does not act there;
     ``averaging`` by how much ``rate`` was sharpened, the readings being means over their interval.
     """
 
@@ -101,15 +101,15 @@ class MoveMeasurements:
 
 
 def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
-    """Angle random walk ``N`` of each raw axis in raw unit · √s, (3,), from block means inside the holds.
+    """Angle random walk ``N`` of each raw axis in raw unit · √s, (3,), from block means inside the poses.
 
-    ``N² = τ σ²(τ)`` with the Allan variance of blocks of τ = 0.5 s, pooled over the holds: unlike the scatter of single
-    samples it is right for filtered gyros, whose neighbouring samples are correlated. Never below the converter's own
+    ``N² = τ σ²(τ)`` with the Allan variance of blocks of τ = 0.5 s, pooled over the poses: unlike the scatter of single
+    samples it is right for filtered gyros, whose neighbouring samples are correlated. Never below the ADC's own
     noise, ``LSB²/12`` per sample.
     """
     gyroscope = _required(recording.gyroscope, "gyroscope")
     step_s = 1.0 / recording.rate_hz
-    kept = [(k, *part) for k, hold in enumerate(segments.holds) for part in hold.undisturbed()]
+    kept = [(k, *part) for k, pose in enumerate(segments.poses) for part in pose.undisturbed()]
     owner, *edges = np.array(kept, dtype=np.int64).reshape(-1, 3).T
     squares, count = _core.block_differences(
         gyroscope, np.column_stack(edges), np.ascontiguousarray(owner), max(1, round(BLOCK_S / step_s))
@@ -135,15 +135,15 @@ def measure_moves(
     *,
     is_bridged: bool = True,
 ) -> MoveMeasurements:
-    """Collect hold means, moves and noise; readings that look like the gyro's limit are bridged if ``is_bridged``.
+    """Collect pose means, moves and noise; readings that look like the gyro's limit are bridged if ``is_bridged``.
 
-    With ``is_attitude_removed`` (``None``: where the holds show it beyond chance) a zero reading that follows specific
+    With ``is_attitude_removed`` (``None``: where the poses show it beyond chance) a bias that follows specific
     force is subtracted sample by sample: interpolating it between two attitudes would be wrong in the middle of a move.
 
     Raises
     ------
     ValueError
-        When a sensor is missing or there is no move between two holds.
+        When a sensor is missing or there is no move between two poses.
     """
     gyroscope = _required(recording.gyroscope, "gyroscope")
     raw_force = _required(recording.accelerometer, "accelerometer")
@@ -213,7 +213,7 @@ def _moves_of(recording: Recording, segments: Segments) -> list[Move]:
         raise RefusedError(
             "no move between two poses was found: turn the sensor by hand between poses and keep each for some seconds"
         )
-    if moves[-1].stop > recording.n_samples or segments.holds[-1].stop > recording.n_samples:
+    if moves[-1].stop > recording.n_samples or segments.poses[-1].stop > recording.n_samples:
         raise RefusedError("the segments reach beyond the recording: they belong to another log")
     return moves
 
@@ -229,7 +229,7 @@ def _bridged(
 def _with_hidden_zero(
     zero: FloatArray, var_zero: FloatArray, segments: Segments, quantum: FloatArray, undithered: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
-    # Rounding hides the same part of every hold's zero: what it hides is fitted to the moves, as one offset.
+    # Rounding hides the same part of every pose's zero: what it hides is fitted to the moves, as one offset.
     hidden = np.where(undithered, quantum**2 / 12.0, 0.0)
     own = np.maximum(np.asarray(segments.gyroscope_sigma_mean, dtype=np.float64) ** 2 - hidden, 0.0)
     return common_zero(zero, np.where(undithered, own, var_zero), undithered)
@@ -238,7 +238,7 @@ def _with_hidden_zero(
 def _pooled_hidden(
     zero: FloatArray, var_zero: FloatArray, undithered: BoolArray, pooled: tuple[FloatArray, FloatArray, FloatArray]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Weights, mean and variance of the session's zero, on undithered axes without what their step hides.
+    """Weights, mean and variance of the session's bias, on undithered axes without what their step hides.
 
     That is the offset that the moves are asked for: counted twice, it makes bars too wide.
     """
@@ -253,14 +253,14 @@ def _pooled_hidden(
 
 
 def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
-    """Steps between samples, the usual one, and the standard deviation of a stamp, s."""
+    """Steps between samples, the usual one, and the standard deviation of a timestamp, s."""
     steps = np.diff(recording.time_s)
     nominal = median(steps[steps > 0]) if np.any(steps > 0) else 1.0 / recording.rate_hz
     return steps, nominal, median(np.abs(steps - nominal)) * 1.4826 / np.sqrt(2.0)
 
 
 def audit_moves(measured: MoveMeasurements) -> list[Finding]:
-    """Findings on clipped moves, gaps inside moves, and a zero reading that changes from hold to hold."""
+    """Findings on clipped moves, gaps inside moves, and a bias that changes from pose to pose."""
     findings = []
     if np.any(measured.clipped_s > 0.0):
         which = [int(i) for i in np.flatnonzero(measured.clipped_s > 0.0)]
@@ -293,12 +293,12 @@ def audit_moves(measured: MoveMeasurements) -> list[Finding]:
 
 def _edges_and_links(moves: Sequence[Move]) -> tuple[IntArray, IntArray]:
     edges = np.array([[move.start, move.stop] for move in moves], dtype=np.int64)
-    links = np.array([[move.hold_before, move.hold_after] for move in moves], dtype=np.int64)
+    links = np.array([[move.pose_before, move.pose_after] for move in moves], dtype=np.int64)
     return edges, links
 
 
 def _undithered(quantum: FloatArray, sigma: FloatArray | None) -> BoolArray:
-    """Axes (3,) whose noise does not reach the converter's step ``quantum`` (3,)."""
+    """Axes (3,) whose noise does not reach the LSB ``quantum`` (3,)."""
     white = np.full(3, np.inf) if sigma is None else _without_rounding(np.asarray(sigma), quantum)
     return undithered_axes(quantum, white)
 
@@ -321,7 +321,7 @@ def _required(readings: FloatArray | None, name: str) -> FloatArray:
 
 
 def _mean_variance(sigma_mean: FloatArray | None) -> FloatArray:
-    """Variance of the hold means, (n, 3); what rounding leaves in them is in it (docs/segmentation.md)."""
+    """Variance of the pose means, (n, 3); what rounding leaves in them is in it (docs/segmentation.md)."""
     if sigma_mean is None:
         raise RefusedError("the segments do not say the uncertainty of their pose means")
     return np.ascontiguousarray(np.asarray(sigma_mean, dtype=np.float64) ** 2)

@@ -1,4 +1,4 @@
-"""Samples lost without a trace in the stamps: the turns they take away, as the motion on either side shows them."""
+"""Samples lost without a trace in the timestamps: the turns they take away, as the motion on either side shows them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ show 0 to 7 long steps, 0 to 4 short ones; healthy sessions of two generators 0 
 FALSE_SHARE = 5e-4
 """Share of long steps that knocks upon brisk motion leave (18 in 38 000 of a filtered noise with knocks)."""
 SERIOUS_SHARE = 0.002
-"""Share of turning steps lost above which a scale factor, short by as much, is beyond its error bars of usual size."""
+"""Share of turning steps lost above which a scale factor, short by as much, exceeds an uncertainty of usual size."""
 
 
 def missing_samples(recording: Recording, segments: Segments, sigma_scale: float = SERIOUS_SHARE) -> list[Finding]:
@@ -58,7 +58,7 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
         noise.append(_positive(segments.accelerometer_sigma))
     readings = np.concatenate(triads, axis=1)
     step_s = 1.0 / recording.rate_hz
-    # A step that the stamps show to be long is a gap, known and reported; no curve is laid across it.
+    # A step that the timestamps show to be long is a gap, known and reported; no curve is laid across it.
     is_gap = ~(np.abs(np.diff(recording.time_s) - step_s) < 0.4 * step_s)
     if not np.isfinite(readings).all():
         is_missing: npt.NDArray[np.bool_] = ~np.all(np.isfinite(readings), axis=1)

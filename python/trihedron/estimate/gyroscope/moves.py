@@ -1,4 +1,4 @@
-"""Method 2: gyro calibration from hand moves between still poses."""
+"""Method 2: gyro calibration from hand moves between poses."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def calibrate_moves(
     recording : Recording
         Raw readings of both sensors.
     segments : Segments
-        Its still poses and moves.
+        Its poses and moves.
     accelerometer : SensorCalibration
         Calibrated accelerometer: its frame becomes the gyro's, its covariance enters the gyro's.
     gravity_m_s2 : float

@@ -1,4 +1,4 @@
-"""Where a coarse gyro is still, or not yet beyond a step, at the ends of a move: its reading there is the zero's."""
+"""Where a coarse gyro is still, or not yet beyond a step, at the ends of a move: its reading there is the bias's."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from trihedron.estimate.gyroscope.rounding import CHATTER
 
 HIDDEN = (0.50, 0.68, 1.0), (0.91, 0.68, 0.50)
 """Of a body that settles as exp(-t/τ), one that starts as t² and one that starts as t: time for the second step beside
-its zero's in that for the first, and how long its place inside the step would have to act, as a rate, to turn what is
+its bias's in that for the first, and how long its place inside the step would have to act, as a rate, to turn what is
 hidden there (first order in the place), in units of the first: τ of τ ln 3; √½/2 of √(3/2) - √½; ½ of 1."""
 STEPS = 0.75, 1.75, 2.75
 """Distance from the reading at rest, in steps, up to which a reading is at rest, one step beside, two."""

@@ -1,4 +1,4 @@
-"""What a coarse converter hides: the rate inside one step, at rest and in moves."""
+"""What a coarse ADC hides: the rate inside one step, at rest and in moves."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ UNDITHERED = 0.5
 """Noise below this part of a step does not dither it: the mean of a rounded reading is off by up to half a step,
 however long it is taken."""
 SETTLING = (0.50, 0.68), (2.5, 1.25)
-"""Of a body that settles as exp(-t/τ), then of one that starts as t² does: time for the second step beside its zero's
-in that for the first, and the samples over which what it still turns, rms over where in its step the zero may lie, is
+"""Of a body that settles as exp(-t/τ), then of one that starts as t² does: time for the second step beside its bias's
+in that for the first, and the samples over which what it still turns, rms over where in its step the bias may lie, is
 a step's uniform error, for each sample that the first step took."""
 CHATTER = 9
 """Readings whose median is free of toggling between neighbouring codes."""
 LONGER = 4
-"""Times what an axis takes to leave the step of its zero, or what chatter hides, for which it must stay in it while
+"""Times what an axis takes to leave the step of its bias, or what chatter hides, for which it must stay in it while
 others turn to count as standing still."""
 QUIETEST = 0.2
 """Quantile of the variances of steady stretches that is their noise's."""
@@ -30,7 +30,7 @@ LEAST_WHITE = 1e-2
 
 
 def undithered_axes(quantum: FloatArray, sigma: FloatArray) -> BoolArray:
-    """Axes (3,) whose noise ``sigma`` (3,) [raw] is too small to be seen through the converter's ``quantum`` (3,)."""
+    """Axes (3,) whose noise ``sigma`` (3,) [raw] is too small to be seen through the ADC's ``quantum`` (3,)."""
     out: BoolArray = (quantum > 0.0) & (sigma < UNDITHERED * quantum)
     return out
 
@@ -43,7 +43,7 @@ def rounding_variance(
     While the rate passes through a step from one side to the other, the errors of the ``n`` readings inside run through
     all values of the step and cancel but for one of them: ``q²/12`` for the run, ``q²/12n`` a reading. Where the rate
     turns back inside the step, the readings share one error: their sum has the variance ``n² q²/12``, that is
-    ``n q²/12`` a reading. At the ``rest`` reading (3,) the error is that of the zero, which is not charged here but for
+    ``n q²/12`` a reading. At the ``rest`` reading (3,) the error is that of the bias, which is not charged here but for
     the start and the end of a move that still lie inside the step.
     """
     if not np.any(axes):
@@ -61,7 +61,7 @@ def rounding_variance(
 def plateau_variance(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> FloatArray | None:
     """The same of readings that toggle between two codes about a steady rate; ``None`` where none do.
 
-    It makes moves at one speed uncertain in common, and is left out where they are held against each other: what single
+    It makes moves at one speed uncertain in common, and is excluded where they are held against each other: what single
     moves miss by a knock or by lost samples would be lost in it.
     """
     out = np.zeros(readings.shape)
@@ -153,7 +153,7 @@ def resting_axes(readings: FloatArray, quantum: FloatArray, rest: FloatArray, ax
 def _standing(
     readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray
 ) -> Iterator[tuple[int, int, int]]:
-    """(axis, begin, end) where an axis stays in the step of its zero, others turning, far longer than it takes to leave
+    """(axis, begin, end) where an axis stays in the step of its bias, others turning, far longer than it takes to leave
     it: where all axes turn, each passes that step or leaves it with the others."""
     turns = np.abs(readings - rest) > 1.75 * quantum
     for axis in np.flatnonzero(axes).tolist():
@@ -167,10 +167,10 @@ def _standing(
 
 
 def _rests(steady: FloatArray, quantum: float, rest: float) -> Iterator[tuple[int, int, int, int]]:
-    """Stretches (begin, end) in which an axis stands in the step of its zero, and the samples at either end in which it
+    """Stretches (begin, end) in which an axis stands in the step of its bias, and the samples at either end in which it
     may turn unseen."""
     away = np.abs(steady - rest)
-    # Between the two nearest codes a zero may toggle.
+    # Between the two nearest codes a bias may toggle.
     is_rest, is_next = away < 0.75 * quantum, away < 1.75 * quantum
     at_rest, beyond = ranges_of(is_rest), ranges_of(away < 2.75 * quantum)
     for first, last in ranges_of(is_next):
@@ -187,7 +187,7 @@ def _rests(steady: FloatArray, quantum: float, rest: float) -> Iterator[tuple[in
 
 
 def _hidden(first_step: int, second_step: int) -> int:
-    """Samples charged next to the step of the zero, by how long the two steps beside it took."""
+    """Samples charged next to the step of the bias, by how long the two steps beside it took."""
     ratio = second_step / max(first_step, 1)
     return math.ceil(first_step * float(np.interp(ratio, *SETTLING)))
 
@@ -201,9 +201,9 @@ def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: f
 
 
 def common_zero(zero: FloatArray, var_zero: FloatArray, axes: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Zeros (n, 3) and variances of undithered axes: one zero for all holds, as uncertain between them as it scatters.
+    """Biases (n, 3) and variances of undithered axes: one zero for all poses, as uncertain between them as it scatters.
 
-    A mean that rounding has moved says nothing of its own hold; what is common to all holds is left to the moves.
+    A mean that rounding has moved says nothing of its own pose; what is common to all poses is left to the moves.
     """
     zero, var_zero = zero.copy(), var_zero.copy()
     for axis in np.flatnonzero(axes):

@@ -6,11 +6,11 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
-from trihedron.refused import RefusedError
 from trihedron.units import rate_to_si
 
 FEWEST_MOVES = 3

@@ -10,11 +10,11 @@ import numpy as np
 
 from trihedron._core import integrate_raw_rate
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.measurements import BLOCK_S
 from trihedron.estimate.gyroscope.turn_rounding import HiddenAngles, hidden_angles
 from trihedron.estimate.gyroscope.zeros import pool_zeros
 from trihedron.records.recording import Recording
-from trihedron.refused import RefusedError
 from trihedron.units import rate_to_si
 
 QUARTER = math.pi / 2.0
@@ -101,8 +101,8 @@ def _unit(axis: int, direction: tuple[float, float, float] | None) -> FloatArray
 class MeasuredTurns:
     """``raw_angle`` (k, 3) = ∫w' dt and ``duration_s`` (k,) of the turns, the same of the zero turns, and their noise.
 
-    ``var_rate`` (3,) is ``N²`` in raw unit² · s; ``zero_spread`` (3,) the variance of the true zero reading between
-    zero turns, ``zero_excess`` (3,) the χ² of its constancy. ``hidden``: what a coarse converter hides of them.
+    ``var_rate`` (3,) is ``N²`` in raw unit² · s; ``zero_spread`` (3,) the variance of the true bias between
+    zero turns, ``zero_excess`` (3,) the χ² of its constancy. ``hidden``: what a coarse ADC hides of them.
     """
 
     raw_angle: FloatArray

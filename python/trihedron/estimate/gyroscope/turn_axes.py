@@ -9,11 +9,11 @@ import numpy as np
 
 from trihedron._core import integrate_raw_rate
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
-from trihedron.refused import RefusedError
 
 SAME_POSE_RAD = math.radians(5.0)
 """A turn on a table leaves gravity where it was, but for twice the table's tilt: a table leans two degrees at most."""
@@ -35,7 +35,7 @@ def turns_about_vertical(segments: Segments, accelerometer: SensorCalibration, g
         move
         for move in segments.moves
         if move.stop - move.start >= 2
-        and float(np.linalg.norm(force[move.hold_after] - force[move.hold_before])) < limit
+        and float(np.linalg.norm(force[move.pose_after] - force[move.pose_before])) < limit
     ]
 
 
@@ -50,7 +50,7 @@ def stated_turns(
 
     The axis of a turn is the table's normal in the body. As the body turns by θ, gravity moves on a circle about it:
     ``f(t) = n̄ + c cos θ + s sin θ + k θ'²`` (the last term for a sensor that does not sit on the axis), fitted over the
-    turn and the holds on both sides; ``n̄`` is the axis.
+    turn and the poses on both sides; ``n̄`` is the axis.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def _turn(
     angle_rad: float,
 ) -> Turn:
     assert segments.accelerometer_mean is not None
-    both = segments.accelerometer_mean[[move.hold_before, move.hold_after]]
+    both = segments.accelerometer_mean[[move.pose_before, move.pose_after]]
     force = both @ accelerometer.S.T + accelerometer.b
     axis = force.sum(axis=0)
     sigma = TABLE_TILT_RAD * abs(math.cos(0.5 * angle_rad))
@@ -121,14 +121,14 @@ def axis_of_turn(
     """Mean force (3,) over the circle of a turn by ``angle_rad``, and the standard error [rad] of its direction."""
     assert recording.accelerometer is not None
     assert recording.gyroscope is not None
-    before, after = segments.holds[move.hold_before], segments.holds[move.hold_after]
+    before, after = segments.poses[move.pose_before], segments.poses[move.pose_after]
     start, stop = before.start, after.stop
     length = max(1, round(BLOCK_S * recording.rate_hz))
     cuts = np.arange(start, stop - length, length)
     edges = np.stack([cuts, np.minimum(cuts + length + 1, stop)], axis=1).astype(np.int64)
     raw, duration = integrate_raw_rate(recording.time_s, recording.gyroscope, edges, 1)
     assert segments.gyroscope_mean is not None
-    zero = segments.gyroscope_mean[[move.hold_before, move.hold_after]].mean(axis=0)
+    zero = segments.gyroscope_mean[[move.pose_before, move.pose_after]].mean(axis=0)
     turned = np.asarray(raw) - np.outer(duration, zero)
     # Along the turn, by the gyro's own reading of it: its scale is that of the stated angle.
     inside = (cuts >= move.start - length) & (cuts < move.stop)

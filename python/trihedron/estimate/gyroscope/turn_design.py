@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ def design_least_squares(
     Raises
     ------
     ValueError
-        When the turns do not determine an axis, or nothing tells the zero.
+        When the turns do not determine an axis, or nothing tells the bias.
     """
     if not 1e-30 < noise_density < 1e30:
         raise RefusedError(f"a noise density of {noise_density:g} is that of no gyro")

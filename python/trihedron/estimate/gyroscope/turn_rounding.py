@@ -1,4 +1,4 @@
-"""What a coarse converter hides of known turns and of the zero: a steady rate inside a step is misread all along."""
+"""What a coarse ADC hides of known turns and of the bias: a steady rate inside a step is misread all along."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.rounding import CHATTER, undithered_axes
 
 AT_REST = 0.75
-"""Steps from the zero within which a reading at the ends of a turn is that of rest: a zero may toggle."""
+"""Steps from the bias within which a reading at the ends of a turn is that of rest: a bias may toggle."""
 
 Group = tuple[int, float, int]
 

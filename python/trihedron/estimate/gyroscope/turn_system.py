@@ -30,7 +30,7 @@ class TurnSystem:
     sigma_face: float = 0.0
 
     def covariances(self) -> FloatArray:
-        """(k, 3, 3) of each raw turn: rate noise ``N² Δt``, a zero that wanders between holds, the turn's own error."""
+        """(k, 3, 3) of each raw turn: rate noise ``N² Δt``, a bias that wanders between poses, the turn's own error."""
         axis = self.axes @ self.S_w.T
         along = (self.sigma_turn**2 - self.sigma_tilt**2) * axis[:, :, None] * axis[:, None, :]
         covariance: FloatArray = self.noise() + along + self.sigma_tilt**2 * self.S_w @ self.S_w.T
@@ -173,7 +173,7 @@ def solve_zero_first(system: TurnSystem, used: BoolArray) -> Solution:
     b_w = (weight * rates).sum(axis=0) / total
     cov_b = np.diag(1.0 / total)
     if measured.hidden is not None:
-        # What a step hides of the zero is the same in every zero turn.
+        # What a step hides of the bias is the same in every zero turn.
         cov_b += np.diag(np.mean(measured.hidden.variance_of_zeros() / zero_s**2, axis=0))
     chi2 = float(np.sum(weight * (rates - b_w) ** 2))
     matrix, side = system.whitened(used, with_zeros=False)

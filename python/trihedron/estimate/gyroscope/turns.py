@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.turn_angles import (
     AMBIGUOUS,
     MIN_SPREAD,
@@ -30,7 +31,6 @@ from trihedron.records.finding import Finding
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.records.words import words
-from trihedron.refused import RefusedError
 from trihedron.sensor_model import other_form, other_form_jacobian
 from trihedron.units import rate_to_si
 
@@ -53,9 +53,9 @@ def turns_from_segments(segments: Segments) -> tuple[list[Turn], list[tuple[int,
         # strict.
         one_g = 0.5 * float(np.max(np.linalg.norm(mean[:, None] - mean[None], axis=2)))
         allowed = max(TILT * one_g, 6.0 * float(np.linalg.norm(sigma)))
-        moves = [m for m in moves if np.linalg.norm(mean[m.hold_after] - mean[m.hold_before]) < allowed]
+        moves = [m for m in moves if np.linalg.norm(mean[m.pose_after] - mean[m.pose_before]) < allowed]
     return [Turn(move.start, move.stop) for move in moves], [
-        (hold.start, hold.stop) for hold in segments.holds if hold.stop - hold.start >= 2
+        (pose.start, pose.stop) for pose in segments.poses if pose.stop - pose.start >= 2
     ]
 
 

@@ -13,7 +13,7 @@ from trihedron.units import rate_to_si
 FEWEST_MOVES = 4
 """Three unknown angles of the first attitude and some moves to spare."""
 MISSED_RAD = 0.3
-"""Gravity carried by body rates misses by less than this after any move, scales and zeros of cheap parts included."""
+"""Gravity carried by body rates misses by less than this after any move, scales and biases of cheap parts included."""
 BETTER = 0.3
 """World rates explain what body rates do not where their error is less than this share of it."""
 
@@ -35,20 +35,20 @@ def carried_gravity(recording: Recording, segments: Segments) -> CarriedGravity 
     """Gravity carried through the moves by the rates, as if of the body and as if of the world.
 
     Of the body: ``u₊ = ΔRᵀ u``. Of the world: ``R₊ = ΔR R``, so ``u_n = R₀ᵀ (ΔR_n … ΔR_1)ᵀ e_z``, with R₀ from all
-    poses (Wahba's problem). Rates are read by their unit, zeros off by the rest before and after each move; ``None``
+    poses (Wahba's problem). Rates are read by their unit, biases off by the rest before and after each move; ``None``
     without a unit or with fewer than four moves in a row.
     """
     scale = rate_to_si(recording.gyroscope_unit)
     if scale is None or recording.gyroscope is None or segments.accelerometer_mean is None:
         return None
     mean, still = segments.accelerometer_mean, segments.gyroscope_mean
-    if still is None or len(segments.moves) < FEWEST_MOVES or len(segments.moves) != segments.n_holds - 1:
+    if still is None or len(segments.moves) < FEWEST_MOVES or len(segments.moves) != segments.n_poses - 1:
         return None
     up = mean / np.linalg.norm(mean, axis=1, keepdims=True)
     attitude = Rotation.identity()
     carried, misses = [np.array([0.0, 0.0, 1.0])], []
     for move in segments.moves:
-        zero = 0.5 * (still[move.hold_before] + still[move.hold_after])
+        zero = 0.5 * (still[move.pose_before] + still[move.pose_after])
         part = slice(move.start, move.stop)
         step = np.gradient(recording.time_s[part])[:, None] if move.stop - move.start > 1 else 0.0
         turns = (recording.gyroscope[part] - zero) * scale * step
@@ -57,7 +57,7 @@ def carried_gravity(recording: Recording, segments: Segments) -> CarriedGravity 
         body = world = Rotation.identity()
         for one in Rotation.from_rotvec(np.atleast_2d(turns)):
             body, world = body * one, one * world
-        miss = float(np.arccos(np.clip(up[move.hold_after] @ body.inv().apply(up[move.hold_before]), -1.0, 1.0)))
+        miss = float(np.arccos(np.clip(up[move.pose_after] @ body.inv().apply(up[move.pose_before]), -1.0, 1.0)))
         misses.append(miss)
         attitude = world * attitude
         carried.append(attitude.inv().apply([0.0, 0.0, 1.0]))

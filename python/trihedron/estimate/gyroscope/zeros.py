@@ -1,4 +1,4 @@
-"""Zero readings of the holds: their common value, how far the true zero changes, and what each hold then has."""
+"""Biases of the poses: their common value, how far the true bias changes, and what each pose then has."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from trihedron.probability import chdtri
 def pool_zeros(
     zero: FloatArray, var_zero: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Random-effects mean of zero readings (n, 3) of variance (n, 3) (DerSimonian & Laird 1986).
+    """Random-effects mean of biases (n, 3) of variance (n, 3) (DerSimonian & Laird 1986).
 
     Returns weights (n, 3), mean (3,), its variance (3,), χ² against constancy (3,) with n − 1 degrees of freedom, and
-    the variance (3,) of the true zero between holds, nothing where χ² is within chance.
+    the variance (3,) of the true bias between poses, nothing where χ² is within chance.
     """
     floor = np.maximum(var_zero, 1e-30 + 1e-24 * zero**2)
     weight = 1.0 / floor
@@ -23,7 +23,7 @@ def pool_zeros(
     chi2 = (weight * (zero - mean) ** 2).sum(axis=0)
     dof = len(zero) - 1
     spread = np.maximum(chi2 - dof, 0.0) / np.maximum(total - (weight**2).sum(axis=0) / total, 1e-300)
-    # Only a change beyond chance counts: a spread fitted to pure noise would spoil the weights of long holds.
+    # Only a change beyond chance counts: a spread fitted to pure noise would spoil the weights of long poses.
     spread = np.where(chi2 > dof + 4.0 * np.sqrt(2.0 * max(dof, 1)), spread, 0.0)
     weight = 1.0 / (floor + spread)
     weight /= weight.sum(axis=0)
@@ -33,7 +33,7 @@ def pool_zeros(
 
 
 def excess_variance(values: FloatArray, noise: FloatArray) -> FloatArray:
-    """Variance (3,) beyond ``noise`` (n, 3) in ``values`` (n, 3) about zero, from the median: deaf to single bad holds.
+    """Variance (3,) beyond ``noise`` (n, 3) in ``values`` (n, 3) about zero, from the median: deaf to single bad poses.
 
     Solves ``median(x²/(v + τ²)) = median of χ²(1)`` for τ² of each column; zero where noise alone explains the median.
     """
@@ -57,9 +57,9 @@ def _median(values: FloatArray) -> float:
 
 
 def shrink(zero: FloatArray, var_zero: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Zero readings of the holds drawn to the session's by their noise: ``(z/v + z̄/τ²)/(1/v + 1/τ²)`` and its variance.
+    """Biases of the poses drawn to the session's by their noise: ``(z/v + z̄/τ²)/(1/v + 1/τ²)`` and its variance.
 
-    With a zero that changes (τ² ≫ v) each hold keeps its own; with a steady one a short hold borrows from the others.
+    With a bias that changes (τ² ≫ v) each pose keeps its own; with a steady one a short pose borrows from the others.
     """
     n = len(zero)
     tau2 = excess_variance((zero - mean) * np.sqrt(n / max(n - 1, 1)), var_zero)

@@ -10,7 +10,7 @@ from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
 from trihedron.estimate.kalman.session import (
     calibrate_session,
     calibrate_session_without_references,
-    noise_from_holds,
+    noise_from_poses,
     pose_readings,
 )
 from trihedron.estimate.kalman.shaping import ShapingOptions
@@ -30,8 +30,8 @@ __all__ = [
     "check_innovations",
     "check_same_converter",
     "check_same_gravity",
-    "noise_from_holds",
     "noise_from_identified",
+    "noise_from_poses",
     "normalised_error_squared",
     "pose_readings",
 ]

@@ -9,14 +9,14 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 State = TypeVar("State")
 
 
 @dataclass(frozen=True)
 class Goal:
-    """Good enough: standard error of sensitivities relative to the axis' own, and of the zero reading in m/s²."""
+    """Good enough: standard error of sensitivities relative to the axis' own, and of the bias in m/s²."""
 
     sensitivity: float = 1e-3
     zero_m_s2: float = 0.02

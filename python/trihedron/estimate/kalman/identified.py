@@ -8,21 +8,21 @@ from typing import Protocol
 
 import numpy as np
 
+from trihedron.errors import RefusedError
 from trihedron.records.calibration import SensorCalibration
-from trihedron.records.hold_noise import OctaveNoise
 from trihedron.records.kalman import AxisNoise
-from trihedron.refused import RefusedError
+from trihedron.records.pose_noise import OctaveNoise
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 MOST_ABOVE = 2.0
-"""Noise of the session over that of the log of rest beyond which its error bars would be more than twice too small."""
+"""Noise of the session over that of the static log from which its uncertainties would be more than twice too small."""
 MOST_BELOW = 3.0
 """The other way round: a sensor may be quieter in a session than in an office, not so in every octave."""
 LARGEST_MISS_OF_GRAVITY = 0.3
 """Part of g by which a log of rest may miss it as the calibration reads it: ranges differ by factors of two, zeros
 from one day to another, or of a second unit of a cheap kind, by less."""
 COARSER = math.sqrt(2.0)
-"""Steps that differ by more are of another converter or range."""
+"""Steps that differ by more are of another ADC or range."""
 
 
 class IdentifiedProcess(Protocol):
@@ -58,7 +58,7 @@ class IdentifiedAxis(Protocol):
 
     @property
     def resolution(self) -> float:
-        """Step of the converter."""
+        """Step of the ADC."""
 
     @property
     def gauss_markov(self) -> IdentifiedProcess | None:
@@ -156,7 +156,7 @@ def check_same_converter(
     rate_hz: float,
     source: str,
 ) -> None:
-    """Refuse the noise of another converter than the session's, of which ``steps`` and ``octaves`` by axis are given.
+    """Refuse the noise of another ADC than the session's, of which ``steps`` and ``octaves`` by axis are given.
 
     Steps are compared where the session's is not lost in the noise; densities octave by octave, beyond a factor in
     every one of them: a filter or a hand's tremor changes some.

@@ -1,4 +1,4 @@
-"""Live use: an estimate with error bars after every pose, when to stop, and what to do next."""
+"""Live use: an estimate with uncertainties after every pose, when to stop, and what to do next."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.kalman.guide import Goal, Guide
 from trihedron.estimate.kalman.per_axis import Prior, noise_per_axis
 from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.kalman import AxisNoise, LiveEstimate
-from trihedron.refused import RefusedError
 
 
 class LiveCalibration:
@@ -35,7 +35,7 @@ class LiveCalibration:
     session_s : float
         Rough length of the session; sets the slowest noise that is modelled.
     hold_s, pause_s : float
-        Length of the holds and pauses to come, for the prediction.
+        Length of the poses and pauses to come, for the prediction.
     """
 
     def __init__(
@@ -47,15 +47,15 @@ class LiveCalibration:
         prior: Prior | None = None,
         options: ShapingOptions | None = None,
         session_s: float = 1800.0,
-        hold_s: float = 3.0,
+        pose_s: float = 3.0,
         pause_s: float = 3.0,
     ) -> None:
         self.goal = goal or Goal()
         self._gravity = gravity_m_s2
-        self._hold, self._pause = hold_s, pause_s
+        self._pose, self._pause = pose_s, pause_s
         options = options or ShapingOptions()
-        models = [shaping_model(n, options, session_s=session_s, hold_s=hold_s) for n in noise_per_axis(noise)]
-        prior = prior or Prior.diffuse([model.fast_variance(hold_s) ** 0.5 for model in models])
+        models = [shaping_model(n, options, session_s=session_s, pose_s=pose_s) for n in noise_per_axis(noise)]
+        prior = prior or Prior.diffuse([model.fast_variance(pose_s) ** 0.5 for model in models])
         self._filters = [
             _core.AxisKalman(model, _core.KalmanStart(prior.mean[i], prior.sigma[i], prior.walk[i]))
             for i, model in enumerate(models)
@@ -72,7 +72,7 @@ class LiveCalibration:
         reference: npt.ArrayLike,
         *,
         start_s: float,
-        hold_s: float,
+        pose_s: float,
         plan: npt.ArrayLike | None = None,
         look_ahead: int = 100,
     ) -> LiveEstimate:
@@ -81,11 +81,11 @@ class LiveCalibration:
         Parameters
         ----------
         reading : (3,)
-            Mean raw reading of the hold.
+            Mean raw reading of the pose.
         reference : (3,)
             Specific force in the body, m/s².
         start_s, hold_s : float
-            When the hold started and how long it lasted.
+            When the pose started and how long it lasted.
         plan : (m, 3), optional
             Poses still planned, m/s²; without it the most useful of 26 directions is taken each time.
         look_ahead : int
@@ -105,7 +105,7 @@ class LiveCalibration:
         nis = np.empty(3)
         vector = [float(v) for v in f]
         for axis, one in enumerate(self._filters):
-            innovation, variance = one.add(float(z[axis]), vector, start_s, hold_s)
+            innovation, variance = one.add(float(z[axis]), vector, start_s, pose_s)
             nis[axis] = innovation**2 / variance
         return self.estimate(nis=nis, plan=plan, look_ahead=look_ahead)
 
@@ -149,5 +149,5 @@ class LiveCalibration:
         vector = [float(v) for v in direction]
         copies = [one.copy() for one in filters]
         for one in copies:
-            one.imagine(vector, start, self._hold)
+            one.imagine(vector, start, self._pose)
         return copies

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.kalman.consistency import check_innovations, consistency_findings, is_settled
 from trihedron.estimate.kalman.guide import Goal, Guide
 from trihedron.estimate.kalman.norm_start import NormStart
@@ -18,7 +19,6 @@ from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisNoise, LiveEstimate, NormKalmanCalibration
-from trihedron.refused import RefusedError
 
 NormFrame = Literal["lower", "symmetric"]
 
@@ -54,16 +54,16 @@ class LiveNormCalibration:
         goal: Goal | None = None,
         options: ShapingOptions | None = None,
         session_s: float = 1800.0,
-        hold_s: float = 3.0,
+        pose_s: float = 3.0,
         pause_s: float = 3.0,
     ) -> None:
         self.goal = goal or Goal()
         self.frame: NormFrame = frame
         self._gravity = gravity_m_s2
-        self._hold, self._pause = hold_s, pause_s
+        self._pose, self._pause = pose_s, pause_s
         self._zero = start.zero
         options = options or ShapingOptions()
-        models = [shaping_model(n, options, session_s=session_s, hold_s=hold_s) for n in noise_per_axis(noise)]
+        models = [shaping_model(n, options, session_s=session_s, pose_s=pose_s) for n in noise_per_axis(noise)]
         size = np.abs(np.diag(start.S)).mean()
         sigma = np.array([start.sigma_relative * size] * 6 + [start.sigma_zero_m_s2] * 3)
         mean = np.array([start.S[i, j] for i, j in ENTRIES] + [0.0] * 3)
@@ -82,7 +82,7 @@ class LiveNormCalibration:
         reading: npt.ArrayLike,
         *,
         start_s: float,
-        hold_s: float,
+        pose_s: float,
         extra_variance: npt.ArrayLike = 0.0,
         relinearise: bool = True,
         look_ahead: int = 50,
@@ -101,14 +101,14 @@ class LiveNormCalibration:
         if a.shape != (3,):
             raise RefusedError(f"a pose needs three readings, got shape {a.shape}")
         extra = [float(v) for v in np.broadcast_to(np.asarray(extra_variance, dtype=np.float64), (3,))]
-        innovation, variance = self._filter.add([float(v) for v in a - self._zero], start_s, hold_s, extra)
+        innovation, variance = self._filter.add([float(v) for v in a - self._zero], start_s, pose_s, extra)
         if relinearise:
             self.relinearise(10)
         return self.estimate(nis=np.full(3, innovation**2 / variance), look_ahead=look_ahead)
 
-    def load(self, readings: FloatArray, start_s: FloatArray, hold_s: FloatArray, extra_variance: FloatArray) -> None:
+    def load(self, readings: FloatArray, start_s: FloatArray, pose_s: FloatArray, extra_variance: FloatArray) -> None:
         """Take many poses at once, (n, 3), (n,), (n,), (n, 3); :meth:`relinearise` then estimates from all of them."""
-        self._filter.load(readings - self._zero, start_s, hold_s, np.ascontiguousarray(extra_variance))
+        self._filter.load(readings - self._zero, start_s, pose_s, np.ascontiguousarray(extra_variance))
 
     def relinearise(self, most: int = MOST_RUNS) -> bool:
         """Repeat the run over all poses until the constants stay; whether they did within ``most`` runs."""
@@ -164,7 +164,7 @@ class LiveNormCalibration:
         S, b = self._centred(one)
         copy = one.copy()
         reading = np.linalg.solve(S, direction - b)
-        copy.imagine([float(v) for v in reading], (one.end_s or 0.0) + self._pause, self._hold)
+        copy.imagine([float(v) for v in reading], (one.end_s or 0.0) + self._pause, self._pose)
         return copy
 
     def estimate(self, *, nis: FloatArray | None = None, look_ahead: int = 50) -> LiveEstimate:
@@ -195,7 +195,7 @@ def calibrate_without_references(
     noise: AxisNoise | Sequence[AxisNoise],
     *,
     start_s: npt.ArrayLike,
-    hold_s: npt.ArrayLike,
+    pose_s: npt.ArrayLike,
     gravity_m_s2: float,
     start: NormStart | None = None,
     frame: NormFrame = "lower",
@@ -208,11 +208,11 @@ def calibrate_without_references(
     Parameters
     ----------
     readings : (n, 3)
-        Mean raw reading of each hold.
+        Mean raw reading of each pose.
     noise : AxisNoise or three of them
         Noise of the raw readings.
     start_s, hold_s : (n,)
-        When each hold starts and how long it lasts, s.
+        When each pose starts and how long it lasts, s.
     start : NormStart, optional
         Default: guessed from the range of the readings, positive axes.
     extra_variance : scalar, (n,) or (n, 3)
@@ -224,7 +224,7 @@ def calibrate_without_references(
         When shapes disagree, values are not finite, poses are out of order, or there are fewer than nine.
     """
     a = _mean_readings(readings)
-    begin, hold, extra = pose_arrays(len(a), start_s, hold_s, extra_variance)
+    begin, pose, extra = pose_arrays(len(a), start_s, pose_s, extra_variance)
 
     def fresh() -> LiveNormCalibration:
         return LiveNormCalibration(
@@ -233,14 +233,14 @@ def calibrate_without_references(
             start=start or NormStart.from_range(a, gravity_m_s2),
             frame=frame,
             options=options,
-            session_s=float(begin[-1] + hold[-1] - begin[0]),
-            hold_s=float(np.median(hold)),
+            session_s=float(begin[-1] + pose[-1] - begin[0]),
+            pose_s=float(np.median(pose)),
         )
 
-    parameters, sigmas = _track(fresh(), a, begin, hold, extra)
+    parameters, sigmas = _track(fresh(), a, begin, pose, extra)
     # The answer does not depend on how the first few poses went: all together, from the start.
     live = fresh()
-    live.load(a, begin, hold, extra)
+    live.load(a, begin, pose, extra)
     converged = live.relinearise()
     S, b, covariance = live.calibration()
     parameters[-1], sigmas[-1] = _flat(S, b, covariance)
@@ -288,14 +288,14 @@ def _flat(S: FloatArray, b: FloatArray, covariance: FloatArray) -> tuple[FloatAr
 
 
 def _track(
-    live: LiveNormCalibration, a: FloatArray, begin: FloatArray, hold: FloatArray, extra: FloatArray
+    live: LiveNormCalibration, a: FloatArray, begin: FloatArray, pose: FloatArray, extra: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """S row by row and b with standard errors (n, 12), as they stand after every pose."""
     parameters, sigmas = np.empty((len(a), 12)), np.empty((len(a), 12))
     for i in range(len(a)):
         # Every pose counts at first; later ones change the point of linearisation by less than its error.
         again = i < 40 or i % 10 == 0
-        when = {"start_s": float(begin[i]), "hold_s": float(hold[i])}
+        when = {"start_s": float(begin[i]), "pose_s": float(pose[i])}
         live.add(a[i], **when, extra_variance=extra[i], relinearise=again, look_ahead=0)
         parameters[i], sigmas[i] = _flat(*live.calibration())
     return parameters, sigmas

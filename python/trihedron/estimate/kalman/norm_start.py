@@ -8,14 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 
 @dataclass(frozen=True, eq=False)
 class NormStart:
     """Where the filter starts: ``f = S (raw − zero)`` with S (3, 3) and bias (3,).
 
-    S is good to ``sigma_relative`` of its size, the zero reading to ``sigma_zero_m_s2``. The signs of S decide
+    S is good to ``sigma_relative`` of its size, the bias to ``sigma_zero_m_s2``. The signs of S decide
     the signs of the result: the length of a vector cannot.
     """
 
@@ -39,7 +39,7 @@ class NormStart:
 
     @classmethod
     def nominal(cls, si_per_raw: float, zero: npt.ArrayLike = (0.0, 0.0, 0.0)) -> NormStart:
-        """The data sheet: one scale [m/s² per raw unit] for all axes, and the zero reading."""
+        """The data sheet: one scale [m/s² per raw unit] for all axes, and the bias."""
         return cls(si_per_raw * np.eye(3), np.asarray(zero, dtype=np.float64))
 
     @classmethod

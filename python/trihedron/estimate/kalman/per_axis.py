@@ -10,13 +10,13 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.kalman.consistency import check_innovations, consistency_findings, is_settled
 from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisKalmanResult, AxisNoise, ConstantsTrack, KalmanCalibration, PoseTable
 from trihedron.records.words import words
-from trihedron.refused import REFUSALS, RefusedError
 
 DIFFUSE = 1e8
 """Width of a diffuse start in standard deviations of one reading: its information is 1e-16 of one pose's."""
@@ -63,7 +63,7 @@ def calibrate_with_references(
     noise: AxisNoise | Sequence[AxisNoise],
     *,
     start_s: npt.ArrayLike,
-    hold_s: npt.ArrayLike,
+    pose_s: npt.ArrayLike,
     extra_variance: npt.ArrayLike = 0.0,
     prior: Prior | None = None,
     options: ShapingOptions | None = None,
@@ -75,13 +75,13 @@ def calibrate_with_references(
     Parameters
     ----------
     readings : (n, 3)
-        Mean raw reading of each hold.
+        Mean raw reading of each pose.
     references : PoseTable or (n, 3)
         Specific force in the body, m/s².
     noise : AxisNoise or three of them
         Noise of the raw readings.
     start_s, hold_s : (n,)
-        When each hold starts and how long it lasts, s; scalars are not enough for ``start_s``.
+        When each pose starts and how long it lasts, s; scalars are not enough for ``start_s``.
     extra_variance : (n,), (n, 3) or scalar
         Variance of a reading on top of the noise model, raw².
     prior : Prior, optional
@@ -102,23 +102,23 @@ def calibrate_with_references(
         raise RefusedError(
             f"there are {len(f)} reference poses, but the readings have shape {z.shape}: one row per pose"
         )
-    start, hold, extra = pose_arrays(len(f), start_s, hold_s, extra_variance)
+    start, pose, extra = pose_arrays(len(f), start_s, pose_s, extra_variance)
     noises = noise_per_axis(noise)
     options = options or ShapingOptions()
-    session = float(start[-1] + hold[-1] - start[0])
-    models = [shaping_model(n, options, session_s=session, hold_s=float(np.median(hold))) for n in noises]
+    session = float(start[-1] + pose[-1] - start[0])
+    models = [shaping_model(n, options, session_s=session, pose_s=float(np.median(pose))) for n in noises]
     if table.sigma_m_s2 > 0:
         # An angle error moves the reference sideways by σ; the axis' own sensitivity turns it into raw units.
         extra = extra + (table.sigma_m_s2 * _sensitivity(z, f)) ** 2
     is_diffuse = prior is None
     if prior is None:
-        prior = Prior.diffuse([model.fast_variance(float(np.min(hold))) ** 0.5 for model in models])
+        prior = Prior.diffuse([model.fast_variance(float(np.min(pose))) ** 0.5 for model in models])
 
     axes: list[AxisKalmanResult] = []
     findings: list[Finding] = []
     for axis in range(3):
         result = _one_axis(
-            axis, noises[axis], models[axis], prior, z[:, axis].copy(), f, start, hold, extra[:, axis].copy(),
+            axis, noises[axis], models[axis], prior, z[:, axis].copy(), f, start, pose, extra[:, axis].copy(),
             with_baselines=with_baselines,
             must_determine=is_diffuse,
         )  # fmt: skip
@@ -131,12 +131,12 @@ def calibrate_with_references(
     accelerometer = direct_form(axes, raw_unit, observability)
     residual = (z @ accelerometer.S.T + accelerometer.b) - f
     return KalmanCalibration(
-        tuple(axes), accelerometer, inverse_S, inverse_b, f, z, start, hold, residual, tuple(findings)
+        tuple(axes), accelerometer, inverse_S, inverse_b, f, z, start, pose, residual, tuple(findings)
     )
 
 
 def pose_arrays(
-    n: int, start_s: npt.ArrayLike, hold_s: npt.ArrayLike, extra_variance: npt.ArrayLike
+    n: int, start_s: npt.ArrayLike, pose_s: npt.ArrayLike, extra_variance: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Starts (n,), lengths (n,) and extra variances (n, 3) of n poses.
 
@@ -146,13 +146,13 @@ def pose_arrays(
         When there is not one start per pose, or a length is not positive.
     """
     start = np.array(start_s, dtype=np.float64)
-    hold = np.array(np.broadcast_to(np.asarray(hold_s, dtype=np.float64), (n,)))
+    pose = np.array(np.broadcast_to(np.asarray(pose_s, dtype=np.float64), (n,)))
     if start.shape != (n,):
         raise RefusedError(f"start_s must have one entry per pose ({n}), got shape {start.shape}")
-    if not (np.all(np.isfinite(hold)) and np.all(hold > 0)):
-        raise RefusedError("hold_s must be finite and positive: every pose needs a positive length")
+    if not (np.all(np.isfinite(pose)) and np.all(pose > 0)):
+        raise RefusedError("pose_s must be finite and positive: every pose needs a positive length")
     extra = np.asarray(extra_variance, dtype=np.float64)
-    return start, hold, np.array(np.broadcast_to(extra[:, None] if extra.ndim == 1 else extra, (n, 3)))
+    return start, pose, np.array(np.broadcast_to(extra[:, None] if extra.ndim == 1 else extra, (n, 3)))
 
 
 def _sensitivity(z: FloatArray, f: FloatArray) -> FloatArray:
@@ -170,7 +170,7 @@ def _one_axis(
     z: FloatArray,
     f: FloatArray,
     start: FloatArray,
-    hold: FloatArray,
+    pose: FloatArray,
     extra: FloatArray,
     *,
     with_baselines: bool,
@@ -178,14 +178,14 @@ def _one_axis(
 ) -> AxisKalmanResult:
     mean, sigma = prior.mean[axis].copy(), prior.sigma[axis].copy()
     begin = _core.KalmanStart(mean, sigma, prior.walk[axis])
-    poses = _core.KalmanPoses(z, f, start, hold, extra)
+    poses = _core.KalmanPoses(z, f, start, pose, extra)
     constants, stated, covariance, innovation, variance, drift, drift_sigma = _core.kalman_track(model, begin, poses)
     _, _, smoothed, smoothed_sigma = _core.kalman_smooth(model, begin, poses)
     tracks = [ConstantsTrack("kalman", constants, stated)]
     batch: dict[str, tuple[FloatArray, FloatArray]] = {}
     if with_baselines:
         # Ordinary least squares is told the scatter of one reading, which is all it can use.
-        white = model.fast_variance(float(np.median(hold))) + float(np.median(extra))
+        white = model.fast_variance(float(np.median(pose))) + float(np.median(extra))
         recursive = _core.kalman_least_squares(z, f, white, mean, sigma)
         tracks.append(ConstantsTrack("recursive least squares", *recursive))
         try:

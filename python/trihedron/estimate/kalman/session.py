@@ -1,4 +1,4 @@
-"""From a recording and its still poses to what the filters take: mean readings, times, noise."""
+"""From a recording and its poses to what the filters take: mean readings, times, noise."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.kalman.norm_invariant import NormFrame, calibrate_without_references
 from trihedron.estimate.kalman.norm_start import NormStart
 from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
@@ -22,29 +23,28 @@ from trihedron.records import (
     Recording,
     Segments,
 )
-from trihedron.refused import RefusedError
 
 
 @dataclass(frozen=True, eq=False)
 class PoseReadings:
-    """Mean raw readings (n, 3) of the still poses, their starts and lengths (n,) [s], and standard errors (n, 3)."""
+    """Mean raw readings (n, 3) of the poses, their starts and lengths (n,) [s], and standard errors (n, 3)."""
 
     mean: FloatArray
     start_s: FloatArray
-    hold_s: FloatArray
+    pose_s: FloatArray
     sigma_mean: FloatArray
 
 
 def pose_readings(recording: Recording, segments: Segments, table: PoseTable | None = None) -> PoseReadings:
-    """Means of the still poses, matched with a pose table.
+    """Means of the poses, matched with a pose table.
 
-    A table with start and stop times is averaged over its own times; one with hold numbers picks still poses of the
-    log; one with neither must have as many rows as the log has still poses.
+    A table with start and stop times is averaged over its own times; one with hold numbers picks poses of the
+    log; one with neither must have as many rows as the log has poses.
 
     Raises
     ------
     ValueError
-        When there is no accelerometer, the log has no still pose, or table and log do not match.
+        When there is no accelerometer, the log has no pose, or table and log do not match.
     """
     a = recording.accelerometer
     if a is None:
@@ -52,25 +52,25 @@ def pose_readings(recording: Recording, segments: Segments, table: PoseTable | N
     if table is not None and table.start_s is not None and table.stop_s is not None:
         return _timed_means(recording, segments, a, table.start_s, table.stop_s)
     mean, sigma = segments.accelerometer_mean, segments.norm_sigma
-    if mean is None or sigma is None or segments.n_holds == 0:
+    if mean is None or sigma is None or segments.n_poses == 0:
         raise RefusedError(f"{recording.source}: no pose was found, so there is nothing to calibrate from")
     step = 1.0 / recording.rate_hz
-    start = np.array([recording.time_s[hold.start] for hold in segments.holds])
-    length = np.array([recording.time_s[hold.stop - 1] + step for hold in segments.holds]) - start
-    chosen = np.arange(segments.n_holds)
-    if table is not None and table.hold is not None:
-        chosen = np.asarray(table.hold, dtype=np.intp)
-        if np.any(chosen >= segments.n_holds):
+    start = np.array([recording.time_s[pose.start] for pose in segments.poses])
+    length = np.array([recording.time_s[pose.stop - 1] + step for pose in segments.poses]) - start
+    chosen = np.arange(segments.n_poses)
+    if table is not None and table.pose is not None:
+        chosen = np.asarray(table.pose, dtype=np.intp)
+        if np.any(chosen >= segments.n_poses):
             worst = int(np.max(chosen)) + 1
             raise RefusedError(
-                f"{table.source}: pose {worst} is asked for, but {recording.source} has {segments.n_holds} poses"
+                f"{table.source}: pose {worst} is asked for, but {recording.source} has {segments.n_poses} poses"
             )
         if np.any(np.diff(chosen) <= 0):
             raise RefusedError(f"{table.source}: give the poses in the order in which they were recorded, each once")
-    elif table is not None and len(table) != segments.n_holds:
+    elif table is not None and len(table) != segments.n_poses:
         raise RefusedError(
-            f"{table.source} lists {len(table)} poses, but {recording.source} has {segments.n_holds} poses: add "
-            "a column 'hold' with the number of the pose (`trihedron segment` lists them), or 'start' and 'stop'"
+            f"{table.source} lists {len(table)} poses, but {recording.source} has {segments.n_poses} poses: add "
+            "a column 'pose' with the number of the pose (`trihedron segment` lists them), or 'start' and 'stop'"
         )
     return PoseReadings(mean[chosen], start[chosen], length[chosen], sigma[chosen])
 
@@ -93,8 +93,8 @@ def _timed_means(
     return PoseReadings(mean, np.array(start_s), np.array(stop_s) - np.array(start_s), sigma)
 
 
-def noise_from_holds(recording: Recording, segments: Segments) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
-    """White noise as scattered inside the holds, and the converter's step where it is coarse: nothing slow.
+def noise_from_poses(recording: Recording, segments: Segments) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
+    """White noise as scattered inside the poses, and the LSB where it is coarse: nothing slow.
 
     Raises
     ------
@@ -121,10 +121,10 @@ def _noise(
 ) -> tuple[AxisNoise | Sequence[AxisNoise], FloatArray, tuple[Finding, ...]]:
     if noise is not None:
         return noise, np.zeros_like(poses.mean), ()
-    assumed = noise_from_holds(recording, segments)
+    assumed = noise_from_poses(recording, segments)
     white = np.array([one.white for one in assumed])
-    # What the segmentation saw beyond white noise inside a hold comes on top of each mean.
-    extra = np.maximum(poses.sigma_mean**2 - white**2 / poses.hold_s[:, None], 0.0)
+    # What the segmentation saw beyond white noise inside a pose comes on top of each mean.
+    extra = np.maximum(poses.sigma_mean**2 - white**2 / poses.pose_s[:, None], 0.0)
     finding = Finding.of(FindingCode.NOISE_ASSUMED)
     return assumed, extra, (finding,)
 
@@ -140,7 +140,7 @@ def calibrate_session(
 ) -> KalmanCalibration:
     """Calibrate the accelerometer of a recording in the known attitudes of a pose table, all methods side by side.
 
-    ``noise`` None takes what the holds show (white noise and resolution) and says so in a finding.
+    ``noise`` None takes what the poses show (white noise and resolution) and says so in a finding.
 
     Raises
     ------
@@ -151,10 +151,10 @@ def calibrate_session(
     used, extra, findings = _noise(recording, segments, noise, poses)
     result = calibrate_with_references(
         poses.mean,
-        replace(table, hold=None, start_s=None, stop_s=None),
+        replace(table, pose=None, start_s=None, stop_s=None),
         used,
         start_s=poses.start_s,
-        hold_s=poses.hold_s,
+        pose_s=poses.pose_s,
         extra_variance=extra,
         prior=prior,
         options=options,
@@ -173,12 +173,12 @@ def calibrate_session_without_references(
     frame: NormFrame = "lower",
     options: ShapingOptions | None = None,
 ) -> NormKalmanCalibration:
-    """Calibrate the accelerometer of a recording from the length of gravity in its still poses.
+    """Calibrate the accelerometer of a recording from the length of gravity in its poses.
 
     Raises
     ------
     ValueError
-        When there are fewer than nine still poses.
+        When there are fewer than nine poses.
     """
     poses = pose_readings(recording, segments)
     used, extra, findings = _noise(recording, segments, noise, poses)
@@ -186,7 +186,7 @@ def calibrate_session_without_references(
         poses.mean,
         used,
         start_s=poses.start_s,
-        hold_s=poses.hold_s,
+        pose_s=poses.pose_s,
         gravity_m_s2=gravity_m_s2,
         start=start,
         frame=frame,

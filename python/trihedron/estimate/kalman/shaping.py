@@ -10,7 +10,7 @@ from trihedron import _core
 from trihedron.records.kalman import AxisNoise
 
 SLOWEST_PER_SESSION, FASTEST_PER_HOLD = 0.3, 6.0
-"""Extreme inverse correlation times, over those of the session and of a hold. With one Gauss-Markov process per decade
+"""Extreme inverse correlation times, over those of the session and of a pose. With one Gauss-Markov process per decade
 between them the Allan deviation follows flicker within 2 %."""
 
 
@@ -21,7 +21,7 @@ class ShapingOptions:
     ``flicker_rates_per_s`` are the inverse correlation times β of the Gauss-Markov processes for flicker: one for the
     article's filter, empty for as many as the session needs. ``ramp_frequency_rad_s`` is ω₀ of the second-order ramp, 0
     for one tenth of the session's inverse length: its slope then lasts for the whole session; ``ramp_damping`` is ζ.
-    With ``averages`` a reading is the mean over its hold, exactly; without, it is the value at its end (the article).
+    With ``averages`` a reading is the mean over its pose, exactly; without, it is the value at its end (the article).
     """
 
     flicker_rates_per_s: tuple[float, ...] = ()
@@ -30,18 +30,18 @@ class ShapingOptions:
     averages: bool = True
 
     @classmethod
-    def of_the_article(cls, session_s: float, hold_s: float) -> ShapingOptions:
+    def of_the_article(cls, session_s: float, pose_s: float) -> ShapingOptions:
         """Eight states: one Gauss-Markov process in the middle of the session's time scales, instantaneous readings."""
-        return cls(flicker_rates_per_s=(1.0 / float(np.sqrt(session_s * hold_s)),), averages=False)
+        return cls(flicker_rates_per_s=(1.0 / float(np.sqrt(session_s * pose_s)),), averages=False)
 
 
 def shaping_model(
-    noise: AxisNoise, options: ShapingOptions, *, session_s: float, hold_s: float
+    noise: AxisNoise, options: ShapingOptions, *, session_s: float, pose_s: float
 ) -> _core.AxisKalmanModel:
     """Compiled shaping filter of one axis for a session of ``session_s`` with holds of about ``hold_s``."""
     rates = options.flicker_rates_per_s
     if not rates:
-        slow, fast = SLOWEST_PER_SESSION / session_s, FASTEST_PER_HOLD / hold_s
+        slow, fast = SLOWEST_PER_SESSION / session_s, FASTEST_PER_HOLD / pose_s
         n = max(2, int(np.ceil(np.log10(fast / slow))) + 1)
         rates = tuple(float(rate) for rate in np.geomspace(slow, fast, n))
     return _core.AxisKalmanModel(

@@ -5,9 +5,9 @@ from trihedron.channel_facts.pooled import ratio_of
 from trihedron.estimate.noise.allan import allan_deviation, default_clusters, stream_allan_deviation
 from trihedron.estimate.noise.degrees import degrees_of_freedom
 from trihedron.estimate.noise.from_curve import identify_curve
-from trihedron.estimate.noise.holds import noise_of_holds
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.planning import recording_length_s, relative_sigma
+from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.estimate.noise.streamed import stream_noise
 
 __all__ = [
@@ -17,7 +17,7 @@ __all__ = [
     "gain_of",
     "identify_curve",
     "identify_noise",
-    "noise_of_holds",
+    "noise_of_poses",
     "ratio_of",
     "recording_length_s",
     "relative_sigma",

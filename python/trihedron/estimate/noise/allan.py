@@ -11,10 +11,10 @@ from scipy.special import chdtri
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.noise.degrees import KINDS, bias_along, edf_along
 from trihedron.estimate.noise.gaps import true_share
 from trihedron.records.noise import AllanCurve, AllanKind
-from trihedron.refused import RefusedError
 
 _LONGEST = {"overlapping": 2, "non-overlapping": 2, "modified": 3, "hadamard": 3, "total": 2}
 

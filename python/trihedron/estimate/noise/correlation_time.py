@@ -1,4 +1,4 @@
-"""The time in which a sensor's coloured noise forgets: a first-order Gauss-Markov process in the octaves of its holds.
+"""The time in which a sensor's coloured noise forgets: a first-order Gauss-Markov process in the octaves of its poses.
 
     S(f) = N² + q / (1 + (2πfτ)²)                                                             (docs/noise.md, eq. N.1)
 
@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from trihedron.arrays import FloatArray
-from trihedron.records.hold_noise import HoldNoise, Measured
+from trihedron.records.pose_noise import Measured, PoseNoise
 
 TIMES_PER_OCTAVE = 8
 BEYOND_OCTAVES = 4.0
@@ -34,7 +34,7 @@ FEWEST_OCTAVES = 5
 """Five octaves hold a floor, a slope and a plateau."""
 
 
-def correlation_time(axes: Sequence[HoldNoise]) -> Measured | None:
+def correlation_time(axes: Sequence[PoseNoise]) -> Measured | None:
     """τ [s] of a sensor's axes with its 95 % interval; ``None`` where none shows."""
     tables = [_Octaves(axis) for axis in axes if axis.white is not None and len(axis.octaves) >= FEWEST_OCTAVES]
     if not tables:
@@ -61,7 +61,7 @@ def correlation_time(axes: Sequence[HoldNoise]) -> Measured | None:
 class _Octaves:
     """Edges (m,) [Hz], densities (m,) and the standard errors of their logarithms (m,) of one axis."""
 
-    def __init__(self, axis: HoldNoise) -> None:
+    def __init__(self, axis: PoseNoise) -> None:
         self.low = np.array([o.low_hz for o in axis.octaves])
         self.high = np.array([o.high_hz for o in axis.octaves])
         self.density = np.array([o.density.value for o in axis.octaves])

@@ -7,9 +7,9 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.noise.isotonic import never_falling
 from trihedron.records.noise import AllanKind
-from trihedron.refused import RefusedError
 
 KINDS = {
     "overlapping": _core.AllanKind.Overlapping,

@@ -10,8 +10,8 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts.low_pass import LEAKAGE, Spectrum, gain_of
+from trihedron.errors import RefusedError
 from trihedron.records.channel_facts import LowPass
-from trihedron.refused import RefusedError
 
 SHAPE_TERMS = 2
 """Even powers of frequency by which the shape below the corner may differ from the best of the list: of running means,

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import check_question, curve_with_intervals
 from trihedron.estimate.noise.axis import LEAST_EDF
@@ -19,7 +20,6 @@ from trihedron.estimate.noise.curve_terms import LEAST_EDF as LEAST_EDF_OF_A_POI
 from trihedron.estimate.noise.curve_terms import TERMS, CurveFit, CurvePoints
 from trihedron.records.finding import Finding
 from trihedron.records.noise import AllanCurve, Noise, NoiseAxis, NoiseTerm, TermName
-from trihedron.refused import RefusedError
 
 FEWEST_POINTS = 6
 STEP = 1.9

@@ -111,7 +111,7 @@ def filled(parts: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Segments (k, n) about their means without a missing reading, and the share of each that was there (k,).
 
     Few missing readings are bridged and their share of white noise given back (1 is returned); scattered ones are left
-    at the mean; segments with a long gap are left out.
+    at the mean; segments with a long gap are excluded.
     """
     missing = ~np.isfinite(parts)
     if not missing.any():

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records import Recording
-from trihedron.refused import RefusedError
 from trihedron.units import acceleration_to_si, rate_to_si
 
 AXES = ("x", "y", "z")

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import as_readings, check_question, curve_of_columns
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
@@ -20,12 +21,11 @@ from trihedron.estimate.noise.screening import Event, readout, repeated_rows, sh
 from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.records.finding import Finding
 from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
-from trihedron.refused import RefusedError
 
 MOST_DISTURBED = 0.25
-"""Share of an axis that may be left out by itself."""
+"""Share of an axis that may be excluded by itself."""
 SHORTEST = 512
-"""Readings below which noise terms are not told apart."""
+"""Readings below which noise terms are not separated."""
 
 
 def identify_noise(

@@ -1,12 +1,12 @@
-"""Bias instability and walk of an accelerometer, as the length of gravity in the still poses of a session shows them.
+"""Bias instability and walk of an accelerometer, as the length of gravity in the poses of a session shows them.
 
-A pose tells one number of an accelerometer's zero: its part along gravity. With ``u`` (n, 3) the directions of gravity
-in the poses and ``V_B``, ``V_K`` the covariance of one axis' zero per B² and per K² (:mod:`of_zeros`), the residuals of
+A pose tells one number of an accelerometer's bias: its part along gravity. With ``u`` (n, 3) the directions of gravity
+in the poses and ``V_B``, ``V_K`` the covariance of one axis' bias per B² and per K² (:mod:`of_zeros`), the residuals of
 the lengths have
 
     V = σ² + s² I + Σ_k (u_k u_kᵀ) ∘ (B_k² V_B + K_k² V_K)
 
-seen through what is orthogonal to the six products and three components of ``u``, which scales, angles and zeros of any
+seen by what is orthogonal to the six products and three components of ``u``, which scales, angles and biases of any
 calibration take up. B and K of an axis are integrated over a low-discrepancy grid of all six strengths and ``s``: what
 one axis is taken to do changes what is left for the others. docs/noise.md, section 9.
 """
@@ -32,7 +32,7 @@ from trihedron.estimate.noise.of_zeros import (
     kernels,
     levels,
 )
-from trihedron.records.hold_noise import Measured, Ratio
+from trihedron.records.pose_noise import Measured, Ratio
 
 DRAWS = 8192
 """Points over six strengths and a scatter: some hundred of them share the weight of a session of 30 poses."""

@@ -1,11 +1,11 @@
-"""Bias instability and rate random walk of a session, as the zeros of its still poses show them.
+"""Bias instability and rate random walk of a session, as the biases of its poses show them.
 
-A hold of seconds shows neither; the means of some tens of holds over minutes do. Per axis, with one constant, the
-zeros y of poses at t with lengths T have the covariance
+A hold of seconds shows neither; the means of some tens of poses over minutes do. Per axis, with one constant, the
+biases y of poses at t with lengths T have the covariance
 
     V = σ² + s² I + K² [min(t, t') - δ T/6] - (B²/π) L
 
-where σ² are the variances of the means by white noise, s the scatter of zeros from pose to pose where that is known to
+where σ² are the variances of the means by white noise, s the scatter of biases from pose to pose where that is known to
 be there, and L the mean of ln|t - t'| over both windows, by its second integral x²/2 ln|x| - 3x²/4 (1/f noise
 of two-sided density B²/2πf has no variance, only the variogram (2B²/π) ln; constants drop out beside the free mean).
 The likelihood is restricted; B and K have flat priors in their logarithms and a weight on zero.
@@ -23,16 +23,16 @@ import numpy as np
 from scipy.stats import chi2
 
 from trihedron.arrays import FloatArray
-from trihedron.records.hold_noise import Measured, Ratio
+from trihedron.records.pose_noise import Measured, Ratio
 
 FEWEST_CONTRASTS = 11
 """A variance from eleven differences is known to a factor of 1.5, its root to 1.25: with fewer nothing is compared."""
 SPACING = 1.3
 """Levels of B and of K are this factor apart, half of what an interval of 30 poses spans."""
 LOWEST, HIGHEST = 0.03, 8.0
-"""Range of the levels in parts of what the zeros spread by: a tenth of it is not seen, three times it is refuted."""
+"""Range of the levels in parts of what the biases spread by: a tenth of it is not seen, three times it is refuted."""
 LEAST_SIDE = 0.02
-"""A side whose zeros spread by less than this share of the other's is silent, as a simulation without noise is: how
+"""A side whose biases spread by less than this share of the other's is silent, as a simulation without noise is: how
 silent says nothing more."""
 SHOWS = 6.63
 """Twice the log-likelihood that a term must win over its absence: χ² of one degree of freedom passes it in 1 %, half
@@ -43,7 +43,7 @@ MIDDLE_OF_WALK = 6.0
 
 @dataclass(frozen=True, eq=False)
 class PoseZeros:
-    """Zeros of one axis (n,), their standard errors by white noise (n,), middles and lengths of the poses [s] (n,).
+    """Biases of one axis (n,), their standard errors by white noise (n,), middles and lengths of the poses [s] (n,).
 
     ``scatters``: beside noise and drift every pose has an accident of its own, of a size that is then free.
     """
@@ -56,7 +56,7 @@ class PoseZeros:
 
     @property
     def n_contrasts(self) -> int:
-        """Zeros less the constant."""
+        """Biases less the constant."""
         return len(self.values) - 1
 
     @property
@@ -115,7 +115,7 @@ def compare_slow(first: Sequence[PoseZeros], second: Sequence[PoseZeros]) -> Slo
 
 
 def levels(sizes: Sequence[float]) -> FloatArray:
-    """Strengths to be tried, zero first, for zeros that spread by ``sizes`` (what one unit of strength makes of it)."""
+    """Strengths to be tried, zero first, for biases spreading by ``sizes`` (what one unit of strength makes of it)."""
     low, high = LOWEST * min(sizes), HIGHEST * max(sizes)
     n = math.ceil(math.log(high / low) / math.log(SPACING)) + 1
     out: FloatArray = np.concatenate([[0.0], np.geomspace(low, high, n)])

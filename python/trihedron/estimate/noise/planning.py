@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from trihedron.errors import RefusedError
 from trihedron.estimate.noise.spectrum import line_coefficients
 from trihedron.estimate.noise.terms import SYMBOLS
 from trihedron.records.noise import NoiseAxis, TermName
-from trihedron.refused import RefusedError
 
 LONGEST_S = 30 * 86400.0
 """Longest recording that is advised: a month."""

@@ -54,12 +54,12 @@ def events(
 
 
 def disturbed_throughout(share: float) -> Finding:
-    """Too much of the log would have to be left out."""
+    """Too much of the log would have to be excluded."""
     return Finding.of(FindingCode.LOG_MOTION, "throughout", share=share)
 
 
 def stretches_excluded(stretches: Sequence[tuple[int, int]], n: int, rate_hz: float) -> Finding:
-    """What was left out."""
+    """What was excluded."""
     total = sum(b - a for a, b in stretches)
     return Finding.of(
         FindingCode.STRETCHES_EXCLUDED, n_stretches=len(stretches), excluded_s=total / rate_hz, share=total / n
@@ -74,7 +74,7 @@ def written(readings: Readout) -> list[Finding]:
 
 
 def dead(readings: Readout, unit: str) -> Finding:
-    """The noise does not move the converter."""
+    """The noise does not move the ADC."""
     return Finding.of(
         FindingCode.QUANTISATION_DEAD,
         sigma=readings.sigma,

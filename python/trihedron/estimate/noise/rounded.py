@@ -1,4 +1,4 @@
-"""White noise through a converter of a coarse step: what hangs on where between two codes the log lies."""
+"""White noise through an ADC of a coarse step: what hangs on where between two codes the log lies."""
 
 from __future__ import annotations
 

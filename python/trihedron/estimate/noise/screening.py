@@ -1,4 +1,4 @@
-"""What in a static log is not stationary noise: steps, knocks, shaking; and what the converter left of the readings.
+"""What in a static log is not stationary noise: steps, knocks, shaking; and what the ADC left of the readings.
 
 Every detector measures the log's own scatter robustly and asks what Gaussian noise of any colour would exceed once in
 10 000 logs; no threshold is set by hand.
@@ -126,7 +126,7 @@ class Readout:
 
     @property
     def is_dead(self) -> bool:
-        """The noise is too small to carry the readings from one step of the converter to the next."""
+        """The noise is too small to carry the readings from one LSB to the next."""
         return self.resolution > 0.0 and self.sigma < 0.5 * self.resolution
 
 

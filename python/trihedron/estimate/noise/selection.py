@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
-from trihedron.refused import RefusedError
 
 EVIDENCE = 8.0
 """Drop of the deviance that a term must earn. An absent term earns it by chance with a probability of 0.25 % (half a

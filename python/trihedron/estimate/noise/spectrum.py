@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.noise.gaps import (
     MOST_BRIDGED,
     MOST_SLOW,
@@ -27,7 +28,6 @@ from trihedron.estimate.noise.gaps import (
     slow_over_fast,
 )
 from trihedron.estimate.noise.leakage import flicker_leakage
-from trihedron.refused import RefusedError
 from trihedron.transforms import cosine_transform
 
 LONGEST_TRANSFORM = 1 << 17

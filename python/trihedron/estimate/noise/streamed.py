@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import (
     STREAM_BUDGET_BYTES,
@@ -23,7 +24,6 @@ from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_b
 from trihedron.estimate.noise.screening import readout, steps_and_knocks
 from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM, ordinates_of_means
 from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
-from trihedron.refused import RefusedError
 
 Keep = Callable[[int, Callable[[], Mapping[str, FloatArray]]], None]
 _PARTS = ("numbers", "fine", "window", "sums")

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.reference.coloured import Solution, solve
 from trihedron.estimate.reference.together import Grid, Reference
 from trihedron.estimate.reference.windows import Windows
-from trihedron.refused import RefusedError
 from trihedron.sensor_model import other_form, other_form_jacobian
 
 TURNS = 4

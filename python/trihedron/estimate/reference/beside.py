@@ -136,7 +136,7 @@ class Beside:
         blocks = log.blocks(self.corrected(point), time, attitude, max(2, round(block_s / self.grid.step_s)))
         M = blocks.moments().reshape(-1, 3, 3, signals.shape[1])
         m = len(M)
-        # A reference stamped later by dτ is compared with the gyro earlier by it.
+        # A reference timestamped later by dτ is compared with the gyro earlier by it.
         clock = [-c for c in blocks.wrt_clock()]
         if self.reference.motion.attitude is None:
             # A rate is summed over the log's own time: its clock moves rows, and does not stretch what they say.

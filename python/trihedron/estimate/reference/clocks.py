@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.reference.together import Grid, Reference
-from trihedron.refused import RefusedError
 
 LEAST_CORRELATION = 0.7
 """Below this the two motions are not taken for one: of 7140 pairs of unrelated hand motions of 30 to 60 s one in a
@@ -31,7 +31,7 @@ SURE = 0.97
 beyond a jump: one that found a neighbouring turn instead fits worse there than at its own lag."""
 SEARCH_S = 6.0
 ALIKE = 0.01
-"""Peaks whose correlation is this near the best are not told apart by it: the stamps then decide."""
+"""Peaks whose correlation is this near the best are not separated by it: the timestamps then decide."""
 
 
 @dataclass(frozen=True)

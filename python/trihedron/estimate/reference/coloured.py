@@ -1,6 +1,6 @@
 """Least squares under coloured residuals: several noise models, the one whose answers repeat best from block to block.
 
-A tracker's noise is blue, a table's wobble has lines, a zero wanders, and all of it grows with motion. A model that is
+A tracker's noise is blue, a table's wobble has lines, a bias wanders, and all of it grows with motion. A model that is
 wrong about one of these can make an answer worse than none; blocks of time left out in turn show which one does.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 Mask = npt.NDArray[np.bool_]
 
@@ -21,13 +21,13 @@ ORDERS = (0, 2, 12)
 ROWS_PER_POLE = 15
 """An autoregression of order p is fitted to 15 p rows of an axis or more: p lags cost 1/15 of its variance."""
 OUTLIER = 7.0
-"""Residuals beyond 7 robust sigmas, and their neighbours, are left out: a normal one is that far once in 4e11."""
+"""Residuals beyond 7 robust sigmas, and their neighbours, are excluded: a normal one is that far once in 4e11."""
 BLOCKS = 16
-"""Blocks of time that are left out in turn. With 16 the pooled ratio of 12 parameters scatters by a tenth."""
+"""Blocks of time that are excluded in turn. With 16 the pooled ratio of 12 parameters scatters by a tenth."""
 MOST_STRETCHES = 100
 """More stretches than this are gaps of a bad log, not plateaus of a table."""
 MOST_OUT = 0.2
-"""Where more than this share would be left out the scale is wrong, not the rows."""
+"""Where more than this share would be excluded the scale is wrong, not the rows."""
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def _by_blocks(
     X: FloatArray, target: FloatArray, index: IntArray, used: Mask, Z: FloatArray, y: FloatArray, rows: IntArray,
     theta: FloatArray,
 ) -> tuple[FloatArray, float]:  # fmt: skip
-    """Jackknife variances (p,) of the answers without each block of time; rms of what is left out, as it was."""
+    """Jackknife variances (p,) of the answers without each block of time; rms of what is excluded, as it was."""
     block = _blocks(index)
     normal, moment = Z.T @ Z, Z.T @ y
     moved, error, n = [], 0.0, 0

@@ -150,8 +150,8 @@ def _prepared(recording: Recording, motion: ReferenceMotion, gravity_m_s2: float
     felt = None
     if force is not None and grid.accelerometer is not None:
         felt = grid.accelerometer @ force.S.T + force.b
-    holds = grid.is_valid if motion.attitude is not None else seen
-    side = Beside(grid, reference, holds, Point(gyro.A, gyro.a, gyro.offset_s, gyro.rate), felt)
+    poses = grid.is_valid if motion.attitude is not None else seen
+    side = Beside(grid, reference, poses, Point(gyro.A, gyro.a, gyro.offset_s, gyro.rate), felt)
     return Prepared(recording, side, gyro, force, windows, wide, found, seen, is_turned)
 
 
@@ -225,7 +225,7 @@ def _right_way_round(
 
 
 def _stamped(recording: Recording, motion: ReferenceMotion) -> float | None:
-    """What both logs' own stamps say of the offset; ``None`` where they do not count from one epoch."""
+    """What both logs' own timestamps say of the offset; ``None`` where they do not count from one epoch."""
     offset = recording.start_epoch_s - motion.start_epoch_s
     return offset if abs(offset) < 0.5 * max(recording.duration_s, motion.time_s[-1]) else None
 
@@ -238,7 +238,7 @@ def _windows(grid: Grid, reference: Reference, seen: Mask) -> Windows:
 
 
 def _own_counts(offset: float, recording: Recording, motion: ReferenceMotion) -> float:
-    """By how much the reference's stamps run ahead of the log's, in both clocks' own counts if they share an epoch."""
+    """By how much the reference's timestamps run ahead of the log's, in both own counts if they share an epoch."""
     if abs(recording.start_epoch_s - motion.start_epoch_s) > 1e5:
         return float(offset)
     return float(offset + motion.start_epoch_s - recording.start_epoch_s)
@@ -291,8 +291,8 @@ def _estimates(found: MotionFit, k: int, effects: list[Scored]) -> dict[str, Est
         names = EFFECTS[one.ident]
         if not all(found.sides[k].has(name) for name in names):
             continue
-        holds = all(name in found.places[k] for name in names)
-        fit = found if holds else one.fitted
+        poses = all(name in found.places[k] for name in names)
+        fit = found if poses else one.fitted
         value = np.concatenate([fit.value(k, name) for name in names])
         out[one.ident] = Estimate(LABELS[one.ident], value, fit.covariance(k, names), UNITS[one.ident], one.score)
     return out

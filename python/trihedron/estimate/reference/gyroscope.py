@@ -35,7 +35,7 @@ class GyroFit:
 def fit_gyroscope(
     grid: Grid, reference: Reference, windows: Windows, offset_s: float, rate: float, *, clock: int = 2
 ) -> GyroFit:
-    """``ω_reference(t (1 + ε) + τ) = A w' + a`` by windows; ``clock`` 0 holds τ and ε, 1 frees τ, 2 both."""
+    """``ω_reference(t (1 + ε) + τ) = A w' + a`` by windows; ``clock`` 0 poses τ and ε, 1 frees τ, 2 both."""
     middle = float(np.mean(grid.time_s[windows.middle]))
     n_clock = clock
     solution: Solution | None = None

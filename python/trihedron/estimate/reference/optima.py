@@ -1,4 +1,4 @@
-"""Two places of a clock that the motion does not tell apart."""
+"""Two places of a clock that the motion does not separate."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.reference.likelihood import Problem, equations, most_likely, together
 from trihedron.estimate.reference.motion import ACCEPTED, MotionFit
-from trihedron.refused import RefusedError
 
 REACH_S, STEP_S = 0.3, 0.02
 """Shifts that are tried: beyond them the sizes of the rates have told one place from another."""

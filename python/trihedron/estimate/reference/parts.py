@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.reference.clocks import JUMP_S
 from trihedron.estimate.reference.gyroscope import GyroFit
 from trihedron.estimate.reference.settled import running_mean
 from trihedron.estimate.reference.together import Grid, Mask, Reference
-from trihedron.refused import RefusedError
 
 STRETCH_S, HOP_S = 2.0, 1.0
 """A hand turns about within two seconds: what is left then shows a lag of its own."""
@@ -30,7 +30,7 @@ FEWEST = 2
 def refuse_parts_elsewhere(grid: Grid, reference: Reference, gyro: GyroFit) -> None:
     """Refuse a reference of which a part fits at another lag than all of it was fitted at.
 
-    The clock's own stretches are 8 s long and see only sizes of rates: a jump in the last seconds is left out by them
+    The clock's own stretches are 8 s long and see only sizes of rates: a jump in the last seconds is excluded by them
     as a stretch of another motion, and by the fit as outliers.
 
     Raises

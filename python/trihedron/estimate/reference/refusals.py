@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.reference.gyroscope import GyroFit
 from trihedron.records import Recording
 from trihedron.records.reference import ReferenceMotion
-from trihedron.refused import RefusedError
 from trihedron.units import rate_to_si
 
 STRANGERS = 0.6

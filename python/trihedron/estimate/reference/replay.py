@@ -9,12 +9,12 @@ import numpy.typing as npt
 
 from trihedron._core import rotation_from_vector
 from trihedron.arrays import FloatArray
+from trihedron.errors import REFUSALS
 from trihedron.estimate.reference.beside import Beside
 from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope
 from trihedron.estimate.reference.together import Grid, Reference
 from trihedron.estimate.reference.windows import Windows
 from trihedron.records.reference import ReplayStage
-from trihedron.refused import REFUSALS
 
 Mask = npt.NDArray[np.bool_]
 

@@ -11,7 +11,7 @@ from trihedron.estimate.reference.together import Grid, Reference
 Mask = npt.NDArray[np.bool_]
 
 GUARD_S = 0.2
-"""Left out on either side of a command at least: commands are stamped by another computer."""
+"""Left out on either side of a command at least: commands are timestamped by another computer."""
 LEVELS = 6.0
 """A sample further from its plateau's median than six robust sigmas is not on it: the table still speeds up."""
 

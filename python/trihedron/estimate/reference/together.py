@@ -10,9 +10,9 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records import Recording
 from trihedron.records.reference import ReferenceMotion
-from trihedron.refused import RefusedError
 
 Mask = npt.NDArray[np.bool_]
 
@@ -41,7 +41,7 @@ def grid_of(recording: Recording) -> Grid:
     """
     if recording.gyroscope is None:
         raise RefusedError(f"{recording.source}: a reference is held against the gyro, and this log has none.")
-    recording = recording.with_distinct_stamps()
+    recording = recording.with_distinct_timestamps()
     gyroscope = recording.gyroscope
     assert gyroscope is not None
     readings = gyroscope if recording.accelerometer is None else np.hstack([gyroscope, recording.accelerometer])
@@ -56,7 +56,7 @@ def grid_of(recording: Recording) -> Grid:
 
 
 def within(stamps: FloatArray, time: FloatArray, step: float) -> Mask:
-    """Whether times (n,) lie among stamps (m,) that are no more than ``LONGEST_GAP`` steps apart there."""
+    """Whether times (n,) lie among timestamps (m,) that are no more than ``LONGEST_GAP`` steps apart there."""
     after = np.clip(np.searchsorted(stamps, time), 1, len(stamps) - 1)
     is_close = stamps[after] - stamps[after - 1] <= LONGEST_GAP * step
     return np.asarray(is_close & (time >= stamps[0]) & (time <= stamps[-1]), dtype=bool)

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.sessions.spread import common_mean, spread_between, spread_of_next, spread_within
 from trihedron.records.sessions import PARAMETERS, Repeated, Session
-from trihedron.refused import RefusedError
 
 
 def repeated_parameters(sessions: Sequence[Session]) -> tuple[Repeated, ...]:

@@ -78,7 +78,7 @@ def spread_between(values: FloatArray, variances: FloatArray, groups: Sequence[o
 
 
 def spread_of_next(spread: Spread | None) -> float:
-    """Standard deviation of which ±1.96 hold another session, about the mean, in 95 %.
+    """Standard deviation of which ±1.96 pose another session, about the mean, in 95 %.
 
     The likeliest spread of few sessions is often zero, and never certain: what (1) leaves possible is a χ² law of the
     variance through its upper end, and a value drawn with a variance of that law is Student's. Without errors of the
@@ -137,7 +137,7 @@ def _spread(values: FloatArray, variances: FloatArray, members: list[IntArray], 
     targets = _chi_square([tail, 1.0 - tail], dof)
     low, high = np.sqrt(_solved(values, variances, members, targets))
     if high == 0.0:
-        # Sessions agree better than their error bars allow: those are too wide, and "no spread at all" is not shown.
+        # Sessions agree better than their uncertainties allow: those are too wide, and "no spread at all" is not shown.
         q = float(_q(values, variances, members, np.zeros(1))[0])
         high = float(np.sqrt(_solved(values, variances * max(q / dof, 1e-6), members, targets[1:])[0]))
     point = _restricted(values, variances, members)

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.sessions.spread import spread_within
 from trihedron.probability import fdtrc
 from trihedron.records.sessions import PARAMETERS, Session, Spread, ThermalModel, ThermalTerm
-from trihedron.refused import RefusedError
 
 MAX_ORDER = 3
 SPARE = 2
@@ -144,7 +144,7 @@ def _branches(values: FloatArray, variances: FloatArray, X: FloatArray, branch: 
         gain += float(np.sum(w * (values[:, axis] - X @ narrow) ** 2)) - after
         left += after
         size.append(float(c[-1]))
-    # The scatter is never taken as less than the sessions' own error bars say.
+    # The scatter is never taken as less than the sessions' own uncertainties say.
     ratio = (gain / k) / max(left / (k * dof), 1.0)
     return np.array(size), fdtrc(k, k * dof, ratio)
 

@@ -15,14 +15,14 @@ from pathlib import Path
 from pkgutil import iter_modules
 
 from trihedron.documents import DocumentError, of_path, read_text
+from trihedron.errors import RefusedError
 from trihedron.files.calibration import FORMAT as OWN
 from trihedron.files.calibration import CalibrationFileError, read_calibration
 from trihedron.files.formats.contract import ExportOptions, Format, NoiseFigure, SensorNoise
 from trihedron.files.formats.matrices import lower_orthogonal, upper_frame
 from trihedron.files.plausible import require_plausible
-from trihedron.printable import printable
 from trihedron.records import Calibration
-from trihedron.refused import RefusedError
+from trihedron.sanitise import printable
 
 __all__ = [
     "ExportOptions",

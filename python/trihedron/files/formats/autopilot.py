@@ -14,10 +14,10 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.files.formats.contract import ExportOptions, Thermal, of_si_readings, thermal_of
 from trihedron.records import Calibration, Onboard, SensorCalibration
 from trihedron.records.plain import from_plain
-from trihedron.refused import RefusedError
 
 AXES = ("X", "Y", "Z")
 _DEG_ROLL_PITCH_YAW = (

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.files.plausible import LARGEST_SI_FACTOR, ROUNDING, has_one_handedness, named_sensors
 from trihedron.records import Calibration, SensorCalibration
-from trihedron.refused import RefusedError
 from trihedron.thermal_model import parameters_at
 from trihedron.units import (
     STANDARD_GRAVITY_M_S2,

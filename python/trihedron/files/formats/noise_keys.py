@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from trihedron.errors import RefusedError
 from trihedron.files.formats.contract import ExportOptions, NoiseFigure, SensorNoise, number
 from trihedron.records import Calibration
-from trihedron.refused import RefusedError
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from trihedron.records import Calibration
 
 
 def noise_alone(
-    calibration: Calibration, options: ExportOptions, target: str, holds: str = ""
+    calibration: Calibration, options: ExportOptions, target: str, poses: str = ""
 ) -> tuple[Calibration, Figures, list[str]]:
     """The calibration of readings in SI, the figures that the target demands, and the comments that head its file.
 
@@ -19,5 +19,5 @@ def noise_alone(
     """
     known = of_si_readings(calibration, target, options)
     figures = required(known, options, target)
-    said = heading(known, f"{target} has no intrinsics of the IMU{holds}.")
+    said = heading(known, f"{target} has no intrinsics of the IMU{poses}.")
     return known, figures, [f"# {line}" for line in [*said, *lost_without_intrinsics(known)]]

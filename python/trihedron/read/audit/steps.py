@@ -1,4 +1,4 @@
-"""Readings in physical units that step like counts: the step is the converter's, and worth saying."""
+"""Readings in physical units that step like counts: the step is the ADC's, and worth saying."""
 
 from __future__ import annotations
 

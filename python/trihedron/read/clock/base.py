@@ -16,7 +16,7 @@ from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
 
 _SHORTEST_STEP_S = 1e-9
-"""Mean step of a log: no converter takes a sample in a nanosecond."""
+"""Mean step of a log: no ADC takes a sample in a nanosecond."""
 _LONGEST_S = 3.2e9
 """A century."""
 NOBODY = Witness()

@@ -21,7 +21,7 @@ FEWEST_ROWS = 100
 UNSEEN = 0.02
 """Part of a period by which timestamps may stray from an even clock before anybody asks how it grows."""
 EXACT = 0.005
-"""Stamps this part of a period about an even clock (rms) are even."""
+"""Timestamps this part of a period about an even clock (rms) are even."""
 GROWTH = 4.0
 """Growth of the variance of a lag's elapsed time over sixteen times the lag, above which no even clock lies behind the
 timestamps: 16 for steps drawn anew, 1 for an even clock."""
@@ -208,7 +208,7 @@ def _parts(first: int, stop: int) -> Iterator[slice]:
 
 
 def _growth(error: FloatArray, pauses: IntArray, unseen: float) -> float:
-    """Variance of the change of the stamps' error over 16 m rows over that over m, m as long as the log allows."""
+    """Variance of the change of the timestamps' error over 16 m rows over that over m, m as long as the log allows."""
     edges = np.concatenate([[0], pauses + 1, [len(error)]])
     longest = int(np.argmax(np.diff(edges)))
     piece = error[edges[longest] : edges[longest + 1]][: 1 << 20]

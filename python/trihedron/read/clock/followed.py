@@ -13,7 +13,7 @@ REACH = 3
 CLEAR_SLOPE = 3.0
 """Standard errors of a slope below which a reading tells nothing of time."""
 FARTHEST = 1.5
-"""Stamps further off than this many steps: what a straight line through the motion says of them is no use."""
+"""Timestamps further off than this many steps: what a straight line through the motion says of them is no use."""
 PART, PARTS = 1 << 17, 8
 """The most active stretches of a long log are looked at."""
 BLOCK = 50
@@ -21,7 +21,7 @@ BLOCK = 50
 
 
 def followed(time_s: FloatArray, even_s: FloatArray, tick: IntArray, triads: list[FloatArray]) -> tuple[float, float]:
-    """Share s of the stamps' scatter about an even clock that the readings (n, 3) follow, and its standard error.
+    """Share s of the timestamps' scatter about an even clock that the readings (n, 3) follow, and its standard error.
 
     A sample taken δ late reads x' δ more, and stands out from the cubic through its neighbours by the contrast of that:
     s is the slope of one against the other over all channels in motion. 1: samples were taken when timestamped; 0:

@@ -143,7 +143,7 @@ def _direct(time_s: FloatArray, frequency_hz: FloatArray) -> FloatArray:
 
 
 def _windows(time_s: FloatArray) -> tuple[list[FloatArray], float]:
-    """Stretches of the log without a pause, each from its own zero, and the mean distance of rows."""
+    """Stretches of the log without a pause, each from its own bias, and the mean distance of rows."""
     n = len(time_s)
     width = min(WINDOW, n)
     # `np.unique` would load masked arrays.

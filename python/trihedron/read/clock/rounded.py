@@ -1,4 +1,4 @@
-"""Samples numbered by their stamps' own steps, where rounding to a grid is all that is wrong with the timestamps."""
+"""Samples numbered by their timestamps' own steps, where rounding to a grid is all that is wrong with them."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from trihedron.records import Finding, FindingCode
 from trihedron.records.sampling import Sampling, StampKind
 
 WORTH = 0.03
-"""Stamps this part of a step (rms) about an even clock are as good as even (those rounded to a tenth of a step are):
+"""Times this part of a step (rms) about an even clock are as good as even (those rounded to a tenth of a step are):
 a turn integrated over them errs by less than a thirtieth of what one sample adds."""
 SHARED = 0.005
 """Share of samples with the timestamp of the one before, above which timestamps cannot be when samples were taken."""

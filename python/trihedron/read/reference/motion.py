@@ -68,7 +68,7 @@ def of_recording(recording: Recording) -> ReferenceMotion:
     ReadError
         When its gyro reads counts, or it has none.
     """
-    recording = recording.with_distinct_stamps()
+    recording = recording.with_distinct_timestamps()
     to_rate = rate_to_si(recording.gyroscope_unit)
     if recording.gyroscope is None or to_rate is None:
         raise ReadError(

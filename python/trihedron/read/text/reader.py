@@ -15,8 +15,8 @@ from trihedron.arrays import FloatArray
 from trihedron.read.columns import find_columns
 from trihedron.read.digest import LateSha256, file_sha256, kept_open
 from trihedron.read.errors import ReadError
+from trihedron.read.memory_limit import check_memory
 from trihedron.read.names import parse_name
-from trihedron.read.room import check_memory
 from trihedron.read.table import Table
 from trihedron.read.text.ahead import Bytes, blocks_ahead
 from trihedron.read.text.blocks import Cursor, as_utf8, blocks, has_semicolon_remarks, with_hash_remarks

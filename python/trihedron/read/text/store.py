@@ -70,7 +70,7 @@ class Store:
         return array
 
     def columns(self) -> list[FloatArray]:
-        """All columns (n,), empty where one holds words; those of a triad are views of one (n, 3)."""
+        """All columns (n,), empty where one poses words; those of a triad are views of one (n, 3)."""
         out: list[FloatArray] = [np.empty(0)] * self.n_columns
         for block, array in zip(self._blocks, self._arrays, strict=True):
             for k, i in enumerate(block):

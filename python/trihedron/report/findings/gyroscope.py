@@ -116,7 +116,7 @@ _MOVES = (
     ),
     Entry(
         Code.GYRO_BIAS_DRIFT,
-        "holds",
+        "poses",
         NOTE,
         "the gyro's bias changes between poses by up to {change_rad_s:.2g deg/s} ({axis:axis}), {times:.1f} times its "
         "noise; each move uses the biases of the two poses next to it.",

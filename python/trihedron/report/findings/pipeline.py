@@ -65,7 +65,7 @@ _CALIBRATE = (
         "One or two orientations in {duration_s:.0f} s: scales, angles between axes and moves are not tested.",
         "A static log, a chamber log or a table that stands still.",
         "To test those too, hold 18 or more poses of 3 to 5 s in different directions (docs/procedure.md).",
-        numbers=("n_holds",),
+        numbers=("n_poses",),
     ),
 )
 

@@ -13,7 +13,7 @@ ENTRIES = (
         Code.POSE_SETTLING,
         "",
         WARNING,
-        "{holds:# pose} {holds:?drifts|drift} while still: in pose {worst_hold} at {worst_s:.1f} s the second half "
+        "{poses:# pose} {poses:?drifts|drift} while still: in pose {worst_pose} at {worst_s:.1f} s the second half "
         "differs by {worst_sigmas:.1f} σ from the first (pose {which:first 8}).",
         "The support gives way, the case settles after being let go, or the sensor warms up.",
         "Wait until the case has settled, hold for less time, or put it on a firmer support.",
@@ -23,7 +23,7 @@ ENTRIES = (
         Code.POSE_DISTURBED,
         "",
         NOTE,
-        "{disturbances:# disturbance} inside {holds:# pose} (pose {which:first 8}), {left_out_s:.1f} s in all, the "
+        "{disturbances:# disturbance} inside {poses:# pose} (pose {which:first 8}), {left_out_s:.1f} s in all, the "
         "first at {first_s:.1f} s, excluded from the means.",
         "The table or the cable was touched, or samples are missing there.",
         "Nothing needs to be done; keep hands off the table while the sensor is in a pose.",
@@ -32,7 +32,7 @@ ENTRIES = (
         Code.POSE_UNSTEADY,
         "",
         WARNING,
-        "{holds:# pose} never {holds:?comes|come} down to the sensor's own noise (pose {which:first 8}; first at "
+        "{poses:# pose} never {poses:?comes|come} down to the sensor's own noise (pose {which:first 8}; first at "
         "{first_s:.1f} s).",
         "The sensor was held in the hand or stood on a support that shakes.",
         "Their means weigh less, by their own scatter; put the case on a firm support for a better result.",
@@ -41,8 +41,8 @@ ENTRIES = (
         Code.POSE_AT_RANGE_LIMIT,
         "",
         WARNING,
-        "{holds:# pose} {holds:?reaches|reach} the accelerometer's range limit (first at {first_s:.1f} s, a "
-        "reading of {reading:.6g}) and {holds:?is|are} excluded: clipped readings only bound gravity.",
+        "{poses:# pose} {poses:?reaches|reach} the accelerometer's range limit (first at {first_s:.1f} s, a "
+        "reading of {reading:.6g}) and {poses:?is|are} excluded: clipped readings only bound gravity.",
         "The range limit is below 1 g plus the bias of that axis.",
         "Set a wider range; the remaining poses are used.",
     ),
@@ -53,7 +53,7 @@ ENTRIES = (
         "No pose of a second or more in {duration_s:.1f} s of log.",
         "The sensor was moving, or held in the hand, all the time; or the log is too short.",
         "Log again: put the case down for several seconds in each pose.",
-        numbers=("holds",),
+        numbers=("poses",),
     ),
     Entry(
         Code.SLOW_TURN,
@@ -68,7 +68,7 @@ ENTRIES = (
         Code.NO_INITIAL_POSE,
         "",
         NOTE,
-        "The log does not begin at rest: the first pose starts at {first_hold_s:.1f} s.",
+        "The log does not begin at rest: the first pose starts at {first_pose_s:.1f} s.",
         "Logging was started with the case in hand.",
         "Nothing needs to be done: the noise was measured in the poses themselves.",
     ),
@@ -76,7 +76,7 @@ ENTRIES = (
         Code.FEW_POSES,
         "",
         WARNING,
-        "{holds:# pose} found in {duration_s:.1f} s; a calibration of nine parameters needs at least {needed}, "
+        "{poses:# pose} found in {duration_s:.1f} s; a calibration of nine parameters needs at least {needed}, "
         "in different directions.",
         "The log has few poses, or they were held for less than a second.",
         "Log the six faces and twelve edges of a cube (18 poses), a few seconds each.",

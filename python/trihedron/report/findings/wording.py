@@ -126,7 +126,7 @@ def _in_words(value: Any, how: str, line: str) -> str:
 
 
 def axis_name(axis: int | str) -> str:
-    """``X``, as printed on the board, of axis 1 or ``x``."""
+    """``X``, as printed on the board, of X or ``x``."""
     return axis.upper() if isinstance(axis, str) else "XYZ"[int(axis) - 1]
 
 

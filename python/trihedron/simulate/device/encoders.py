@@ -7,8 +7,8 @@ import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from trihedron.errors import RefusedError
 from trihedron.records.frame_declaration import SIZES, FrameDeclaration
-from trihedron.refused import RefusedError
 
 Reading = Sequence[float]
 Encoder = Callable[[int, float, Reading, Reading], bytes]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, field, fields
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 KINDS = ("missing", "cut", "flipped", "garbage", "byte_lost", "byte_doubled", "twice")
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
-from trihedron.printable import meant
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
+from trihedron.sanitise import meant
 from trihedron.simulate.effects import experiment, sensor
 from trihedron.simulate.effects.sizes import Change
 from trihedron.simulate.effects.truth import effects_of

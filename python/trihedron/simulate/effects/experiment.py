@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 from trihedron.simulate.effects.sizes import Sensor, Values, checked, triple
-from trihedron.simulate.motion import Disturb, Hold, Motion, Step, Turn, Vibrate
+from trihedron.simulate.motion import Disturb, Motion, Pose, Step, Turn, Vibrate
 from trihedron.simulate.scenario import Loss, Scenario
 
 
@@ -50,7 +50,7 @@ def rectification(
     steps: list[Step] = []
     count = 0
     for step in scenario.motion.steps:
-        if isinstance(step, Hold):
+        if isinstance(step, Pose):
             count += 1
             if count > 1 and count % every == 0:
                 shaken = Vibrate((1.0, 1.0, 1.0), rms_m_s2, low_hz, step.duration_s, high_hz=high_hz, name=step.name)
@@ -65,7 +65,7 @@ def disturbed(scenario: Scenario, poses: Sequence[int], tilt_deg: float = 0.5, s
     steps: list[Step] = []
     count = 0
     for step in scenario.motion.steps:
-        if isinstance(step, Hold):
+        if isinstance(step, Pose):
             if count in poses:
                 rest = max((step.duration_s - 0.6) / 2.0, 0.1)
                 steps += [

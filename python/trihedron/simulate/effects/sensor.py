@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 from trihedron.simulate.effects.response import mass_response, suspension, with_response
 from trihedron.simulate.effects.sizes import Change, Sensor, Values, checked, electronics, matrix3, triple
 from trihedron.simulate.readout import Adc, Drift, Interference

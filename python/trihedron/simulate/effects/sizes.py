@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 from trihedron.simulate.readout import Matrix, Triple
 from trihedron.simulate.scenario import Scenario
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from trihedron.simulate.effects.response import mass_response, response
 from trihedron.simulate.effects.sizes import triple
-from trihedron.simulate.motion import Disturb, Hold, Motion, Turn
+from trihedron.simulate.motion import Disturb, Motion, Pose, Turn
 from trihedron.simulate.readout import Electronics
 from trihedron.simulate.scenario import Scenario, Temperature
 
@@ -114,7 +114,7 @@ def _note_motion(note: Callable[..., None], motion: Motion) -> None:
         note("turn-angle-error", errors_deg=tuple(errors))
     pose, disturbed = -1, []
     for before, step in zip((None, *motion.steps), motion.steps, strict=False):
-        if isinstance(step, Hold) and not isinstance(before, Disturb):
+        if isinstance(step, Pose) and not isinstance(before, Disturb):
             pose += 1
         elif isinstance(step, Disturb):
             disturbed.append(pose)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 from trihedron.simulate.motion.steps import LEVEL, Quaternion
 
 

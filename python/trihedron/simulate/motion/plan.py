@@ -9,8 +9,8 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.records.truth import SegmentKind
-from trihedron.refused import RefusedError
 from trihedron.simulate.motion.attitude import (
     quaternion_from_vector,
     quaternion_product,
@@ -21,10 +21,10 @@ from trihedron.simulate.motion.attitude import (
 )
 from trihedron.simulate.motion.steps import (
     NOWHERE,
-    Hold,
     Motion,
     MoveTo,
     Oscillate,
+    Pose,
     Quaternion,
     Replay,
     Step,
@@ -134,9 +134,9 @@ class _Planner:
             self.wobble.append([segment, *amplitude, factor * frequency_hz, self.rng.uniform(0.0, 2.0 * math.pi)])
 
     def step(self, step: Step) -> None:
-        if isinstance(step, Hold):
+        if isinstance(step, Pose):
             creep = radians_from_degrees(step.creep_deg) * unit(step.creep_axis)
-            self.add("hold", step.name, step.duration_s, creep if step.creep_deg else None, ramp=0.05)
+            self.add("pose", step.name, step.duration_s, creep if step.creep_deg else None, ramp=0.05)
         elif isinstance(step, MoveTo):
             # Body vector v turns so that the new zenith is `up`: R' = R exp(v), exp(v) up = old zenith in the body.
             turn = quaternion_from_vector(shortest_turn(unit(step.up), up_in_body(self.attitude_above_table())))

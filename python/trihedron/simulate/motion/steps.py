@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 Vector: TypeAlias = tuple[float, float, float]
 Quaternion: TypeAlias = tuple[float, float, float, float]
@@ -23,8 +23,8 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Hold:
-    """Stand still. ``creep_deg`` turns slowly by that angle about ``creep_axis`` (body) over the whole hold."""
+class Pose:
+    """Stand still. ``creep_deg`` turns slowly by that angle about ``creep_axis`` (body) over the whole pose."""
 
     duration_s: float
     name: str = ""
@@ -138,7 +138,7 @@ class Replay:
         object.__setattr__(self, "acceleration_m_s2", acceleration)
 
 
-Step: TypeAlias = Hold | MoveTo | Turn | Oscillate | Vibrate | Disturb | Replay
+Step: TypeAlias = Pose | MoveTo | Turn | Oscillate | Vibrate | Disturb | Replay
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
-"""Noise inside the holds of a session: white density, spectrum by octaves, lines, filter corner, resolution.
+"""Noise inside the poses of a session: white density, spectrum by octaves, lines, filter corner, resolution.
 
-A session's holds are seconds long and differ a little (temperature, gravity on the axis, a hand): every figure is a
-mean of logarithms over holds, whose error comes from the number of readings and from the holds' own scatter. Two logs
+A session's poses are seconds long and differ a little (temperature, gravity on the axis, a hand): every figure is a
+mean of logarithms over poses, whose error comes from the number of readings and from the poses' own scatter. Two logs
 are then compared figure by figure (:func:`ratio_of`). docs/noise.md, section 8.
 """
 
@@ -17,27 +17,27 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts.at_rest import AxisAtRest
 from trihedron.channel_facts.low_pass import low_passes
 from trihedron.channel_facts.pooled import as_measured, pooled_logarithm, root_of
+from trihedron.errors import RefusedError
 from trihedron.estimate.noise.densities import densities_below
 from trihedron.records.channel_facts import LowPass
-from trihedron.records.hold_noise import HoldNoise, Measured, OctaveNoise
-from trihedron.refused import RefusedError
+from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise
 from trihedron.transforms import cosine_transform
 
 FEWEST_HOLDS = 3
-"""Holds that must show an octave, where there are as many: the scatter of one is not known."""
+"""Poses that must show an octave, where there are as many: the scatter of one is not known."""
 LEVEL_KNOWN = 1.0
 """Standard error of the logarithm of a density below a corner, from which on the differences of readings say more."""
 
 
-def noise_of_holds(
+def noise_of_poses(
     readings: npt.ArrayLike,
     rate_hz: float,
-    holds: Sequence[tuple[int, int]],
+    poses: Sequence[tuple[int, int]],
     *,
     names: Sequence[str] = (),
     units: Sequence[str] = (),
-) -> tuple[HoldNoise, ...]:
-    """Noise of every axis inside the holds of a session, each figure with its interval.
+) -> tuple[PoseNoise, ...]:
+    """Noise of every axis inside the poses of a session, each figure with its interval.
 
     The channels are those of one sensor: they share a low-pass unless their spectra deny it.
 
@@ -69,21 +69,21 @@ def noise_of_holds(
     x = x[:, np.newaxis] if x.ndim == 1 else x
     if not (math.isfinite(rate_hz) and rate_hz > 0):
         raise RefusedError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
-    for start, stop in holds:
+    for start, stop in poses:
         if not 0 <= start < stop <= len(x):
             raise RefusedError(f"a pose runs from an earlier to a later of {len(x)} readings, got {start} to {stop}")
     channels = x.shape[1]
     names = tuple(names) or tuple(f"channel {c + 1}" for c in range(channels))
     units = tuple(units) or ("",) * channels
-    axes = [AxisAtRest.of(x[:, c], rate_hz, holds, names[c]) for c in range(channels)]
+    axes = [AxisAtRest.of(x[:, c], rate_hz, poses, names[c]) for c in range(channels)]
     filters = low_passes([axis.spectrum for axis in axes], rate_hz)
     white = _white(axes, filters, rate_hz)
     return tuple(
-        HoldNoise(
+        PoseNoise(
             name=name,
             unit=unit,
             rate_hz=rate_hz,
-            n_holds=len(axis.parts),
+            n_poses=len(axis.parts),
             n_readings=sum(len(part) for part in axis.parts),
             white=density,
             reading_sigma=math.sqrt(max(axis.total - axis.rounding, 0.0)) if axis.is_dithered else 0.0,
@@ -117,7 +117,7 @@ def _white(axes: Sequence[AxisAtRest], filters: Sequence[LowPass], rate_hz: floa
 def _band_power(
     parts: Sequence[FloatArray], rate_hz: float, low_hz: float, high_hz: float
 ) -> tuple[FloatArray, FloatArray]:
-    """(k,) mean power of each hold between two frequencies, and its number of ordinates; holds too short left out."""
+    """(k,) mean power of each pose between two frequencies, and its number of ordinates; holds too short left out."""
     power, ordinates = [], []
     for part in parts:
         first, last = (math.ceil(f * 2.0 * len(part) / rate_hz) for f in (low_hz, high_hz))
@@ -139,9 +139,9 @@ def _of_differences(axis: AxisAtRest, rate_hz: float) -> Measured | None:
 
 
 def _of_level(axis: AxisAtRest, density: float, sigma_log: float, corner_hz: float, rate_hz: float) -> Measured | None:
-    """White density below a filter's corner, of a typical hold.
+    """White density below a filter's corner, of a typical pose.
 
-    ``density`` is that of the mean over holds, which loud ones fill: how far a typical one lies beneath it is read off
+    ``density`` is that of the mean over poses, which loud ones fill: how far a typical one lies beneath it is read off
     the same band, for holds differ there by a hand's tremor too, and by less in their differences.
     """
     if not (density > 0.0 and axis.dithers(2.0 * corner_hz * density)):
@@ -160,7 +160,7 @@ def _of_level(axis: AxisAtRest, density: float, sigma_log: float, corner_hz: flo
 
 
 def _octaves(parts: Sequence[FloatArray], rate_hz: float) -> tuple[OctaveNoise, ...]:
-    """Mean power between powers of two of a hertz, over the holds long enough to have four ordinates there."""
+    """Mean power between powers of two of a hertz, over the poses long enough to have four ordinates there."""
     nyquist = rate_hz / 2.0
     found: dict[int, tuple[list[float], list[float]]] = {}
     for part in parts:
@@ -179,7 +179,7 @@ def _octaves(parts: Sequence[FloatArray], rate_hz: float) -> tuple[OctaveNoise, 
             dofs.append(float(n))
     out = []
     for octave in sorted(found):
-        # One long hold, perhaps with the hand still on it, is not the sensor's low octave.
+        # One long pose, perhaps with the hand still on it, is not the sensor's low octave.
         if len(found[octave][0]) < min(FEWEST_HOLDS, len(parts)):
             continue
         pooled = pooled_logarithm(np.array(found[octave][0]), np.array(found[octave][1]))

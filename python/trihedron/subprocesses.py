@@ -10,7 +10,7 @@ import os
 import sys
 import threading
 
-from trihedron.refused import RefusedError
+from trihedron.errors import RefusedError
 
 PATIENCE_S = 2.0
 """A trial takes milliseconds where the library works; a loaded machine may take a hundred times as long."""

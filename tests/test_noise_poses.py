@@ -1,4 +1,4 @@
-"""Noise inside holds: simulated sessions of known figures, and one held against another."""
+"""Noise inside poses: simulated sessions of known figures, and one held against another."""
 
 import math
 
@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from trihedron.estimate.noise import noise_of_holds, ratio_of
+from trihedron.estimate.noise import noise_of_poses, ratio_of
 
 RATE = 100.0
 
 
-def session(rng, holds=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0.0, knocks=0, line=0.0, rate=RATE):
-    """Readings (n,) of one axis and windows of its holds, a second of handling between them."""
+def session(rng, poses=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0.0, knocks=0, line=0.0, rate=RATE):
+    """Readings (n,) of one axis and windows of its poses, a second of handling between them."""
     parts, windows, at = [], [], 0
-    for k in range(holds):
+    for k in range(poses):
         n = int(rate * seconds * rng.uniform(0.7, 1.4))
         x = N * np.sqrt(rate) * np.exp(0.5 * scatter * rng.standard_normal()) * rng.standard_normal(n + 200)
         if corner:
@@ -37,7 +37,7 @@ def session(rng, holds=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0.
 
 def of(rng, **options):
     readings, windows = session(rng, **options)
-    return noise_of_holds(readings, RATE, windows)[0]
+    return noise_of_poses(readings, RATE, windows)[0]
 
 
 @pytest.mark.parametrize("options", [{}, {"step": 0.1}, {"step": 0.2}, {"scatter": 0.2}, {"knocks": 2}], ids=str)
@@ -58,7 +58,7 @@ def test_the_white_density_and_the_ratio_of_two_are_inside_their_intervals(optio
 
 def test_octaves_hold_the_density_and_tell_where_two_spectra_differ():
     rng = np.random.default_rng(72)
-    plain, bent = of(rng, holds=40), of(rng, holds=40, corner=10.0)
+    plain, bent = of(rng, poses=40), of(rng, poses=40, corner=10.0)
     assert sum(o.density.lower <= 1e-4 <= o.density.upper for o in plain.octaves) >= len(plain.octaves) - 1
     by_octave = {o.low_hz: o.density for o in bent.octaves}
     p_values = [ratio_of(o.density, by_octave[o.low_hz]).p_value for o in plain.octaves]
@@ -85,28 +85,28 @@ def test_a_filter_shows_its_corner_and_white_noise_none():
 
 def test_a_line_common_to_the_holds_is_found_with_its_amplitude():
     rng = np.random.default_rng(74)
-    (line,) = of(rng, holds=40, line=0.03).lines
+    (line,) = of(rng, poses=40, line=0.03).lines
     assert line.frequency_hz == pytest.approx(17.0, abs=0.4)
     assert line.amplitude.value == pytest.approx(0.03, rel=0.3)
-    assert of(rng, holds=40).lines == ()
+    assert of(rng, poses=40).lines == ()
 
 
 @pytest.mark.parametrize("step", [0.05, 0.1, 1 / 16, 3.0])
 def test_the_step_of_the_converter_is_read_off_the_values_also_where_digits_are_cut(step):
     rng = np.random.default_rng(75)
     readings, windows = session(rng, step=step, N=step / 10)
-    axis = noise_of_holds(np.round(readings, 4), RATE, windows)[0]
+    axis = noise_of_poses(np.round(readings, 4), RATE, windows)[0]
     assert axis.step == pytest.approx(step, rel=2e-3)
     assert of(rng).step == 0.0
 
 
 def test_missing_readings_cut_holds_and_channels_keep_their_names():
     rng = np.random.default_rng(77)
-    readings, windows = session(rng, holds=10)
+    readings, windows = session(rng, poses=10)
     readings[windows[3][0] + 100] = np.nan
-    two = noise_of_holds(np.column_stack([readings, 2 * readings]), RATE, windows, names=("x", "y"), units=("g", "g"))
+    two = noise_of_poses(np.column_stack([readings, 2 * readings]), RATE, windows, names=("x", "y"), units=("g", "g"))
     assert [axis.name for axis in two] == ["x", "y"]
-    assert two[0].n_holds == 11
+    assert two[0].n_poses == 11
     assert two[1].white.value == pytest.approx(2 * two[0].white.value, rel=1e-9)
 
 
@@ -115,15 +115,15 @@ def test_a_line_is_neither_white_noise_nor_a_corner_nor_the_noise_of_its_octave(
     ratios, corners = [], []
     for seed in range(6):
         rng = np.random.default_rng(seed)
-        n, holds = 12000, [(k, k + 450) for k in range(0, 12000, 600)]
+        n, poses = 12000, [(k, k + 450) for k in range(0, 12000, 600)]
         clean = rng.normal(size=(n, 1))
         wave = amplitude * np.sin(2.0 * np.pi * 18.34 * np.arange(n) / 100.0 + seed)[:, None]
-        plain, lined = (noise_of_holds(x, 100.0, holds)[0] for x in (clean, clean + wave))
+        plain, lined = (noise_of_poses(x, 100.0, poses)[0] for x in (clean, clean + wave))
         assert len(lined.lines) == 1
         ratios.append(lined.white.value / plain.white.value)
         corners.append(lined.corner_hz)
         both = zip(plain.octaves, lined.octaves, strict=True)
-        # The same noise: what the line's own two numbers a hold take off, of some 70 in its octave.
+        # The same noise: what the line's own two numbers a pose take off, of some 70 in its octave.
         assert all(abs(np.log(b.density.value / a.density.value)) < 0.1 for a, b in both)
     # Left in, half its square would be 2 and 22 % of the density.
     assert np.abs(np.log(ratios)).max() < 0.01
@@ -138,7 +138,7 @@ def test_a_stand_that_rings_on_one_axis_is_no_filter_and_no_white_noise(quality,
     radius = np.exp(-np.pi * 0.064 / quality)
     hump = lfilter([1.0], [1.0, -2.0 * radius * np.cos(2.0 * np.pi * 0.064), radius**2], rng.standard_normal(12_000))
     x[:, 1] += 1e-2 * size * hump / hump.std()
-    axes = noise_of_holds(x, 100.0, [(k * 400, k * 400 + 300) for k in range(30)])
+    axes = noise_of_poses(x, 100.0, [(k * 400, k * 400 + 300) for k in range(30)])
     assert axes[1].lines
     assert [axis.corner_hz for axis in axes] == [None] * 3
     # 9000 readings: a density to 1 %; what the hump leaves elsewhere adds some.
@@ -158,10 +158,10 @@ def test_holds_that_a_hand_shakes_lift_white_noise_below_a_corner_no_more_than_t
         if k % 3 == 0:
             x += 4.0 * sosfilt(tremor, rng.normal(size=(length + 64, 3)), axis=0)
         parts.append(np.round(x[64:] / 1.5) * 1.5)
-    holds = [(k * length, (k + 1) * length) for k in range(20)]
-    for axis in noise_of_holds(np.concatenate(parts), rate_hz, holds):
+    poses = [(k * length, (k + 1) * length) for k in range(20)]
+    for axis in noise_of_poses(np.concatenate(parts), rate_hz, poses):
         assert axis.corner_hz is not None
         assert axis.white is not None
         below = [o.density.value for o in axis.octaves if o.low_hz >= 1.0 and o.high_hz <= 8.0]
-        # The mean over all holds is six times the octaves' typical hold, its root 2.4; a filter's shape is worth 10 %.
+        # The mean over all poses is six times the octaves' typical pose, its root 2.4; a filter's shape is worth 10 %.
         assert axis.white.value < 1.3 * math.sqrt(float(np.mean(below)))

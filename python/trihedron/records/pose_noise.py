@@ -31,7 +31,7 @@ class OctaveNoise:
 
 
 @dataclass(frozen=True)
-class HoldLine:
+class PoseLine:
     """A line of ``amplitude`` [u] at ``frequency_hz`` that the poses have in common, over ``limit`` times its level."""
 
     frequency_hz: float
@@ -40,28 +40,28 @@ class HoldLine:
 
 
 @dataclass(frozen=True)
-class HoldNoise:
-    """Noise of one axis inside the holds of a session; u is the unit of the raw readings.
+class PoseNoise:
+    """Noise of one axis inside the poses of a session; u is the unit of the raw readings.
 
     ``white`` is the density N [u/√Hz] of the white noise ahead of the sensor's filter, freed of the rounding of the
-    converter, ``None`` where the converter hides it; ``reading_sigma`` [u] the noise from reading to reading (that of
+    ADC, ``None`` where the ADC hides it; ``reading_sigma`` [u] the noise from reading to reading (that of
     their differences over √2, rounding taken off; zero where it is hidden), which is N times the root of the rate
     where there is no filter. ``step`` [u] is the resolution, zero where the readings are finer than their noise shows.
     ``corner_hz`` is the corner of a low-pass filter where one shows, ``corner_above_hz`` what it lies above where none
     does; ``corner_shape`` is the order of the Butterworth filter that it resembles, 0 for a Gaussian. ``scatter`` is by
-    how much the noise differs from hold to hold beyond chance (standard deviation of the logarithm of its power).
+    how much the noise differs from pose to pose beyond chance (standard deviation of the logarithm of its power).
     """
 
     name: str
     unit: str
     rate_hz: float
-    n_holds: int
+    n_poses: int
     n_readings: int
     white: Measured | None
     reading_sigma: float
     step: float
     octaves: tuple[OctaveNoise, ...]
-    lines: tuple[HoldLine, ...]
+    lines: tuple[PoseLine, ...]
     corner_hz: Measured | None
     corner_above_hz: float
     scatter: float
