@@ -18,8 +18,8 @@ import trihedron
 from trihedron.cli import COMMANDS, build_app
 from trihedron.records.finding import FindingCode
 from trihedron.report.effects.catalogue import ENTRIES as EFFECTS
-from trihedron.report.effects.laws import FAMILIES
 from trihedron.report.effects.reasons import REASONS
+from trihedron.report.effects.relations import FAMILIES
 from trihedron.report.findings.catalogue import ENTRIES as FINDINGS
 from trihedron.report.findings.phrases import LINES, PHRASES
 from trihedron.simulate import hand_session

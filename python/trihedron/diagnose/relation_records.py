@@ -10,7 +10,7 @@ from trihedron.diagnose.relations.search import Follows, Related
 from trihedron.diagnose.relations.signals import AXES, ROOM_VECTOR
 from trihedron.records.diagnosis import EffectParameter, Relation
 from trihedron.records.domains import Domain, HeldOut
-from trihedron.records.words import law_experiment, law_resembles, words
+from trihedron.records.words import relation_experiment, relation_resembles, words
 
 OUT = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
 AT_REST: dict[str, Domain] = {"gyroscope": "static-gyro", "accelerometer": "static-accel"}
@@ -50,7 +50,7 @@ def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, held: He
     return Relation(
         sensor=signal.sensor,
         depends_on=signal.names,
-        form=words("law-form", axes=axes, terms=[f"c{k + 1}·({name})" for k, name in enumerate(signal.names)]),
+        form=words("relation-form", axes=axes, terms=[f"c{k + 1}·({name})" for k, name in enumerate(signal.names)]),
         coefficients=tuple(
             EffectParameter(f"{axis}: {name}", float(size[i, j]), float(error[i, j]), unit)
             for i, axis in enumerate(axes)
@@ -58,10 +58,10 @@ def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, held: He
         ),
         share=_share(held),
         held_out=held,
-        resembles=law_resembles(signal.family),
-        experiment=law_experiment(signal.family),
+        resembles=relation_resembles(signal.family),
+        experiment=relation_experiment(signal.family),
         statement=words(
-            "law-follows", sensor="gyro" if signal.sensor == "gyroscope" else signal.sensor,
+            "relation-follows", sensor="gyro" if signal.sensor == "gyroscope" else signal.sensor,
             is_at_rest=not signal.is_motion, axes=axes, depends=signal.names, share=_share(held),
         ),
     )  # fmt: skip
@@ -80,7 +80,7 @@ def _of_room(value: FloatArray, covariance: FloatArray, held: HeldOut | None) ->
     return Relation(
         sensor="gyroscope",
         depends_on=(ROOM_VECTOR,),
-        form=words("law-form-room"),
+        form=words("relation-form-room"),
         coefficients=(
             *(
                 EffectParameter(f"{AXES[i]}: m_{AXES[j]}", float(coupling[i, j]), float(sigma[i, j]), "rad/s")
@@ -91,10 +91,10 @@ def _of_room(value: FloatArray, covariance: FloatArray, held: HeldOut | None) ->
         ),
         share=share,
         held_out=held,
-        resembles=law_resembles(family),
-        experiment=law_experiment(family),
+        resembles=relation_resembles(family),
+        experiment=relation_experiment(family),
         statement=words(
-            "law-follows-room", inclination_deg=inclination, inclination_sigma_deg=spread, share=share
+            "relation-follows-room", inclination_deg=inclination, inclination_sigma_deg=spread, share=share
         ),
     )  # fmt: skip
 

@@ -50,11 +50,11 @@ def why_not(name: str, /, **values: Any) -> Words:
     return Words(import_module("trihedron.report.effects.catalogue").why_not(name, values))
 
 
-def law_experiment(family: str) -> Words:
+def relation_experiment(family: str) -> Words:
     """What would prove a law of a family of variables; empty where the catalogue has none."""
-    return Words(import_module("trihedron.report.effects.laws").family_words(family).experiment)
+    return Words(import_module("trihedron.report.effects.relations").family_words(family).experiment)
 
 
-def law_resembles(family: str) -> tuple[Words, ...]:
+def relation_resembles(family: str) -> tuple[Words, ...]:
     """Mechanisms that follow such variables."""
-    return tuple(map(Words, import_module("trihedron.report.effects.laws").family_words(family).resembles))
+    return tuple(map(Words, import_module("trihedron.report.effects.relations").family_words(family).resembles))

@@ -1,4 +1,4 @@
-"""A law written out as a file of the effects' folder, which `diagnose`, `apply` and `calibrate --extended` then use."""
+"""A relation written out as a file of the effects' folder, which `diagnose`, `apply`, `calibrate --extended` then use."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ from trihedron.records.diagnosis import Relation
 AXES = ("x", "y", "z")
 
 
-def effect_file(law: Relation, effect_id: str = "named-law") -> str | None:
-    """Source of an effect with the law's terms (docs/adding-an-effect.md); ``None`` where a term needs the past.
+def effect_file(relation: Relation, effect_id: str = "named-relation") -> str | None:
+    """Source of an effect with the relation's terms (docs/adding-an-effect.md); ``None`` where a term needs the past.
 
-    Laws of force, rate, temperature, supply and vibration follow from every sample; a previous pose, a last turn or a
+    Relations of force and rate follow from every sample; a previous pose, a last turn or a
     heading do not.
     """
     columns: list[tuple[int, str, str, str]] = []
-    for coefficient in law.coefficients:
+    for coefficient in relation.coefficients:
         target, _, name = coefficient.name.partition(": ")
         expression = _expression(name)
         if expression is None or target not in AXES:
             return None
         columns.append((AXES.index(target), expression, f"c_{target}_{len(columns)}", coefficient.unit))
-    is_gyro = law.sensor == "gyroscope"
+    is_gyro = relation.sensor == "gyroscope"
     only, needs = ("rate_only", "obs.raw_rate") if is_gyro else ("force_only", "obs.raw_force")
     class_name = "".join(word.capitalize() for word in effect_id.split("-"))
     rows = "\n".join(
         f"        values[:, {axis}, {k}] = {expression}" for k, (axis, expression, _, _) in enumerate(columns)
     )
-    mechanism = law.statement.split(":")[0]
+    mechanism = relation.statement.split(":")[0]
     return f'''"""{mechanism}."""
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ from trihedron.diagnose.effects.contract import Effect, Variant, {only}
 
 
 class {class_name}(Effect):
-    """{law.form}."""
+    """{relation.form}."""
 
     id = "{effect_id}"
     mechanism = "{mechanism}"
-    experiment = "{law.experiment}"
+    experiment = "{relation.experiment}"
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:
@@ -61,14 +61,11 @@ class {class_name}(Effect):
 
 def _expression(name: str) -> str | None:
     """How a term of the dictionary reads in a context."""
-    table = {"T": "context.temperature", "T^2": "context.temperature**2", "supply": "context.supply"}
-    table |= {"vibration power": "context.vibration_power.sum(axis=1)", "|w|": "np.linalg.norm(w, axis=1)"}
+    table = {"|w|": "np.linalg.norm(w, axis=1)"}
     for i, a in enumerate(AXES):
         table |= {
-            f"u_{a}": f"u[:, {i}]", f"u_{a}^2": f"u[:, {i}] ** 2", f"u_{a}^3": f"u[:, {i}] ** 3",
-            f"|u_{a}|": f"np.abs(u[:, {i}])", f"w_{a}": f"w[:, {i}]", f"w_{a}^2": f"w[:, {i}] ** 2",
-            f"w_{a} |w_{a}|": f"w[:, {i}] * np.abs(w[:, {i}])", f"T w_{a}": f"context.temperature * w[:, {i}]",
-            f"dw_{a}/dt": f"context.angular_acceleration[:, {i}]", f"df_{a}/dt": f"context.force_rate[:, {i}]",
+            f"u_{a}^2": f"u[:, {i}] ** 2", f"u_{a}^3": f"u[:, {i}] ** 3", f"|u_{a}|": f"np.abs(u[:, {i}])",
+            f"w_{a}": f"w[:, {i}]",
         }  # fmt: skip
         for k, b in enumerate(AXES):
             table |= {

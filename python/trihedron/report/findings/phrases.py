@@ -66,12 +66,12 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "gravity-missed": "tilt error after a rotation",
         "velocity-over-move": "velocity error over a rotation",
         # empirical relations of what stays unexplained
-        "law-follows": "The {sensor}'s {is_at_rest:?bias|reading in motion} ({axes:axes}) follows {depends:and}: "
+        "relation-follows": "The {sensor}'s {is_at_rest:?bias|reading in motion} ({axes:axes}) follows {depends:and}: "
         "{share:.0f %} of the held-out misfit.",
-        "law-follows-room": "The gyro's bias follows a vector fixed in the room, {inclination_deg:.0f}° ± "
+        "relation-follows-room": "The gyro's bias follows a vector fixed in the room, {inclination_deg:.0f}° ± "
         "{inclination_sigma_deg:.0f}° from the vertical: {share:.0f %} of the held-out misfit.",
-        "law-form": "reading of {axes:axes} grows by {terms:& + }",
-        "law-form-room": "bias = K Rᵀ m, m a unit vector fixed in the room",
+        "relation-form": "reading of {axes:axes} grows by {terms:& + }",
+        "relation-form-room": "bias = K Rᵀ m, m a unit vector fixed in the room",
         "angle-to-vertical": "angle to the vertical",
         # places in a file, amounts
         "line": "line {line}",

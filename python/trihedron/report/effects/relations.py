@@ -1,4 +1,4 @@
-"""What would prove a law of what stays unexplained, and what it resembles, by the family of its variables."""
+"""What would prove a relation that no mechanism explains, and what it resembles, by the family of its variables."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
         "force rate": FamilyWords("shake along one axis without turning"),
     }
 )
-"""By the family that the dictionary of variables gives (``diagnose/laws``); a family not named here has no words."""
+"""By the family that ``diagnose/relations`` gives its variables; a family not named here has no words."""
 
 
 def family_words(family: str) -> FamilyWords:
