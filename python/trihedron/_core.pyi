@@ -697,7 +697,11 @@ class SessionFit:
         self, hypotheses: Sequence[_Asked], strengths: Sequence[_Strengths], within: tuple[_Pair, _Pair, _Pair]
     ) -> list[tuple[float, _Strengths, FloatArray, FloatArray]]: ...
     def looks(
-        self, candidates: Sequence[_Asked], scales: Sequence[float], strengths: Sequence[_Strengths]
+        self,
+        candidates: Sequence[_Asked],
+        scales: Sequence[float],
+        strengths: Sequence[_Strengths],
+        parts: Sequence[Sequence[int]] | None = None,
     ) -> list[tuple[FloatArray, FloatArray, FloatArray]]: ...
     def leverage(self) -> FloatArray: ...
     def held_out(

@@ -79,20 +79,34 @@ impl<'a> Looks<'a> {
     }
 
     /// A candidate's columns, whitened as the fit's rows are, group after group; `sizes` beforehand times each scale.
+    /// Every one of `parts` (numbers of columns) is looked at as a candidate by itself.
     ///
     /// # Errors
     /// When a candidate has no size.
-    pub fn seen(&self, columns: &[DMatrix<f64>], sizes: &[f64], scales: &[f64]) -> Result<Seen> {
-        let k = sizes.len();
-        let sizes = DVector::from_column_slice(sizes);
+    pub fn seen(
+        &self,
+        columns: &[DMatrix<f64>],
+        sizes: &[f64],
+        scales: &[f64],
+        parts: &[Vec<usize>],
+    ) -> Result<Vec<Seen>> {
+        let left = self.left(columns, sizes.len());
+        let each = parts.iter().map(|part| {
+            let of_part: Vec<Left> = left.iter().map(|whole| whole.of(part)).collect();
+            let sizes = DVector::from_iterator(part.len(), part.iter().map(|&i| sizes[i]));
+            judged(&of_part, &sizes, scales)
+        });
+        each.collect()
+    }
+
+    /// What is left of a candidate's columns at every of the strengths.
+    fn left(&self, columns: &[DMatrix<f64>], k: usize) -> Vec<Left> {
         let readings = || {
             let pairs = self.fit.groups.iter().zip(columns);
             pairs.filter(|(group, _)| group.kind == Kind::Reading)
         };
         let at_rest = self.sums(k, readings().filter(|(group, _)| !is_move(group)));
-        let mut gain = DMatrix::zeros(scales.len(), self.each.len());
-        let mut first: Option<(f64, DVector<f64>, DMatrix<f64>)> = None;
-        for (l, look) in self.each.iter().enumerate() {
+        let each = self.each.iter().map(|look| {
             let of_moves: Vec<DMatrix<f64>> = readings()
                 .filter(|(group, _)| is_move(group))
                 .map(|(group, own)| &look.turned[group.segment] * own)
@@ -104,35 +118,12 @@ impl<'a> Looks<'a> {
             side.column_mut(k).copy_from(&look.side.column(0));
             let imitated = look.factor.inner(&side);
             let normal = own.columns(0, k) - imitated.view((0, 0), (k, k));
-            let slope = own.column(k) - imitated.view((0, k), (k, 1)).column(0);
-            for (s, scale) in scales.iter().enumerate() {
-                // In units of the sizes: a prior of one, and no term for its width.
-                let d = &sizes * *scale;
-                let inner = DMatrix::from_fn(k, k, |i, j| {
-                    d[i] * d[j] * 0.5 * (normal[(i, j)] + normal[(j, i)]) + f64::from(i == j)
-                });
-                let slope = slope.component_mul(&d);
-                let half = Cholesky::new(inner)
-                    .ok_or_else(|| Error::not_determined("a candidate's columns are not finite"))?;
-                let step = half.solve(&slope);
-                gain[(s, l)] = 0.5 * slope.dot(&step) - half.l().diagonal().map(f64::ln).sum();
-                if l == 0 && first.as_ref().is_none_or(|(best, ..)| gain[(s, l)] > *best) {
-                    let scaled = DMatrix::from_diagonal(&d);
-                    first = Some((
-                        gain[(s, l)],
-                        -step.component_mul(&d),
-                        &scaled * half.inverse() * &scaled,
-                    ));
-                }
+            Left {
+                normal: 0.5 * (&normal + normal.transpose()),
+                slope: own.column(k) - imitated.view((0, k), (k, 1)).column(0),
             }
-        }
-        let (_, estimate, covariance) =
-            first.ok_or_else(|| Error::bad_input("strengths or scales are missing"))?;
-        Ok(Seen {
-            gain,
-            estimate,
-            covariance,
-        })
+        });
+        each.collect()
     }
 
     /// `CᵀC` with `Cᵀr` behind it, and `JᵀC`.
@@ -152,6 +143,59 @@ impl<'a> Looks<'a> {
         }
         (own, beside)
     }
+}
+
+/// Columns with what the unknowns of the fit imitate taken off, at some strengths: their products and the slope along
+/// each.
+struct Left {
+    normal: DMatrix<f64>,
+    slope: DVector<f64>,
+}
+
+impl Left {
+    /// Some of the columns.
+    fn of(&self, part: &[usize]) -> Self {
+        Self {
+            normal: self.normal.select_rows(part).select_columns(part),
+            slope: self.slope.select_rows(part),
+        }
+    }
+}
+
+/// What columns come to, their sizes beforehand times each scale.
+fn judged(left: &[Left], sizes: &DVector<f64>, scales: &[f64]) -> Result<Seen> {
+    let k = sizes.len();
+    let mut gain = DMatrix::zeros(scales.len(), left.len());
+    let mut first: Option<(f64, DVector<f64>, DMatrix<f64>)> = None;
+    for (l, one) in left.iter().enumerate() {
+        for (s, scale) in scales.iter().enumerate() {
+            // In units of the sizes: a prior of one, and no term for its width.
+            let d = sizes * *scale;
+            let inner = DMatrix::from_fn(k, k, |i, j| {
+                d[i] * d[j] * one.normal[(i, j)] + f64::from(i == j)
+            });
+            let slope = one.slope.component_mul(&d);
+            let half = Cholesky::new(inner)
+                .ok_or_else(|| Error::not_determined("a candidate's columns are not finite"))?;
+            let step = half.solve(&slope);
+            gain[(s, l)] = 0.5 * slope.dot(&step) - half.l().diagonal().map(f64::ln).sum();
+            if l == 0 && first.as_ref().is_none_or(|(best, ..)| gain[(s, l)] > *best) {
+                let scaled = DMatrix::from_diagonal(&d);
+                first = Some((
+                    gain[(s, l)],
+                    -step.component_mul(&d),
+                    &scaled * half.inverse() * &scaled,
+                ));
+            }
+        }
+    }
+    let (_, estimate, covariance) =
+        first.ok_or_else(|| Error::bad_input("strengths or scales are missing"))?;
+    Ok(Seen {
+        gain,
+        estimate,
+        covariance,
+    })
 }
 
 fn is_move(group: &Group) -> bool {

@@ -110,9 +110,14 @@ class Hypothesis:
         found = self.fitted.line.core.evidence(_columns(terms), [self.strengths, *ELSEWHERE], self.within)
         return [Asked(*one) for one in found]
 
-    def looked_at(self, terms: Sequence[Term], scales: Sequence[float]) -> list[Look]:
-        """What each of some terms gains at the strengths found here and elsewhere, sizes times each of ``scales``."""
-        found = self.fitted.line.core.looks(_columns(terms), list(scales), [self.strengths, *ELSEWHERE])
+    def looked_at(
+        self, terms: Sequence[Term], scales: Sequence[float], parts: Sequence[Sequence[int]] | None = None
+    ) -> list[Look]:
+        """What each of some terms gains at the strengths found here and elsewhere, sizes times each of ``scales``.
+
+        With ``parts``, numbers of columns, each of these by itself.
+        """
+        found = self.fitted.line.core.looks(_columns(terms), list(scales), [self.strengths, *ELSEWHERE], parts)
         return [Look(*one) for one in found]
 
     def plain(self, strengths: Sequence[Strengths]) -> float:

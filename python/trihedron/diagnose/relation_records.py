@@ -45,14 +45,15 @@ def _share(held: HeldOut | None) -> float:
 def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, held: HeldOut | None) -> Relation:
     signal, sigma = one.signal, np.sqrt(np.maximum(np.diag(covariance), 0.0))
     size, error = (x.reshape(len(one.axes), -1) for x in (value, sigma))
-    unit = OUT[signal.sensor] if signal.unit == "1" else f"({OUT[signal.sensor]})/({signal.unit})"
+    out = OUT[signal.sensor]
+    units = [out if unit == "1" else f"({out})/({unit})" for unit in signal.units]
     axes = tuple(AXES[a] for a in one.axes)
     return Relation(
         sensor=signal.sensor,
         depends_on=signal.names,
         form=words("relation-form", axes=axes, terms=[f"c{k + 1}·({name})" for k, name in enumerate(signal.names)]),
         coefficients=tuple(
-            EffectParameter(f"{axis}: {name}", float(size[i, j]), float(error[i, j]), unit)
+            EffectParameter(f"{axis}: {name}", float(size[i, j]), float(error[i, j]), units[j])
             for i, axis in enumerate(axes)
             for j, name in enumerate(signal.names)
         ),

@@ -141,6 +141,11 @@ def _beside_relations(judged: _Judged, limit: float) -> tuple[_Judged, Related]:
         return judged, best
     k = 0
     while k < len(judged.model.terms):
+        # What stands beside the relations is not theirs.
+        without = again(best.model, [t for j, t in enumerate(best.model.terms) if j != k])
+        if 2.0 * (best.model.log_evidence - without.log_evidence) - judged.model.terms[k].paid > limit:
+            k += 1
+            continue
         fewer = again(judged.model, [t for j, t in enumerate(judged.model.terms) if j != k])
         other = related(fewer, limit)
         if other.relations and other.score > best.score + NEAR:

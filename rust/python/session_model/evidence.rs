@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyReadonlyArray3, ToPyArray};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
@@ -55,27 +56,42 @@ pub(super) fn tuned<'py>(
     lent.collect()
 }
 
-/// What every candidate gains at each of some strengths (11.19).
+/// What every candidate, or every one of its `parts`, gains at each of some strengths (11.19).
 pub(super) fn seen<'py>(
     of: (&Arc<Session>, &Arc<Fit>),
     py: Python<'py>,
     candidates: &[Asked<'py>],
     scales: Vec<f64>,
     strengths: Vec<AllStrengths>,
+    parts: Option<Vec<Vec<usize>>>,
 ) -> PyResult<Vec<Glance<'py>>> {
     let at: Vec<Strengths> = strengths.into_iter().map(strengths_of).collect();
     let asked = asked_of(of.0, candidates)?;
+    if let Some(parts) = &parts {
+        let k = asked.iter().map(|(_, sizes)| sizes.len()).min();
+        if parts.iter().flatten().any(|&i| k.is_none_or(|k| i >= k)) {
+            return Err(PyValueError::new_err(
+                "a part names a column that is not there",
+            ));
+        }
+    }
     let (session, fit) = (Arc::clone(of.0), Arc::clone(of.1));
     let found = run_long(py, || {
         let looks = Looks::of(&fit, &at)?;
         let each = asked.par_iter().map(|(effects, sizes)| {
             let columns =
                 session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, effects)?;
-            looks.seen(&columns, sizes, &scales)
+            let whole = || vec![(0..sizes.len()).collect()];
+            looks.seen(
+                &columns,
+                sizes,
+                &scales,
+                &parts.clone().unwrap_or_else(whole),
+            )
         });
         each.collect::<Result<Vec<_>>>()
     })?;
-    let lent = found.iter().map(|one| {
+    let lent = found.iter().flatten().map(|one| {
         Ok((
             matrix(py, &one.gain)?,
             one.estimate.as_slice().to_pyarray(py),

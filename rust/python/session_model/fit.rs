@@ -236,12 +236,15 @@ impl SessionFit {
 
     /// What every candidate gains in log-evidence at each of some strengths, its sizes beforehand times each of some
     /// scales: `(scales, strengths)`; its parameters and their covariance at the first strengths and their best scale.
+    /// With `parts` (numbers of columns) each of these instead, candidate after candidate.
+    #[pyo3(signature = (candidates, scales, strengths, parts=None))]
     fn looks<'py>(
         &self,
         py: Python<'py>,
         candidates: Vec<Asked<'py>>,
         scales: Vec<f64>,
         strengths: Vec<AllStrengths>,
+        parts: Option<Vec<Vec<usize>>>,
     ) -> PyResult<Vec<Glance<'py>>> {
         seen(
             (&self.session, &self.fit),
@@ -249,6 +252,7 @@ impl SessionFit {
             &candidates,
             scales,
             strengths,
+            parts,
         )
     }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,9 @@ from trihedron.diagnose.relations.signals import AXES, ROOM_VECTOR, Signal, room
 
 N_FITTED = 3
 """Relations whose strengths of noise are found anew before the best is chosen."""
+ALL_AXES = (0, 1, 2)
+ANY_BY_ANY = ("rate", "last turn", "rate products")
+"""Families of vectors: three of their variables may act on any axis together."""
 MOST_RELATIONS = 3
 """A longer list is no law that a person would check."""
 
@@ -64,9 +67,9 @@ def related(model: Hypothesis, limit: float) -> Related:
     """Relations added to a hypothesis one at a time while the best scores more than ``limit``."""
     found: list[Follows] = []
     steps: list[Hypothesis] = []
-    tried = list(_candidates(model.context)) if model.context.moves else []
-    for _ in range(MOST_RELATIONS):
-        best = _best(model, tried)
+    context = model.context
+    while len(found) < MOST_RELATIONS and context.moves:
+        best = _best(model, context, {one.signal.names for one in found})
         if best is None:
             break
         larger = again(model, [*model.terms, best.term])
@@ -75,44 +78,73 @@ def related(model: Hypothesis, limit: float) -> Related:
         found.append(best)
         steps.append(model)
         model = larger
-        tried = [one for one in tried if one.signal is not best.signal]
     return Related(model, tuple(found), tuple(steps))
 
 
-def _best(model: Hypothesis, tried: list[Follows]) -> Follows | None:
+def _best(model: Hypothesis, context: Context, known: Collection[tuple[str, ...]]) -> Follows | None:
     """The relation that gains most of those that look best at fixed strengths, each family once."""
-    if not tried:
+    leading: list[tuple[float, Follows]] = []
+    n_tried = 0
+    # One family at a time: the columns of all of them together are larger than the log.
+    for whole in _families(context):
+        ways = [way for way in _ways(whole.signal) if tuple(whole.signal.names[k] for k in way[0]) not in known]
+        m = len(whole.signal.names)
+        parts = [[a * m + k for a in axes for k in names] for names, axes in ways]
+        looks = model.looked_at([whole.term], PRIOR_SCALES, parts)
+        n_tried += len(ways)
+        best = max(range(len(ways)), key=lambda k: float(looks[k].gain.max()), default=None)
+        if best is not None:
+            gain = looks[best].gain.max(axis=1)
+            scale = PRIOR_SCALES[int(gain.argmax())]
+            leading.append((float(gain.max()), _part(context, whole.signal, ways[best], scale)))
+    paid = 2.0 * float(np.log(max(n_tried, 1) * len(PRIOR_SCALES)))
+    leading = sorted(leading, key=lambda pair: -pair[0])[:N_FITTED]
+    terms = [replace(one.term, paid=paid) for gain, one in leading if 2.0 * gain > paid]
+    if not terms:
         return None
-    paid = 2.0 * float(np.log(len(tried) * len(PRIOR_SCALES)))
-    gains = np.stack([one.gain for one in model.looked_at([one.term for one in tried], PRIOR_SCALES)])
-    leading: dict[str, Follows] = {}
-    for k in np.argsort(-gains.max(axis=(1, 2))).tolist():
-        one, scale = tried[k], PRIOR_SCALES[int(gains[k].max(axis=1).argmax())]
-        term = replace(one.term, sizes=one.term.sizes * scale, paid=paid)
-        leading.setdefault(one.signal.family + one.signal.sensor, replace(one, term=term))
-        if len(leading) == N_FITTED:
-            break
-    asked = model.asked([one.term for one in leading.values()])
+    asked = model.asked(terms)
     plain = model.plain([one.strengths for one in asked])
     scores = [2.0 * (one.log_evidence - plain) - paid for one in asked]
-    return list(leading.values())[int(np.argmax(scores))] if max(scores) > 0.0 else None
+    best = int(np.argmax(scores))
+    return replace(leading[best][1], term=terms[best]) if scores[best] > 0.0 else None
 
 
-def _candidates(context: Context) -> Iterator[Follows]:
+Way = tuple[tuple[int, ...], tuple[int, ...]]
+"""Numbers of the variables, and of the axes that follow them."""
+
+
+def _ways(signal: Signal) -> list[Way]:
+    """Each variable on each axis and on all of them; the first three, and three more, as any axis by any axis."""
+    n = len(signal.names)
+    if signal.family == "room":
+        return [(tuple(range(n)), ALL_AXES)]
+    ways: list[Way] = [((k,), axes) for k in range(n) for axes in ((0,), (1,), (2,), ALL_AXES)]
+    if signal.family in ANY_BY_ANY:
+        ways += [((k, k + 1, k + 2), ALL_AXES) for k in range(0, n - 2, 3)]
+    return ways
+
+
+def _families(context: Context) -> Iterator[Follows]:
+    """All variables of a family on all axes, in one set of columns."""
     every = signals(context)
-    for one in every:
-        for axes in ((0,), (1,), (2,), (0, 1, 2)):
-            yield _follows(context, one, axes)
-    # ω on the accelerometer, and the turn that led to a pose, act on any axis by any axis.
-    for sensor in ("accelerometer", "gyroscope"):
-        for family in ("rate", "last turn", "rate products"):
-            own = [one for one in every if one.sensor == sensor and one.family == family]
-            for part in (own[:3], own[3:6]):
-                if len(part) == 3:
-                    values = np.hstack([one.values for one in part])
-                    names = tuple(name for one in part for name in one.names)
-                    yield _follows(context, replace(part[0], names=names, values=values), (0, 1, 2))
+    for sensor, family in dict.fromkeys((one.sensor, one.family) for one in every):
+        own = [one for one in every if (one.sensor, one.family) == (sensor, family)]
+        names = tuple(name for one in own for name in one.names)
+        units = tuple(unit for one in own for unit in one.units)
+        together = replace(own[0], names=names, units=units, values=np.hstack([one.values for one in own]))
+        yield _follows(context, together, ALL_AXES)
     yield from _room(context)
+
+
+def _part(context: Context, whole: Signal, way: Way, scale: float) -> Follows:
+    """Some variables of a family, expected as large as fits."""
+    names, axes = way
+    signal = replace(
+        whole, names=tuple(whole.names[k] for k in names), units=tuple(whole.units[k] for k in names),
+        values=whole.values[:, names],
+    )  # fmt: skip
+    one = _follows(context, signal, axes)
+    return replace(one, term=replace(one.term, sizes=scale * one.term.sizes))
 
 
 def _follows(context: Context, signal: Signal, axes: tuple[int, ...]) -> Follows:
@@ -120,7 +152,7 @@ def _follows(context: Context, signal: Signal, axes: tuple[int, ...]) -> Follows
     own = (context.gyro_axes if is_gyro else context.accel_axes)[:, list(axes)]
     columns = np.einsum("ia,nk->niak", own, signal.values).reshape(len(signal.values), 3, -1)
     names = tuple(f"{AXES[a]}: {name}" for a in axes for name in signal.names)
-    variant = Variant((rate_only if is_gyro else force_only)(columns), names, (signal.unit,) * len(names))
+    variant = Variant((rate_only if is_gyro else force_only)(columns), names, signal.units * len(axes))
     return Follows(signal, axes, Term(EMPIRICAL, variant, EMPIRICAL.sizes(context, variant)))
 
 
@@ -132,4 +164,4 @@ def _room(context: Context) -> Iterator[Follows]:
     seen = room(context) if context.obs.raw_rate is not None else None
     if seen is not None:
         names = tuple(f"{ROOM_VECTOR} {AXES[j]}{h}" for j in range(3) for h in range(3))
-        yield _follows(context, Signal("gyroscope", "room", names, seen.reshape(len(seen), -1), "1"), (0, 1, 2))
+        yield _follows(context, Signal("gyroscope", "room", names, seen.reshape(len(seen), -1), ("1",) * 9), ALL_AXES)

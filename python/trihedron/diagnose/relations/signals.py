@@ -22,7 +22,7 @@ ROOM_VECTOR = "vector fixed in the room"
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """Variables that go together: ``values`` (points, k), ``names`` (k,) as they are said, their ``unit``.
+    """Variables that go together: ``values`` (points, k), ``names`` and ``units`` (k,) as they are said.
 
     ``family`` chooses the words for the experiment; ``is_motion`` marks what vanishes at rest.
     """
@@ -31,14 +31,16 @@ class Signal:
     family: str
     names: tuple[str, ...]
     values: FloatArray
-    unit: str
+    units: tuple[str, ...]
     is_motion: bool = False
 
 
 def signals(context: Context) -> list[Signal]:
     """Every variable that this session has, of both sensors, those at rest about their mean over the poses."""
     out = _history(context, "accelerometer") + _warming(context, "accelerometer") + _forces(context, "accelerometer")
-    out += [Signal("accelerometer", "rate", (f"w_{AXES[a]}",), context.rate[:, [a]], "rad/s", True) for a in range(3)]
+    out += [
+        Signal("accelerometer", "rate", (f"w_{AXES[a]}",), context.rate[:, [a]], ("rad/s",), True) for a in range(3)
+    ]
     if context.obs.raw_rate is not None:
         out += _forces(context, "gyroscope") + _gyro_only(context) + _history(context, "gyroscope")
         out += _warming(context, "gyroscope") + _motion(context)
@@ -59,26 +61,26 @@ def _centred(signal: Signal, n_poses: int) -> Signal:
     if signal.is_motion:
         return signal
     values = signal.values - signal.values[:n_poses].mean(axis=0)
-    return Signal(signal.sensor, signal.family, signal.names, values, signal.unit)
+    return Signal(signal.sensor, signal.family, signal.names, values, signal.units)
 
 
 def _forces(context: Context, sensor: Sensor) -> list[Signal]:
     f = context.force / context.fitted.twin.gravity
     return [
-        Signal(sensor, "force", (f"u_{AXES[a]} u_{AXES[b]}",), (f[:, a] * f[:, b])[:, None], "g^2")
+        Signal(sensor, "force", (f"u_{AXES[a]} u_{AXES[b]}",), (f[:, a] * f[:, b])[:, None], ("g^2",))
         for a, b in combinations(range(3), 2)
     ]
 
 
 def _gyro_only(context: Context) -> list[Signal]:
     f = context.force / context.fitted.twin.gravity
-    out = [Signal("gyroscope", "force", (f"u_{AXES[a]}^2",), f[:, [a]] ** 2, "g^2") for a in range(3)]
-    out += [Signal("gyroscope", "force", (f"u_{AXES[a]}^3",), f[:, [a]] ** 3, "g^3") for a in range(3)]
-    out += [Signal("gyroscope", "force", (f"|u_{AXES[a]}|",), np.abs(f[:, [a]]), "g") for a in range(3)]
+    out = [Signal("gyroscope", "force", (f"u_{AXES[a]}^2",), f[:, [a]] ** 2, ("g^2",)) for a in range(3)]
+    out += [Signal("gyroscope", "force", (f"u_{AXES[a]}^3",), f[:, [a]] ** 3, ("g^3",)) for a in range(3)]
+    out += [Signal("gyroscope", "force", (f"|u_{AXES[a]}|",), np.abs(f[:, [a]]), ("g",)) for a in range(3)]
     up = context.fitted.twin.up
     before = context.between_holds(np.vstack([up[:1], up[:-1]]))
     return out + [
-        Signal("gyroscope", "previous pose", (f"previous u_{AXES[a]}",), before[:, [a]], "g") for a in range(3)
+        Signal("gyroscope", "previous pose", (f"previous u_{AXES[a]}",), before[:, [a]], ("g",)) for a in range(3)
     ]
 
 
@@ -89,28 +91,32 @@ def _history(context: Context, sensor: Sensor) -> list[Signal]:
         turn[after] = np.trapezoid(context.rate[where], context.time_s[where], axis=0)
     angle, sign = context.between_holds(turn), context.between_holds(np.sign(turn))
     size = context.between_holds(np.linalg.norm(turn, axis=1, keepdims=True))
-    out = [Signal(sensor, "last turn", (f"last turn about {AXES[a]}",), angle[:, [a]], "rad") for a in range(3)]
+    out = [Signal(sensor, "last turn", (f"last turn about {AXES[a]}",), angle[:, [a]], ("rad",)) for a in range(3)]
     out += [
-        Signal(sensor, "last turn", (f"sign of the last turn about {AXES[a]}",), sign[:, [a]], "1") for a in range(3)
+        Signal(sensor, "last turn", (f"sign of the last turn about {AXES[a]}",), sign[:, [a]], ("1",)) for a in range(3)
     ]
-    return [*out, Signal(sensor, "last turn", ("size of the last turn",), size, "rad")]
+    return [*out, Signal(sensor, "last turn", ("size of the last turn",), size, ("rad",))]
 
 
 def _warming(context: Context, sensor: Sensor) -> list[Signal]:
     speed = context.temperature_rate
-    return [] if speed is None else [Signal(sensor, "temperature", ("dT/dt",), speed[:, None], "K/s")]
+    return [] if speed is None else [Signal(sensor, "temperature", ("dT/dt",), speed[:, None], ("K/s",))]
 
 
 def _motion(context: Context) -> list[Signal]:
     w, f = context.rate, context.force / context.fitted.twin.gravity
     out = [
-        Signal("gyroscope", "rate products", (f"w_{AXES[a]} w_{AXES[b]}",), (w[:, a] * w[:, b])[:, None], "(rad/s)^2",
-               True)
+        Signal(
+            "gyroscope", "rate products", (f"w_{AXES[a]} w_{AXES[b]}",), (w[:, a] * w[:, b])[:, None],
+            ("(rad/s)^2",), True,
+        )
         for a, b in combinations(range(3), 2)
     ]  # fmt: skip
     out += [
-        Signal("gyroscope", "rate times force", (f"w_{AXES[a]} f_{AXES[b]}",), (w[:, a] * f[:, b])[:, None], "rad/s g",
-               True)
+        Signal(
+            "gyroscope", "rate times force", (f"w_{AXES[a]} f_{AXES[b]}",), (w[:, a] * f[:, b])[:, None],
+            ("rad/s g",), True,
+        )
         for a in range(3) for b in range(3)
     ]  # fmt: skip
-    return [*out, Signal("gyroscope", "rate", ("|w|",), np.linalg.norm(w, axis=1, keepdims=True), "rad/s", True)]
+    return [*out, Signal("gyroscope", "rate", ("|w|",), np.linalg.norm(w, axis=1, keepdims=True), ("rad/s",), True)]

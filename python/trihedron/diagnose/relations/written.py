@@ -1,4 +1,4 @@
-"""A relation written out as a file of the effects' folder, which `diagnose`, `apply`, `calibrate --extended` then use."""
+"""A relation written out as a file of the effects' folder, for `diagnose`, `apply` and `calibrate --extended`."""
 
 from __future__ import annotations
 
