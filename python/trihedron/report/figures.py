@@ -90,7 +90,8 @@ def draw_residuals(quality: FitQuality) -> Figure:
     )
     axis.set_xlabel("pose")
     axis.set_ylabel("|f| − |g|  [mm/s²]")
-    axis.set_xlim(-0.8, len(pose) - 0.2)
+    axis.set_xlim(0.2, len(pose) + 0.8)
+    axis.xaxis.get_major_locator().set_params(integer=True)
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     return figure
 
@@ -127,7 +128,8 @@ def draw_moves(quality: FitQuality) -> Figure:
         axis.bar(move + 0.2, quality.held_out_angle_deg, 0.38, color=ACCENT, label="held out")
     axis.set_xlabel("move")
     axis.set_ylabel("tilt error [°]")
-    axis.set_xlim(-0.8, len(move) - 0.2)
+    axis.set_xlim(0.2, len(move) + 0.8)
+    axis.xaxis.get_major_locator().set_params(integer=True)
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     return figure
 
@@ -196,7 +198,7 @@ def _hemisphere(axis: Axes, title: str) -> None:
         z = np.sin(np.radians(elevation_deg))
         radius = np.sqrt(1.0 - z)
         axis.plot(radius * np.cos(angle), radius * np.sin(angle), color="#AAB4BD", linewidth=0.6, zorder=0)
-    for label, x, y in (("+1", 1.15, 0.0), ("−1", -1.15, 0.0), ("+2", 0.0, 1.15), ("−2", 0.0, -1.15)):
+    for label, x, y in (("+X", 1.15, 0.0), ("−X", -1.15, 0.0), ("+Y", 0.0, 1.15), ("−Y", 0.0, -1.15)):
         axis.annotate(label, (x, y), ha="center", va="center", fontsize=9, color=INK)
         axis.plot([0.0, np.clip(x, -1.0, 1.0)], [0.0, np.clip(y, -1.0, 1.0)], color="#D5DBE0", linewidth=0.6, zorder=0)
     axis.set_aspect("equal")
