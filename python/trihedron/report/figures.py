@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from trihedron.arrays import FloatArray
 from trihedron.records import FitQuality, Recording, Segments, SensorCalibration, Verification
@@ -91,7 +92,7 @@ def draw_residuals(quality: FitQuality) -> Figure:
     axis.set_xlabel("pose")
     axis.set_ylabel("|f| − |g|  [mm/s²]")
     axis.set_xlim(0.2, len(pose) + 0.8)
-    axis.xaxis.get_major_locator().set_params(integer=True)
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     return figure
 
@@ -129,7 +130,7 @@ def draw_moves(quality: FitQuality) -> Figure:
     axis.set_xlabel("move")
     axis.set_ylabel("tilt error [°]")
     axis.set_xlim(0.2, len(move) + 0.8)
-    axis.xaxis.get_major_locator().set_params(integer=True)
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     return figure
 
