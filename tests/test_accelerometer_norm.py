@@ -155,7 +155,7 @@ def test_a_touched_pose_is_found_and_a_robust_loss_ignores_it():
     means[7] += [20.0, -15.0, 10.0]
     plain, findings = calibrate_norm(means, SIGMA, G)
     outliers = [f for f in findings if f.code is FindingCode.OUTLIER_POSE]
-    assert [f.numbers["pose"] for f in outliers] == [7.0]
+    assert [f.numbers["pose"] for f in outliers] == [8.0]
     clean, _ = calibrate_norm(np.delete(means, 7, axis=0), SIGMA, G)
     robust, _ = calibrate_norm(means, SIGMA, G, loss="cauchy")
     # Cauchy's influence of a residual of 60 standard errors is 2.385²/60, a tenth of one.

@@ -184,7 +184,7 @@ def test_a_disturbed_hold_costs_its_two_moves_and_is_named(quiet):
         recording, replace(segments, accelerometer_mean=mean), given_accelerometer(truth), truth.gravity_m_s2
     )
     named = {int(f.numbers["move"]) for f in findings if f.code is FindingCode.OUTLIER_MOVE}
-    assert named == {6, 7}
+    assert named == {7, 8}
     assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
     assert list(np.flatnonzero(found.quality.weights == 0.0)) == [6, 7]
 

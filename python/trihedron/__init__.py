@@ -6,7 +6,7 @@ recording
     What one IMU wrote: raw readings of accelerometer and gyro on one time base, in the unit of the log, with the audit
     of the log as findings. (:func:`read` makes one.)
 segments
-    *Poses* (``holds``), where the sensor stood still, and the *moves* between them. (:func:`segment`)
+    *Poses* (``poses``), where the sensor stood still, and the *moves* between them. (:func:`segment`)
 pose
     A static stretch in one orientation. It shows the accelerometer the vector of gravity.
 body frame

@@ -247,7 +247,7 @@ def _angle_findings(moves: Carriage) -> list[Finding]:
             "verify-moves",
             severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
             angle_rms_deg=rms,
-            worst_move=int(moves.which[worst]),
+            worst_move=int(moves.which[worst]) + 1,
             worst_deg=angle_deg[worst],
             times_expected=times,
         )

@@ -58,6 +58,11 @@ def demo(
     Files go to ``folder``; ``seed`` draws unit and flaw of the second act. ``.document`` of each is its story, which
     ``print`` shows.
 
+    Returns
+    -------
+    (Demonstration, Disagreement)
+        The two acts.
+
     Raises
     ------
     ValueError

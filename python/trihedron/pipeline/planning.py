@@ -37,8 +37,8 @@ def plan(
     ----------
     turns_deg : sequence of float
         The turns about every one of the three axes, each taking ``turn_s``.
-    hold_s : float
-        How long every pose, and the one zero turn, is held.
+    pose_s : float
+        How long every pose, and the one stretch without rotation, lasts.
     gyroscope_density, accelerometer_density : float
         White noise [rad/s/√Hz, m/s²/√Hz]; that of a consumer part unless said.
     sigma_turn_rad : float
@@ -53,6 +53,12 @@ def plan(
     ------
     ValueError
         When a figure is not positive or the turns determine nothing.
+
+    Examples
+    --------
+    >>> longer = trihedron.plan(turns_deg=(1440.0, -1440.0), turn_s=8.0)
+    >>> longer.turns.scale < trihedron.plan().turns.scale
+    True
     """
     for name, value in (("turn time", turn_s), ("pose", pose_s), ("accelerometer noise", accelerometer_density)):
         if not value > 0.0:

@@ -174,7 +174,7 @@ def segment(recording: AnyRecording, *, progress: Progress | None = None) -> Seg
     Returns
     -------
     Segments
-        ``holds`` and ``moves``, mean reading of every pose (n, 3) in raw units and its standard error.
+        ``poses`` and ``moves``, mean reading of every pose (n, 3) in raw units and its standard error.
 
     Examples
     --------

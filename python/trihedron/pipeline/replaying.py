@@ -57,6 +57,11 @@ def guide(
     on_pose : callable, optional
         Is given the guide's view (instruction, next pose, uncertainties) after every pose.
 
+    Returns
+    -------
+    (CalibrationResult, VerificationResult or None)
+        None where the log ends before poses to verify with.
+
     Raises
     ------
     ValueError

@@ -95,7 +95,7 @@ def read_recording(
     choice = Choice(device, topic, None if instance is None else str(instance))
     options = Options(columns, rate_hz, time_unit, choice, progress)
     if path is not None and (accelerometer_path is not None or gyroscope_path is not None):
-        raise ReadError("give either one log or one file per sensor, not both.")
+        raise ReadError("give one log, or one file per sensor (--accel FILE --gyro FILE).")
     if path is not None:
         if isinstance(path, str | os.PathLike):
             sensors = _of_file(Path(path), None, options)

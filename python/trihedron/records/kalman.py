@@ -67,7 +67,7 @@ class PoseTable:
     """Known attitudes: specific force (n, 3) [m/s²] along the reference axes while the sensor stands still.
 
     ``sigma_m_s2`` is the uncertainty of each component (angle errors of the head times g). ``source`` says where the
-    table came from. ``hold`` (n,) says which pose of the log each row belongs to, ``start_s``, ``stop_s`` (n,)
+    table came from. ``pose`` (n,) says which pose of the log each row belongs to, ``start_s``, ``stop_s`` (n,)
     when it was held; without either the rows are the poses in order.
     """
 

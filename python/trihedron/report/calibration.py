@@ -34,6 +34,8 @@ from trihedron.report.numbers import (
 from trihedron.report.segments import signals_picture
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
 
+FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
+"""The field's names of the frames."""
 MOST_PAIRS = 6
 """Correlated pairs that one line names; the table of correlations holds them all."""
 SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
@@ -119,7 +121,7 @@ def _result(calibration: Calibration, segments: Segments | None, recording: Reco
     if segments is not None:
         facts.append(("motion", f"{how_many(segments.n_poses, 'pose')}, {how_many(len(segments.moves), 'move')}"))
     facts.append(("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"))
-    facts.append(("frame", calibration.frame))
+    facts.append(("frame", FRAMES[calibration.frame]))
     blocks: list[Block] = [Facts(tuple(facts))]
     for name, sensor in _sensors(calibration):
         blocks += [parameter_table(name, sensor), Facts(tuple(_fit_in_words(name, sensor)))]
@@ -142,20 +144,27 @@ def parameter_table(name: str, sensor: SensorCalibration) -> Table:
     scale = 10.0**-exponent
     times = f" × {power_of_ten(exponent)}" if exponent else ""
     head = ("", *(f"{raw}′_{j}{times}" for j in "xyz"), f"b [{unit}]")
+    value = np.column_stack([scale * sensor.S, sensor.b])
+    sigma = np.column_stack([scale * sensor.sigma_S, sensor.sigma_b])
     rows = tuple(
-        (
-            f"{true}_{'xyz'[i]} =",
-            *(with_sigma(scale * sensor.S[i, j], scale * sensor.sigma_S[i, j]) for j in range(3)),
-            with_sigma(sensor.b[i], sensor.sigma_b[i]),
-        )
+        row
         for i in range(3)
+        for row in (
+            (f"{true}_{'xyz'[i]} =", *(with_sigma(v, s) for v, s in zip(value[i], sigma[i], strict=True))),
+            ("", *(_percent(v, s) for v, s in zip(value[i], sigma[i], strict=True))),
+        )
     )
     of_S = "S dimensionless" if sensor.raw_unit == sensor.si_unit else f"S in {unit} per {one_of(sensor.raw_unit)}"
     caption = (
         f"{name.capitalize()}: {true} = S {raw}′ + b, with the reading {raw}′ in {unit_in_print(sensor.raw_unit)}, "
-        f"{of_S}; value ± standard uncertainty (1 σ)"
+        f"{of_S}; value ± standard uncertainty (1 σ), and σ in % of the value"
     )
     return Table(head, rows, caption)
+
+
+def _percent(value: float, sigma: float) -> str:
+    """σ in percent of the value; nothing where either is missing or none of it is known."""
+    return f"± {plain_number(100.0 * sigma / abs(value), 2)} %" if 0.0 < sigma < abs(value) else ""
 
 
 def _fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]:

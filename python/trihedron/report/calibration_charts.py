@@ -22,9 +22,9 @@ LIMIT_SIGMAS = 3.0
 
 def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> Chart:
     """Residual of every pose in and out of sample, against three standard errors of noise alone."""
-    pose = np.arange(len(quality.residual), dtype=np.float64)
+    pose = np.arange(1, len(quality.residual) + 1, dtype=np.float64)
     residual, sigma = mm_s2(quality.residual), mm_s2(quality.sigma)
-    label = [f"pose {k}" for k in range(len(pose))] if names is None else list(names)
+    label = [f"pose {k + 1}" for k in range(len(pose))] if names is None else list(names)
     limit = LIMIT_SIGMAS * np.abs(sigma)
     edge = np.concatenate([pose - 0.5, pose + 0.5]).reshape(2, -1).T.ravel()
     marks: list[Band | Level | Points] = [
@@ -43,7 +43,7 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
         )
     told = [said(name, "", v, "mm/s²", s) for name, v, s in zip(label, residual, sigma, strict=True)]
     marks.append(Points(pose - 0.17, residual, told, None, "in sample", "c1"))
-    x = Scale("pose", limits=(-0.7, len(pose) - 0.3), whole=True)
+    x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
     return Chart((Panel(x, Scale("|f| − |g|  [mm/s²]", "mm/s²"), tuple(marks)),))
 
 
@@ -56,13 +56,13 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     """Tilt error after every rotation, in and out of sample, and what noise alone gives (rms)."""
     assert quality.angle_deg is not None
     n = len(quality.angle_deg)
-    move = np.arange(n, dtype=np.float64)
+    move = np.arange(1, n + 1, dtype=np.float64)
     is_out = np.zeros(n, dtype=bool)
     if quality.weights is not None and len(quality.weights) == n:
         is_out = quality.weights == 0.0
     moves = segments.moves if segments is not None and len(segments.moves) == n else None
     names = [
-        f"move {k}" + ("" if moves is None else f" (pose {moves[k].pose_before} → {moves[k].pose_after})")
+        f"move {k + 1}" + ("" if moves is None else f" (pose {moves[k].pose_before + 1} → {moves[k].pose_after + 1})")
         for k in range(n)
     ]
     told = [
@@ -88,7 +88,7 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     # A move that was excluded may be a hundred times as wrong: the rest must stay readable.
     top = 1.1 * float(max(shown.max(initial=0.0), np.nanmax(noise, initial=0.0))) or 1.0
     y = Scale("tilt error  [°]", "°", limits=(0.0, top))
-    return Chart((Panel(Scale("move", limits=(-0.7, n - 0.3), whole=True), y, tuple(marks), height_px=200),))
+    return Chart((Panel(Scale("move", limits=(0.3, n + 0.7), whole=True), y, tuple(marks), height_px=200),))
 
 
 def move_noise_deg(quality: FitQuality) -> FloatArray:
@@ -110,7 +110,7 @@ def sphere_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
             # A pose with level Z lies on the rim of both.
             if sign * u[2] >= -1e-2:
                 words = " ".join(f"{c:+.2f}" for c in u).replace("-", "−")
-                points.append((*equal_area((u[0], u[1], u[2])), str(k), f"pose {k}: up is {words}", "taken"))
+                points.append((*equal_area((u[0], u[1], u[2])), str(k + 1), f"pose {k + 1}: up is {words}", "taken"))
         for n, (words, d) in enumerate(wanted):
             if sign * d[2] >= -1e-2:
                 points.append((*equal_area((d[0], d[1], d[2])), str(n + 1), f"to add, {n + 1}: {words}", "wanted"))
@@ -138,8 +138,8 @@ def strong_correlations(calibration: Calibration) -> list[tuple[str, str, float]
 
 def _correlations(calibration: Calibration) -> tuple[list[str], FloatArray]:
     """Names (k,) and correlations (k, k) of all free parameters of both sensors."""
-    both = (("a", calibration.accelerometer), ("w", calibration.gyroscope))
-    names = [f"{sign}.{name}" for sign, sensor in both if sensor is not None for name in PARAMETER_NAMES]
+    both = (("accel", calibration.accelerometer), ("gyro", calibration.gyroscope))
+    names = [f"{prefix} {name}" for prefix, sensor in both if sensor is not None for name in PARAMETER_NAMES]
     sigma = np.sqrt(np.maximum(np.diag(calibration.covariance), 0.0))
     free = np.flatnonzero(sigma > 0.0)
     r = calibration.covariance[np.ix_(free, free)] / np.outer(sigma[free], sigma[free])

@@ -31,7 +31,7 @@ def _pose_table(sensor: SensorCalibration, quality: FitQuality, segments: Segmen
     is_known = segments is not None and segments.n_poses == len(quality.residual)
     rows = []
     for k, (residual, sigma) in enumerate(zip(quality.residual, quality.sigma, strict=True)):
-        row = [str(k)]
+        row = [str(k + 1)]
         if is_known and segments is not None:
             row += [plain_number(segments.time_mid_s[k], 4), plain_number(segments.duration_s[k], 2)]
             mean = segments.accelerometer_mean
@@ -67,9 +67,9 @@ def _move_table(quality: FitQuality, segments: Segments | None) -> Table:
     rows = []
     noise = move_noise_deg(quality)
     for k, angle in enumerate(quality.angle_deg):
-        row = [str(k)]
+        row = [str(k + 1)]
         if moves is not None:
-            row.append(f"{moves[k].pose_before} → {moves[k].pose_after}")
+            row.append(f"{moves[k].pose_before + 1} → {moves[k].pose_after + 1}")
         held = quality.held_out_angle_deg
         is_out = quality.weights is not None and len(quality.weights) > k and quality.weights[k] == 0.0
         row += [

@@ -25,6 +25,7 @@ from trihedron.report.diagnosis_words import (
     MEANING,
     p_in_words,
     printed_unit,
+    quantity,
     rms_in_words,
     size_in_words,
     value_in_words,
@@ -212,15 +213,11 @@ def _evidence(effect: AcceptedEffect) -> str:
 
 
 def _improvement(held: HeldOut) -> str:
+    chi2 = f"χ²/dof {plain_number(held.chi2_per_dof_before)} → {plain_number(held.chi2_per_dof_after)}"
     if held.rms_before == held.rms_after == 0.0:
-        return (
-            f"{held.domain} χ²/dof {plain_number(held.chi2_per_dof_before)} → {plain_number(held.chi2_per_dof_after)}"
-        )
-    return (
-        f"{held.domain} from {size_in_words(held.rms_before, held.unit)} "
-        f"to {size_in_words(held.rms_after, held.unit)} rms "
-        f"(χ²/dof {plain_number(held.chi2_per_dof_before)} → {plain_number(held.chi2_per_dof_after)})"
-    )
+        return f"{quantity(held)} {chi2}"
+    before, after = (size_in_words(rms, held.unit) for rms in (held.rms_before, held.rms_after))
+    return f"{quantity(held)} from {before} to {after} rms ({chi2})"
 
 
 def _remaining(diagnosis: Diagnosis) -> str:
@@ -323,9 +320,9 @@ def _headlines(diagnosis: Diagnosis) -> list[Headline]:
                 words = f"{plain_number(100.0 * effect.share, 2)}"
                 return [
                     Headline(f"{effect.id} explains", words, "%", "of the misfit"),
-                    Headline(MEANING[held.domain], after, unit, f"cross-validated, with it; {before} without"),
+                    Headline(quantity(held), after, unit, f"cross-validated, with it; {before} without"),
                 ]
-            return [Headline(MEANING[held.domain], after, unit, f"cross-validated, with {effect.id}; {before} without")]
+            return [Headline(quantity(held), after, unit, f"cross-validated, with {effect.id}; {before} without")]
     tests = [d for d in diagnosis.domains if d.dof > 0]
     if not tests:
         return []

@@ -235,7 +235,7 @@ def _g_sensitivity(
             marks.append(Line(line, slope * line, f"{'xyz'[i]}: model", colour))
             told = [
                 f"pose {n}, gyro {'xyz'[i]}: {plain_number(float(v))} °/s at f{'xyz'[j]} {plain_number(float(f))} m/s²"
-                for n, (v, f) in enumerate(zip(part[:, i], force[:, j], strict=True))
+                for n, (v, f) in enumerate(zip(part[:, i], force[:, j], strict=True), start=1)
             ]
             marks.append(Points(force[:, j], part[:, i], told, None, f"static gyro {'XYZ'[i]}", colour))
         x = Scale(f"f_{'xyz'[j]} [m/s²]", "m/s²", limits=(-10.6, 10.6))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from trihedron.records.diagnosis import Diagnosis
-from trihedron.records.domains import DomainTest
+from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.finding import FindingCode
 from trihedron.report.diagnosis_numbers import differing_in_short
 from trihedron.report.numbers import listed, plain_number, unit_in_print, with_sigma
@@ -79,6 +79,13 @@ def _footnotes(diagnosis: Diagnosis) -> str:
     """What was found and is no physics of the model: a disturbed pose, a weak spectral line."""
     named = list(dict.fromkeys(effect.id for effect in diagnosis.effects))
     return f" (also found: {listed(named)})" if named else ""
+
+
+def quantity(held: HeldOut) -> str:
+    """What a cross-validated figure measures: mechanisms of the accelerations of a rotation are judged by these."""
+    return (
+        "acceleration during rotations" if (held.domain, held.unit) == ("dynamics", "m/s^2") else MEANING[held.domain]
+    )
 
 
 def rms_in_words(test: DomainTest) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from trihedron.arrays import FloatArray
 from trihedron.records import FitQuality, Recording, Segments, SensorCalibration, Verification
@@ -64,7 +65,7 @@ def draw_pose_means(segments: Segments) -> Figure:
 def draw_residuals(quality: FitQuality) -> Figure:
     """Residual of every pose with its standard error, and the held-out prediction."""
     figure, (axis,) = panels(1, 1, (9.5, 3.2))
-    pose = np.arange(len(quality.residual))
+    pose = np.arange(1, len(quality.residual) + 1)
     axis.axhline(0.0, color=INK, linewidth=0.8)
     if quality.held_out is not None:
         axis.errorbar(
@@ -90,7 +91,8 @@ def draw_residuals(quality: FitQuality) -> Figure:
     )
     axis.set_xlabel("pose")
     axis.set_ylabel("|f| − |g|  [mm/s²]")
-    axis.set_xlim(-0.8, len(pose) - 0.2)
+    axis.set_xlim(0.2, len(pose) + 0.8)
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     return figure
 
@@ -113,7 +115,7 @@ def draw_poses(sensor: SensorCalibration, means: FloatArray) -> Figure:
                 continue
             x, y = _equal_area(direction * np.array([1.0, 1.0, sign]))
             axis.plot(x, y, "o", markersize=8, color=AXIS_COLOURS[0], alpha=0.85)
-            axis.annotate(str(k), (x, y), ha="center", va="center", fontsize=5.5, color="white")
+            axis.annotate(str(k + 1), (x, y), ha="center", va="center", fontsize=5.5, color="white")
     return figure
 
 
@@ -121,13 +123,14 @@ def draw_moves(quality: FitQuality) -> Figure:
     """Angle between predicted and measured gravity after every move."""
     assert quality.angle_deg is not None
     figure, (axis,) = panels(1, 1, (9.5, 3.0))
-    move = np.arange(len(quality.angle_deg))
+    move = np.arange(1, len(quality.angle_deg) + 1)
     axis.bar(move - 0.2, quality.angle_deg, 0.38, color=AXIS_COLOURS[0], label="in sample")
     if quality.held_out_angle_deg is not None:
         axis.bar(move + 0.2, quality.held_out_angle_deg, 0.38, color=ACCENT, label="held out")
     axis.set_xlabel("move")
     axis.set_ylabel("tilt error [°]")
-    axis.set_xlim(-0.8, len(move) - 0.2)
+    axis.set_xlim(0.2, len(move) + 0.8)
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     return figure
 
@@ -196,7 +199,7 @@ def _hemisphere(axis: Axes, title: str) -> None:
         z = np.sin(np.radians(elevation_deg))
         radius = np.sqrt(1.0 - z)
         axis.plot(radius * np.cos(angle), radius * np.sin(angle), color="#AAB4BD", linewidth=0.6, zorder=0)
-    for label, x, y in (("+1", 1.15, 0.0), ("−1", -1.15, 0.0), ("+2", 0.0, 1.15), ("−2", 0.0, -1.15)):
+    for label, x, y in (("+X", 1.15, 0.0), ("−X", -1.15, 0.0), ("+Y", 0.0, 1.15), ("−Y", 0.0, -1.15)):
         axis.annotate(label, (x, y), ha="center", va="center", fontsize=9, color=INK)
         axis.plot([0.0, np.clip(x, -1.0, 1.0)], [0.0, np.clip(y, -1.0, 1.0)], color="#D5DBE0", linewidth=0.6, zorder=0)
     axis.set_aspect("equal")
@@ -210,7 +213,7 @@ def draw_verification(verification: Verification) -> Figure:
     """Norm error per pose with its standard error, and angle per move with the expected one."""
     has_moves = len(verification.angle_deg) > 0
     figure, axes = panels(2 if has_moves else 1, 1, (9.5, 5.2 if has_moves else 3.0))
-    pose = np.arange(len(verification.norm_error))
+    pose = np.arange(1, len(verification.norm_error) + 1)
     axes[0].axhline(0.0, color=INK, linewidth=0.8)
     axes[0].errorbar(
         pose,
@@ -224,7 +227,7 @@ def draw_verification(verification: Verification) -> Figure:
     axes[0].set_xlabel("pose")
     axes[0].set_ylabel("|f| − |g|  [mm/s²]")
     if has_moves:
-        move = verification.moves
+        move = verification.moves + 1
         axes[1].bar(move, verification.angle_deg, 0.7, color=AXIS_COLOURS[0], label="tilt error")
         axes[1].plot(move, verification.angle_sigma_deg, "_", markersize=14, color=ACCENT, label="to be expected (rms)")
         axes[1].set_xlabel("move")

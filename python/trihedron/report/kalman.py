@@ -17,7 +17,7 @@ from trihedron.records import (
     KalmanCalibration,
     NormKalmanCalibration,
 )
-from trihedron.report.calibration import parameter_table
+from trihedron.report.calibration import FRAMES, parameter_table
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
@@ -141,7 +141,7 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
     facts = (
         ("poses", f"{len(outcome.residual_m_s2)} in unknown attitudes"),
         ("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"),
-        ("frame", calibration.frame),
+        ("frame", FRAMES[calibration.frame]),
         ("residual", _residual_words(outcome.residual_m_s2)),
     )
     pictures: tuple[Block, ...] = (
@@ -235,7 +235,7 @@ def _arrival_table(outcome: KalmanCalibration) -> Table | Paragraph:
 def _pose_table(outcome: KalmanCalibration) -> Table:
     rows = tuple(
         (
-            str(k),
+            str(k + 1),
             plain_number(float(outcome.start_s[k]), 4),
             *(plain_number(float(v), 3) for v in outcome.references[k]),
             *(plain_number(mm_s2_from_m_s2(float(v)), 3) for v in outcome.residual_m_s2[k]),

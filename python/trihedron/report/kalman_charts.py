@@ -102,14 +102,14 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
     across = np.array([-0.5, n - 0.5])
     band = Band(across, np.full(2, low), np.full(2, high), f"99 % of means of {window} when the noise model is right")
     y = Scale("innovation² / predicted variance", "", includes=(0.0,))
-    return Chart((Panel(Scale("pose", limits=(-0.7, n - 0.3), whole=True), y, (band, Level(y=1.0), *marks)),))
+    return Chart((Panel(Scale("pose", limits=(0.3, n + 0.7), whole=True), y, (band, Level(y=1.0), *marks)),))
 
 
 def drift_chart(results: Sequence[AxisKalmanResult], raw_unit: str) -> Chart:
     """Slow noise that the filter saw while it ran, and smoothed with all readings."""
     panels = []
     for result in results:
-        pose = np.arange(len(result.drift), dtype=np.float64)
+        pose = np.arange(1, len(result.drift) + 1, dtype=np.float64)
         smooth, sigma = result.smoothed_drift, result.smoothed_drift_sigma
         marks = (
             Band(pose, smooth - sigma, smooth + sigma, "1σ"),
@@ -118,18 +118,18 @@ def drift_chart(results: Sequence[AxisKalmanResult], raw_unit: str) -> Chart:
         )
         unit = unit_in_print(raw_unit)
         y = Scale(f"{'XYZ'[result.axis]} [{unit}]", unit)
-        panels.append(Panel(Scale("pose", whole=True, limits=(0, max(1, len(pose) - 1))), y, marks, height_px=140))
+        panels.append(Panel(Scale("pose", whole=True, limits=(1, max(2, len(pose)))), y, marks, height_px=140))
     return Chart(tuple(panels), is_linked=True)
 
 
 def residual_chart(residual: FloatArray) -> Chart:
     """Residual (n, 3) of the components or (n, 1) of the length, m/s²."""
-    pose = np.arange(len(residual), dtype=np.float64)
+    pose = np.arange(1, len(residual) + 1, dtype=np.float64)
     marks: list[Level | Points] = [Level(y=0.0)]
     for k in range(residual.shape[1]):
         name = f"f{'xyz'[k]}" if residual.shape[1] == 3 else "|f| − |g|"
         values = mm_s2(residual[:, k])
-        told = [said(f"pose {p}, {name}", "", float(v), "mm/s²") for p, v in enumerate(values)]
+        told = [said(f"pose {p}, {name}", "", float(v), "mm/s²") for p, v in enumerate(values, start=1)]
         marks.append(Points(pose, values, told, None, name, AXIS_COLOURS[k]))
-    x = Scale("pose", limits=(-0.7, len(pose) - 0.3), whole=True)
+    x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
     return Chart((Panel(x, Scale("residual [mm/s²]", "mm/s²"), tuple(marks)),))

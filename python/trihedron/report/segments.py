@@ -86,7 +86,7 @@ def pose_table(recording: Recording, segments: Segments) -> Table:
     head += [title for _, title in columns]
     rows = tuple(
         (
-            str(k),
+            str(k + 1),
             f"{recording.time_s[pose.start]:.2f}",
             f"{recording.time_s[pose.stop - 1]:.2f}",
             *(cells[k] for cells, _ in columns),

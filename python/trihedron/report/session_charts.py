@@ -52,16 +52,16 @@ def _signals(recording: Recording, spans: tuple[Span, ...]) -> Chart:
 def verification_chart(verification: Verification) -> Chart:
     """Norm error of every pose against what was to be expected, and the angle missed after every move."""
     v = verification
-    pose = np.arange(len(v.norm_error), dtype=np.float64)
+    pose = np.arange(1, len(v.norm_error) + 1, dtype=np.float64)
     error, sigma = mm_s2(v.norm_error), mm_s2(v.norm_sigma)
     edge = np.column_stack([pose - 0.5, pose + 0.5]).ravel()
     limit = np.repeat(LIMIT_SIGMAS * sigma, 2)
     told = [
         said(f"pose {k}", "", e, f"mm/s² ({e / s:+.1f}σ)".replace("-", "−"))
-        for k, (e, s) in enumerate(zip(error, sigma, strict=True))
+        for k, (e, s) in enumerate(zip(error, sigma, strict=True), start=1)
     ]
     norm = Panel(
-        Scale("pose", limits=(-0.7, len(pose) - 0.3), whole=True),
+        Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True),
         Scale("|f| − |g|  [mm/s²]", "mm/s²"),
         (
             Band(edge, -limit, limit, "3σ of noise and of the calibration's own error"),
@@ -71,13 +71,13 @@ def verification_chart(verification: Verification) -> Chart:
     )
     if not len(v.angle_deg):
         return Chart((norm,))
-    move = v.moves.astype(np.float64)
-    told = [said(f"move {k}", "", a, "°") for k, a in zip(v.moves, v.angle_deg, strict=True)]
+    move = (v.moves + 1).astype(np.float64)
+    told = [said(f"move {k + 1}", "", a, "°") for k, a in zip(v.moves, v.angle_deg, strict=True)]
     expected = [
-        said(f"move {k}, to be expected", "", a, "° rms") for k, a in zip(v.moves, v.angle_sigma_deg, strict=True)
+        said(f"move {k + 1}, to be expected", "", a, "° rms") for k, a in zip(v.moves, v.angle_sigma_deg, strict=True)
     ]
     moves = Panel(
-        Scale("move", limits=(-0.7, move[-1] + 0.7), whole=True),
+        Scale("move", limits=(0.3, move[-1] + 0.7), whole=True),
         Scale("tilt error  [°]", "°", includes=(0.0,)),
         (
             Bars(move, v.angle_deg, 0.7, told, "tilt error", "c3"),

@@ -68,7 +68,12 @@ def _poses(segments: Segments) -> Table:
                 [with_sigma(float(m), float(s)) for m, s in zip(mean[:, k], sigma[:, k], strict=True)] for k in range(3)
             ]
     rows = tuple(
-        (str(k), f"{segments.time_mid_s[k]:.1f}", f"{segments.duration_s[k]:.1f}", *(column[k] for column in columns))
+        (
+            str(k + 1),
+            f"{segments.time_mid_s[k]:.1f}",
+            f"{segments.duration_s[k]:.1f}",
+            *(column[k] for column in columns),
+        )
         for k in range(segments.n_poses)
     )
     return Table(tuple(head), rows, "Mean readings in the unit of the log ± their standard error")

@@ -65,7 +65,7 @@ def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:
         (
             "gravity error in static poses",
             f"{_acceleration(v.norm_rms)} rms over {len(v.norm_error)} poses, worst "
-            f"{_acceleration(float(v.norm_error[worst]))} in pose {worst}",
+            f"{_acceleration(float(v.norm_error[worst]))} in pose {worst + 1}",
         ),
         ("  expected", f"{_acceleration(expected)} rms from noise and the calibration's uncertainty"),
     ]
@@ -75,7 +75,7 @@ def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:
             (
                 "tilt error after a rotation",
                 f"{plain_number(v.angle_rms_deg)}° rms over {how_many(len(v.angle_deg), 'move')}, worst "
-                f"{plain_number(float(v.angle_deg[worst]))}° in move {v.moves[worst]}{_without(v)}",
+                f"{plain_number(float(v.angle_deg[worst]))}° in move {v.moves[worst] + 1}{_without(v)}",
             ),
             ("  expected", f"{plain_number(v.angle_expected_deg)}° rms from noise and the calibration's uncertainty"),
         ]
@@ -88,7 +88,7 @@ def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:
 def _without(v: Verification) -> str:
     if not v.moves_left_out:
         return ""
-    return f"; without move {', '.join(map(str, v.moves_left_out))}, where the gyro was at its limit"
+    return f"; without move {', '.join(str(k + 1) for k in v.moves_left_out)}, where the gyro was at its limit"
 
 
 def parameters_table(v: Verification) -> Table:
@@ -122,7 +122,7 @@ def _tables(verification: Verification, segments: Segments | None) -> list[Block
     v = verification
     rows = tuple(
         (
-            str(k),
+            str(k + 1),
             "" if segments is None else plain_number(float(segments.time_mid_s[k]), 4),
             with_sigma(mm_s2_from_m_s2(float(v.norm_error[k])), mm_s2_from_m_s2(float(v.norm_sigma[k]))),
             plain_number(float(v.norm_error[k] / v.norm_sigma[k]), 2),

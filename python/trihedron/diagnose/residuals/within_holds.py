@@ -306,5 +306,7 @@ def judge_within_holds(obs: Observations, alpha: float) -> DomainTest:
         strong = [line for line in lines if line.p_value < alpha]
         loud_channels = [CHANNELS[c] for c in np.flatnonzero(loud.min(axis=0) * n_looks < alpha)]
         channels = tuple(dict.fromkeys([line.channel for line in strong] + loud_channels))
-        where = Where(channels, tuple(f"pose {i}" for i in holds), spans, tuple(line.frequency_hz for line in strong))
+        where = Where(
+            channels, tuple(f"pose {i + 1}" for i in holds), spans, tuple(line.frequency_hz for line in strong)
+        )
     return DomainTest("within-static", chi2_per_dof, dof, p, disagrees, where, 0.0, "")

@@ -322,7 +322,7 @@ def _tilt_findings(estimate: _Estimate, S: FloatArray, faces: IntArray, used: In
             FindingCode.TABLE_TILT,
             chi2_per_dof=estimate.chi2_noise / estimate.dof,
             tilt_deg=degrees_from_radians(estimate.tilt_rad),
-            pose=int(used[worst]),
+            pose=int(used[worst]) + 1,
             face=face_poses.face_in_words(int(faces[worst])),
         )
     ]

@@ -107,7 +107,7 @@ def held_out_findings(held_out: FloatArray, sigma: FloatArray, chi2_per_dof: Flo
     z[seen] = held_out[seen] / (sigma[seen] * spread[seen])
     limit = float(-probability.stdtrit(dof - 1, SIGNIFICANCE / (2 * n)))
     found = [
-        Finding.of(FindingCode.OUTLIER_POSE, pose=int(i), held_out_m_s2=held_out[i], z=z[i], limit=limit)
+        Finding.of(FindingCode.OUTLIER_POSE, pose=int(i) + 1, held_out_m_s2=held_out[i], z=z[i], limit=limit)
         for i in np.flatnonzero(np.abs(z) > limit)
     ]
     mean_square = float(np.mean(z[seen] ** 2))

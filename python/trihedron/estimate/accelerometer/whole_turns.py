@@ -18,7 +18,7 @@ FEWEST = 60
 
 @dataclass(frozen=True, eq=False)
 class OppositeHeadings:
-    """Readings (k, 3), raw, that a case would show half a turn from pose ``hold`` (k,), and their covariances."""
+    """Readings (k, 3), raw, that a case would show half a turn from pose ``pose`` (k,), and their covariances."""
 
     values: FloatArray
     noise: FloatArray

@@ -94,9 +94,9 @@ def _outlier_findings(aligned: Aligned, measured: MoveMeasurements) -> list[Find
         found.append(
             Finding.of(
                 FindingCode.OUTLIER_MOVE,
-                move=int(index),
-                before=before,
-                after=after,
+                move=int(index) + 1,
+                before=before + 1,
+                after=after + 1,
                 residual_m_s2=size,
                 times=size / sigma,
             )

@@ -263,7 +263,7 @@ def audit_moves(measured: MoveMeasurements) -> list[Finding]:
     """Findings on clipped moves, gaps inside moves, and a bias that changes from pose to pose."""
     findings = []
     if np.any(measured.clipped_s > 0.0):
-        which = [int(i) for i in np.flatnonzero(measured.clipped_s > 0.0)]
+        which = [int(i) + 1 for i in np.flatnonzero(measured.clipped_s > 0.0)]
         lost = int(np.count_nonzero(measured.is_lost))
         findings.append(
             Finding.of(
@@ -278,7 +278,7 @@ def audit_moves(measured: MoveMeasurements) -> list[Finding]:
             )
         )
     if np.any(measured.is_gapped):
-        which = [int(i) for i in np.flatnonzero(measured.is_gapped)]
+        which = [int(i) + 1 for i in np.flatnonzero(measured.is_gapped)]
         findings.append(
             Finding.of(
                 FindingCode.TIME_GAP,

@@ -20,7 +20,7 @@ class LiveCalibration:
     """Calibrate a triad in known attitudes while it is being turned.
 
     >>> live = LiveCalibration(AxisNoise(white=0.01), gravity_m_s2=9.81)
-    >>> said = live.add([0.02, -0.01, 9.9], [0.0, 0.0, 9.81], start_s=0.0, hold_s=2.0)
+    >>> said = live.add([0.02, -0.01, 9.9], [0.0, 0.0, 9.81], start_s=0.0, pose_s=2.0)
     >>> said.good_enough, said.n_poses
     (False, 1)
 
@@ -34,7 +34,7 @@ class LiveCalibration:
         When to stop.
     session_s : float
         Rough length of the session; sets the slowest noise that is modelled.
-    hold_s, pause_s : float
+    pose_s, pause_s : float
         Length of the poses and pauses to come, for the prediction.
     """
 
@@ -84,7 +84,7 @@ class LiveCalibration:
             Mean raw reading of the pose.
         reference : (3,)
             Specific force in the body, m/s².
-        start_s, hold_s : float
+        start_s, pose_s : float
             When the pose started and how long it lasted.
         plan : (m, 3), optional
             Poses still planned, m/s²; without it the most useful of 26 directions is taken each time.

@@ -211,7 +211,7 @@ def calibrate_without_references(
         Mean raw reading of each pose.
     noise : AxisNoise or three of them
         Noise of the raw readings.
-    start_s, hold_s : (n,)
+    start_s, pose_s : (n,)
         When each pose starts and how long it lasts, s.
     start : NormStart, optional
         Default: guessed from the range of the readings, positive axes.

@@ -80,7 +80,7 @@ def calibrate_with_references(
         Specific force in the body, m/s².
     noise : AxisNoise or three of them
         Noise of the raw readings.
-    start_s, hold_s : (n,)
+    start_s, pose_s : (n,)
         When each pose starts and how long it lasts, s; scalars are not enough for ``start_s``.
     extra_variance : (n,), (n, 3) or scalar
         Variance of a reading on top of the noise model, raw².

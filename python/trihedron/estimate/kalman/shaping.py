@@ -38,7 +38,7 @@ class ShapingOptions:
 def shaping_model(
     noise: AxisNoise, options: ShapingOptions, *, session_s: float, pose_s: float
 ) -> _core.AxisKalmanModel:
-    """Compiled shaping filter of one axis for a session of ``session_s`` with holds of about ``hold_s``."""
+    """Compiled shaping filter of one axis for a session of ``session_s`` with poses of about ``pose_s``."""
     rates = options.flicker_rates_per_s
     if not rates:
         slow, fast = SLOWEST_PER_SESSION / session_s, FASTEST_PER_HOLD / pose_s

@@ -194,7 +194,7 @@ _MOVES = (
         "verify-moves",
         WARNING,
         "The tilt error after rotations is {angle_rms_deg:.3g}° rms (worst move {worst_move}: {worst_deg:.3g}°), "
-        "on average {times_expected:.1f} times the noise and uncertainty of a move.",
+        "single moves {times_expected:.1f} times (rms) their own noise and uncertainty.",
         "The gyro's scale has changed since, it clipped, samples were lost, or a pose was not still.",
         "Look at the worst moves; calibrate again near the conditions of use.",
         or_severity=SERIOUS,
