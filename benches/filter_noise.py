@@ -79,7 +79,7 @@ def drawn(seed, kind, seconds):
     tau, white = rng.uniform(3, 15), 3e-4
     throttle = np.maximum(1 + 0.7 * smooth(rng, len(t), 0.0, 0.05)[:, 0], 0.1)
     throttle = throttle**2 / np.mean(throttle**2)
-    shaking = 0.3 * smooth(rng, len(t), 30, 48) * np.sqrt(throttle)[:, None]
+    shaking = {"drone": 0.1, "car": 0.02, "walk": 0.05}[kind] * smooth(rng, len(t), 30, 48) * np.sqrt(throttle)[:, None]
     noise = np.sqrt(N**2 + V**2 * throttle)[:, None] * np.sqrt(HZ) * rng.normal(size=w.shape)
     bias = 0.02 * rng.normal(size=3) + K / np.sqrt(HZ) * np.cumsum(rng.normal(size=w.shape), axis=0)
     M = np.eye(3) + rng.uniform(-0.01, 0.01, (3, 3))

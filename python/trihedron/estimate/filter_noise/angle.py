@@ -37,9 +37,10 @@ def band_power(signal: FloatArray, step_s: float, band_hz: float, n: int) -> Flo
 def relative(power: FloatArray, density: float, width_hz: float) -> FloatArray:
     """Band power (m,) beyond the noise at rest of that density, its mean one; zeros where there is none of it.
 
-    A sample's white noise has N² times the width of the band; the quietest tenth bounds it where N is not known.
+    N √rate is the deviation of a sample, so that a band has 2 N² times its width of it; the quietest tenth bounds it
+    where N is not known.
     """
-    floor = density**2 * width_hz if density > 0.0 else float(np.quantile(power, 0.1))
+    floor = 2.0 * density**2 * width_hz if density > 0.0 else float(np.quantile(power, 0.1))
     beyond = np.maximum(power - floor, 0.0)
     # Half the floor is what its own scatter and a wrong N leave.
     return np.asarray(beyond / beyond.mean()) if beyond.mean() > 0.5 * floor else np.zeros(len(power))

@@ -41,7 +41,7 @@ VELOCITY = Prior(
 """The same of accelerometers beside a path: a millimetre of white error; a tilt of the world's attitude."""
 LEAST_S = 40.0
 """Shared motion below which two halves say nothing of ten seconds."""
-CALIBRATION_DRAWS, PREDICTING = 16, 8
+CALIBRATION_DRAWS, PREDICTING = 71, 8
 """Draws of the scale matrix for its share; of the strengths for a prediction."""
 
 
@@ -97,7 +97,7 @@ def _sensor(
     prior = informed(usual, stretches, static)
     half, held = halves(stretches)
     taught = fit(half, prior)
-    found = fit(stretches, prior, np.log(taught.mode[prior.is_there > 0.0]))
+    found = fit(stretches, prior, taught)
     gain, sigma, tau = forgetting(stretches, prior, found)
     is_gm = gain > PREFERRED
     draws = found.draws
@@ -190,34 +190,29 @@ def calibration_left(found: MotionFit, horizon_s: float) -> FloatArray:
 
     The mounting is nobody's fault, and a filter finds the bias: neither counts.
     """
-    problem, side = found.problems[0], found.sides[0]
-    moments = problem.blocks.moments()
-    moments = moments.reshape(-1, 3, 3, moments.shape[-1])
+    side, point = found.sides[0], found.points[0]
+    grid = side.grid
+    C = side.reference.attitude(grid.time_s * (1.0 + point.rate) + point.offset_s) @ point.mounting
+    raw = np.where(side.seen[:, None], grid.gyroscope - grid.gyroscope[side.seen].mean(axis=0), 0.0)
+    carried = np.cumsum(np.einsum("nij,nk->nijk", C, raw).reshape(len(raw), 3, 9), axis=0) * grid.step_s
+    ahead = max(1, round(horizon_s / grid.step_s))
+    if len(raw) <= ahead:
+        return np.zeros(1)
+    steps = carried[ahead:] - carried[:-ahead]
+    square = np.einsum("nai,naj->ij", steps, steps) / len(steps)
     S, cov = found.value(0, "S"), found.covariance(0, ("S",))
-    rng = np.random.default_rng(0)
     root = np.linalg.cholesky(cov + 1e-18 * np.trace(cov) * np.eye(9))
-    ahead = max(1, round(horizon_s / 1.0))
-    out = []
-    for k in range(CALIBRATION_DRAWS):
-        drawn = (S if k == 0 else S + root @ rng.normal(size=9)).reshape(3, 3)
-        u, s, vt = np.linalg.svd(drawn)
-        scale = float(np.mean(s)) if side_is_raw(found) else 1.0
-        error = np.einsum("maik,ik->ma", moments[:, :, :, :3], drawn - scale * (u @ vt))
-        carried = error + np.einsum("mai,i->ma", moments[:, :, :, 3], _mean_bias(side.grid.gyroscope, drawn, scale * (u @ vt)))
-        step = carried[ahead:] - carried[:-ahead]
-        out.append(float(np.mean(np.sum(step**2, axis=1))) if len(step) else 0.0)
-    return np.array(out)
+    rng = np.random.default_rng(0)
+    drawn = [left_of(S + root @ rng.normal(size=9)) for _ in range(CALIBRATION_DRAWS)]
+    return np.array([error @ square @ error for error in drawn])
 
 
-def side_is_raw(found: MotionFit) -> bool:
-    """Whether readings are counts: their one scale is then a data sheet's, and no error."""
-    S = found.value(0, "S").reshape(3, 3)
-    return not 0.5 < float(np.cbrt(abs(np.linalg.det(S)))) < 2.0
-
-
-def _mean_bias(gyroscope: FloatArray, S: FloatArray, other: FloatArray) -> FloatArray:
-    """(3,) the bias by which the nominal S is made right at the mean reading."""
-    return np.asarray(-(S - other) @ gyroscope.mean(axis=0))
+def left_of(S: FloatArray) -> FloatArray:
+    """(9,) S less the square, equal one that comes nearest to it; of readings in SI its scale is one."""
+    u, s, vt = np.linalg.svd(S.reshape(3, 3))
+    # Of counts the scale is a data sheet's, and no error.
+    scale = 1.0 if 0.5 < float(np.mean(s)) < 2.0 else float(np.mean(s))
+    return np.asarray(S - scale * (u @ vt).ravel())
 
 
 def _worth(draws: FloatArray) -> ReferenceWorth:

@@ -77,10 +77,13 @@ def whole(prior: Prior, x: FloatArray) -> FloatArray:
     return out
 
 
-def fit(stretches: Sequence[Stretch], prior: Prior, start: FloatArray | None = None) -> Fitted:
-    """Mode of the strengths and a Metropolis walk over their posterior."""
-    best, top = most_likely(stretches, prior, start)
+def fit(stretches: Sequence[Stretch], prior: Prior, near: Fitted | None = None) -> Fitted:
+    """Mode of the strengths and a Metropolis walk over their posterior; ``near`` is a fit of a part, to begin with."""
+    free = prior.is_there > 0.0
+    best, top = most_likely(stretches, prior, None if near is None else np.log(near.mode[free]))
     covariance = np.linalg.inv(_curvature(stretches, prior, best))
+    if near is not None:
+        covariance = 0.5 * np.cov(np.log(near.draws[:, free]).T) + 0.05 * covariance
     rng = np.random.default_rng(0)
     now, here, seen = best, top, []
     root = np.linalg.cholesky(covariance)
