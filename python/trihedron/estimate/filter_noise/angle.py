@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
+import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.filter_noise.stretch import Stretch, accumulated, walked
 from trihedron.estimate.reference.motion import MotionFit
+
+Mask = npt.NDArray[np.bool_]
 
 START_RAD = 0.3
 """Prior σ of the attitude at the beginning of a stretch: the fit has it within some degrees."""
@@ -14,14 +19,14 @@ LONGEST, SHORTEST = 300, 12
 """Blocks of a stretch: beyond five minutes its parameters are its own (temperature), and matrices stay small."""
 
 
-def runs(is_good: np.ndarray) -> list[tuple[int, int]]:
+def runs(is_good: Mask) -> list[tuple[int, int]]:
     """Stretches of good blocks, none longer than ``LONGEST``."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_good, [False]]).astype(int))).reshape(-1, 2)
     out = []
     for first, last in edges:
         parts = max(1, int(np.ceil((last - first) / LONGEST)))
         cuts = np.linspace(first, last, parts + 1).astype(int)
-        out += [(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True) if b - a >= SHORTEST]
+        out += [(int(a), int(b)) for a, b in pairwise(cuts) if b - a >= SHORTEST]
     return out
 
 
@@ -51,8 +56,8 @@ def angle_stretches(found: MotionFit, band_hz: float, static_N: float) -> list[S
     side, problem, point = found.sides[0], found.problems[0], found.points[0]
     blocks = problem.blocks
     n = max(2, round(1.0 / side.grid.step_s))
-    seen = side.seen[: len(side.seen) // n * n].reshape(-1, n).all(axis=1)
-    is_good = blocks.rows()[:, 0] > 0
+    seen = np.asarray(np.all(side.seen[: len(side.seen) // n * n].reshape(-1, n), axis=1), dtype=bool)
+    is_good = np.asarray(blocks.rows()[:, 0] > 0, dtype=bool)
     m = min(len(seen), len(is_good))
     power = band_power(side.corrected(point), side.grid.step_s, band_hz, n)
     vibration = relative(power[:m], static_N, 0.5 / side.grid.step_s - band_hz)

@@ -98,7 +98,7 @@ def _sensor(
     half, held = halves(stretches)
     taught = fit(half, prior)
     found = fit(stretches, prior, taught)
-    gain, sigma, tau = forgetting(stretches, prior, found)
+    gain, sigma, tau = forgetting(stretches, found)
     is_gm = gain > PREFERRED
     draws = found.draws
     N = np.hypot(draws[:, 0], draws[:, 1])
@@ -127,7 +127,7 @@ def _sensor(
 
 
 def informed(usual: Prior, stretches: Sequence[Stretch], static: StaticNoise | None) -> Prior:
-    """The usual prior with the noise at rest as a datum, and without vibration where no band power varies or stands out."""
+    """The usual prior with the noise at rest as a datum; without vibration where no band power stands out."""
     mean, sigma, is_there = usual.mean.copy(), usual.sigma.copy(), usual.is_there.copy()
     if static is not None and not static.N.is_limit and static.N.value > 0.0:
         mean[0] = np.log(static.N.value)
@@ -201,10 +201,33 @@ def calibration_left(found: MotionFit, horizon_s: float) -> FloatArray:
     steps = carried[ahead:] - carried[:-ahead]
     square = np.einsum("nai,naj->ij", steps, steps) / len(steps)
     S, cov = found.value(0, "S"), found.covariance(0, ("S",))
-    root = np.linalg.cholesky(cov + 1e-18 * np.trace(cov) * np.eye(9))
+    errors = drawn_errors(left_of(S), _across(S) @ cov @ _across(S).T)
+    return np.asarray(np.einsum("ki,ij,kj->k", errors, square, errors))
+
+
+def drawn_errors(seen: FloatArray, cov: FloatArray) -> FloatArray:
+    """(k, 9) errors of a scale matrix seen as ``seen`` (9,) with covariance (9, 9), all elements of one unknown size.
+
+    What noise alone makes of a perfect matrix is no error: without a common size its square would be twice counted.
+    """
+    sizes = np.geomspace(1e-5, 0.1, 33)
+    width = [cov + size**2 * np.eye(9) for size in sizes]
+    log_p = np.array([-0.5 * (np.linalg.slogdet(V)[1] + seen @ np.linalg.solve(V, seen)) for V in width])
+    weight = np.exp(log_p - log_p.max())
     rng = np.random.default_rng(0)
-    drawn = [left_of(S + root @ rng.normal(size=9)) for _ in range(CALIBRATION_DRAWS)]
-    return np.array([error @ square @ error for error in drawn])
+    out = []
+    for k in rng.choice(len(sizes), CALIBRATION_DRAWS, p=weight / weight.sum()):
+        gain = sizes[k] ** 2 * np.linalg.inv(width[k])
+        left = sizes[k] ** 2 * (np.eye(9) - gain)
+        values, vectors = np.linalg.eigh(0.5 * (left + left.T))
+        out.append(gain @ seen + vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.normal(size=9)))
+    return np.array(out)
+
+
+def _across(S: FloatArray) -> FloatArray:
+    """(9, 9) derivative of what is left of S."""
+    step = 1e-6 * float(np.linalg.norm(S))
+    return np.array([(left_of(S + step * e) - left_of(S - step * e)) / (2.0 * step) for e in np.eye(9)]).T
 
 
 def left_of(S: FloatArray) -> FloatArray:

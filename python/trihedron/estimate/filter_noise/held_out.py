@@ -13,7 +13,7 @@ from trihedron.estimate.filter_noise.stretch import Stretch
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Over one horizon: NEES of every start (n,), mean squares of error and prediction [SI²], starts without overlap."""
+    """NEES of every start (n,) of one horizon, mean squares of error and prediction [SI²], starts apart."""
 
     nees: FloatArray
     actual: float
@@ -40,7 +40,9 @@ def errors_over(stretches: Sequence[tuple[Stretch, int]], draws: FloatArray, hor
         errors = np.array([error for error, _ in every])
         middle = errors.mean(axis=0)
         apart_of = errors - middle
-        covariance = np.mean([cov for _, cov in every], axis=0) + np.einsum("dni,dnj->nij", apart_of, apart_of) / len(draws)
+        covariance = np.mean([cov for _, cov in every], axis=0) + np.einsum("dni,dnj->nij", apart_of, apart_of) / len(
+            draws
+        )
         nees += list(np.einsum("ni,ni->n", middle, np.linalg.solve(covariance, middle[:, :, None])[:, :, 0]))
         actual += list(np.sum(middle**2, axis=1))
         predicted += list(np.trace(covariance, axis1=1, axis2=2))
@@ -49,9 +51,7 @@ def errors_over(stretches: Sequence[tuple[Stretch, int]], draws: FloatArray, hor
     return Errors(np.array(nees), float(np.mean(actual)), float(np.mean(predicted)), apart)
 
 
-def _ahead(
-    stretch: Stretch, strengths: FloatArray, ahead: int, targets: np.ndarray
-) -> tuple[FloatArray, FloatArray]:
+def _ahead(stretch: Stretch, strengths: FloatArray, ahead: int, targets: np.ndarray) -> tuple[FloatArray, FloatArray]:
     """Errors (n, 3) and their covariances (n, 3, 3) under one set of strengths."""
     L, w = stretch.factor(strengths)
     errors, covariances = np.empty((len(targets), 3)), np.empty((len(targets), 3, 3))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.filter_noise.strengths import ABSENT
@@ -33,7 +34,7 @@ def parts_of(draws: FloatArray, horizon_s: float, tilt_m_s2: float | None = None
 def shares_over(parts: dict[str, FloatArray], calibration: FloatArray, horizon_s: float) -> tuple[Share, ...]:
     """Shares with 95 % intervals of causes' mean squares (k,), that of the calibration left over beside them."""
     every = {**parts, "calibration": calibration}
-    total = np.sum([value for value in every.values()], axis=0)
+    total = np.sum(list(every.values()), axis=0)
     return tuple(Share(name, horizon_s, bounded(every[name] / total)) for name in CAUSES)
 
 
@@ -53,7 +54,7 @@ def _twice_summed(h: float, tau_s: FloatArray) -> FloatArray:
     """Variance of the integral over h of a Matérn-3/2 process of variance one."""
     lag = np.linspace(0.0, h, 101)
     kernel = _matern_all(lag, tau_s)
-    return np.asarray(2.0 * np.trapezoid((h - lag) * kernel, lag, axis=1))
+    return np.asarray(2.0 * trapezoid((h - lag) * kernel, lag, axis=1))
 
 
 def _matern_all(lag: FloatArray, tau_s: FloatArray) -> FloatArray:

@@ -15,8 +15,8 @@ FARTHEST = 4.0
 """Strengths beyond four prior σ are strengths of nothing."""
 STEP, CURVATURE_STEP = 0.02, 0.3
 """Steps in the logarithm of a strength for the slope, and for the curvature that the walk begins with."""
-STEPS, LEARNED, THINNED = 500, 150, 7
-"""Steps of the walk over strengths; the first 150 teach its size; every seventh of the others counts."""
+STEPS, LEARNED, THINNED = 900, 200, 10
+"""Steps of the walk over strengths; the first 200 teach its size; every tenth of the others counts."""
 TIMES_S = (10.0, 30.0, 100.0)
 """Time constants of a Gauss-Markov bias that are tried beside the walk."""
 PREFERRED = 6.0
@@ -27,7 +27,7 @@ ABSENT = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Of the logarithms of the strengths: ``mean`` (8,), ``sigma`` (8,); ``is_there`` (8,) tells those that the model has."""
+    """Of the logarithms of the strengths: ``mean`` (8,), ``sigma`` (8,); ``is_there`` (8,) those that there are."""
 
     mean: FloatArray
     sigma: FloatArray
@@ -43,7 +43,9 @@ class Fitted:
     draws: FloatArray
 
 
-def most_likely(stretches: Sequence[Stretch], prior: Prior, start: FloatArray | None = None) -> tuple[FloatArray, float]:
+def most_likely(
+    stretches: Sequence[Stretch], prior: Prior, start: FloatArray | None = None
+) -> tuple[FloatArray, float]:
     """Logarithms (f,) of the strengths that the model has at their greatest posterior, and its logarithm there."""
     free = prior.is_there > 0.0
     first = prior.mean[free] if start is None else start
@@ -85,7 +87,8 @@ def fit(stretches: Sequence[Stretch], prior: Prior, near: Fitted | None = None) 
     if near is not None:
         covariance = 0.5 * np.cov(np.log(near.draws[:, free]).T) + 0.05 * covariance
     rng = np.random.default_rng(0)
-    now, here, seen = best, top, []
+    now, here = best, top
+    seen: list[FloatArray] = []
     root = np.linalg.cholesky(covariance)
     for k in range(STEPS):
         if k == LEARNED:
@@ -110,7 +113,7 @@ def _curvature(stretches: Sequence[Stretch], prior: Prior, at: FloatArray) -> Fl
     return np.diag(np.maximum(np.where(np.isfinite(curved), curved, flat), flat))
 
 
-def forgetting(stretches: Sequence[Stretch], prior: Prior, walk: Fitted) -> tuple[float, float, float]:
+def forgetting(stretches: Sequence[Stretch], walk: Fitted) -> tuple[float, float, float]:
     """(2 ln gain, σ, time constant) of the best Gauss-Markov bias over the walk, the other strengths as they are."""
     at = NAMES.index("bias_walk")
     best = (-np.inf, 0.0, 0.0)

@@ -7,15 +7,17 @@ matrices, each with one strength; those of slow errors change with a time consta
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from trihedron.arrays import FloatArray
 
+AnyFloats = np.ndarray[Any, np.dtype[Any]]
+
 NAMES = ("noise", "vibration", "bias_walk", "white", "world", "world_s", "body", "body_s")
 """Strengths of a stretch, in this order."""
-TIME_CONSTANTS = ("world_s", "body_s")
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +34,7 @@ class Stretch:
     observed: FloatArray
     columns: FloatArray
     centre: FloatArray
-    walks: tuple[FloatArray, ...]
+    walks: tuple[AnyFloats, ...]
     bias_steps: FloatArray
     slow: FloatArray | None
     plane: FloatArray

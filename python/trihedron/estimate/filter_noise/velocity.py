@@ -1,4 +1,4 @@
-"""Stretches of the velocity that the accelerometer gives along the reference's attitude, against the reference's position."""
+"""Stretches of the velocity that accelerometer and reference attitude give, against the reference's position."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ SIZES = {"S": 0.05, "b": 0.5, "up": 0.5, "start": 5.0, "arm": 0.3}
 """Prior σ: 5 % of a scale beside the fit, 0.5 m/s² of bias and of gravity, 5 m/s at the start, 0.3 m of lever arm."""
 
 
-def velocity_stretches(side: Beside, point: Point, band_hz: float, static_N: float, gravity_m_s2: float) -> list[Stretch]:
+def velocity_stretches(
+    side: Beside, point: Point, band_hz: float, static_N: float, gravity_m_s2: float
+) -> list[Stretch]:
     """Stretches of differences of the position's block means, each a triangular mean of the velocity."""
     assert side.force is not None
     h_grid = side.grid.step_s
@@ -22,7 +24,7 @@ def velocity_stretches(side: Beside, point: Point, band_hz: float, static_N: flo
     time = side.grid.time_s[: m * n]
     inside = time * (1.0 + point.rate) + point.offset_s
     seen = side.seen[: m * n] & side.reference.covers(inside)
-    is_good = seen.reshape(m, n).all(axis=1)
+    is_good = np.asarray(np.all(seen.reshape(m, n), axis=1), dtype=bool)
     power = band_power(side.force[: m * n], h_grid, band_hz, n)
     vibration = relative(power, static_N, 0.5 / h_grid - band_hz)
     C = side.reference.attitude(inside) @ point.mounting
