@@ -101,7 +101,7 @@ def filter_noise(
         if own is None:
             raise RefusedError(
                 f"{recording.source}: nothing rests in it for {SHORTEST_REST_S:.0f} s in units that are known; "
-                "give a reference with --reference MOTION, or a log that begins at rest."
+                "give known motion beside it (--reference), or a log that begins at rest."
             )
         sensors = tuple(_at_rest(own, sensor, known) for sensor in UNITS if at_rest(own.axes, UNITS[sensor]))
         tilt = None if segments is None else _tilt(recording, segments, known)

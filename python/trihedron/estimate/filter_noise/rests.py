@@ -60,7 +60,7 @@ def tilt_over_moves(time_s: FloatArray, rate: FloatArray, segments: Segments, st
         length = float(time_s[move.stop] - time_s[move.start])
         if not 0.0 < length <= LONGEST_MOVE_S:
             continue
-        rests = np.concatenate([before.samples, after.samples])
+        rests = np.concatenate([before.samples(), after.samples()])
         turned = integrate_rate(
             time_s[move.start : move.stop + 1],
             rate[move.start : move.stop + 1] - rate[rests].mean(axis=0),
