@@ -78,9 +78,9 @@ def filter_noise(
 
     Examples
     --------
-    >>> found = trihedron.filter_noise(recording)
-    >>> found.sensors[0].sensor
-    'gyroscope'
+    >>> found = trihedron.filter_noise("flight.csv", static="rest.csv", reference="truth.csv")  # doctest: +SKIP
+    >>> found.sensor("gyroscope").N.value  # doctest: +SKIP
+    0.00017
     """
     recording = recording_of(recording)
     horizons = tuple(sorted(float(h) for h in horizons_s))
