@@ -88,10 +88,10 @@ def drawn(seed, kind, seconds):
     force = middle.inv().apply([0, 0, G]) + 0.3 * smooth(rng, len(t), 0.1, 3) + 0.02 * rng.normal(size=w.shape)
     log = Recording.from_arrays(t, force, raw, accelerometer_unit="m/s^2", gyroscope_unit="rad/s")
     k = np.arange(0, len(t), HZ // TRACK_HZ)
-    stamps = t[k] - 0.5 / HZ
-    off = slow_error(rng, stamps, sigma, tau) + white * rng.normal(size=(len(k), 3))
+    timestamps = t[k] - 0.5 / HZ
+    off = slow_error(rng, timestamps, sigma, tau) + white * rng.normal(size=(len(k), 3))
     seen = (Rotation.from_rotvec(off) * C[k]).as_matrix()
-    motion = ReferenceMotion(stamps - stamps[0], attitude=seen, source="truth")
+    motion = ReferenceMotion(timestamps - timestamps[0], attitude=seen, source="truth")
     told = N * np.exp(0.05 * rng.normal())
     static = StaticNoise(Bounded(told, told * np.exp(-0.1), told * np.exp(0.1)), Bounded(K, 0.5 * K, 2 * K))
     truth = np.array([N, V, K, white / np.sqrt(TRACK_HZ), sigma, tau, 0.0, 1.0])

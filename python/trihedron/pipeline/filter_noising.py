@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.filter_noise import Asked, at_rest, beside_reference, tilt_over_moves, unlike_axes
 from trihedron.files.formats.contract import NoiseFigure
 from trihedron.files.noise import read_noise
@@ -17,7 +18,6 @@ from trihedron.pipeline.reading import AnyRecording, read, recording_of, segment
 from trihedron.pipeline.referring import AnyReference, motion_of
 from trihedron.records import Finding, FindingCode, Noise, Recording, Segments
 from trihedron.records.filter_noise import BiasModel, Bounded, FilterNoise, SensorFilterNoise, StaticNoise, TiltCheck
-from trihedron.refused import REFUSALS, RefusedError
 from trihedron.units import rate_to_si
 
 UNITS = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
@@ -132,9 +132,9 @@ def _segments(recording: Recording) -> Segments | None:
 
 def _of_rest(recording: Recording, segments: Segments) -> Noise | None:
     """Noise of the longest rest; None where none is long enough."""
-    if not segments.holds:
+    if not segments.poses:
         return None
-    longest = max(segments.holds, key=lambda hold: hold.stop - hold.start)
+    longest = max(segments.poses, key=lambda pose: pose.stop - pose.start)
     at = slice(longest.start, longest.stop)
     if recording.time_s[longest.stop - 1] - recording.time_s[longest.start] < SHORTEST_REST_S:
         return None
@@ -197,7 +197,7 @@ def _tilt(recording: Recording, segments: Segments, known: Static) -> TiltCheck 
     if recording.gyroscope is None or scale is None or "gyroscope" not in known:
         return None
     rate = np.nan_to_num(recording.gyroscope * scale)
-    return tilt_over_moves(recording.with_distinct_stamps().time_s, rate, segments, known["gyroscope"])
+    return tilt_over_moves(recording.with_distinct_timestamps().time_s, rate, segments, known["gyroscope"])
 
 
 def _noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:

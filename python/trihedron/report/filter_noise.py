@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from trihedron.printable import printable
 from trihedron.records.filter_noise import Bounded, FilterNoise, SensorFilterNoise, StaticNoise
 from trihedron.records.plain import as_plain
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
@@ -14,6 +13,7 @@ from trihedron.report.filter_noise_charts import OF_SENSOR, horizon_chart
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.frames import Columns, of_rows
 from trihedron.report.numbers import how_many, plain_number, unit_in_print
+from trihedron.sanitise import printable
 from trihedron.units import degrees_from_radians
 
 CAUSE_WORDS = {

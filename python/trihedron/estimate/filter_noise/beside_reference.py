@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 from trihedron.estimate.filter_noise.angle import angle_stretches
 from trihedron.estimate.filter_noise.held_out import Errors, errors_over
 from trihedron.estimate.filter_noise.shares import bounded, parts_of, shares_over
@@ -25,7 +26,6 @@ from trihedron.records.filter_noise import (
     StaticNoise,
 )
 from trihedron.records.reference import ReferenceMotion
-from trihedron.refused import RefusedError
 
 ANGLE = Prior(
     np.log([2e-4, 2e-4, 2e-5, 3e-4, 1e-3, 8.0, 1e-3, 8.0]),

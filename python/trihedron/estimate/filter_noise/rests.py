@@ -56,7 +56,7 @@ def tilt_over_moves(time_s: FloatArray, rate: FloatArray, segments: Segments, st
         return None
     errors, predicted, longest = [], [], 0.0
     for move in segments.moves:
-        before, after = segments.holds[move.hold_before], segments.holds[move.hold_after]
+        before, after = segments.poses[move.pose_before], segments.poses[move.pose_after]
         length = float(time_s[move.stop] - time_s[move.start])
         if not 0.0 < length <= LONGEST_MOVE_S:
             continue
@@ -66,7 +66,7 @@ def tilt_over_moves(time_s: FloatArray, rate: FloatArray, segments: Segments, st
             rate[move.start : move.stop + 1] - rate[rests].mean(axis=0),
             last_only=True,
         )
-        up = [means[k] / np.linalg.norm(means[k]) for k in (move.hold_before, move.hold_after)]
+        up = [means[k] / np.linalg.norm(means[k]) for k in (move.pose_before, move.pose_after)]
         errors.append(float(np.arccos(np.clip(up[1] @ (turned.T @ up[0]), -1.0, 1.0))))
         rested = len(rests) * float(np.median(np.diff(time_s)))
         predicted.append(2.0 * static.N.filter_value**2 * (length + length**2 / rested))

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from trihedron.errors import RefusedError
 from trihedron.files.formats.contract import NoiseFigure, SensorNoise, number
 from trihedron.files.formats.kalibr import KEYS
 from trihedron.files.formats.noise_keys import Figures, si_rows
 from trihedron.records.filter_noise import Bounded, FilterNoise, SensorFilterNoise
-from trihedron.refused import RefusedError
 
 
 def _rows(names: tuple[str, str, str, str], rate: str = "") -> Callable[[Figures], list[str]]:
