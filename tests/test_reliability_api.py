@@ -50,6 +50,7 @@ def right(folder, recording, result, tmp_path_factory):
         "demo": {"folder": place / "demo"},
         "export": {"calibration": result, "target": "c"},
         "extend": {"result": result},
+        "filter_noise": {"recording": folder / "rest.csv"},
         "fleet": {"logs": [folder / "log.csv"], "out": place / "fleet"},
         "identify_noise": {"x": x, "rate_hz": 100.0},
         "integrate_rate": {"time_s": np.arange(50) / 100, "rate": np.zeros((50, 3))},

@@ -37,6 +37,7 @@ OUTPUTS = {
     "segment": [["segment", "log.csv", "--json"], ["segment", "log.csv", "--report"]],
     "calibrate": [["calibrate", "log.csv", *WHOLE, flag] for flag in ("-o", "--json", "--report")],
     "allan": [["allan", "rest.csv", flag] for flag in ("--json", "--csv", "--plot", "--report")],
+    "noise": [["noise", "rest.csv", flag] for flag in ("--json", "--report")],
     "kalman": [["kalman", "log.csv", *WHOLE, flag] for flag in ("-o", "--json", "--report")],
     "verify": [["verify", "c.json", "log.csv", flag] for flag in ("--json", "--report")],
     "diagnose": [["diagnose", "log.csv", *WHOLE, flag] for flag in ("--json", "--report")],

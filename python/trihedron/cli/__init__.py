@@ -29,6 +29,7 @@ from trihedron.cli.fleet import fleet
 from trihedron.cli.guide import guide
 from trihedron.cli.help import WIDEST, Command, Group
 from trihedron.cli.kalman import kalman
+from trihedron.cli.noise import noise
 from trihedron.cli.output import silence_stdout
 from trihedron.cli.plan import plan
 from trihedron.cli.ports import ports
@@ -52,6 +53,7 @@ COMMANDS = (
     segment,
     calibrate,
     allan,
+    noise,
     kalman,
     verify,
     diagnose,

@@ -49,6 +49,17 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "trihedron kalman log.csv --reference poses.csv --angle-sigma 0.01",
         ),
     ),
+    "noise": (
+        (
+            "N and K beside a tracker's attitudes, the sensor at rest known:",
+            "trihedron noise flight.csv --static rest.csv --reference truth.csv --report noise.html",
+        ),
+        (
+            "Written for a filter:",
+            "trihedron noise flight.csv --static rest.csv --reference truth.csv --to kalibr -o imu.yaml",
+        ),
+        ("Without a reference, what rests and gravity tell:", "trihedron noise flight.csv"),
+    ),
     "allan": (
         ("The terms, the curves and Kalibr's imu.yaml:", "trihedron allan static.csv --report noise.html"),
         (

@@ -11,7 +11,7 @@ from trihedron.cli.examples import EXAMPLES
 COMMAND_GROUPS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("First look", ("demo",)),
     ("Record", ("plan", "ports", "capture", "guide")),
-    ("Calibrate", ("check", "segment", "calibrate", "kalman", "allan")),
+    ("Calibrate", ("check", "segment", "calibrate", "kalman", "allan", "noise")),
     ("Judge", ("verify", "diagnose")),
     ("Many devices", ("fleet",)),
     ("Use", ("apply", "export", "convert")),

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from trihedron.pipeline.driving import driven
     from trihedron.pipeline.exporting import export
     from trihedron.pipeline.extending import extend
+    from trihedron.pipeline.filter_noising import filter_noise
     from trihedron.pipeline.filtering import KalmanResult, kalman
     from trihedron.pipeline.identifying import noise, noise_of_curve, noise_of_file, recording_lengths
     from trihedron.pipeline.improving import improve
@@ -54,6 +55,7 @@ __all__ = [
     "driven",
     "export",
     "extend",
+    "filter_noise",
     "guide",
     "improve",
     "kalman",
@@ -98,6 +100,7 @@ _HOME = {
     "diagnose": "trihedron.pipeline.diagnosing",
     "extend": "trihedron.pipeline.extending",
     "export": "trihedron.pipeline.exporting",
+    "filter_noise": "trihedron.pipeline.filter_noising",
     "KalmanResult": "trihedron.pipeline.filtering",
     "kalman": "trihedron.pipeline.filtering",
     "noise": "trihedron.pipeline.identifying",

@@ -15,12 +15,14 @@ from trihedron.pipeline.filtering import KalmanResult
 from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
 from trihedron.pipeline.sessions import SessionsResult
 from trihedron.records import AllanCurve, Calibration, Noise, Recording, Segments, Verification
+from trihedron.records.filter_noise import FilterNoise
 from trihedron.records.plan import ExperimentPlan
 from trihedron.records.ranking import Ranking
 from trihedron.report import document, frames, machine, summaries
 from trihedron.report.calibration import calibration_report
 from trihedron.report.check import check_report
 from trihedron.report.diagnosis import diagnosis_report
+from trihedron.report.filter_noise import filter_noise_columns, filter_noise_record, filter_noise_report
 from trihedron.report.fragment import to_fragment
 from trihedron.report.kalman import kalman_record, kalman_report
 from trihedron.report.noise import noise_picture, noise_report
@@ -81,6 +83,7 @@ _KINDS: dict[type, _Shown] = {
     Ranking: _Shown(ranking_report, ranking_record),
     Verification: _Shown(verification_report, machine.verification_record, frames.verification_columns),
     Noise: _Shown(noise_report, noise_record, frames.noise_columns),
+    FilterNoise: _Shown(filter_noise_report, filter_noise_record, filter_noise_columns),
     AllanCurve: _Shown(summaries.curve_summary, machine.curve_record, frames.curve_columns),
     Recording: _Shown(summaries.recording_summary, machine.recording_record, frames.recording_columns),
     Segments: _Shown(summaries.segments_summary, machine.poses_record, frames.segments_columns),

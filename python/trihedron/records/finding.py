@@ -108,6 +108,11 @@ class FindingCode(str, Enum):
     REFERENCE_TURNED_ROUND = "reference-turned-round"
     REFERENCE_OF_ITSELF = "reference-of-itself"
     REFERENCE_ONLY = "reference-only"
+    # noise for a filter
+    FILTER_NOISE_AT_REST = "filter-noise-at-rest"
+    FILTER_NOISE_NO_STATIC = "filter-noise-no-static"
+    FILTER_NOISE_NOT_SEPARATED = "filter-noise-not-separated"
+    FILTER_NOISE_INCONSISTENT = "filter-noise-inconsistent"
     ACCELEROMETER_NOMINAL = "accelerometer-nominal"
     SHARED_MOTION = "shared-motion"
     # many recordings, temperature

@@ -191,6 +191,17 @@ def _answer(
     return replace(result, findings=(*motion.findings, *remarks(result, one.is_turned)))
 
 
+def laid_beside(recording: Recording, motion: ReferenceMotion, gravity_m_s2: float) -> Beside:
+    """A log on its grid beside its reference, with numbers to begin a fit with.
+
+    Raises
+    ------
+    ValueError
+        As :func:`fit_reference`.
+    """
+    return _prepared(recording, motion, gravity_m_s2).side
+
+
 def moves_along(recording: Recording, motion: ReferenceMotion) -> float:
     """Correlation of the turning rates where a log and a reference hold one motion.
 

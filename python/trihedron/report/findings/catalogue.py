@@ -10,6 +10,7 @@ from trihedron.records.finding import FindingCode, Severity
 from trihedron.report.findings import (
     accelerometer,
     clock,
+    filter_noise,
     gyroscope,
     kalman,
     noise,
@@ -31,6 +32,7 @@ ENTRIES: tuple[Entry, ...] = (
     *kalman.ENTRIES,
     *noise.ENTRIES,
     *pipeline.ENTRIES,
+    *filter_noise.ENTRIES,
     *reference.ENTRIES,
     *segment.ENTRIES,
 )

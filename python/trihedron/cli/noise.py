@@ -1,0 +1,109 @@
+"""``trihedron noise``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from trihedron.cli.options import Force, GravitySource, Json, LogSource, Report, progress, with_options
+from trihedron.cli.output import check_outputs, leave, put, say, show, write_json, write_report
+from trihedron.files.output import write_whole
+
+FIRST_SCREEN = 2
+
+
+Static = Annotated[
+    Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+    typer.Option("--static", metavar="REST", help="The sensor at rest: a static log, or the JSON of trihedron allan."),
+]
+Reference = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--reference", metavar="MOTION", help="Known motion beside the log: attitude, or pose."),
+]
+ReferenceColumns = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz,px [m],...'."),
+]
+Band = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option(
+        "--band", metavar="HZ", help="Look for vibration above this; a quarter of the sampling rate if not said."
+    ),
+]
+Horizon = Annotated[
+    str, typer.Option("--horizon", metavar="LIST", help="Seconds over which the filter carries on alone: '1,10,60'.")
+]
+To = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--to",
+        metavar="TARGET",
+        help="Write N and K for kalibr, openvins, vins-fusion, basalt, orb-slam3, fast-lio, gtsam, robot_localization.",
+    ),
+]
+Output = Annotated[
+    Path, typer.Option("-o", "--output", metavar="FILE", help="Where --to writes; '-' is stdout, the report left out.")
+]
+Full = Annotated[bool, typer.Option("--full", help="Print the test on the other half and all findings as well.")]
+
+
+@with_options(source=LogSource, place=GravitySource)
+def noise(
+    source: LogSource,
+    place: GravitySource,
+    static: Static = None,
+    reference: Reference = None,
+    reference_columns: ReferenceColumns = None,
+    band: Band = None,
+    horizon: Horizon = "1,10,60",
+    to: To = None,
+    output: Output = Path("-"),
+    json: Json = None,
+    report: Report = None,
+    full: Full = False,
+    force: Force = False,
+) -> None:
+    """N and K for your filter: what its errors in motion are made of, beside the values of a static log."""
+    horizons = _horizons(horizon)
+    inputs = (*source.files, static, reference)
+    check_outputs(json, None if to is None else output, force=force, report=report, inputs=inputs)
+    recording = source.read()
+    from trihedron import pipeline
+    from trihedron.files.formats.filter_noise import filter_noise_text
+    from trihedron.report.filter_noise import filter_noise_record, filter_noise_report
+
+    with progress("estimating"):
+        found = pipeline.filter_noise(
+            recording,
+            static=static,
+            reference=reference,
+            reference_columns=reference_columns,
+            band_hz=band,
+            horizons_s=horizons,
+            gravity_m_s2=place.gravity,
+            latitude_deg=place.latitude,
+            height_m=place.height,
+        )
+    text = None if to is None else filter_noise_text(found, to)
+    document, machine = filter_noise_report(found), filter_noise_record(found)
+    if text is not None and str(output) == "-":
+        put(text)
+    else:
+        show(document, json, sections=None if full else FIRST_SCREEN)
+    write_json(machine, json, force=force)
+    write_report(document, machine, report, force=force)
+    if text is not None and str(output) != "-":
+        write_whole(output, text, overwrite=force)
+        say(f"noise for {to}: {output}")
+    if not full and report is None:
+        say("The test on the other half: --full; with the picture: --report FILE.html.")
+    leave(found.findings)
+
+
+def _horizons(text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise typer.BadParameter(f"--horizon is a list of seconds, as in 1,10,60, not {text!r}") from None

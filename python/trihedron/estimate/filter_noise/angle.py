@@ -1,0 +1,107 @@
+"""Stretches of the gyro's attitude against the reference's."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.arrays import FloatArray
+from trihedron.estimate.filter_noise.stretch import Stretch, accumulated, walked
+from trihedron.estimate.reference.motion import MotionFit
+
+Mask = npt.NDArray[np.bool_]
+
+START_RAD = 0.3
+"""Prior σ of the attitude at the beginning of a stretch: the fit has it within some degrees."""
+LONGEST, SHORTEST = 300, 12
+"""Blocks of a stretch: beyond five minutes its parameters are its own (temperature), and matrices stay small."""
+
+
+def runs(is_good: Mask) -> list[tuple[int, int]]:
+    """Stretches of good blocks, none longer than ``LONGEST``."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_good, [False]]).astype(int))).reshape(-1, 2)
+    out = []
+    for first, last in edges:
+        parts = max(1, int(np.ceil((last - first) / LONGEST)))
+        cuts = np.linspace(first, last, parts + 1).astype(int)
+        out += [(int(a), int(b)) for a, b in pairwise(cuts) if b - a >= SHORTEST]
+    return out
+
+
+def band_power(signal: FloatArray, step_s: float, band_hz: float, n: int) -> FloatArray:
+    """(m,) mean square over blocks of ``n`` samples of a signal (k, 3) above ``band_hz``, one axis' mean [SI²]."""
+    spectrum = np.fft.rfft(signal - signal.mean(axis=0), axis=0)
+    spectrum[np.fft.rfftfreq(len(signal), step_s) < band_hz] = 0.0
+    fast = np.fft.irfft(spectrum, len(signal), axis=0)
+    m = len(fast) // n
+    return np.asarray(np.mean(fast[: m * n].reshape(m, n, 3) ** 2, axis=(1, 2)))
+
+
+def relative(power: FloatArray, density: float, width_hz: float) -> FloatArray:
+    """Band power (m,) beyond the noise at rest of that density, its mean one; zeros where there is none of it.
+
+    N √rate is the deviation of a sample, so that a band has 2 N² times its width of it; the quietest tenth bounds it
+    where N is not known.
+    """
+    floor = 2.0 * density**2 * width_hz if density > 0.0 else float(np.quantile(power, 0.1))
+    beyond = np.maximum(power - floor, 0.0)
+    # Half the floor is what its own scatter and a wrong N leave.
+    return np.asarray(beyond / beyond.mean()) if beyond.mean() > 0.5 * floor else np.zeros(len(power))
+
+
+def angle_stretches(found: MotionFit, band_hz: float, static_N: float) -> list[Stretch]:
+    """Stretches of recording 0 between its gaps; ``static_N`` [rad/s/√Hz] or zero where it is not known."""
+    side, problem, point = found.sides[0], found.problems[0], found.points[0]
+    blocks = problem.blocks
+    n = max(2, round(1.0 / side.grid.step_s))
+    seen = np.asarray(np.all(side.seen[: len(side.seen) // n * n].reshape(-1, n), axis=1), dtype=bool)
+    is_good = np.asarray(blocks.rows()[:, 0] > 0, dtype=bool)
+    m = min(len(seen), len(is_good))
+    power = band_power(side.corrected(point), side.grid.step_s, band_hz, n)
+    vibration = relative(power[:m], static_N, 0.5 / side.grid.step_s - band_hz)
+    rows = blocks.rows()[:, 0]
+    moments = blocks.moments().reshape(-1, 3, 3, blocks.moments().shape[-1])
+    table = {
+        "time": blocks.time_s(), "angle": problem.observed.reshape(-1, 3), "bias": moments[:, :, :, 3],
+        "columns": problem.columns.reshape(len(rows), 3, -1), "attitude": blocks.attitude(),
+        "white": rows.max() / np.maximum(rows, 1), "power": np.pad(vibration, (0, len(rows) - m)),
+    }  # fmt: skip
+    return [_stretch(table, slice(a, b), n * side.grid.step_s, problem.centre) for a, b in runs(is_good[:m] & seen[:m])]
+
+
+def _stretch(table: dict[str, FloatArray], at: slice, h: float, centre: FloatArray) -> Stretch:
+    time = table["time"][at]
+    m = len(time)
+    start = np.tile(START_RAD * np.eye(3), (m, 1))
+    columns = np.hstack([table["columns"][at].reshape(3 * m, -1), start])
+    steps = bias_steps(table["bias"][at])
+    eye = np.eye(3)
+    quiet, shaken = np.full(m, h), h * table["power"][at]
+    # A mean over a block of a walk has a third of the block's variance, and not half.
+    noise, vibration = (np.kron(accumulated(q) - np.diag(q) / 6.0, eye) for q in (quiet, shaken))
+    C = table["attitude"][at]
+    return Stretch(
+        time_s=time,
+        observed=table["angle"][at].ravel(),
+        columns=columns,
+        centre=np.concatenate([centre, np.zeros(3)]),
+        walks=(noise, vibration, h * walked(steps), np.diag(np.repeat(table["white"][at], 3))),
+        bias_steps=steps,
+        slow=None,
+        plane=eye,
+        turned=np.einsum("kij,lmj->kilm", C, C).reshape(3 * m, 3 * m),
+        power=table["power"][at],
+    )
+
+
+def bias_steps(upto: FloatArray) -> FloatArray:
+    """(3 m, 3 m) what a bias during each block does, from what one from the start on does to each block (m, 3, 3)."""
+    m = len(upto)
+    edge = np.concatenate([upto[:1], 0.5 * (upto[1:] + upto[:-1]), upto[-1:]])
+    out = np.zeros((m, 3, m, 3))
+    for k in range(m):
+        out[k, :, :k] = (edge[1 : k + 1] - edge[:k]).transpose(1, 0, 2)
+        out[k, :, k] = upto[k] - edge[k]
+    return out.reshape(3 * m, 3 * m)

@@ -1,0 +1,76 @@
+"""Without a reference: noise at rest as identified, and the tilt that the gyro carries from rest to rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.estimate.attitude import integrate_rate
+from trihedron.records import NoiseAxis, Segments, TermName
+from trihedron.records.filter_noise import Bounded, StaticNoise, TiltCheck
+
+LONGEST_MOVE_S = 60.0
+"""Beyond a minute between two rests the bias may have gone anywhere."""
+
+
+def at_rest(axes: Sequence[NoiseAxis], unit: str) -> StaticNoise | None:
+    """N and K, root mean squares over a sensor's axes in ``unit``, with their intervals; None without a sensor."""
+    own = [axis for axis in axes if axis.unit == unit]
+    return StaticNoise(_pooled(own, TermName.WHITE), _pooled(own, TermName.RATE_RANDOM_WALK)) if own else None
+
+
+def unlike_axes(axes: Sequence[NoiseAxis], unit: str) -> tuple[Bounded, ...]:
+    """N of each axis of a sensor, where two of their intervals do not meet; else nothing."""
+    each = [axis.terms[TermName.WHITE] for axis in axes if axis.unit == unit]
+    if len(each) < 2 or max(t.lower for t in each) <= min(t.upper for t in each):
+        return ()
+    return tuple(Bounded(t.value, t.lower, t.upper, not t.is_present) for t in each)
+
+
+def _pooled(axes: Sequence[NoiseAxis], term: TermName) -> Bounded:
+    terms = [axis.terms[term] for axis in axes]
+    if not all(one.is_present for one in terms):
+        limit = _rms([max(one.limit, one.value) for one in terms])
+        return Bounded(0.0, 0.0, limit, True)
+    value = _rms([one.value for one in terms])
+    # Axes are told independently: their relative errors add in squares.
+    spread = math.sqrt(sum(one.sigma**2 * one.value**2 for one in terms)) / (len(terms) * max(value, 1e-300))
+    factor = math.exp(1.96 * spread / max(value, 1e-300))
+    return Bounded(value, value / factor, value * factor)
+
+
+def _rms(values: Sequence[float]) -> float:
+    return math.sqrt(sum(v * v for v in values) / len(values))
+
+
+def tilt_over_moves(time_s: FloatArray, rate: FloatArray, segments: Segments, static: StaticNoise) -> TiltCheck | None:
+    """Gravity carried by the gyro (n, 3) [rad/s] over every move against gravity measured after it.
+
+    The bias is the mean of the rests on both sides; turns about the vertical stay unseen. None without a move.
+    """
+    means = segments.accelerometer_mean
+    if means is None:
+        return None
+    errors, predicted, longest = [], [], 0.0
+    for move in segments.moves:
+        before, after = segments.poses[move.pose_before], segments.poses[move.pose_after]
+        length = float(time_s[move.stop] - time_s[move.start])
+        if not 0.0 < length <= LONGEST_MOVE_S:
+            continue
+        rests = np.concatenate([before.samples(), after.samples()])
+        turned = integrate_rate(
+            time_s[move.start : move.stop + 1],
+            rate[move.start : move.stop + 1] - rate[rests].mean(axis=0),
+            last_only=True,
+        )
+        up = [means[k] / np.linalg.norm(means[k]) for k in (move.pose_before, move.pose_after)]
+        errors.append(float(np.arccos(np.clip(up[1] @ (turned.T @ up[0]), -1.0, 1.0))))
+        rested = len(rests) * float(np.median(np.diff(time_s)))
+        predicted.append(2.0 * static.N.filter_value**2 * (length + length**2 / rested))
+        longest = max(longest, length)
+    if not errors:
+        return None
+    return TiltCheck(len(errors), longest, _rms(errors), math.sqrt(float(np.mean(predicted))))

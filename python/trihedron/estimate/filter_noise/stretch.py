@@ -1,0 +1,122 @@
+"""A stretch of a log beside its reference: observations, columns of what is constant, covariances of what is random.
+
+Everything is linear (docs/reference.md, eq. 1) and Gaussian, so the covariance of a whole stretch is a sum of fixed
+matrices, each with one strength; those of slow errors change with a time constant (docs/filter-noise.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+
+from trihedron.arrays import FloatArray
+
+AnyFloats = np.ndarray[Any, np.dtype[Any]]
+
+NAMES = ("noise", "vibration", "bias_walk", "white", "world", "world_s", "body", "body_s")
+"""Strengths of a stretch, in this order."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Observations ``observed`` (3 m,) at ``time_s`` (m,), columns (3 m, p) in units of their prior, p standard normal.
+
+    ``centre`` (p,) is where that prior stands; ``walks`` the covariances (3 m, 3 m) of noise, vibration, bias walk and
+    white error of the reference for strength one; ``slow`` (m, m) integrates a slow error of the world, which ``plane``
+    (3, 3) turns into the observation; ``turned`` (3 m, 3 m) holds the bodies' attitudes to one another, or None;
+    ``bias_steps`` (3 m, 3 m) is what a bias of each block does to the observations.
+    """
+
+    time_s: FloatArray
+    observed: FloatArray
+    columns: FloatArray
+    centre: FloatArray
+    walks: tuple[AnyFloats, ...]
+    bias_steps: FloatArray
+    slow: FloatArray | None
+    plane: FloatArray
+    turned: FloatArray | None
+    power: FloatArray
+
+    def covariance(self, strengths: FloatArray) -> FloatArray:
+        """(3 m, 3 m) of everything random, under strengths (8,) in SI, a zero being none."""
+        s = dict(zip(NAMES, strengths, strict=True))
+        out = np.zeros_like(self.walks[0])
+        for name, basis in zip(NAMES[:4], self.walks, strict=True):
+            if s[name] > 0.0:
+                out += s[name] ** 2 * basis
+        if s["world"] > 0.0:
+            kernel = s["world"] ** 2 * matern(self.time_s, s["world_s"])
+            if self.slow is not None:
+                kernel = self.slow @ kernel @ self.slow.T
+            out += np.kron(kernel, self.plane)
+        if self.turned is not None and s["body"] > 0.0:
+            out += np.kron(s["body"] ** 2 * matern(self.time_s, s["body_s"]), np.ones((3, 3))) * self.turned
+        return out
+
+    def evidence(self, strengths: FloatArray) -> float:
+        """Log evidence of the observations, the columns' coefficients integrated out (docs/reference.md, eq. 2)."""
+        V = self.covariance(strengths)
+        try:
+            L = cholesky(V, lower=True, check_finite=False)
+        except np.linalg.LinAlgError:
+            return -np.inf
+        half = solve_triangular(L, np.column_stack([self.columns, self.observed]), lower=True, check_finite=False)
+        X, y = half[:, :-1], half[:, -1] - half[:, :-1] @ self.centre
+        inner = cholesky(np.eye(X.shape[1]) + X.T @ X, lower=True)
+        gain = solve_triangular(inner, X.T @ y, lower=True)
+        log_det = np.sum(np.log(np.diag(L))) + np.sum(np.log(np.diag(inner)))
+        return float(-0.5 * (y @ y - gain @ gain) - log_det - 0.5 * len(y) * np.log(2.0 * np.pi))
+
+    def factor(self, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Cholesky factor (3 m, 3 m) of the covariance with the columns' prior in it, and whitened observations."""
+        V = self.covariance(strengths) + self.columns @ self.columns.T
+        L = cholesky(V, lower=True, check_finite=False)
+        return L, solve_triangular(L, self.observed - self.columns @ self.centre, lower=True, check_finite=False)
+
+    def part(self, first: int, last: int) -> Stretch:
+        """Blocks from ``first`` up to ``last``."""
+        rows = slice(3 * first, 3 * last)
+        at = slice(first, last)
+        return replace(
+            self,
+            time_s=self.time_s[at],
+            observed=self.observed[rows],
+            columns=self.columns[rows],
+            walks=tuple(walk[rows, rows] for walk in self.walks),
+            bias_steps=self.bias_steps[rows],
+            slow=None if self.slow is None else self.slow[at, at],
+            turned=None if self.turned is None else self.turned[rows, rows],
+            power=self.power[at],
+        )
+
+    def with_gauss_markov(self, correlation_time_s: float) -> Stretch:
+        """The bias as a Gauss-Markov process of that time constant, its strength the σ [SI]."""
+        steps = self.bias_steps.shape[1] // 3
+        h = float(np.median(np.diff(self.time_s)))
+        lag = np.abs(np.subtract.outer(np.arange(steps), np.arange(steps))) * h
+        kernel = np.kron(np.exp(-lag / correlation_time_s), np.eye(3))
+        return replace(self, walks=(*self.walks[:2], self.bias_steps @ kernel @ self.bias_steps.T, self.walks[3]))
+
+
+def matern(time_s: FloatArray, tau_s: float) -> FloatArray:
+    """(m, m) Matérn-3/2 correlation: a smoothed truth has a derivative."""
+    x = np.sqrt(3.0) / tau_s * np.abs(np.subtract.outer(time_s, time_s))
+    return np.asarray((1.0 + x) * np.exp(-x))
+
+
+def accumulated(per_block: FloatArray) -> FloatArray:
+    """(m, m) of min(t, t') with a rate of its own in every block (m,): up to the middle of the earlier one."""
+    upto = np.cumsum(per_block) - 0.5 * per_block
+    return np.minimum.outer(upto, upto)
+
+
+def walked(steps: FloatArray) -> FloatArray:
+    """Covariance (3 m, 3 m) of a bias that walks by one per block: ``steps`` (3 m, 3 m) is what each block's does."""
+    # From block j on all later ones carry the change: sums from behind.
+    m = steps.shape[1] // 3
+    carried = np.cumsum(steps.reshape(len(steps), m, 3)[:, ::-1], axis=1)[:, ::-1].reshape(len(steps), -1)
+    return np.asarray(carried @ carried.T)

@@ -1,0 +1,103 @@
+"""Stretches of the velocity that accelerometer and reference attitude give, against the reference's position."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.estimate.filter_noise.angle import band_power, bias_steps, relative, runs
+from trihedron.estimate.filter_noise.stretch import Stretch, accumulated, walked
+from trihedron.estimate.reference.beside import Beside, Point
+
+SIZES = {"S": 0.05, "b": 0.5, "up": 0.5, "start": 5.0, "arm": 0.3}
+"""Prior σ: 5 % of a scale beside the fit, 0.5 m/s² of bias and of gravity, 5 m/s at the start, 0.3 m of lever arm."""
+
+
+def velocity_stretches(
+    side: Beside, point: Point, band_hz: float, static_N: float, gravity_m_s2: float
+) -> list[Stretch]:
+    """Stretches of differences of the position's block means, each a triangular mean of the velocity."""
+    assert side.force is not None
+    h_grid = side.grid.step_s
+    n = max(2, round(1.0 / h_grid))
+    m = len(side.grid.time_s) // n
+    time = side.grid.time_s[: m * n]
+    inside = time * (1.0 + point.rate) + point.offset_s
+    seen = side.seen[: m * n] & side.reference.covers(inside)
+    is_good = np.asarray(np.all(seen.reshape(m, n), axis=1), dtype=bool)
+    power = band_power(side.force[: m * n], h_grid, band_hz, n)
+    vibration = relative(power, static_N, 0.5 / h_grid - band_hz)
+    C = side.reference.attitude(inside) @ point.mounting
+    out = []
+    for a, b in runs(is_good):
+        at = slice(a * n, b * n)
+        local = (C[at], side.force[at], side.reference.position(inside[at]))
+        out.append(_stretch(local, time[at], n, vibration[a:b], gravity_m_s2))
+    return out
+
+
+def _stretch(
+    local: tuple[FloatArray, FloatArray, FloatArray], time: FloatArray, n: int, vibration: FloatArray, gravity: float
+) -> Stretch:
+    """``local``: attitude (k, 3, 3), specific force (k, 3), position (k, 3) of a stretch's samples."""
+    C, force, position = local
+    step = float(np.median(np.diff(time)))
+    h = n * step
+
+    def between(samples: FloatArray) -> FloatArray:
+        """Mean velocities between neighbouring blocks of an acceleration (k, ...)."""
+        twice = np.cumsum(np.cumsum(samples, axis=0) - 0.5 * samples, axis=0) * step**2
+        return _differences(twice, n) / h
+
+    world = np.einsum("kij,kj->ki", C, force)
+    up = world.mean(axis=0) / np.linalg.norm(world.mean(axis=0))
+    # Gravity along the mean force is the point about which its vector is free.
+    carried = between(world - gravity * up)
+    observed = _differences(position, n) / h - carried
+    m = len(observed)
+    bias = between(C)
+    scale = between(np.einsum("kij,kl->kijl", C, force).reshape(len(C), 3, 9)) * SIZES["S"]
+    since = between(np.ones((len(C), 1)))[:, 0]
+    arm = -_differences(C, n) / h * SIZES["arm"]
+    start, upward = np.tile(np.eye(3) * SIZES["start"], (m, 1, 1)), since[:, None, None] * np.eye(3) * SIZES["up"]
+    columns = np.concatenate([scale, bias * SIZES["b"], upward, start, arm], axis=2).reshape(3 * m, -1)
+    steps = bias_steps(bias)
+    quiet = np.full(m, h)
+    shaken = 0.5 * h * (vibration[1:] + vibration[:-1])
+    eye = np.eye(3)
+    noise, shakes = (np.kron(_triangular(q), eye) for q in (quiet, shaken))
+    # An attitude wrong by e turns gravity by g e: two axes across the vertical, summed over time.
+    return Stretch(
+        time_s=time[: m * n].reshape(m, n).mean(axis=1) + 0.5 * h,
+        observed=observed.ravel(),
+        columns=columns,
+        centre=np.zeros(columns.shape[1]),
+        walks=(noise, shakes, h * walked(steps), np.kron(2.0 * eye_of(m) - neighbours(m), eye) / h**2),
+        bias_steps=steps,
+        slow=h * np.tril(np.ones((m, m))),
+        plane=gravity**2 * (eye - np.outer(up, up)),
+        turned=None,
+        power=vibration[1:],
+    )
+
+
+def eye_of(m: int) -> FloatArray:
+    """(m, m) ones on the diagonal."""
+    return np.eye(m)
+
+
+def neighbours(m: int) -> FloatArray:
+    """(m, m) ones beside the diagonal."""
+    return np.eye(m, k=1) + np.eye(m, k=-1)
+
+
+def _triangular(per_block: FloatArray) -> FloatArray:
+    """Covariance of triangular means, two blocks wide, of a walk: min(t, t') less 7/30 of a block, neighbours 1/120."""
+    m = len(per_block)
+    return accumulated(per_block) - np.diag(7.0 / 30.0 * per_block) - neighbours(m) * np.mean(per_block) / 120.0
+
+
+def _differences(samples: FloatArray, n: int) -> FloatArray:
+    """Differences (m - 1, ...) of the means over blocks of ``n`` samples."""
+    m = len(samples) // n
+    return np.asarray(np.diff(samples[: m * n].reshape(m, n, *samples.shape[1:]).mean(axis=1), axis=0))

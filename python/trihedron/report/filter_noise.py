@@ -1,0 +1,208 @@
+"""Noise for a filter, as a report."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+from trihedron.records.filter_noise import Bounded, FilterNoise, SensorFilterNoise, StaticNoise
+from trihedron.records.plain import as_plain
+from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
+from trihedron.report.filter_noise_charts import OF_SENSOR, horizon_chart
+from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.frames import Columns, of_rows
+from trihedron.report.numbers import how_many, plain_number, unit_in_print
+from trihedron.sanitise import printable
+from trihedron.units import degrees_from_radians
+
+CAUSE_WORDS = {
+    "rest": ("noise as at rest", "a better sensor; nothing else"),
+    "vibration": ("vibration", "dampers at the mount, a low-pass filter on the sensor, a higher rate"),
+    "bias": ("bias random walk", "warm up, calibrate the temperature"),
+    "calibration": ("calibration left over", "trihedron calibrate: none of it goes into N or K"),
+    "reference": ("error of the reference", "a better reference: none of it goes into N or K"),
+}
+"""Every cause of the records, and what lowers its share."""
+
+
+def filter_noise_report(found: FilterNoise) -> Document:
+    """Lay out noise for a filter: values, shares, the test on the other half."""
+    tables: list[Block] = [values_table(found)]
+    tables += [Facts(facts)] if (facts := _facts(found)) else []
+    sections = [Section("N and K", tuple(tables))]
+    shares = [_shares(one) for one in found.sensors if one.shares]
+    if shares:
+        sections.append(Section("What the error is made of", (*shares, _advice(found))))
+    tested = [one for one in found.sensors if one.consistency]
+    if tested:
+        sections.append(Section("On the half that the fit did not see", tuple(_tested(one) for one in tested)))
+    sections.append(Section("Findings", (findings_block(found.findings),)))
+    chart = partial(horizon_chart, found)
+    picture = Picture(
+        "horizon",
+        "Error of a filter that carries on alone for a horizon: predicted and actual, effective and static.",
+        later("chart_figures", "draw_chart", chart),
+        chart,
+    )
+    return Document(
+        title="Noise for your filter",
+        subtitle=printable(found.source),
+        verdict=verdict_of(found.findings, "OK: no problems found.", "Usable", "NOT TO BE TRUSTED"),
+        is_trustworthy=not any(f.severity.value == "serious" for f in found.findings),
+        sections=tuple(sections),
+        headlines=tuple(_headline(one) for one in found.sensors),
+        lead=picture if tested else None,
+    )
+
+
+def _headline(one: SensorFilterNoise) -> Headline:
+    beside = "" if one.static is None else f"static {_number(one.static.N)}"
+    return Headline(f"{one.sensor} N", plain_number(one.N.filter_value), f"{unit_in_print(one.unit)}/√Hz", beside)
+
+
+def values_table(found: FilterNoise) -> Table:
+    """N and K of each sensor, static values and the factor between them."""
+    rows = []
+    for one in found.sensors:
+        unit = unit_in_print(one.unit)
+        static: tuple[Bounded | None, ...] = (None, None) if one.static is None else (one.static.N, one.static.K)
+        for name, value, beside in (("N", one.N, static[0]), ("K", one.K, static[1])):
+            per = "/√Hz" if name == "N" else "/√s"
+            rows.append(
+                (
+                    f"{one.sensor} {name} [{unit}{per}]", _number(value), _interval(value),
+                    "–" if beside is None else _number(beside), _factor(value, beside),
+                )
+            )  # fmt: skip
+        rows += [
+            (f"{one.sensor} N, {axis} [{unit}/√Hz]", _number(n), _interval(n), "–", "–")
+            for axis, n in zip("XYZ", one.axes_N, strict=False)
+        ]
+    return Table(
+        ("", "for the filter", "95 % interval", "static", "factor"), tuple(rows), "White density N, random walk K"
+    )
+
+
+def _number(one: Bounded) -> str:
+    return f"below {plain_number(one.upper)}" if one.is_limit else plain_number(one.value)
+
+
+def _interval(one: Bounded) -> str:
+    return "–" if one.is_limit else f"{plain_number(one.lower)} … {plain_number(one.upper)}"
+
+
+def _factor(value: Bounded, static: Bounded | None) -> str:
+    if static is None or static.is_limit or value.is_limit or static.value <= 0.0:
+        return "–"
+    return plain_number(value.value / static.value)
+
+
+def _facts(found: FilterNoise) -> tuple[tuple[str, str], ...]:
+    facts = []
+    if found.reference_source:
+        facts.append(("reference", printable(found.reference_source)))
+    for one in found.sensors:
+        if one.bias.kind == "gauss-markov":
+            sigma, tau = plain_number(one.bias.sigma), plain_number(one.bias.correlation_time_s)
+            facts.append((f"{one.sensor} bias", f"Gauss-Markov, σ {sigma} {unit_in_print(one.unit)}, τ {tau} s"))
+        if one.reference is not None:
+            slow = degrees_from_radians(one.reference.slow.filter_value)
+            word = "below " if one.reference.slow.is_limit else ""
+            said = f"slow error {word}{plain_number(slow, 2)}° in {plain_number(one.reference.slow_s, 2)} s"
+            facts.append((f"reference, by the {one.sensor}", said))
+    if found.tilt is not None:
+        actual, predicted = (
+            plain_number(degrees_from_radians(v), 2) for v in (found.tilt.actual, found.tilt.predicted)
+        )
+        facts.append(
+            (
+                "tilt error after a rotation",
+                f"{actual}° rms over {how_many(found.tilt.n, 'move')}; N at rest predicts {predicted}° (calibration "
+                "left over, vibration and bias are in the difference; the heading is not seen)",
+            )
+        )
+    return tuple(facts)
+
+
+def _shares(one: SensorFilterNoise) -> Table:
+    horizons = sorted({share.horizon_s for share in one.shares})
+    by = {(share.cause, share.horizon_s): share.share for share in one.shares}
+    rows = tuple(
+        (words, *(_percent(by[cause, h]) for h in horizons))  # type: ignore[index]
+        for cause, (words, _) in CAUSE_WORDS.items()
+    )
+    head = (f"share of the {one.sensor}'s error", *(f"{plain_number(h)} s [%]" for h in horizons))
+    return Table(head, rows, "Shares of the mean square error, 95 % intervals")
+
+
+def _percent(one: Bounded) -> str:
+    return f"below {plain_number(100 * one.upper, 2)}" if one.is_limit else (
+        f"{plain_number(100 * one.value, 2)} ({plain_number(100 * one.lower, 2)} … {plain_number(100 * one.upper, 2)})"
+    )  # fmt: skip
+
+
+def _advice(found: FilterNoise) -> Facts:
+    """What would lower the shares, the largest at ten seconds (or the nearest horizon) first."""
+    one = found.sensors[0]
+    near = min({share.horizon_s for share in one.shares}, key=lambda h: abs(h - 10.0))
+    ranked = sorted((s for s in one.shares if s.horizon_s == near), key=lambda s: -s.share.value)
+    return Facts(tuple((CAUSE_WORDS[s.cause][0], CAUSE_WORDS[s.cause][1]) for s in ranked[:3]))
+
+
+def _tested(one: SensorFilterNoise) -> Block:
+    factor, unit, what = OF_SENSOR[one.sensor]
+    rows = tuple(
+        (
+            plain_number(c.horizon_s), str(c.n_apart), plain_number(c.nees, 2),
+            plain_number(factor * c.predicted), plain_number(factor * c.actual),
+            "–" if c.static_nees is None else plain_number(c.static_nees, 2),
+            "–" if c.static_predicted is None else plain_number(factor * c.static_predicted),
+        )
+        for c in one.consistency
+    )  # fmt: skip
+    if not rows:
+        return Paragraph("The half is too short for every horizon.")
+    head = (
+        "horizon [s]",
+        "stretches",
+        "NEES",
+        f"predicted [{unit}]",
+        f"actual [{unit}]",
+        "NEES, static",
+        f"static [{unit}]",
+    )
+    return Table(
+        head, rows, f"{what[0].upper()}{what[1:]}; NEES 3 is right; static: N and K at rest, reference taken as exact"
+    )
+
+
+def filter_noise_record(found: FilterNoise) -> dict[str, Any]:
+    """All that the report says, in SI, for machines."""
+    return {
+        "source": found.source,
+        "reference": found.reference_source,
+        "rate_hz": found.rate_hz,
+        "band_hz": found.band_hz,
+        "duration_s": found.duration_s,
+        "sensors": [as_plain(one) for one in found.sensors],
+        "tilt": None if found.tilt is None else as_plain(found.tilt),
+        "findings": [finding.to_dict() for finding in found.findings],
+    }
+
+
+def filter_noise_columns(found: FilterNoise) -> Columns:
+    """A row per sensor and term: value for the filter, interval, whether it is a limit, static value, unit."""
+    rows = [
+        {
+            "sensor": one.sensor, "term": term, "value": value.filter_value, "lower": value.lower, "upper": value.upper,
+            "is_limit": value.is_limit, "static": _static(one.static, term), "unit": f"{one.unit}{per}",
+        }
+        for one in found.sensors
+        for term, value, per in (("N", one.N, "/√Hz"), ("K", one.K, "/√s"))
+    ]  # fmt: skip
+    return of_rows(rows, ("sensor", "term", "value", "lower", "upper", "is_limit", "static", "unit"))
+
+
+def _static(static: StaticNoise | None, term: str) -> float | None:
+    return None if static is None else (static.N if term == "N" else static.K).filter_value

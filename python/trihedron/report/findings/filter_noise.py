@@ -1,0 +1,48 @@
+"""What is said of noise for a filter."""
+
+from __future__ import annotations
+
+from trihedron.records.finding import FindingCode as Code
+from trihedron.records.finding import Severity
+from trihedron.report.findings.entry import Entry
+
+NOTE, WARNING = Severity.NOTE, Severity.WARNING
+
+ENTRIES = (
+    Entry(
+        Code.FILTER_NOISE_AT_REST,
+        "",
+        WARNING,
+        "There is no reference: N and K are those of this log's rest. What vibration and motion add to them is not in "
+        "them.",
+        "Rests and gravity show neither the heading nor what happens during motion.",
+        "Give the filter's own result, a tracker or a second unit with --reference MOTION.",
+    ),
+    Entry(
+        Code.FILTER_NOISE_NO_STATIC,
+        "",
+        NOTE,
+        "Nothing is known of the {sensor} at rest: noise at rest and vibration are told apart only where the vibration "
+        "changes.",
+        "No static log was given, and the log does not rest for 20 s.",
+        "Give a static log of the unit with --static REST.",
+    ),
+    Entry(
+        Code.FILTER_NOISE_NOT_SEPARATED,
+        "",
+        NOTE,
+        "Bias random walk of the {sensor} and the slow error of the reference are not separated here: the one that is "
+        "marked 'below' has an upper limit only.",
+        "Both grow slowly, and one recording holds few of their time constants.",
+        "Use the limit in a filter that must not be too sure, or record longer beside a better reference.",
+    ),
+    Entry(
+        Code.FILTER_NOISE_INCONSISTENT,
+        "",
+        WARNING,
+        "On the half that the fit did not see the {sensor}'s errors over {horizon_s:.3g} s have a NEES of {nees:.2g} "
+        "instead of 3.",
+        "The two halves differ in noise, vibration or the reference's error.",
+        "Treat N and K as those of the whole log only; estimate them from a log of the same kind of motion.",
+    ),
+)

@@ -1,0 +1,301 @@
+"""Noise for a filter: strengths by evidence, errors on the half not seen, shares, rests, and what is written."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import trihedron
+from reference_rig import FINE_HZ, G, forces, hand, rates_of
+from trihedron.cli import main
+from trihedron.estimate.filter_noise.angle import bias_steps
+from trihedron.estimate.filter_noise.held_out import errors_over
+from trihedron.estimate.filter_noise.shares import bounded, parts_of
+from trihedron.estimate.filter_noise.strengths import Prior, fit
+from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, accumulated, matern, walked
+from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
+from trihedron.records import Recording
+from trihedron.records.filter_noise import Bounded, StaticNoise
+from trihedron.records.reference import ReferenceMotion
+
+EUROC = Path(__file__).parents[2] / "shared" / "data" / "euroc"
+N, K, SLOW, TAU = 2e-4, 3e-5, 2e-3, 6.0
+
+
+def still(m=60):
+    """A stretch of a body that does not turn: means over blocks of a second, nothing constant but the start."""
+    time, eye = np.arange(m) + 0.5, np.eye(3)
+    steps = bias_steps(time[:, None, None] * eye)
+    noise = np.kron(accumulated(np.ones(m)) - np.eye(m) / 6.0, eye)
+    return Stretch(
+        time, np.zeros(3 * m), np.tile(0.1 * eye, (m, 1)), np.zeros(3),
+        (noise, 0 * noise, walked(steps), np.eye(3 * m)), steps, None, eye, None, np.zeros(m),
+    )  # fmt: skip
+
+
+STRENGTHS = np.array([N, 0.0, K, 1e-5, SLOW, TAU, 0.0, 1.0])
+
+
+def drawn(seed, m=60):
+    """The same with errors of known strengths."""
+    stretch = still(m)
+    L, _ = stretch.factor(STRENGTHS)
+    return replace(stretch, observed=L @ np.random.default_rng(seed).normal(size=3 * m))
+
+
+def test_covariances_are_those_of_the_processes():
+    # Written out: a walk's block mean has a variance of t_start + h/3, a later one t_mid in common with it.
+    noise = still(4).walks[0][::3, ::3]
+    assert noise[2, 2] == pytest.approx(2.0 + 1.0 / 3.0)
+    assert noise[1, 3] == pytest.approx(1.5)
+    # A bias that steps by one at each of three blocks' starts (the first begins at its middle): 2 s, 1.5 s, 0.5 s.
+    assert still(3).walks[2][::3, ::3][2, 2] == pytest.approx(2.0**2 + 1.5**2 + 0.5**2)
+    assert matern(np.array([0.0, 1e-9, 50.0]), 1.0)[0] == pytest.approx([1.0, 1.0, 0.0], abs=1e-9)
+
+
+def test_errors_are_as_large_as_predicted_when_the_strengths_are_right():
+    nees = [errors_over([(drawn(seed), 30)], STRENGTHS[None], 5.0).nees.mean() for seed in range(40)]
+    # 40 runs of about five stretches apart: 3 with a standard error of sqrt(6/200) = 0.17.
+    assert np.mean(nees) == pytest.approx(3.0, abs=0.6)
+    plain = np.array([N, 0.0, K, 1e-5, 0.0, 1.0, 0.0, 1.0])
+    assert errors_over([(drawn(0), 30)], plain[None], 5.0).nees.mean() > 6.0
+
+
+def test_no_start_has_room_for_a_horizon_that_is_too_long():
+    assert errors_over([(drawn(0), 30)], STRENGTHS[None], 50.0) is None
+
+
+def test_strengths_lie_within_their_intervals():
+    prior = Prior(
+        np.log([2e-4, 1.0, 2e-5, 3e-5, 1e-3, 8.0, 1.0, 1.0]),
+        np.log([1.1, 2.0, 30.0, 3.0, 30.0, 4.0, 2.0, 2.0]),
+        np.array([1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]),
+    )
+    found = fit([drawn(3)], prior)
+    for name, true in (("noise", N), ("bias_walk", K), ("world", SLOW), ("world_s", TAU)):
+        low, high = np.quantile(found.draws[:, NAMES.index(name)], [0.005, 0.995])
+        assert low < true < high, name
+    assert np.all(found.draws[:, 1] == 0.0)
+
+
+def test_an_interval_over_decades_is_a_limit():
+    assert bounded(np.geomspace(1e-6, 1.0, 99)).is_limit
+    assert bounded(np.geomspace(1e-6, 1.0, 99)).lower == 0.0
+    one = bounded(np.linspace(1.0, 2.0, 101))
+    assert not one.is_limit
+    assert one.lower < one.value == one.filter_value == pytest.approx(1.5)
+
+
+def test_parts_of_an_error_are_the_textbook_ones():
+    found = {name: value[0] for name, value in parts_of(STRENGTHS[None], 10.0).items()}
+    assert found["rest"] == pytest.approx(3 * N**2 * 10)
+    assert found["bias"] == pytest.approx(K**2 * 1000)
+    far = parts_of(STRENGTHS[None], 1e6)["reference"][0]
+    assert far == pytest.approx(6 * SLOW**2, rel=1e-3)  # two errors that no longer know of each other
+
+
+@pytest.fixture(scope="module")
+def moved():
+    """A hand for 70 s before a tracker, noise and truth error known."""
+    rng = np.random.default_rng(5)
+    t, C, _ = hand(rng, 70)
+    step = FINE_HZ // 100
+    n = len(t) // step
+    w, f = (x[: n * step].reshape(n, step, 3).mean(axis=1) for x in (rates_of(C), forces(C)))
+    w = w + 0.01 + N * 10 * rng.normal(size=w.shape)
+    log = Recording.from_arrays(
+        (np.arange(n) * step + (step - 1) / 2) / FINE_HZ, f + 0.01 * rng.normal(size=f.shape), w,
+        accelerometer_unit="m/s^2", gyroscope_unit="rad/s",
+    )  # fmt: skip
+    k = np.arange(0, len(t), FINE_HZ // 50)
+    return log, ReferenceMotion(t[k], attitude=C[k], source="tracker")
+
+
+@pytest.fixture(scope="module")
+def static(tmp_path_factory):
+    path = tmp_path_factory.mktemp("static") / "allan.json"
+    axes = [
+        {"unit": unit, "terms": {s: {"present": s == "N", "value": v, "limit": v} for s, v in (("N", n), ("K", n / 5))}}
+        for unit, n in (("rad/s", N), ("m/s^2", 1e-3))
+    ]
+    path.write_text(json.dumps({"rate_hz": 100.0, "axes": axes}))
+    return path
+
+
+@pytest.fixture(scope="module")
+def found(moved, static):
+    return trihedron.filter_noise(moved[0], static=static, reference=moved[1], horizons_s=[1, 10], gravity_m_s2=G)
+
+
+def test_a_healthy_gyro_before_a_good_truth_keeps_its_static_noise(found):
+    gyro = found.sensor("gyroscope")
+    assert found.sensor("accelerometer") is None  # a truth without position says nothing of velocity
+    assert gyro.N.value == pytest.approx(N, rel=0.1)
+    assert gyro.bias.kind == "walk"
+    rest = next(s.share for s in gyro.shares if s.cause == "rest" and s.horizon_s == 1.0)
+    assert rest.upper > 0.5
+    for one in gyro.consistency:
+        assert 0.5 < one.nees < 9.0
+    for h in (1.0, 10.0):
+        middle = sum(s.share.value for s in gyro.shares if s.horizon_s == h)
+        assert middle == pytest.approx(1.0, abs=0.25)
+
+
+def test_a_report_a_page_a_frame_and_plain_types(found, tmp_path):
+    text = trihedron.report(found, tmp_path / "noise.html")
+    assert "calibration left over" in text
+    assert "gyroscope K" in text
+    assert "predicted, effective" in (tmp_path / "noise.html").read_text(encoding="utf-8")
+    json.dumps(found.to_dict(), allow_nan=False)
+    assert list(found.to_dataframe()["term"]) == ["N", "K"]
+    assert found.plot("horizon") is not None
+
+
+def both(found):
+    """With an accelerometer as a position would give it."""
+    b = Bounded(2e-3, 1e-3, 3e-3)
+    sensor = replace(
+        found.sensor("gyroscope"), sensor="accelerometer", unit="m/s^2", N=b, K=Bounded(0.0, 0.0, 4e-4, True),
+        static=StaticNoise(b, b),
+    )  # fmt: skip
+    return replace(found, sensors=(found.sensors[0], sensor))
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_every_consumer_gets_both_sensors_in_its_own_unit(found, target):
+    whole = both(found)
+    text = filter_noise_text(whole, target)
+    gyro, rate = whole.sensors[0].N.filter_value, whole.rate_hz
+    wanted = {"fast-lio": gyro**2 * rate, "robot_localization": gyro**2 * rate, "gtsam": gyro**2}.get(target, gyro)
+    assert f"{wanted:.4g}"[:5] in text.replace(f"{wanted!r}", f"{wanted:.4g}")
+    if target != "basalt":
+        assert "static gyroscope: N 0.0002" in text
+    if target not in ("gtsam", "basalt"):
+        assert yaml.safe_load(text.replace("%YAML:1.0", ""))
+    if target == "basalt":
+        assert json.loads(text)["value0"]["accel_bias_std"] == [4e-4] * 3
+
+
+def test_keys_and_values_are_those_of_the_export_with_a_calibration(found):
+    from trihedron.files.formats import ExportOptions, export_files
+    from trihedron.files.formats.contract import NoiseFigure, SensorNoise
+    from trihedron.records import Calibration, SensorCalibration
+
+    whole = both(found)
+    one = {s.sensor: SensorNoise(*(NoiseFigure(x.filter_value, x.is_limit) for x in (s.N, s.K))) for s in whole.sensors}
+    sensors = [
+        SensorCalibration(np.eye(3), np.zeros(3), np.eye(12) * 1e-9, unit, unit, "given") for unit in ("m/s^2", "rad/s")
+    ]
+    known = Calibration(*sensors, np.eye(24) * 1e-9, "lower", G, "given", "log", "", ())
+    options = ExportOptions(one["accelerometer"], one["gyroscope"], whole.rate_hz)
+    for target in ("kalibr", "vins-fusion", "orb-slam3", "fast-lio", "gtsam", "openvins"):
+        (text,) = export_files(known, target, options).values()
+        rows = {line.strip() for line in filter_noise_text(whole, target).splitlines() if line[:1] not in "#%"}
+        numbers = {row for row in rows if any(c.isdigit() for c in row) and "imu0" not in row}
+        assert numbers <= {line.strip() for line in text.splitlines()}, target
+
+
+def test_both_sensors_are_demanded(found):
+    with pytest.raises(ValueError, match="the accelerometer was not estimated"):
+        filter_noise_text(found, "kalibr")
+    with pytest.raises(ValueError, match="there are kalibr"):
+        filter_noise_text(found, "nonsense")
+
+
+def resting(seed=1, seconds=120, n=N):
+    rng = np.random.default_rng(seed)
+    m = 100 * seconds
+    return Recording.from_arrays(
+        np.arange(m) / 100.0, [0.0, 0.0, G] + 0.01 * rng.normal(size=(m, 3)), 10 * n * rng.normal(size=(m, 3)),
+        accelerometer_unit="m/s^2", gyroscope_unit="rad/s",
+    )  # fmt: skip
+
+
+def test_a_static_log_gives_back_the_static_values_with_a_factor_of_one():
+    rest = trihedron.noise(resting(2))
+    found = trihedron.filter_noise(resting(1), static=rest)
+    gyro = found.sensor("gyroscope")
+    assert gyro.static is not None
+    assert gyro.N.value / gyro.static.N.value == pytest.approx(1.0, abs=0.04)
+    assert gyro.N.lower < N < gyro.N.upper
+    assert gyro.K.is_limit
+    assert any(f.code.value == "filter-noise-at-rest" for f in found.findings)
+
+
+def test_without_a_reference_the_tilt_over_moves_is_shown_beside_what_noise_predicts():
+    log = turned_between_rests(scale=1.02)
+    found = trihedron.filter_noise(log, static=trihedron.noise(resting(2)))
+    assert found.tilt is not None
+    # Two per cent of 90°; noise at rest predicts hundredths of a degree.
+    assert found.tilt.actual == pytest.approx(0.02 * np.pi / 2, rel=0.2)
+    assert found.tilt.predicted < 0.1 * found.tilt.actual
+
+
+def turned_between_rests(scale):
+    """Rests of 30 s with quarter turns about X between, a gyro whose scale is off."""
+    rng = np.random.default_rng(7)
+    rate = np.concatenate([x for _ in range(3) for x in (np.zeros(3000), np.full(200, np.pi / 4))] + [np.zeros(3000)])
+    angle = np.cumsum(rate) / 100.0
+    force = G * np.column_stack([0.0 * angle, np.sin(angle), np.cos(angle)])
+    w = scale * np.column_stack([rate, 0.0 * rate, 0.0 * rate]) + 10 * N * rng.normal(size=force.shape)
+    return Recording.from_arrays(
+        np.arange(len(rate)) / 100.0, force + 0.01 * rng.normal(size=force.shape), w,
+        accelerometer_unit="m/s^2", gyroscope_unit="rad/s",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"horizons_s": [0.0]}, "horizons are seconds"),
+        ({"horizons_s": []}, "horizons are seconds"),
+        ({"band_hz": 60.0}, "--band|band_hz"),
+    ],
+)
+def test_impossible_questions_are_one_sentence(moved, more, said):
+    with pytest.raises(ValueError, match=said):
+        trihedron.filter_noise(moved[0], reference=moved[1], **more)
+
+
+def test_a_reference_of_rates_is_refused(moved):
+    log, motion = moved
+    rates = ReferenceMotion(motion.time_s, rate=np.zeros((len(motion.time_s), 3)), source="table.csv")
+    with pytest.raises(ValueError, match="holds rates; give attitudes"):
+        trihedron.filter_noise(log, reference=rates)
+
+
+def test_the_command_on_a_log_at_rest(tmp_path, capsys):
+    log = resting(1, 60)
+    table = np.column_stack([log.time_s, log.accelerometer, log.gyroscope])
+    np.savetxt(
+        tmp_path / "rest.csv", table, delimiter=",", comments="",
+        header="t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]",
+    )  # fmt: skip
+    assert main(["noise", str(tmp_path / "rest.csv"), "--to", "kalibr", "-o", str(tmp_path / "imu.yaml")]) == 0
+    written = yaml.safe_load((tmp_path / "imu.yaml").read_text())
+    assert written["gyroscope_noise_density"] == pytest.approx(N, rel=0.05)
+    assert "factor" in capsys.readouterr().out
+    assert main(["noise", str(tmp_path / "rest.csv"), "--horizon", "1,x"]) == 1
+    assert "--horizon is a list of seconds" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not EUROC.exists(), reason="the recorded flights are not beside this checkout")
+def test_most_of_what_looks_like_noise_in_a_recorded_flight_is_its_truth():
+    static = StaticNoise(Bounded(1.7e-4, 1.55e-4, 1.87e-4), Bounded(1.94e-5, 1.94e-5, 1.94e-5))
+    from trihedron.estimate.filter_noise import Asked, beside_reference
+    from trihedron.pipeline.referring import motion_of
+
+    log = trihedron.read(EUROC / "V1_02_medium.log.csv.gz")
+    gyro, accelerometer = beside_reference(
+        log, motion_of(EUROC / "V1_02_medium.truth.csv.gz"), Asked((10.0,), 50.0, 9.807, static)
+    )
+    (one,) = gyro.consistency
+    assert one.nees < 7.0
+    assert one.static_nees > 30.0
+    assert next(s.share.lower for s in gyro.shares if s.cause == "reference") > 0.6
+    assert gyro.N.lower < 1.7e-4 * 1.3
+    assert math.isfinite(accelerometer.N.value)
