@@ -223,7 +223,8 @@ def _improvement(held: HeldOut) -> str:
 def _remaining(diagnosis: Diagnosis) -> str:
     left = [d for d in diagnosis.remaining if d.disagrees]
     if not left:
-        return "Unexplained: nothing detectable in this recording."
+        beside = "beside the relation below" if diagnosis.relations else "in this recording"
+        return f"Unexplained: nothing detectable {beside}."
     said = [
         f"{d.domain} ({MEANING[d.domain]}): χ²/dof {plain_number(d.chi2_per_dof)}"
         + (f", {place}" if (place := where_in_words(d)) else "")

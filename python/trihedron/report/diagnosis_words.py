@@ -22,6 +22,13 @@ MEANING = {
 MOST_NAMED = 4
 
 
+def _followed(diagnosis: Diagnosis) -> str:
+    """What readings follow, the largest relation first, by the variables that a person would plot."""
+    names = list(dict.fromkeys(name for one in diagnosis.relations for name in one.depends_on))
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return listed(names[:MOST_NAMED]) + more
+
+
 def verdict_in_words(diagnosis: Diagnosis) -> str:
     """The verdict and what carries it, in one sentence."""
     off: list[str] = [d.domain for d in diagnosis.domains if d.disagrees]
@@ -34,12 +41,13 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
         )
     if diagnosis.verdict == "unexplained":
         named = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "recording"))
-        off = left if named else off
+        off = (left or off) if named else off
         verbs = "are present, and explain" if len(named) > 1 else "is present, and explains"
         beside = f" ({listed(named)} {verbs} little)" if named else ""
         return (
             f"UNEXPLAINED: {listed(off) if off else 'the recording'} "
             f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect explains it{beside}"
+            + (f": the misfit follows {_followed(diagnosis)}" if diagnosis.relations else "")
             + (f"; parameters differ too ({listed(numbers)})." if numbers else ".")
         )
     if diagnosis.verdict == "not-testable":
