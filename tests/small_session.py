@@ -25,9 +25,9 @@ table_tilt_deg = [0.1, -0.2]
 [session]
 kind = "hand"
 n_poses = 8
-hold_s = 1.5
+pose_s = 1.5
 move_s = 1.0
-first_hold_s = 3.0
+first_pose_s = 3.0
 
 [environment]
 gravity_m_s2 = 9.80665

@@ -52,7 +52,7 @@ def test_a_zero_that_jumps_in_a_few_poses_is_found_and_a_pose_that_turns_is_not(
         force[500 * k + 250 : 500 * k + 500, 0] += 0.0
     found = jumps_in_poses(Poses(force, rate))
     assert found.p_value[1] < JUMPS
-    assert set(found.poses[1]) <= {3, 9, 14, 22, 27}
+    assert set(found.holds[1]) <= {3, 9, 14, 22, 27}
     moved = force.copy()
     for k in (3, 9, 14, 22, 27):
         moved[500 * k + 250 : 500 * k + 500, 0] += 1.0
@@ -72,10 +72,10 @@ def test_the_error_of_a_mean_of_few_turns_covers_it():
 
 def test_footnotes_are_no_answer_while_something_else_disagrees():
     left = DomainTest("static-gyro", 9.0, 30.0, 1e-9, True)
-    footnote = SimpleNamespace(ids={"disturbed-pose"}, are_footnotes=True)
+    footnote = SimpleNamespace(ids={"disturbed-pose"}, are_footnotes=True, are_spread=False)
     assert verdict.verdict_of(footnote, (left,), (left,)) == "unexplained"
     assert verdict.verdict_of(footnote, (left,), ()) == "missing-physics"
-    answer = SimpleNamespace(ids={"accel-cubic"}, are_footnotes=False)
+    answer = SimpleNamespace(ids={"accel-cubic"}, are_footnotes=False, are_spread=False)
     assert verdict.verdict_of(answer, (left,), (left,)) == "missing-physics"
 
 

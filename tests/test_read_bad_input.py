@@ -119,7 +119,7 @@ def test_two_files_that_do_not_belong_together_are_refused(tmp_path):
     blind = write(tmp_path / "blind.csv", table[:, 4:], "x,y,z\n")
     with pytest.raises(ReadError, match="no time column and the other one has"):
         read_recording(accelerometer_path=acc, gyroscope_path=blind)
-    with pytest.raises(ReadError, match="not both"):
+    with pytest.raises(ReadError, match="or one file per sensor"):
         read_recording(acc, gyroscope_path=gyr)
     named = write(tmp_path / "named.csv", table[:, :4], "t,ax,ay,az\n")
     with pytest.raises(ReadError, match="swap the two files"):

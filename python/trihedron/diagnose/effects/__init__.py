@@ -21,7 +21,7 @@ def catalogue() -> tuple[Effect, ...]:
 
 
 def _concrete(kind: Any) -> list[Any]:
-    found = [kind] if "id" in vars(kind) else []
+    found = [kind] if vars(kind).get("id") else []
     for child in kind.__subclasses__():
         found += _concrete(child)
     return found

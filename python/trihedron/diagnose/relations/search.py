@@ -23,9 +23,9 @@ MOST_RELATIONS = 3
 
 
 class Empirical(Effect):
-    """What readings follow without a mechanism: an effect in all but the name."""
+    """What readings follow without a mechanism: an effect in all but the name, and so in no catalogue."""
 
-    id = "relation"
+    id = ""
 
     def variants(self, context: Context) -> list[Variant]:
         """None of its own: the search makes them."""

@@ -308,7 +308,7 @@ def _lines(
     holds = tuple(Pose(k, a, b, a, b) for k, (a, b) in enumerate(pieces.spans))
     force = quick(recording.accelerometer, pieces.force)
     rate = None if recording.gyroscope is None or pieces.rate is None else quick(recording.gyroscope, pieces.rate)
-    samples = cast(Observations, _Samples(recording, t, force, rate, SimpleNamespace(holds=holds)))
+    samples = cast(Observations, _Samples(recording, t, force, rate, SimpleNamespace(poses=holds)))
     test = judge_within_holds(samples, alpha)
     S = [np.eye(3) if side is None else np.array(side["S"]) for side in (model.accelerometer, model.gyroscope)]
     fitted = cast(Fit, SimpleNamespace(twin=SimpleNamespace(accel_S=S[0], gyro_S=S[1])))
