@@ -20,7 +20,7 @@ from trihedron.diagnose.rest.pieces import RestPieces, rest_pieces
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.zeros.curve import DriftCurve, smooth_curve
-from trihedron.diagnose.zeros.evidence import KIND_LIMIT, examine
+from trihedron.diagnose.zeros.evidence import slow_change
 from trihedron.diagnose.zeros.process import ZeroReadings
 from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
@@ -261,12 +261,12 @@ def _drift(pieces: RestPieces, sensor: Sensor) -> tuple[DriftCurve | None, float
         np.vstack([r.values for r in parts]), np.vstack([r.sigma for r in parts]), parts[0].time_s,
         parts[0].length_s, parts[0].pose, parts[0].design, parts[0].direction,
     )  # fmt: skip
-    found = examine(together)
-    if not found.kind:
-        return None, float(found.p_slow), False
+    found = slow_change(together)
+    if not found.is_slow:
+        return None, found.p_value, False
     columns = list(range(together.design.shape[1]))
     curve = smooth_curve(found.process, columns, found.sigma, together.time_s[::2])
-    return curve, max(found.p_slow, 1e-300), found.drift_ratio > KIND_LIMIT
+    return curve, max(found.p_value, 1e-300), found.is_smooth
 
 
 def _drifting(

@@ -1,11 +1,10 @@
-"""The smooth latent curve of a zero with its band, and how far every pose lies from the others (eq. Z.10)."""
+"""The smooth latent curve of a bias with its band (docs/static-logs.md, R.10)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.zeros.process import INITIAL_SLOPE, ZeroProcess, unit_kernels
@@ -77,24 +76,3 @@ def smooth_curve(process: ZeroProcess, keep: list[int], sigma: FloatArray, time_
         covariance = centre @ kernel(at, at, w, d) @ centre - cross @ P @ cross.T
         errors.append(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
     return DriftCurve(time_s, np.array(values), np.array(errors))
-
-
-def residuals_of_poses(
-    process: ZeroProcess, keep: list[int], sigma: FloatArray
-) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """``(poses, (axes, poses))``: mean of every pose less the others' prediction, over its standard error."""
-    r = process.readings
-    X = r.design[:, keep]
-    poses = np.unique(r.pose)
-    out = np.zeros((len(r.values), len(poses)))
-    for axis, y in enumerate(r.values):
-        V, _ = covariance_of(process, axis, sigma)
-        inverse = np.linalg.inv(V)
-        side = inverse @ X
-        P = inverse - side @ np.linalg.pinv(X.T @ side) @ side.T
-        Py = P @ y
-        for k, pose in enumerate(poses):
-            # One unknown mean of the pose: its estimate over its standard error, by the readings' own precision matrix.
-            own = (r.pose == pose).astype(np.float64)
-            out[axis, k] = own @ Py / np.sqrt(max(float(own @ P @ own), 1e-300))
-    return poses, out

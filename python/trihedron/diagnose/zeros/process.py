@@ -1,4 +1,4 @@
-"""One Gaussian process for a zero from pose to pose: scatter, walk, drift (docs/bias-repeatability.md, eq. Z.1-Z.4).
+"""One Gaussian process for a bias at rest: scatter, walk, drift (docs/static-logs.md, R.7, R.8).
 
 Per axis ``y = X θ + e``, flat prior on θ, ``V = φ² diag σ² + σ_s² (ones within a pose) + σ_w² W + σ_d² D``; W is a
 random walk, D an integrated walk whose initial slope is random too, both scaled so that σ_w and σ_d are the expected
@@ -55,19 +55,6 @@ class ZeroReadings:
     pose: npt.NDArray[np.int64]
     design: FloatArray
     direction: FloatArray
-
-    @property
-    def n_poses(self) -> int:
-        """Number of poses."""
-        return len(np.unique(self.pose))
-
-    def without(self, pose: int) -> ZeroReadings:
-        """The same without one pose."""
-        keep = self.pose != pose
-        return ZeroReadings(
-            self.values[:, keep], self.sigma[:, keep], self.time_s[keep], self.length_s[keep], self.pose[keep],
-            self.design[keep], self.direction[keep],
-        )  # fmt: skip
 
 
 def unit_kernels(r: ZeroReadings) -> tuple[FloatArray, FloatArray, float, float]:
@@ -257,7 +244,7 @@ class ZeroProcess:
         return top, best
 
     def mixture(self, keep: list[int], free: tuple[int, ...] = (0, 1, 2)) -> tuple[FloatArray, FloatArray]:
-        """Coefficients (axes, k) and covariances (axes, k, k) averaged over the strengths by their likelihood (Z.4).
+        """Coefficients (axes, k) and covariances (axes, k, k) averaged over the strengths by their likelihood (R.8).
 
         Flat in log σ from the lowest level to the highest, with the weight of one level on 0.
         """
