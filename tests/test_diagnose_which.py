@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 import trihedron
 from nuisance_trial.draw import G, draw
 from trihedron.diagnose.effects.quantisation import before_converter, missing_codes
-from trihedron.diagnose.zeros.process import ZeroReadings
+from trihedron.diagnose.rest.process import ZeroReadings
 
 
 def zeros(rng, temperature, scatter, walk, per_kelvin, n=24):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from trihedron import _core
-from trihedron.diagnose.zeros.curve import smooth_curve
-from trihedron.diagnose.zeros.evidence import slow_change
-from trihedron.diagnose.zeros.process import ZeroProcess
+from trihedron.diagnose.rest.curve import smooth_curve
+from trihedron.diagnose.rest.slow_change import slow_change
+from trihedron.diagnose.rest.process import ZeroProcess
 from zero_sessions import Session, draw, readings_of
 
 ALL = [0, 1, 2, 3, 4]

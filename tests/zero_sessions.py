@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.diagnose.zeros.process import ZeroReadings
+from trihedron.diagnose.rest.process import ZeroReadings
 
 STEP_S = 0.25
 

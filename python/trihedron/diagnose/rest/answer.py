@@ -19,9 +19,9 @@ from trihedron.diagnose.rest.heat import Curve, branch_gap, thermal_curve
 from trihedron.diagnose.rest.pieces import RestPieces, rest_pieces
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
-from trihedron.diagnose.zeros.curve import DriftCurve, smooth_curve
-from trihedron.diagnose.zeros.evidence import slow_change
-from trihedron.diagnose.zeros.process import ZeroReadings
+from trihedron.diagnose.rest.curve import DriftCurve, smooth_curve
+from trihedron.diagnose.rest.slow_change import slow_change
+from trihedron.diagnose.rest.process import ZeroReadings
 from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
 from trihedron.records.domains import Domain, DomainTest, HeldOut, Where

@@ -10,7 +10,7 @@ from scipy.special import chdtrc
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.effects.thermal_shapes import BRANCH_K_S
 from trihedron.diagnose.rest.pieces import RestPieces
-from trihedron.diagnose.zeros.process import DRIFT, SCATTER, WALK, ZeroProcess
+from trihedron.diagnose.rest.process import DRIFT, SCATTER, WALK, ZeroProcess
 
 LEAST_SWING_K = 0.5
 """A logged temperature that changes by less explains no zero."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.zeros.process import INITIAL_SLOPE, ZeroProcess, unit_kernels
+from trihedron.diagnose.rest.process import INITIAL_SLOPE, ZeroProcess, unit_kernels
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.zeros.process import DRIFT, SCATTER, WALK, ZeroProcess, ZeroReadings
+from trihedron.diagnose.rest.process import DRIFT, SCATTER, WALK, ZeroProcess, ZeroReadings
 
 SMOOTH = 8.75
 """1 % point of 3/8 χ²(1) + 3/8 χ²(2) + 1/8 χ²(3): one strength more where the others may be 0."""
