@@ -81,8 +81,8 @@ fn session(n_poses: usize) -> (Session, State) {
         force_bias: Vector3::zeros(),
         rate_scale: Matrix3::identity(),
         up,
-        rate_zero: zeros.clone(),
-        force_zero: zeros.clone(),
+        pose_rate_bias: zeros.clone(),
+        pose_force_bias: zeros.clone(),
         own: [zeros.clone(), zeros],
         effect: DVector::zeros(0),
     };

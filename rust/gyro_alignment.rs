@@ -35,7 +35,7 @@ pub struct StillPose {
     /// Raw gyro mean: the zero reading here.
     pub zero: Vector3<f64>,
     /// Variance of each component of that mean.
-    pub var_zero: Vector3<f64>,
+    pub var_bias: Vector3<f64>,
 }
 
 /// A move joins two holds.
@@ -78,7 +78,7 @@ pub struct Alignment {
     /// Noise of the integrated rate.
     pub noise: RateNoise,
     /// Variance of the true change of the zero reading from hold to hold, raw unit².
-    pub var_zero_walk: Vector3<f64>,
+    pub var_bias_walk: Vector3<f64>,
     /// Directions in `(S_f row by row, b_f)` that are free: `(12, k)`; no columns when the accelerometer is given.
     pub accelerometer_basis: DMatrix<f64>,
     /// Whether these directions are standard errors of a given accelerometer (each then has a row of its own that holds

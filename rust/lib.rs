@@ -7,6 +7,7 @@ pub mod allan;
 pub mod attitude;
 pub mod audit;
 pub mod banded;
+pub mod bias_process;
 pub mod block_motion;
 pub mod chi_square;
 pub mod converter_grid;
@@ -39,9 +40,8 @@ pub mod simd;
 pub mod simulate;
 pub mod sinusoid;
 pub mod spectral_likelihood;
-pub mod stamps;
 pub mod stillness;
-pub mod zero_process;
+pub mod timestamps;
 
 #[cfg(feature = "python")]
 mod python;

@@ -152,14 +152,14 @@ def tracked(seed, seconds=50, sigma_deg=0.05, has_path=False, track_hz=100, eart
     lead, ppm = rng.uniform(-3, 3), rng.uniform(-100, 100)
     k = np.arange(0, len(t), FINE_HZ // track_hz)
     k = k[t[k] > 1.0]
-    stamps = t[k] * (1 + 1e-6 * ppm) + lead
+    timestamps = t[k] * (1 + 1e-6 * ppm) + lead
     seen = jittered(C[k], rng, np.radians(sigma_deg))
     position = path[k] + 3e-4 * rng.normal(size=(len(k), 3)) if has_path else None
     log = Recording.from_arrays(
         times(len(gyro), 10), accelerometer, gyro, accelerometer_unit="counts", gyroscope_unit="counts"
     )
-    motion = ReferenceMotion(stamps - stamps[0], attitude=seen, position=position, source="tracker.csv")
-    return Trial(log, motion, u, lead - stamps[0], ppm, arm)
+    motion = ReferenceMotion(timestamps - timestamps[0], attitude=seen, position=position, source="tracker.csv")
+    return Trial(log, motion, u, lead - timestamps[0], ppm, arm)
 
 
 def measured_table(seed, seconds=90, wobble_deg=0.15):
@@ -183,10 +183,12 @@ def measured_table(seed, seconds=90, wobble_deg=0.15):
     gyro = read_gyro(rng, u, true, np.tile([0.0, 0, G], (len(t), 1)), 10)
     lead, ppm = rng.uniform(-3, 3), rng.uniform(-50, 50)
     k = np.arange(0, len(t), 20)
-    stamps = t[k] * (1 + 1e-6 * ppm) + lead
+    timestamps = t[k] * (1 + 1e-6 * ppm) + lead
     log = Recording.from_arrays(times(len(gyro), 10), None, gyro, gyroscope_unit="counts")
-    motion = ReferenceMotion(stamps - stamps[0], rate=rate[k] + 1e-4 * rng.normal(size=(len(k), 3)), source="table.csv")
-    return Trial(log, motion, u, lead - stamps[0], ppm, np.zeros(3))
+    motion = ReferenceMotion(
+        timestamps - timestamps[0], rate=rate[k] + 1e-4 * rng.normal(size=(len(k), 3)), source="table.csv"
+    )
+    return Trial(log, motion, u, lead - timestamps[0], ppm, np.zeros(3))
 
 
 LEVELS_DEG = (0, 30, -30, 60, -60, 120, -120, 0)
@@ -214,7 +216,7 @@ def commanded_table(seed, pose_s=6.0, wobble_deg=0.05, lag_s=0.15):
     log = Recording.from_arrays(
         times(len(gyro), 10), accelerometer, gyro, accelerometer_unit="counts", gyroscope_unit="counts"
     )
-    stamps = pose_s * np.arange(len(commands) + 1)
+    timestamps = pose_s * np.arange(len(commands) + 1)
     return Trial(
-        log, ReferenceMotion(stamps, rate=told, is_stepwise=True, source="commands.csv"), u, 0.0, 0.0, np.zeros(3)
+        log, ReferenceMotion(timestamps, rate=told, is_stepwise=True, source="commands.csv"), u, 0.0, 0.0, np.zeros(3)
     )

@@ -40,15 +40,15 @@ def test_exact_faces_give_the_exact_model_in_any_order(method):
     assert not findings
 
 
-@pytest.mark.parametrize(("method", "zero_variance"), [("least-squares", 1 / 6), ("closed-form", 1 / 6)])
-def test_reported_variances_are_those_of_the_formula(method, zero_variance):
+@pytest.mark.parametrize(("method", "bias_variance"), [("least-squares", 1 / 6), ("closed-form", 1 / 6)])
+def test_reported_variances_are_those_of_the_formula(method, bias_variance):
     sigma = 2e-3
     sensor, _ = calibrate_faces(face_readings(SIX, 0.0, 0), sigma, G, raw_unit="m/s^2", method=method)
     # Back to the inverse form, in which the formula is stated: var S_a = σ²/2g², var b_a = σ²/6.
     jacobian = other_form_jacobian(sensor.S, sensor.b)
     variance = np.diag(jacobian @ sensor.covariance @ jacobian.T)
     np.testing.assert_allclose(variance[:9], sigma**2 / (2 * G**2), rtol=1e-9)
-    np.testing.assert_allclose(variance[9:], sigma**2 * zero_variance, rtol=1e-9)
+    np.testing.assert_allclose(variance[9:], sigma**2 * bias_variance, rtol=1e-9)
 
 
 def test_repeats_and_missing_faces_are_taken_as_they_come():

@@ -39,7 +39,7 @@ def test_two_turns_about_the_vertical_with_stamps_that_stray_have_no_negative_va
     recording, segments, measured, truth = measured_session(1e-12)
     # Timestamps alone: an error along the axis turned about, which is the vertical, and none across it.
     zero = np.zeros_like(measured.zero)
-    alone = replace(measured, sigma_time_s=1e-3, var_zero=zero, var_reading=zero, noise_density=np.zeros(3))
+    alone = replace(measured, sigma_time_s=1e-3, var_bias=zero, var_reading=zero, noise_density=np.zeros(3))
     one = np.linspace(-1.0, 1.0, 9)
     out = seen(recording, segments, alone, truth, np.outer(one, one))
     assert (out.floor2 >= 0.0).all()
@@ -51,7 +51,7 @@ def test_variances_of_independent_causes_add_up():
     recording, segments, measured, truth = measured_session()
     measured = replace(measured, sigma_time_s=1e-4)
     zero = np.zeros_like(measured.zero)
-    nothing = {"sigma_time_s": 0.0, "var_zero": zero, "var_reading": zero, "noise_density": np.zeros(3)}
+    nothing = {"sigma_time_s": 0.0, "var_bias": zero, "var_reading": zero, "noise_density": np.zeros(3)}
     whole = seen(recording, segments, measured, truth)
     parts = [seen(recording, segments, replace(measured, **(nothing | {name: getattr(measured, name)})), truth)
              for name in nothing]  # fmt: skip

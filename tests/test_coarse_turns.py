@@ -12,13 +12,13 @@ from trihedron.segment.means import BIAS_VARIANCE, NOISE_TRIED
 
 RATE_HZ = 100.0
 DEG = np.pi / 180.0
-HOLD_S = 3.0
+POSE_S = 3.0
 
 
 def steady_turns(rng, step_deg_s, rate_deg_s, noise_deg_s=0.05, is_table=True):
     """Readings [deg/s] of twelve half turns at a steady rate, there and back twice about each axis; the truth."""
     mix, zero = np.eye(3) + 0.01 * rng.normal(size=(3, 3)), rng.normal(size=3) * 3.0
-    rates, turns, at = [np.zeros((round(HOLD_S * RATE_HZ), 3))], [], round(HOLD_S * RATE_HZ)
+    rates, turns, at = [np.zeros((round(POSE_S * RATE_HZ), 3))], [], round(POSE_S * RATE_HZ)
     for axis in range(3):
         for sense in (1.0, -1.0, -1.0, 1.0):
             peak = rate_deg_s * (1.0 if is_table else rng.uniform(0.7, 1.4))
@@ -26,7 +26,7 @@ def steady_turns(rng, step_deg_s, rate_deg_s, noise_deg_s=0.05, is_table=True):
             n = round(180.0 / peak * RATE_HZ) - len(ramp)
             shape = np.concatenate([ramp, np.ones(n), 1.0 - ramp])
             shape *= sense * 180.0 * RATE_HZ / shape.sum()
-            rates += [shape[:, None] * np.eye(3)[axis], np.zeros((round(HOLD_S * RATE_HZ), 3))]
+            rates += [shape[:, None] * np.eye(3)[axis], np.zeros((round(POSE_S * RATE_HZ), 3))]
             turns.append(Turn(at - 5, at + len(shape) + 5, axis, sense * np.pi))
             at += len(shape) + len(rates[-1])
     rates = np.concatenate(rates)
@@ -71,7 +71,7 @@ def test_a_steady_reading_inside_one_step_is_one_error_and_a_ramp_is_none():
     # Two seconds at 7: the turn is off by 2 s of a step's uniform error; of the ramp's steps one error each.
     assert hidden.variance_of_turns()[0, 0] == pytest.approx(2.0**2 / 12.0)
     assert hidden.passing[1, 1] == pytest.approx(8 * 0.01**2 / 12.0)
-    assert hidden.variance_of_zeros()[0] == pytest.approx(np.full(3, 3.0**2 / 12.0))
+    assert hidden.variance_of_biases()[0] == pytest.approx(np.full(3, 3.0**2 / 12.0))
 
 
 def test_an_axis_that_is_up_shows_one_rounding_error_at_every_heading():

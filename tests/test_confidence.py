@@ -107,7 +107,7 @@ def test_the_zero_of_a_coarse_gyro_is_not_drawn_to_its_code():
 
 @pytest.mark.parametrize("bits", [8, 10])
 def test_a_coarse_gyro_has_the_error_bars_of_its_rounding(bits):
-    z, of_zero = [], []
+    z, of_bias = [], []
     for seed in (31, 32, 33):
         f, w, rate, truth, _ = hand(seed, gyro_bits=bits)
         result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
@@ -118,11 +118,11 @@ def test_a_coarse_gyro_has_the_error_bars_of_its_rounding(bits):
         # A step of 4 °/s at 8 bit: three parts in a thousand are what its moves of 2 s show.
         assert relative < (6e-3 if bits == 8 else 2e-3)
         z.append(scores)
-        of_zero.append((result.gyroscope.b - lower(truth).b_w) / result.gyroscope.sigma_b)
+        of_bias.append((result.gyroscope.b - lower(truth).b_w) / result.gyroscope.sigma_b)
     assert len(z) >= 2
     # Mean square of 6 to 9 scores, between limits that chance passes once in a hundred: 0.04 when the part of the bias
     # that its step hides was counted as the poses' and as the moves'.
-    assert 0.15 < np.mean(np.square(of_zero)) < 2.8
+    assert 0.15 < np.mean(np.square(of_bias)) < 2.8
     # At most 27 scores: none beyond four, nor larger together than chance allows once in a thousand.
     assert np.abs(z).max() < 4.0
     assert np.sum(np.square(z)) < 56.0

@@ -38,9 +38,9 @@ def session(seed, lean_rad, scatter_rad_s):
         force[here] += (1.0 - np.exp(-since / 2.0))[:, None] * (to_raw[0] @ np.cross(up, direction))
         turning = (np.exp(-since / 2.0) / 2.0)[:, None] * direction + rng.normal(size=3) * scatter_rad_s
         rate[here] += turning @ to_raw[1].T
-    stamps = recording.time_s
+    timestamps = recording.time_s
     log = Recording(
-        time_s=stamps, rate_hz=recording.rate_hz, accelerometer=force, gyroscope=rate,
+        time_s=timestamps, rate_hz=recording.rate_hz, accelerometer=force, gyroscope=rate,
         accelerometer_unit=recording.accelerometer_unit, gyroscope_unit=recording.gyroscope_unit,
     )  # fmt: skip
     segments = segment_recording(log)

@@ -9,13 +9,13 @@ from scipy.spatial.transform import Rotation
 import trihedron
 from trihedron.diagnose.against import FittedModel, compare_numbers
 from trihedron.estimate.gyroscope.world_rates import carried_gravity
-from trihedron.estimate.noise.of_zeros import PoseZeros, compare_slow
+from trihedron.estimate.noise.of_biases import PoseBiases, compare_slow
 from trihedron.pipeline.comparing_frames import sign_of_gravity
 from trihedron.records import Pose
-from trihedron.records.sampling import Sampling, StampKind
+from trihedron.records.sampling import Sampling, TimestampKind
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
-N, HOLD_S, GAP_S, POSES = 9e-5, 4.5, 2.0, 26
+N, POSE_S, GAP_S, POSES = 9e-5, 4.5, 2.0, 26
 
 
 def model(accel_size, gyro_size, units=("m/s^2", "rad/s")):
@@ -99,7 +99,7 @@ def zeros(seed, walk, flicker=0.0):
     """Three axes of pose means made sample by sample: white noise, a walk, and a chain of 1/f by octaves."""
     rng = np.random.default_rng(seed)
     rate = 20.0
-    n, every, length = int(POSES * (HOLD_S + GAP_S) * rate), int((HOLD_S + GAP_S) * rate), int(HOLD_S * rate)
+    n, every, length = int(POSES * (POSE_S + GAP_S) * rate), int((POSE_S + GAP_S) * rate), int(POSE_S * rate)
     out = []
     for _ in range(3):
         x = N * np.sqrt(rate) * rng.standard_normal(n) + walk / np.sqrt(rate) * np.cumsum(rng.standard_normal(n))
@@ -109,9 +109,9 @@ def zeros(seed, walk, flicker=0.0):
             spectrum = np.sqrt(density * rate * 4 * n / 2.0) * (phase[0] + 1j * phase[1])
             x = x + np.fft.irfft(spectrum, 4 * n)[:n]
         means = np.array([x[k * every : k * every + length].mean() for k in range(POSES)])
-        t = np.arange(POSES) * (HOLD_S + GAP_S)
-        sigma = np.full(POSES, N / np.sqrt(HOLD_S))
-        out.append(PoseZeros(means - means.mean(), sigma, t, np.full(POSES, HOLD_S), scatters=True))
+        t = np.arange(POSES) * (POSE_S + GAP_S)
+        sigma = np.full(POSES, N / np.sqrt(POSE_S))
+        out.append(PoseBiases(means - means.mean(), sigma, t, np.full(POSES, POSE_S), scatters=True))
     return out
 
 
@@ -156,8 +156,8 @@ def test_stamps_that_reading_made_even_still_count_as_scattered():
     readings = 1e-2 * rng.standard_normal((4000, 3))
     clean = replace(body, time_s=np.arange(4000) / 100.0, accelerometer=readings, gyroscope=0.1 * readings[::-1],
                     temperature_degc=None, supply_v=None, rate_hz=100.0)  # fmt: skip
-    late = replace(clean, sampling=Sampling(StampKind.LATE, 0.01, 0.0, 1.5e-3, is_even=True))
-    rounded = replace(clean, sampling=Sampling(StampKind.ROUNDED, 0.01, 0.0, 1.5e-3, is_even=True))
+    late = replace(clean, sampling=Sampling(TimestampKind.LATE, 0.01, 0.0, 1.5e-3, is_even=True))
+    rounded = replace(clean, sampling=Sampling(TimestampKind.ROUNDED, 0.01, 0.0, 1.5e-3, is_even=True))
     poses = tuple(Pose(k, 500 * k, 500 * k + 450, 500 * k, 500 * k + 450) for k in range(8))
     given, fit = sampled(clean, poses, model(1.0, 1.0)), model(1.0, 1.0)
     for log, expected in ((late, {"jitter"}), (rounded, set()), (clean, set())):

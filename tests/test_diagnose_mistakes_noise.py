@@ -12,17 +12,17 @@ from trihedron.pipeline.comparing_noise import compare_noise, sampled
 from trihedron.records import Pose, Recording
 from trihedron.records.channel_facts import LowPass
 
-RATE_HZ, POSE, EVERY, N_HOLDS = 100.0, 900, 1000, 12
-HOLDS = tuple(Pose(k, EVERY * k, EVERY * k + POSE, EVERY * k, EVERY * k + POSE) for k in range(N_HOLDS))
+RATE_HZ, POSE, EVERY, N_POSES = 100.0, 900, 1000, 12
+POSES = tuple(Pose(k, EVERY * k, EVERY * k + POSE, EVERY * k, EVERY * k + POSE) for k in range(N_POSES))
 STEP = 1e-4
 SENSORS = {"accelerometer": 1e-2, "gyroscope": 1e-3}
 """Noise of a reading, SI."""
 
 
-def numbers(accel_zero=(0.0, 0.0, 0.0), gyro_zero=(0.0, 0.0, 0.0)):
+def numbers(accel_bias=(0.0, 0.0, 0.0), gyro_bias=(0.0, 0.0, 0.0)):
     sigma = np.r_[np.full(9, 1e-5), np.full(3, 1e-3), np.full(9, 1e-5), np.full(3, 1e-5)]
     return FittedModel(
-        np.eye(3), -np.array(accel_zero), "m/s^2", np.eye(3), -np.array(gyro_zero), "rad/s", np.diag(sigma**2),
+        np.eye(3), -np.array(accel_bias), "m/s^2", np.eye(3), -np.array(gyro_bias), "rad/s", np.diag(sigma**2),
         np.zeros(3), np.zeros(3),
     )  # fmt: skip
 
@@ -30,7 +30,7 @@ def numbers(accel_zero=(0.0, 0.0, 0.0), gyro_zero=(0.0, 0.0, 0.0)):
 def log(seed, *, axes=(1.0, 1.1, 1.25), uniform=False, size=1.0, step=STEP, tau_s=None, jitter_s=0.0, one=False):
     """Readings at rest; ``tau_s``: a Gauss-Markov process of twice the noise's size beside it, per sensor."""
     rng = np.random.default_rng(seed)
-    n = EVERY * N_HOLDS
+    n = EVERY * N_POSES
     readings = {}
     for sensor, noise in SENSORS.items():
         x = rng.uniform(-np.sqrt(3.0), np.sqrt(3.0), (n, 3)) if uniform else rng.standard_normal((n, 3))
@@ -43,7 +43,7 @@ def log(seed, *, axes=(1.0, 1.1, 1.25), uniform=False, size=1.0, step=STEP, tau_
         readings[sensor] = lsb * np.round(x / lsb) if lsb else x
     time = np.arange(n) / RATE_HZ + (jitter_s * rng.standard_normal(n) if jitter_s else 0.0)
     made = Recording.from_arrays(time, **readings, accelerometer_unit="m/s^2", gyroscope_unit="rad/s")
-    return sampled(made, HOLDS, numbers())
+    return sampled(made, POSES, numbers())
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -151,14 +151,14 @@ def test_a_bias_that_was_drawn_and_never_added_is_named_and_a_drawn_one_is_not()
 def test_a_step_of_a_quarter_of_the_noise_is_another_converter_and_digits_of_a_file_are_none():
     def counts(seed, step, offset=0.0):
         rng = np.random.default_rng(seed)
-        readings = step * np.round(60.0 * rng.standard_normal((EVERY * N_HOLDS, 3)) / step) + offset
+        readings = step * np.round(60.0 * rng.standard_normal((EVERY * N_POSES, 3)) / step) + offset
         time = np.arange(len(readings)) / RATE_HZ
         fit = FittedModel(
             1e-3 * np.eye(3), np.zeros(3), "counts", 1e-5 * np.eye(3), np.zeros(3), "counts", np.eye(24),
             np.zeros(3), np.zeros(3),
         )  # fmt: skip
         made = Recording.from_arrays(time, readings, readings, accelerometer_unit="counts", gyroscope_unit="counts")
-        return sampled(made, HOLDS, fit)
+        return sampled(made, POSES, fit)
 
     fine = counts(1, 1.0)
     found = said(counts(2, 16.0), fine)

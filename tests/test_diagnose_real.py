@@ -8,7 +8,7 @@ import pytest
 
 from trihedron import calibrate, diagnose
 from trihedron.diagnose import diagnose_recording
-from trihedron.diagnose.effects.stamp_errors import stamp_errors
+from trihedron.diagnose.effects.timestamp_errors import timestamp_errors
 from trihedron.diagnose.session.observations import observe
 from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
@@ -70,12 +70,12 @@ def test_stamps_on_a_coarse_grid_are_not_when_the_samples_were_taken(real_data: 
     logged = np.loadtxt(real_data / "kim/kim_imu_good1.txt", usecols=0)
     recording = replace(recording, time_s=logged - logged[0])
     observed = observe(recording, resegment(recording, segment_recording(recording)))
-    found = stamp_errors(observed)
+    found = timestamp_errors(observed)
     assert found is not None
     # Timestamps on a grid of 5.12 ms scatter by its twelfth root, 1.48 ms; the readings do not follow them at all.
     assert found.rms_s == pytest.approx(5.12e-3 / np.sqrt(12.0), rel=0.05)
     assert abs(found.followed) < 0.1
-    assert stamp_errors(replace(observed, time_s=found.even_s)) is None
+    assert timestamp_errors(replace(observed, time_s=found.even_s)) is None
 
 
 def test_motion_above_half_the_rate_is_counted_and_smooth_motion_is_not() -> None:

@@ -68,7 +68,7 @@ def test_branches_that_differ_while_heating_and_cooling_are_stated_in_degrees_pe
     assert told == pytest.approx(0.2 * DEG, rel=0.25)
 
 
-def test_a_zero_that_swings_without_a_logged_cause_is_hidden_drift():
+def test_a_zero_that_swings_without_a_logged_cause_is_bias_drift():
     t, accelerometer, gyroscope = still(60000, 50.0, 46)
     gyroscope[:, 1] += 0.2 * DEG * np.sin(2.0 * np.pi * t / t[-1] * 1.3)
     d = trihedron.diagnose(recording(t, accelerometer, gyroscope), gravity_m_s2=9.8)

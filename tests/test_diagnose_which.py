@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 import trihedron
 from nuisance_trial.draw import G, draw
 from trihedron.diagnose.effects.quantisation import before_converter, missing_codes
-from trihedron.diagnose.rest.process import ZeroReadings
+from trihedron.diagnose.rest.process import BiasReadings
 
 
 def zeros(rng, temperature, scatter, walk, per_kelvin, n=24):
@@ -24,7 +24,7 @@ def zeros(rng, temperature, scatter, walk, per_kelvin, n=24):
     wandering = np.cumsum(rng.normal(size=(3, 2 * n)), axis=1) * walk
     drawn = rng.normal(size=(3, n))[:, pose] * scatter
     values = np.outer(per_kelvin, heat) + wandering + drawn + rng.normal(size=(3, 2 * n))
-    return ZeroReadings(
+    return BiasReadings(
         values, np.ones((3, 2 * n)), t, np.full(2 * n, 3.0), pose, np.column_stack([np.ones(2 * n), heat]),
         np.ones((2 * n, 1)),
     )  # fmt: skip

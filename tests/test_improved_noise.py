@@ -196,7 +196,7 @@ def test_one_pose_that_was_pushed_makes_no_scatter_for_all_of_them():
 def test_stamps_that_scatter_in_a_driven_scenario_are_settled_as_those_of_a_file():
     clean, recording = session(5)
     own = trihedron.calibrate(recording, gravity_m_s2=9.80665)
-    shaken = replace(clean, clock=replace(clean.clock, stamp_jitter_s=1.5e-3))
+    shaken = replace(clean, clock=replace(clean.clock, timestamp_jitter_s=1.5e-3))
     made = driven(shaken, recording, own.segments, own.calibration)
     assert made.sampling.is_even
     assert np.ptp(np.diff(made.time_s)) < 1e-6

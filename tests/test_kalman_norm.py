@@ -82,7 +82,7 @@ def test_live_use_stops_when_good_enough_and_proposes_poses_that_get_there():
         NOISE,
         gravity_m_s2=GRAVITY,
         start=NormStart.nominal(0.039, [500.0, 570.0, 520.0]),
-        goal=Goal(sensitivity=2e-3, zero_m_s2=0.02),
+        goal=Goal(sensitivity=2e-3, bias_m_s2=0.02),
         session_s=300.0,
         pose_s=4.0,
         pause_s=4.0,

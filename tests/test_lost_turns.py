@@ -27,12 +27,12 @@ def drifting(step_s=STEP_S):
 
 
 @pytest.mark.parametrize(
-    "stamps",
+    "timestamps",
     [ROWS * STEP_S, ROWS / 99.746, np.round(ROWS / 99.746, 3), np.round(ROWS / 99.746, 6), np.round(ROWS * 0.0037, 2)],
-    ids=["exact", "odd rate", "to 1 ms", "to 1 µs", "shared stamps"],
+    ids=["exact", "odd rate", "to 1 ms", "to 1 µs", "shared timestamps"],
 )
-def test_stamps_that_are_a_line_in_the_row_may_have_been_remade(stamps):
-    assert could_be_remade(stamps, float(np.median(np.diff(stamps)[np.diff(stamps) > 0])))
+def test_stamps_that_are_a_line_in_the_row_may_have_been_remade(timestamps):
+    assert could_be_remade(timestamps, float(np.median(np.diff(timestamps)[np.diff(timestamps) > 0])))
 
 
 @pytest.mark.parametrize("digits", [3, 4, 6])

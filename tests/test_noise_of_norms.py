@@ -3,25 +3,25 @@
 import numpy as np
 import pytest
 
+from trihedron.estimate.noise.of_biases import PoseBiases
 from trihedron.estimate.noise.of_norms import PoseNorms, compare_slow_norms
-from trihedron.estimate.noise.of_zeros import PoseZeros
 
-N, HOLD_S, GAP_S, POSES, RATE_HZ = 4e-3, 4.5, 2.0, 26, 20.0
+N, POSE_S, GAP_S, POSES, RATE_HZ = 4e-3, 4.5, 2.0, 26, 20.0
 
 
 def session(seed, walk, scatter=0.0, poses=POSES):
     """Norms of poses whose biases walk, sample by sample; ``walk`` of all axes or of each [m/s²/√s]."""
     rng = np.random.default_rng(seed)
-    every, length = int((HOLD_S + GAP_S) * RATE_HZ), int(HOLD_S * RATE_HZ)
+    every, length = int((POSE_S + GAP_S) * RATE_HZ), int(POSE_S * RATE_HZ)
     up = rng.standard_normal((poses, 3))
     up /= np.linalg.norm(up, axis=1)[:, None]
     steps = np.broadcast_to(walk, 3) / np.sqrt(RATE_HZ) * rng.standard_normal((poses * every, 3))
     zero = np.cumsum(steps, axis=0)
     means = np.array([zero[k * every : k * every + length].mean(axis=0) for k in range(poses)])
-    sigma = np.full(poses, N / np.sqrt(HOLD_S))
+    sigma = np.full(poses, N / np.sqrt(POSE_S))
     norms = (up * means).sum(axis=1) + np.hypot(sigma, scatter) * rng.standard_normal(poses)
-    t = np.arange(poses) * (HOLD_S + GAP_S)
-    return PoseNorms(PoseZeros(norms, sigma, t, np.full(poses, HOLD_S), scatters=True), up)
+    t = np.arange(poses) * (POSE_S + GAP_S)
+    return PoseNorms(PoseBiases(norms, sigma, t, np.full(poses, POSE_S), scatters=True), up)
 
 
 def test_sessions_of_one_unit_are_not_told_apart_and_the_walk_is_inside_its_interval():
@@ -56,7 +56,7 @@ def test_figures_do_not_hang_on_how_the_accelerometer_was_calibrated():
     one, other = session(1, 4e-3), session(2, 4e-4)
     x, y, z = one.up.T
     moved = PoseNorms(
-        PoseZeros(one.norms.values + 0.03 * x - 0.02 * y + 0.01 * z * z + 0.005 * x * y, one.norms.sigma,
+        PoseBiases(one.norms.values + 0.03 * x - 0.02 * y + 0.01 * z * z + 0.005 * x * y, one.norms.sigma,
                   one.norms.time_s, one.norms.length_s, scatters=True), one.up)  # fmt: skip
     first, second = compare_slow_norms(one, other), compare_slow_norms(moved, other)
     assert first.first[2]["K"].value == pytest.approx(second.first[2]["K"].value, rel=1e-6)

@@ -185,8 +185,8 @@ def coarse_readings_on_arrival(n: int = 20_000, seed: int = 5):
     """Codes of one noise sigma at 1 kHz, timestamped on arrival: times and readings repeat those before by chance."""
     rng = np.random.default_rng(seed)
     codes = np.round(rng.normal([0.0, 0.0, 400.0, 0.0, 0.0, 0.0], 1.0, (n, 6)))
-    stamps = np.maximum.accumulate(np.arange(n) * 1e-3 + rng.exponential(3e-3, n)).round(6)
-    return np.column_stack([stamps, codes * 0.0245])
+    timestamps = np.maximum.accumulate(np.arange(n) * 1e-3 + rng.exponential(3e-3, n)).round(6)
+    return np.column_stack([timestamps, codes * 0.0245])
 
 
 def test_equal_readings_under_equal_stamps_are_samples_where_codes_are_coarse(tmp_path):

@@ -7,7 +7,7 @@ from test_read import HEADER, codes, finding, write
 from trihedron.read import read_recording
 from trihedron.read.clock.even import find_even_clock
 from trihedron.read.clock.settle import sample_numbers
-from trihedron.records import FindingCode, StampKind
+from trihedron.records import FindingCode, TimestampKind
 
 N = 6000
 T = 0.0100237
@@ -52,15 +52,15 @@ def test_the_period_is_right_and_losses_are_counted_where_they_are(law, lost, se
     if lost:
         # Among late timestamps, or steps of one and two coarse ticks, the place is told to a few rows.
         assert np.abs(found - behind).max() <= (0 if law in ("exact", "scattered") else 12)
-    kinds = {"exact": StampKind.EXACT, "rounded": StampKind.ROUNDED, "scattered": StampKind.SCATTERED}
-    assert clock.kind is kinds.get(law, StampKind.LATE)
+    kinds = {"exact": TimestampKind.EXACT, "rounded": TimestampKind.ROUNDED, "scattered": TimestampKind.SCATTERED}
+    assert clock.kind is kinds.get(law, TimestampKind.LATE)
 
 
 @pytest.mark.parametrize("scatter", [0.05, 0.2, 0.5])
 def test_steps_drawn_anew_have_no_even_clock(scatter):
     rng = np.random.default_rng(3)
     t = np.cumsum(T * rng.gamma(scatter**-2, scatter**2, N))
-    assert find_even_clock(t - t[0]).kind is StampKind.IRREGULAR
+    assert find_even_clock(t - t[0]).kind is TimestampKind.IRREGULAR
 
 
 def motion(taken_s, seed=5):
@@ -74,29 +74,29 @@ def motion(taken_s, seed=5):
 @pytest.mark.parametrize("law", ["late", "scattered", "rounded"])
 def test_motion_tells_whether_samples_were_taken_evenly_or_when_stamped(tmp_path, law):
     even = T * np.arange(N)
-    stamps = arrival(np.arange(N), law, 2)
-    by_clock = read_recording(write(tmp_path / "a.csv", np.column_stack([stamps, motion(even)]), HEADER))
+    timestamps = arrival(np.arange(N), law, 2)
+    by_clock = read_recording(write(tmp_path / "a.csv", np.column_stack([timestamps, motion(even)]), HEADER))
     assert by_clock.sampling.is_even
     assert FindingCode.EVEN_CLOCK in codes(by_clock)
     np.testing.assert_allclose(np.diff(by_clock.time_s), T, rtol=1e-3)
-    by_stamp = read_recording(write(tmp_path / "b.csv", np.column_stack([stamps, motion(stamps)]), HEADER))
-    assert not by_stamp.sampling.is_even
-    assert FindingCode.TIMESTAMPS_KEPT in codes(by_stamp)
-    np.testing.assert_allclose(by_stamp.time_s, stamps - stamps[0], atol=1e-9)
+    by_timestamp = read_recording(write(tmp_path / "b.csv", np.column_stack([timestamps, motion(timestamps)]), HEADER))
+    assert not by_timestamp.sampling.is_even
+    assert FindingCode.TIMESTAMPS_KEPT in codes(by_timestamp)
+    np.testing.assert_allclose(by_timestamp.time_s, timestamps - timestamps[0], atol=1e-9)
 
 
 def test_without_motion_stamps_stay_and_the_doubt_is_said(tmp_path):
-    stamps = arrival(np.arange(N), "scattered", 4)
+    timestamps = arrival(np.arange(N), "scattered", 4)
     still = motion(np.zeros(N))
-    recording = read_recording(write(tmp_path / "a.csv", np.column_stack([stamps, still]), HEADER))
+    recording = read_recording(write(tmp_path / "a.csv", np.column_stack([timestamps, still]), HEADER))
     assert not recording.sampling.is_even
     assert "no motion shows" in finding(recording, FindingCode.CLOCK_UNDECIDED).seen
     assert FindingCode.TIME_GAP not in codes(recording)
 
 
 def test_packets_with_one_stamp_are_spread_even_at_rest(tmp_path):
-    stamps = np.repeat(T * np.arange(4, N, 5), 5)
-    recording = read_recording(write(tmp_path / "a.csv", np.column_stack([stamps, motion(np.zeros(N))]), HEADER))
+    timestamps = np.repeat(T * np.arange(4, N, 5), 5)
+    recording = read_recording(write(tmp_path / "a.csv", np.column_stack([timestamps, motion(np.zeros(N))]), HEADER))
     assert recording.sampling.is_even
     np.testing.assert_allclose(np.diff(recording.time_s), T, rtol=1e-4)
 
@@ -104,8 +104,8 @@ def test_packets_with_one_stamp_are_spread_even_at_rest(tmp_path):
 def test_a_counter_settles_what_late_stamps_leave_open(tmp_path):
     tick, behind = numbers(1, 30)
     rng = np.random.default_rng(1)
-    stamps = np.maximum.accumulate(T * tick + rng.exponential(3.0 * T, N))
-    table = np.column_stack([stamps, motion(T * tick), tick + 17])
+    timestamps = np.maximum.accumulate(T * tick + rng.exponential(3.0 * T, N))
+    table = np.column_stack([timestamps, motion(T * tick), tick + 17])
     recording = read_recording(write(tmp_path / "a.csv", table, HEADER.replace("gz\n", "gz,counter\n")))
     assert recording.sampling.is_even
     assert recording.sampling.n_lost == 30
@@ -128,5 +128,5 @@ def test_a_sensor_a_little_fast_of_whole_milliseconds_loses_nothing_to_its_stamp
     clock = find_even_clock(np.round(0.0021 + period * tick, 3))
     # Rounding to 1 ms tells the slope of 6000 rows to a part in a million; an alias is off by hundreds and more.
     assert clock.period_s == pytest.approx(period, rel=1e-4)
-    assert clock.kind is not StampKind.IRREGULAR
+    assert clock.kind is not TimestampKind.IRREGULAR
     np.testing.assert_array_equal(np.flatnonzero(clock.lost_behind), behind)

@@ -107,8 +107,8 @@ def ulog(topics: dict[tuple[str, int], tuple[str, np.ndarray, list[np.ndarray]]]
         out += message(b"F", f"{name}:uint64_t timestamp;{fields}".encode())
     for k, (name, instance) in enumerate(topics):
         out += message(b"A", struct.pack("<BH", instance, k) + name.encode())
-    for k, (_, stamps, columns) in enumerate(topics.values()):
-        for i, stamp in enumerate(stamps):
+    for k, (_, timestamps, columns) in enumerate(topics.values()):
+        for i, stamp in enumerate(timestamps):
             out += message(b"D", struct.pack(f"<HQ{len(columns)}f", k, int(stamp), *(float(c[i]) for c in columns)))
     return out
 

@@ -29,8 +29,8 @@ def written(path, *columns, header=HEADER, remark=""):
     return path
 
 
-def table(stamps, force, rate):
-    return (list(stamps), *(list(map(float, c)) for c in (*force.T, *rate.T)))
+def table(timestamps, force, rate):
+    return (list(timestamps), *(list(map(float, c)) for c in (*force.T, *rate.T)))
 
 
 def serious(recording):
@@ -55,12 +55,12 @@ def test_ticks_of_an_unknown_size_are_asked_for(tmp_path, tick_s, unit, factor, 
 
 def test_a_doubtful_clock_is_settled_by_a_stated_gyro_unit_that_gravity_agrees_with(tmp_path):
     t, force, rate = motion(1000.0, n_poses=4)
-    stamps = [round(x * 1e3) for x in t]
+    timestamps = [round(x * 1e3) for x in t]
     header = "t,ax,ay,az,gx [rad/s],gy [rad/s],gz [rad/s]"
-    told = read_recording(written(tmp_path / "log.csv", *table(stamps, force, rate), header=header))
+    told = read_recording(written(tmp_path / "log.csv", *table(timestamps, force, rate), header=header))
     assert told.rate_hz == pytest.approx(1000.0)
     assert not serious(told)
-    untold = read_recording(written(tmp_path / "log.csv", *table(stamps, force, rate)))
+    untold = read_recording(written(tmp_path / "log.csv", *table(timestamps, force, rate)))
     assert FindingCode.TIME_UNIT_DETECTED in serious(untold)
 
 
@@ -119,20 +119,20 @@ def test_a_unit_that_nobody_knows_is_asked_for_by_name(tmp_path, name):
     assert read_recording(log, accelerometer_unit="m/s^2").accelerometer_unit is AccelerationUnit.M_S2
 
 
-@pytest.mark.parametrize("same_stamps", [True, False])
+@pytest.mark.parametrize("same_timestamps", [True, False])
 @pytest.mark.parametrize("name", ["ch", "port", "whose"])
-def test_two_devices_row_by_row_are_asked_for_whatever_the_column_is_called(tmp_path, same_stamps, name):
+def test_two_devices_row_by_row_are_asked_for_whatever_the_column_is_called(tmp_path, same_timestamps, name):
     t, *first = motion(seed=1)
     _, *second = motion(seed=2)
     force, rate = (np.stack(pair, axis=1).reshape(-1, 3) for pair in zip(first, second, strict=True))
-    stamps = np.stack([t, t if same_stamps else t + 0.005], axis=1).ravel()
-    which = [k % 2 for k in range(len(stamps))]
-    log = written(tmp_path / "log.csv", *table(stamps, force, rate), which, header=f"{HEADER},{name}")
+    timestamps = np.stack([t, t if same_timestamps else t + 0.005], axis=1).ravel()
+    which = [k % 2 for k in range(len(timestamps))]
+    log = written(tmp_path / "log.csv", *table(timestamps, force, rate), which, header=f"{HEADER},{name}")
     with pytest.raises(ReadError, match=rf"'{name}' identifies 2 devices"):
         read_recording(log)
     recording = read_recording(log, instance=1)
     np.testing.assert_allclose(recording.accelerometer, second[0], atol=1e-5)
-    bare = read_recording(written(tmp_path / "bare.csv", *table(stamps, force, rate)))
+    bare = read_recording(written(tmp_path / "bare.csv", *table(timestamps, force, rate)))
     assert FindingCode.DEVICES_INTERLEAVED in serious(bare)
 
 
@@ -170,10 +170,10 @@ def test_axes_swapped_in_the_middle_of_a_log_are_serious(tmp_path, share):
 def test_a_clock_that_changes_its_rate_is_serious_unless_gravity_turns_so_too(tmp_path, is_true):
     t, force, rate = motion(n_poses=16)
     half = len(t) // 2
-    stamps = np.where(t < t[half], t, t[half] + 1.25 * (t - t[half]))
+    timestamps = np.where(t < t[half], t, t[half] + 1.25 * (t - t[half]))
     if is_true:
         rate[half:] /= 1.25
-    recording = read_recording(written(tmp_path / "log.csv", *table(stamps, force, rate)))
+    recording = read_recording(written(tmp_path / "log.csv", *table(timestamps, force, rate)))
     assert (FindingCode.CLOCK_JUMPED in serious(recording)) is not is_true
 
 
@@ -294,8 +294,8 @@ def test_sensorstream_rawimu_and_kitti_keep_every_reading(tmp_path):
         counts = f"{c[2]},{-c[1]},{c[0]},{c[5]},{-c[4]},{c[3]}"
         messages.append(f"%RAWIMUSA,2105,{x:.3f};2105,{366000 + x:.9f},00000077,{counts}*b5c3d6f8")
         (oxts / "data" / f"{k:010d}.txt").write_text(" ".join(map(str, [*range(11), *a, *a, *w, *w, *range(7)])))
-    stamps = [f"2011-09-26 13:02:{int(x):02d}.{round(1e9 * (x % 1)):09d}" for x in t]
-    (oxts / "timestamps.txt").write_text("\n".join(stamps) + "\n")
+    timestamps = [f"2011-09-26 13:02:{int(x):02d}.{round(1e9 * (x % 1)):09d}" for x in t]
+    (oxts / "timestamps.txt").write_text("\n".join(timestamps) + "\n")
     (tmp_path / "stream.csv").write_text("\n".join(lines) + "\n")
     (tmp_path / "rawimu.txt").write_text("\n".join([*messages[:50], "#BESTPOSA,COM1;x,y", *messages[50:]]) + "\n")
     stream = read_recording(tmp_path / "stream.csv")

@@ -8,7 +8,7 @@ from trihedron import _core
 LENGTHS = (2, 3, 7, 64, 65, 66, 129, 65536, 65537, 200_003)
 
 
-def stamps(n: int, seed: int) -> np.ndarray:
+def timestamps(n: int, seed: int) -> np.ndarray:
     """Steps of every kind: usual ones that differ by rounding, none, long ones, some back."""
     rng = np.random.default_rng(seed)
     step = rng.choice(
@@ -19,9 +19,9 @@ def stamps(n: int, seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize("n", LENGTHS)
 def test_steps_are_counted_and_their_median_found_as_by_sorting(n):
-    time = stamps(n, n)
+    time = timestamps(n, n)
     step = np.diff(time)
-    assert _core.stamp_steps(time) == ((step < 0).sum(), (step == 0).sum(), (step > 0).sum(), 0)
+    assert _core.timestamp_steps(time) == ((step < 0).sum(), (step == 0).sum(), (step > 0).sum(), 0)
     forward = step[step > 0]
     expected = np.median(forward) if len(forward) else np.nan
     np.testing.assert_array_equal(_core.usual_step(time), expected)
@@ -44,7 +44,7 @@ def test_the_earliest_of_every_block_takes_in_what_is_left_over(n, width):
         expected[-1] = blocks * width + int(rest.argmin())
     if n - expected[-1] > width:
         expected.append(n - width // 2 + int(late[-(width // 2) :].argmin()))
-    np.testing.assert_array_equal(_core.earliest_stamps(late, width), expected)
+    np.testing.assert_array_equal(_core.earliest_timestamps(late, width), expected)
 
 
 @pytest.mark.parametrize("kind", [np.int32, np.int64])
@@ -54,9 +54,9 @@ def test_an_even_clock_is_laid_and_left_as_its_formula_says(kind):
     tick = np.cumsum(rng.integers(1, 3, n)).astype(kind)
     time = period * tick + 1e-4 * rng.standard_normal(n)
     late = np.empty(n)
-    _core.stamp_lateness(time, tick, period, late)
+    _core.timestamp_lateness(time, tick, period, late)
     np.testing.assert_array_equal(late, tick * -period + time)
-    _core.stamp_lateness(time, None, period, late)
+    _core.timestamp_lateness(time, None, period, late)
     np.testing.assert_array_equal(late, np.arange(n) * -period + time)
     late = time - period * tick
     cut = n // 38 * 38

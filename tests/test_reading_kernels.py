@@ -39,9 +39,9 @@ def test_a_running_median_is_that_of_scipy(size, n):
 
 def phase_power_twin(windows, cell, length):
     power = []
-    for stamps in windows:
-        at = np.floor(stamps / cell).astype(np.int64)
-        share = stamps / cell - at
+    for timestamps in windows:
+        at = np.floor(timestamps / cell).astype(np.int64)
+        share = timestamps / cell - at
         taper = np.sin(np.pi * (np.arange(len(at)) + 0.5) / len(at)) ** 2
         weight = np.bincount(at, (1.0 - share) * taper, length) + np.bincount(at + 1, share * taper, length)
         power.append((np.abs(fft.rfft(weight[:length])) / taper.sum()) ** 2)
@@ -60,11 +60,11 @@ def test_phase_power_is_the_transform_of_shared_stamps():
 
 
 def test_direct_power_is_the_squared_mean_of_exponentials():
-    stamps = np.sort(np.random.default_rng(2).uniform(0.0, 5.0, 512))
+    timestamps = np.sort(np.random.default_rng(2).uniform(0.0, 5.0, 512))
     frequency = 3.0 + 0.01 * np.arange(41)
-    twin = np.abs(np.exp(2j * np.pi * np.outer(frequency, stamps)).mean(axis=1)) ** 2
+    twin = np.abs(np.exp(2j * np.pi * np.outer(frequency, timestamps)).mean(axis=1)) ** 2
     # Forty turns one after the other gather forty roundings.
-    np.testing.assert_allclose(_core.direct_power(stamps, 3.0, 0.01, 41), twin, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(_core.direct_power(timestamps, 3.0, 0.01, 41), twin, rtol=0.0, atol=1e-13)
 
 
 def test_statistics_of_windows_are_those_of_numpy():

@@ -192,9 +192,9 @@ def test_a_clock_that_jumps_late_is_refused_with_the_place(seed, by_s):
     trial = tracked(seed)
     t = trial.motion.time_s
     late = t > t[-1] - 10.0
-    stamps = t + np.where(late, by_s, 0.0)
-    kept = np.concatenate(([True], np.diff(np.maximum.accumulate(stamps)) > 0.0))
-    moved = replace(trial.motion, time_s=stamps[kept], attitude=trial.motion.attitude[kept])
+    timestamps = t + np.where(late, by_s, 0.0)
+    kept = np.concatenate(([True], np.diff(np.maximum.accumulate(timestamps)) > 0.0))
+    moved = replace(trial.motion, time_s=timestamps[kept], attitude=trial.motion.attitude[kept])
     with pytest.raises(ValueError, match=r"clock jumps"):
         fit_reference(trial.log, moved, G)
 

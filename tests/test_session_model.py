@@ -16,7 +16,7 @@ from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
 from trihedron.records.published import published_figures
-from trihedron.records.recording import spread_stamps
+from trihedron.records.recording import spread_timestamps
 from trihedron.segment import segment_recording
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.named import _of
@@ -82,20 +82,20 @@ def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_
 
 
 def test_samples_that_share_a_stamp_are_spread_to_the_next():
-    stamps = np.array([0.0, 0.01, 0.02, 0.02, 0.02, 0.05, 0.06, 0.06])
-    spread = spread_stamps(stamps, 0.01)
+    timestamps = np.array([0.0, 0.01, 0.02, 0.02, 0.02, 0.05, 0.06, 0.06])
+    spread = spread_timestamps(timestamps, 0.01)
     np.testing.assert_allclose(spread, [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07], atol=1e-12)
 
 
 def test_two_samples_with_one_stamp_change_nothing_that_can_be_seen():
     recording, truth = session_of(4)
     plain, _ = fitted_to(recording, truth.gravity_m_s2)
-    stamps = recording.time_s.copy()
+    timestamps = recording.time_s.copy()
     moves = segment_recording(recording).moves
     for move in moves[2:8]:
-        stamps[(move.start + move.stop) // 2] = stamps[(move.start + move.stop) // 2 - 1]
+        timestamps[(move.start + move.stop) // 2] = timestamps[(move.start + move.stop) // 2 - 1]
     with np.errstate(all="raise", under="ignore"):
-        fitted, _ = fitted_to(replace(recording, time_s=stamps), truth.gravity_m_s2)
+        fitted, _ = fitted_to(replace(recording, time_s=timestamps), truth.gravity_m_s2)
     sigma = np.sqrt(np.diag(plain.covariance()))[9:18]
     # One timestamp of a move of some hundred samples late by half a step: a fraction of the noise.
     assert np.abs((fitted.twin.gyro_S - plain.twin.gyro_S).ravel() / sigma).max() < 1.0

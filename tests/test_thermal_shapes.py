@@ -9,7 +9,7 @@ from trihedron.diagnose.effects.thermal_shapes import thermal_bias_variants
 
 
 def context(temperature, rate, n_poses=10):
-    return SimpleNamespace(temperature=temperature, temperature_rate=rate, obs=SimpleNamespace(n_holds=n_poses))
+    return SimpleNamespace(temperature=temperature, temperature_rate=rate, obs=SimpleNamespace(n_poses=n_poses))
 
 
 def on_axes(values):

@@ -34,8 +34,8 @@ SETTINGS = {
     **{f"{n} poses": (hand, {"n_poses": n}) for n in (9, 12, 40)},
     "1/f strong": (hand, STRONG),
     "1/f weak": (hand, WEAK),
-    **{f"lost {100 * p:g} %, stamps true": (hand, {"lost": p}) for p in (0.001, 0.03)},
-    **{f"lost {100 * p:g} %, stamps remade": (hand, {"lost": p, "is_remade": True}) for p in (0.001, 0.03)},
+    **{f"lost {100 * p:g} %, timestamps true": (hand, {"lost": p}) for p in (0.001, 0.03)},
+    **{f"lost {100 * p:g} %, timestamps remade": (hand, {"lost": p, "is_remade": True}) for p in (0.001, 0.03)},
     **{
         f"{hz:g} Hz, moves of {s:g} s, lost {100 * p:g} %, remade": (
             hand,
@@ -65,7 +65,7 @@ ASKED = (
     *(f"moves of {s:g} s" for s in (0.25, 2.0, 30.0)),
     *(f"{which} of {b} bit" for which in ("gyro", "both") for b in (8, 10, 12)),
     *("10 Hz", "1000 Hz", "9 poses", "12 poses", "40 poses", "1/f strong", "1/f weak"),
-    *(f"lost {100 * p:g} %, stamps {stamps}" for p in (0.001, 0.03) for stamps in ("true", "remade")),
+    *(f"lost {100 * p:g} %, timestamps {timestamps}" for p in (0.001, 0.03) for timestamps in ("true", "remade")),
 )
 
 

@@ -22,7 +22,7 @@ FACTORS = {
     "path": ("free", "axis by axis"),
     "tremor_deg_s": (0.0, 2.0),
     "sampling": ("points", "averages"),
-    "stamps": ("exact", "late", "milliseconds", "lost rows"),
+    "timestamps": ("exact", "late", "milliseconds", "lost rows"),
     "drift": ("none", "accelerometer", "gyro"),
     "support": ("rigid", "settling"),
     "outlier": ("none", "bumped pose"),
@@ -60,7 +60,7 @@ def session(seed, **levels):
     """One session at the levels given; the other factors as a careful hand has them."""
     of = {
         **{"rate_hz": 100.0, "bits": 16, "grade": "consumer", "poses": 18, "pose_s": 4.0, "move_s": 2.0},
-        **{"path": "free", "tremor_deg_s": 2.0, "sampling": "points", "stamps": "exact", "drift": "none"},
+        **{"path": "free", "tremor_deg_s": 2.0, "sampling": "points", "timestamps": "exact", "drift": "none"},
         **{"support": "rigid", "outlier": "none"},
         **levels,
     }
@@ -153,11 +153,11 @@ def _read_out(of, rates, forces, is_rest, per, rng):
         units[name] = np.clip(np.round(read / step), -top, top - 1), inverse * step, -inverse @ bias[still].mean(axis=0)
     t = (np.arange(n) + 0.5) / rate_hz
     kept = np.ones(n, dtype=bool)
-    if of["stamps"] == "late":
+    if of["timestamps"] == "late":
         t = np.maximum.accumulate(t + rng.exponential(0.1 / rate_hz, n))
-    elif of["stamps"] == "milliseconds":
+    elif of["timestamps"] == "milliseconds":
         t = np.round(t, 3)
-    elif of["stamps"] == "lost rows":
+    elif of["timestamps"] == "lost rows":
         kept = rng.random(n) > 1e-3
     truth = Truth(units["f"][1], units["f"][2], units["w"][1], units["w"][2])
     return Session(t[kept], units["f"][0][kept], units["w"][0][kept], rate_hz, truth, (0.0,) * of["poses"])

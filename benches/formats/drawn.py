@@ -104,7 +104,7 @@ EXTRAS = (
     "euler",
     "free acceleration",
 )
-DEVICES = ("id", "same stamps", "apart", "wide")
+DEVICES = ("id", "same timestamps", "apart", "wide")
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ class Layout:
     is_open: bool = False
 
 
-def stamps(clock: str, time_s: np.ndarray, rng: np.random.Generator) -> list[str]:
+def timestamps(clock: str, time_s: np.ndarray, rng: np.random.Generator) -> list[str]:
     start = float(rng.uniform(0, 5000))
     t = time_s + start
     if clock == "seconds":
@@ -255,7 +255,7 @@ def text(layout: Layout, rng: np.random.Generator, parts: list[Session]) -> str:
             digits = 0 if counts else max(0, 6 - int(np.ceil(np.log10(np.abs(values[:, k]).max()))))
             data[k] = [f"{x:.{digits}f}" for x in values[:, k]]
         shift = 0.5 / layout.rate_hz if layout.devices == "apart" and cells else 0.0
-        data[time_name] = stamps(layout.clock, part.time_s + shift, np.random.default_rng(5))
+        data[time_name] = timestamps(layout.clock, part.time_s + shift, np.random.default_rng(5))
         data |= extras(layout.extras, part, rng)
         cells.append(data)
         rows.append(n)
@@ -269,7 +269,7 @@ def text(layout: Layout, rng: np.random.Generator, parts: list[Session]) -> str:
         rest = [c for c in every if not isinstance(c, int)]
         every = [*rest[:1], *(p + title[k] for p in ("imu0_", "imu1_") for k in range(6)), *rest[1:]]
         header, unit_row, cells = every, [""] * len(every), cells[:1]
-    elif layout.devices in ("id", "same stamps"):
+    elif layout.devices in ("id", "same timestamps"):
         which = pick(("id", "ch", "port", "sensor", "device", "imu"))
         for k, data in enumerate(cells):
             data[which] = [str(k)] * rows[k]

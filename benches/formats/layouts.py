@@ -192,9 +192,9 @@ def rostopic_echo() -> Layout:
     names += [f"field.angular_velocity.{x}" for x in "xyz"] + [c.format("angular_velocity") for c in cov]
     names += [f"field.linear_acceleration.{x}" for x in "xyz"] + [c.format("linear_acceleration") for c in cov]
     zeros = [np.zeros(s.n)] * 9
-    stamps = _ns(s)
+    timestamps = _ns(s)
     q = [np.zeros(s.n)] * 3 + [np.ones(s.n)]
-    body = _rows(stamps, np.arange(s.n), stamps, ["imu"] * s.n, *q, *zeros, *w.T, *zeros, *a.T, *zeros)
+    body = _rows(timestamps, np.arange(s.n), timestamps, ["imu"] * s.n, *q, *zeros, *w.T, *zeros, *a.T, *zeros)
     return Layout("ROS (rostopic echo -p)", {"imu.csv": (",".join(names) + "\n" + body).encode()}, 100, a, w, SI, s.n)
 
 
@@ -367,8 +367,8 @@ def sensorlog_ios() -> Layout:
     names += [f"gyroRotation{x}(rad/s)" for x in "XYZ"] + [f"motionUserAcceleration{x}(G)" for x in "XYZ"]
     t = 12345.6 + s.time_s
     zeros = [np.round(0.001 * np.random.default_rng(i).standard_normal(s.n), 6) for i in range(3)]
-    stamps = _dates(s, "%Y-%m-%dT%H:%M:%S.%f", 3)
-    body = _rows([f"{x}+01:00" for x in stamps], np.arange(1, s.n + 1), t, *a.T, t, *w.T, *zeros)
+    timestamps = _dates(s, "%Y-%m-%dT%H:%M:%S.%f", 3)
+    body = _rows([f"{x}+01:00" for x in timestamps], np.arange(1, s.n + 1), t, *a.T, t, *w.T, *zeros)
     text = ",".join(names) + "\n" + body
     return Layout("SensorLog (iOS)", {"sensorlog.csv": text.encode()}, 100, a, w, ("g", "rad/s"), s.n)
 
@@ -382,9 +382,9 @@ def androsensor() -> Layout:
     names += [f"LINEAR ACCELERATION {x} (m/s²)" for x in "XYZ"] + [f"GYROSCOPE {x} (rad/s)" for x in "XYZ"]
     names += ["Time since start in ms", "YYYY-MO-DD HH-MI-SS_SSS"]
     linear = [np.round(0.01 * np.random.default_rng(i).standard_normal(s.n), 4) for i in range(3)]
-    stamps = [x.replace(".", ":") for x in _dates(s, "%Y-%m-%d %H:%M:%S.%f", 3)]
+    timestamps = [x.replace(".", ":") for x in _dates(s, "%Y-%m-%d %H:%M:%S.%f", 3)]
     ms = np.rint(1000 * s.time_s).astype(int)
-    body = _rows(*a.T, *a.T, *linear, *w.T, ms, stamps, separator=";")
+    body = _rows(*a.T, *a.T, *linear, *w.T, ms, timestamps, separator=";")
     text = ";".join(names) + "\n" + body
     return Layout("AndroSensor", {"Sensor_record.csv": text.encode()}, 50, a, w, SI, s.n)
 
@@ -395,10 +395,10 @@ def matlab_mobile() -> Layout:
     s = session(100)
     a, w = _si(s)
     head = "Timestamp,X,Y,Z\n"
-    stamps = _dates(s, "%d-%b-%Y %H:%M:%S.%f", 3)
+    timestamps = _dates(s, "%d-%b-%Y %H:%M:%S.%f", 3)
     files = {
-        "Acceleration.csv": (head + _rows(stamps, *a.T)).encode(),
-        "AngularVelocity.csv": (head + _rows(stamps, *w.T)).encode(),
+        "Acceleration.csv": (head + _rows(timestamps, *a.T)).encode(),
+        "AngularVelocity.csv": (head + _rows(timestamps, *w.T)).encode(),
     }
     return Layout("MATLAB Mobile", files, 100, a, w, SI, 2 * s.n, {}, True)
 
@@ -409,11 +409,11 @@ def metabase() -> Layout:
     s = session(100)
     a, w = _round(s.force / G, 3), _round(np.degrees(s.rate), 3)
     ms = [1709294400000 + round(1000 * t) for t in s.time_s]
-    stamps = _dates(s, "%Y-%m-%dT%H.%M.%S.%f", 3)
+    timestamps = _dates(s, "%Y-%m-%dT%H.%M.%S.%f", 3)
     files = {}
     for name, v, unit in (("MetaWear_Accelerometer.csv", a, "g"), ("MetaWear_Gyroscope.csv", w, "deg/s")):
         head = "epoc (ms),timestamp (-0700),elapsed (s)," + ",".join(f"{x}-axis ({unit})" for x in "xyz") + "\n"
-        files[name] = (head + _rows(ms, stamps, _round(s.time_s, 3), *v.T)).encode()
+        files[name] = (head + _rows(ms, timestamps, _round(s.time_s, 3), *v.T)).encode()
     return Layout("MbientLab MetaBase", files, 100, a, w, ("g", "deg/s"), 2 * s.n, {}, True)
 
 
@@ -430,8 +430,8 @@ def actigraph() -> Layout:
     head += (
         "Timestamp,Accelerometer X,Accelerometer Y,Accelerometer Z,Temperature,Gyroscope X,Gyroscope Y,Gyroscope Z\n"
     )
-    stamps = [x + "0" for x in _dates(s, "%m/%d/%Y %H:%M:%S.%f")]
-    body = _rows(stamps, *a.T, np.full(s.n, 26.5), *w.T)
+    timestamps = [x + "0" for x in _dates(s, "%m/%d/%Y %H:%M:%S.%f")]
+    body = _rows(timestamps, *a.T, np.full(s.n, 26.5), *w.T)
     return Layout("ActiGraph GT9X", {"IMU.csv": (head + body).encode()}, 100, a, w, ("g", "deg/s"), s.n)
 
 
@@ -452,8 +452,8 @@ def witmotion() -> Layout:
     names = ["Chiptime", *(f"a{x}(g)" for x in "xyz"), *(f"w{x}(deg/s)" for x in "xyz")]
     head = "\t".join([*names, *(f"Angle{x}(deg)" for x in "XYZ"), "T(°)"]) + "\r\n"
     angles = [np.round(10 + 0.1 * np.random.default_rng(i).standard_normal(s.n), 3) for i in range(3)]
-    stamps = _dates(s, "%Y-%m-%d %H:%M:%S.%f", 3)
-    body = _rows(stamps, *a.T, *w.T, *angles, np.full(s.n, 28.25), separator="\t", end="\r\n")
+    timestamps = _dates(s, "%Y-%m-%d %H:%M:%S.%f", 3)
+    body = _rows(timestamps, *a.T, *w.T, *angles, np.full(s.n, 28.25), separator="\t", end="\r\n")
     return Layout("WitMotion", {"20240301120000.txt": (head + body).encode()}, 100, a, w, ("g", "deg/s"), s.n)
 
 
@@ -462,12 +462,12 @@ def arduino_monitor() -> Layout:
     """Arduino IDE 1.8 serial monitor with 'Show timestamp': 12:00:00.000 -> before every line, names in the first."""
     s = session(100)
     a, w = _round(s.force, 3), _round(s.rate, 4)
-    stamps = _dates(s, "%H:%M:%S.%f", 3)
+    timestamps = _dates(s, "%H:%M:%S.%f", 3)
     ms = np.rint(1000 * s.time_s).astype(int)
-    lines = [f"{stamps[0]} -> millis,ax,ay,az,gx,gy,gz"]
-    lines += [f"{t} -> {row}" for t, row in zip(stamps, _rows(ms, *a.T, *w.T).splitlines(), strict=True)]
+    lines = [f"{timestamps[0]} -> millis,ax,ay,az,gx,gy,gz"]
+    lines += [f"{t} -> {row}" for t, row in zip(timestamps, _rows(ms, *a.T, *w.T).splitlines(), strict=True)]
     text = "\n".join(lines) + "\n"
-    return Layout("Arduino (monitor stamps)", {"monitor.txt": text.encode()}, 100, a, w, SI, s.n)
+    return Layout("Arduino (monitor timestamps)", {"monitor.txt": text.encode()}, 100, a, w, SI, s.n)
 
 
 @layout

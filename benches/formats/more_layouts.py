@@ -36,12 +36,12 @@ def polar_sensor_logger() -> Layout:
     """Polar Sensor Logger (Verity Sense): semicolons, phone's date, sensor's ns since 2000, [mg] and [dps]."""
     s = session(52)
     a, w = np.rint(1000 * s.force / G).astype(int), _round(np.degrees(s.rate), 3)
-    stamps = _dates(s, "%Y-%m-%dT%H:%M:%S.%f", 3)
+    timestamps = _dates(s, "%Y-%m-%dT%H:%M:%S.%f", 3)
     ns = [n - 946684800 * 10**9 for n in _ns(s)]
     head = "Phone timestamp;sensor timestamp [ns];X [{0}];Y [{0}];Z [{0}]\n"
     files = {
-        "Polar_Sense_ACC.txt": (head.format("mg") + _rows(stamps, ns, *a.T, separator=";")).encode(),
-        "Polar_Sense_GYRO.txt": (head.format("dps") + _rows(stamps, ns, *w.T, separator=";")).encode(),
+        "Polar_Sense_ACC.txt": (head.format("mg") + _rows(timestamps, ns, *a.T, separator=";")).encode(),
+        "Polar_Sense_GYRO.txt": (head.format("dps") + _rows(timestamps, ns, *w.T, separator=";")).encode(),
     }
     return Layout("Polar Sensor Logger", files, 52, a, w, ("mg", "deg/s"), 2 * s.n, {}, True)
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 G = 9.80665
-HOLD_S, TURN_S = 2.0, 1.2
+POSE_S, TURN_S = 2.0, 1.2
 AXES = "xyxyxx"
 
 
@@ -28,7 +28,7 @@ class Session:
 
 def session(rate_hz: float, seed: int = 1, offset_s: float = 0.0) -> Session:
     """Quarter turns about alternating body axes with a rest before, between and after; white noise on both sensors."""
-    total = HOLD_S + len(AXES) * (HOLD_S + TURN_S)
+    total = POSE_S + len(AXES) * (POSE_S + TURN_S)
     time_s = offset_s + np.arange(round(total * rate_hz)) / rate_hz
     rng = np.random.default_rng(seed)
     rate = np.zeros((len(time_s), 3))
@@ -36,7 +36,7 @@ def session(rate_hz: float, seed: int = 1, offset_s: float = 0.0) -> Session:
     attitude = Rotation.from_euler("x", 20, degrees=True)
     done = np.zeros(len(time_s), dtype=bool)
     for k, axis in enumerate(AXES):
-        start = HOLD_S + k * (HOLD_S + TURN_S)
+        start = POSE_S + k * (POSE_S + TURN_S)
         vector = np.eye(3)["xyz".index(axis)]
         before = (time_s < start) & ~done
         force[before] = attitude.inv().apply([0, 0, G])

@@ -15,9 +15,9 @@ FLAWS = (
     "accel-saturation", "lever-arm", "accel-gyro-time-offset", "sensor-lag", "dropped-samples",
     "vibration-rectification", "periodic-interference", "quantisation", "accel-hysteresis", "none",
 )  # fmt: skip
-NUISANCES = ("scatter", "stamps", "line", "soft", "bumps", "jolt", "warm", "coarse")
+NUISANCES = ("scatter", "timestamps", "line", "soft", "bumps", "jolt", "warm", "coarse")
 ALLOWED_BESIDE = {
-    "scatter": {"gyro-bias-repeatability", "accel-bias-repeatability"}, "stamps": {"timing-jitter"},
+    "scatter": {"gyro-bias-repeatability", "accel-bias-repeatability"}, "timestamps": {"timing-jitter"},
     "line": {"periodic-interference"}, "soft": {"disturbed-pose"}, "bumps": {"disturbed-pose"},
     "jolt": {"disturbed-pose"}, "warm": {"accel-bias-drift", "gyro-bias-drift"}, "coarse": {"quantisation"},
 }  # fmt: skip
@@ -137,12 +137,12 @@ def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
         force = np.stack([np.interp(t - delay, t, force[:, k]) for k in range(3)], axis=1)
         values = {"delay_s": np.array([delay])}
     # -- the small faults ---------------------------------------------------------------------------------------------
-    zero_force, zero_rate = np.zeros((n_poses, 3)), np.zeros((n_poses, 3))
+    bias_force, bias_rate = np.zeros((n_poses, 3)), np.zeros((n_poses, 3))
     if here["scatter"]:
-        zero_force = rng.normal(size=(n_poses, 3)) * np.exp(rng.uniform(np.log(0.001), np.log(0.01)))
-        zero_rate = rng.normal(size=(n_poses, 3)) * np.exp(rng.uniform(np.log(0.01), np.log(0.1))) * DEG
-        truth["scatter"] = [float(zero_force.std()), float(zero_rate.std() / DEG)]
-    force, rate = force + zero_force[at_pose], rate + zero_rate[at_pose]
+        bias_force = rng.normal(size=(n_poses, 3)) * np.exp(rng.uniform(np.log(0.001), np.log(0.01)))
+        bias_rate = rng.normal(size=(n_poses, 3)) * np.exp(rng.uniform(np.log(0.01), np.log(0.1))) * DEG
+        truth["scatter"] = [float(bias_force.std()), float(bias_rate.std() / DEG)]
+    force, rate = force + bias_force[at_pose], rate + bias_rate[at_pose]
     if here["warm"]:
         curve = np.exp(-t / duration / rng.uniform(0.1, 0.4))[:, None]
         force = force + curve * rng.normal(size=3) * 0.004
@@ -196,7 +196,7 @@ def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
         values = {"limit": np.array([limit])}
         truth["visible"] = int((np.abs(x) >= limit).sum())
     accel, gyro = np.round(accel / lsb_a) * lsb_a, np.round(gyro / lsb_g) * lsb_g
-    stamps = true_t.copy()
+    timestamps = true_t.copy()
     if flaw == "dropped-samples":
         moving = np.flatnonzero(np.linalg.norm(rate, axis=1) > 0.5)
         n_events = int(rng.integers(3, 9))
@@ -205,18 +205,18 @@ def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
         for k in rng.choice(moving, n_events, replace=False):
             keep[k : k + gap] = False
         accel, gyro = accel[keep], gyro[keep]
-        stamps = true_t[: keep.sum()]
+        timestamps = true_t[: keep.sum()]
         values = {"lost": np.array([float((~keep).sum())])}
-    if here["stamps"]:
-        stamps = np.maximum.accumulate(stamps + rng.exponential(rng.uniform(0.001, 0.004), len(stamps)))
-        stamps = np.round(stamps, 6)
-    columns["time [s]"] = stamps
+    if here["timestamps"]:
+        timestamps = np.maximum.accumulate(timestamps + rng.exponential(rng.uniform(0.001, 0.004), len(timestamps)))
+        timestamps = np.round(timestamps, 6)
+    columns["time [s]"] = timestamps
     for k, axis in enumerate("xyz"):
         columns[f"acc_{axis} [m/s^2]"] = accel[:, k]
     for k, axis in enumerate("xyz"):
         columns[f"gyro_{axis} [rad/s]"] = gyro[:, k]
     if temperature is not None:
-        columns["temperature [degC]"] = np.round(temperature[when], 2)[: len(stamps)]
+        columns["temperature [degC]"] = np.round(temperature[when], 2)[: len(timestamps)]
     if flaw == "accel-hysteresis":
         # S and b are those of a pose that has lasted: the memory has then followed and is part of the scale.
         A = A @ (np.eye(3) + np.diag(values["memory"]))

@@ -6,7 +6,7 @@ factored, so that it stays positive, and the innovations.
 
 import numpy as np
 
-WHITE, WALK, HOLD_S, GAP_S = 0.02, 1e-3, 5.0, 10.0
+WHITE, WALK, POSE_S, GAP_S = 0.02, 1e-3, 5.0, 10.0
 PRIOR_SIGMA = 10.0
 
 
@@ -16,7 +16,7 @@ def data(n):
     force = rng.standard_normal((n, 3))
     force *= 9.81 / np.linalg.norm(force, axis=1, keepdims=True)
     zero = np.cumsum(WALK * np.sqrt(GAP_S) * rng.standard_normal(n))
-    read = force @ [0.032, 0.001, 0.002] - 2.5 + zero + WHITE / np.sqrt(HOLD_S) * rng.standard_normal(n)
+    read = force @ [0.032, 0.001, 0.002] - 2.5 + zero + WHITE / np.sqrt(POSE_S) * rng.standard_normal(n)
     return read, force
 
 
@@ -30,7 +30,7 @@ def ours():
 
     def call(read, force):
         n = len(read)
-        poses = _core.KalmanPoses(read, force, GAP_S * np.arange(n), np.full(n, HOLD_S), np.zeros(n))
+        poses = _core.KalmanPoses(read, force, GAP_S * np.arange(n), np.full(n, POSE_S), np.zeros(n))
         return _core.kalman_track(model, start, poses)[:2]
 
     return call
@@ -43,11 +43,11 @@ def rows_of(force):
 
 def begun():
     # The walk begins with the first pose.
-    return np.diag([PRIOR_SIGMA**2] * 4 + [WALK**2 * HOLD_S])
+    return np.diag([PRIOR_SIGMA**2] * 4 + [WALK**2 * POSE_S])
 
 
 def numpy_loop(read, force):
-    x, P, R, walk = np.zeros(5), begun(), WHITE**2 / HOLD_S, WALK**2 * GAP_S
+    x, P, R, walk = np.zeros(5), begun(), WHITE**2 / POSE_S, WALK**2 * GAP_S
     means, sigmas = np.empty((len(read), 4)), np.empty((len(read), 4))
     for k, (z, h) in enumerate(zip(read, rows_of(force), strict=True)):
         if k:
@@ -88,7 +88,7 @@ def numba_chain():
                 means[k, i], sigmas[k, i] = x[i], np.sqrt(P[i, i])
         return means, sigmas
 
-    return lambda read, force: run(read, rows_of(force), begun(), WHITE**2 / HOLD_S, WALK**2 * GAP_S)
+    return lambda read, force: run(read, rows_of(force), begun(), WHITE**2 / POSE_S, WALK**2 * GAP_S)
 
 
 def filterpy(read, force):
@@ -97,7 +97,7 @@ def filterpy(read, force):
     one = KalmanFilter(dim_x=5, dim_z=1)
     one.x, one.P, one.F = np.zeros((5, 1)), begun(), np.eye(5)
     one.Q = np.diag([0.0] * 4 + [WALK**2 * GAP_S])
-    one.R = np.array([[WHITE**2 / HOLD_S]])
+    one.R = np.array([[WHITE**2 / POSE_S]])
     means, sigmas = np.empty((len(read), 4)), np.empty((len(read), 4))
     for k, (z, h) in enumerate(zip(read, rows_of(force), strict=True)):
         if k:

@@ -57,7 +57,7 @@ pub struct Samples<'a> {
 }
 
 impl<'a> Samples<'a> {
-    /// Rates in rad/s at instants in s; stamps may repeat (no rotation in between), not run backward.
+    /// Rates in rad/s at instants in s; timestamps may repeat (no rotation in between), not run backward.
     ///
     /// # Errors
     /// When there are none, or not as many rates as instants.

@@ -151,7 +151,7 @@ impl Layout {
     }
 
     /// How the rows answer to the zero reading of every hold: `(n, 3)` each.
-    pub fn wrt_zero(&self, problem: &Alignment, at: &Evaluated) -> Vec<DMatrix<f64>> {
+    pub fn wrt_bias(&self, problem: &Alignment, at: &Evaluated) -> Vec<DMatrix<f64>> {
         let mut out = vec![DMatrix::zeros(self.n, 3); problem.holds.len()];
         for source in self
             .sources(problem, at)
@@ -181,7 +181,7 @@ impl Layout {
             .map(|hold| Source {
                 hold,
                 is_zero: true,
-                var: problem.holds[hold].var_zero,
+                var: problem.holds[hold].var_bias,
                 touched: Vec::new(),
             })
             .collect();
@@ -257,7 +257,7 @@ pub(super) fn own_covariance(problem: &Alignment, at: &Evaluated, index: usize) 
     let share = (turn.duration_s / problem.moves[index].span_s()).clamp(0.0, 1.0);
     let rate = (turn.wrt_bias_before + turn.wrt_bias_after) * at.model.gyroscope_scale;
     let walk = rate
-        * Matrix3::from_diagonal(&problem.var_zero_walk)
+        * Matrix3::from_diagonal(&problem.var_bias_walk)
         * rate.transpose()
         * (0.25 - share / 6.0);
     wrt_angle * (turn.cov_noise + walk) * wrt_angle.transpose()
@@ -276,11 +276,11 @@ pub(super) fn whole_covariance(problem: &Alignment, at: &Evaluated, index: usize
         (-scale, after.var_reading),
         (
             across * turn.wrt_bias_before * at.model.gyroscope_scale,
-            before.var_zero,
+            before.var_bias,
         ),
         (
             across * turn.wrt_bias_after * at.model.gyroscope_scale,
-            after.var_zero,
+            after.var_bias,
         ),
     ] {
         cov += wrt * Matrix3::from_diagonal(&var) * wrt.transpose();

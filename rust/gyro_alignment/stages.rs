@@ -37,7 +37,7 @@ pub struct Fit {
     /// accelerometer parameters.
     pub covariance: DMatrix<f64>,
     /// `(p, 3)`: covariance of the solution with the weighted mean of the zero readings.
-    pub cov_with_zero: DMatrix<f64>,
+    pub cov_with_bias: DMatrix<f64>,
     /// Weighted sum of squares, robust weights included, and its degrees of freedom.
     pub chi2: f64,
     /// Rows minus determined parameters.
@@ -75,14 +75,14 @@ const SETTLED: f64 = 1e-3;
 
 /// Fits from each start and keeps the best; then weighs by the full covariance.
 ///
-/// `zero_weights` `(n_holds)` are the weights of each hold's zero reading in the mean that the caller forms.
+/// `bias_weights` `(n_poses)` are the weights of each hold's zero reading in the mean that the caller forms.
 ///
 /// # Errors
 /// When the pieces do not fit together, no start is given, or no start gives finite residuals.
 pub fn fit(
     problem: &Alignment,
     starts: &[Model],
-    zero_weights: &[Vector3<f64>],
+    bias_weights: &[Vector3<f64>],
     settings: &Settings,
 ) -> Result<Fit> {
     problem.check()?;
@@ -147,7 +147,7 @@ pub fn fit(
         problem,
         at,
         &weights,
-        zero_weights,
+        bias_weights,
         &solution,
         iterations,
         settled,
@@ -237,7 +237,7 @@ fn finish(
     problem: &Alignment,
     at: Evaluated,
     weights: &[f64],
-    zero_weights: &[Vector3<f64>],
+    bias_weights: &[Vector3<f64>],
     solution: &Solution,
     iterations: usize,
     settled: bool,
@@ -257,13 +257,13 @@ fn finish(
     let left = (&jacobian * (&covariance * (jacobian.transpose() * &whitened))).norm();
     // x̂ = x − K ε with K = P Jᵀ in whitened rows: how anything that entered the rows reaches the solution.
     let gain = &covariance * jacobian.transpose();
-    let mut cov_with_zero = DMatrix::zeros(problem.n_parameters(), 3);
-    for (hold, mut wrt) in layout.wrt_zero(problem, &at).into_iter().enumerate() {
+    let mut cov_with_bias = DMatrix::zeros(problem.n_parameters(), 3);
+    for (hold, mut wrt) in layout.wrt_bias(problem, &at).into_iter().enumerate() {
         factor.whiten(&mut wrt);
         let var = problem.holds[hold]
-            .var_zero
-            .component_mul(&zero_weights.get(hold).copied().unwrap_or_default());
-        cov_with_zero -=
+            .var_bias
+            .component_mul(&bias_weights.get(hold).copied().unwrap_or_default());
+        cov_with_bias -=
             &gain * wrt * DMatrix::from_diagonal(&DVector::from_column_slice(var.as_slice()));
     }
     let rows: Vec<_> = (0..problem.links.len())
@@ -272,7 +272,7 @@ fn finish(
     let dof = layout.n.saturating_sub(certainty.rank);
     Ok(Fit {
         covariance,
-        cov_with_zero,
+        cov_with_bias,
         chi2,
         dof,
         certainty,

@@ -298,10 +298,10 @@ impl Shaping {
                 .copy_from(&(self.h.transpose() / hold));
             f.view_mut((1, 1), (k, k)).copy_from(&self.f);
             qc.view_mut((1, 1), (k, k)).copy_from(&self.qc);
-            let (phi_hold, q_hold) = discretise(&f, &qc, hold);
-            let from_slow = phi_hold.columns(1, k).into_owned();
+            let (phi_pose, q_pose) = discretise(&f, &qc, hold);
+            let from_slow = phi_pose.columns(1, k).into_owned();
             let phi_both = &from_slow * phi_gap;
-            let q_both = &from_slow * q_gap * from_slow.transpose() + q_hold;
+            let q_both = &from_slow * q_gap * from_slow.transpose() + q_pose;
             // Rows of the discrete system: the mean is state 0, the slow states start at `s`.
             let place = |i: usize| if i == 0 { 0 } else { s + i - 1 };
             for i in 0..=k {

@@ -87,7 +87,7 @@ pub struct Turn {
     pub wrt_bias_before: Matrix3<f64>,
     /// `G` with respect to the rate bias at the anchor after, s.
     pub wrt_bias_after: Matrix3<f64>,
-    /// Covariance of `θ` from rate noise, time stamps and lost samples, rad².
+    /// Covariance of `θ` from rate noise, time timestamps and lost samples, rad².
     pub cov_noise: Matrix3<f64>,
     /// Integrated time, s.
     pub duration_s: f64,

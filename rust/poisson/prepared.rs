@@ -14,7 +14,7 @@ pub struct PreparedMove {
     span_s: f64,
 }
 
-/// Reduces the samples of a move to moments; non-finite rows and repeated stamps are bridged.
+/// Reduces the samples of a move to moments; non-finite rows and repeated timestamps are bridged.
 ///
 /// `var_extra`, as long as `raw` where given, is the variance of single readings beyond the rate noise: readings that
 /// were reconstructed where the gyro met its limit.

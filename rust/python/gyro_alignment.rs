@@ -33,35 +33,35 @@ struct Moves {
 #[pyclass(frozen, module = "trihedron._core")]
 struct AlignmentPoses {
     holds: Vec<StillPose>,
-    zero_weights: Vec<Vector3<f64>>,
-    var_zero_walk: Vector3<f64>,
+    bias_weights: Vec<Vector3<f64>>,
+    var_bias_walk: Vector3<f64>,
 }
 
 #[pymethods]
 impl AlignmentPoses {
     #[new]
-    #[pyo3(signature = (*, reading, var_reading, zero, var_zero, zero_weights, var_zero_walk))]
+    #[pyo3(signature = (*, reading, var_reading, zero, var_bias, bias_weights, var_bias_walk))]
     fn new(
         reading: PyReadonlyArray2<'_, f64>,
         var_reading: PyReadonlyArray2<'_, f64>,
         zero: PyReadonlyArray2<'_, f64>,
-        var_zero: PyReadonlyArray2<'_, f64>,
-        zero_weights: PyReadonlyArray2<'_, f64>,
-        var_zero_walk: PyReadonlyArray1<'_, f64>,
+        var_bias: PyReadonlyArray2<'_, f64>,
+        bias_weights: PyReadonlyArray2<'_, f64>,
+        var_bias_walk: PyReadonlyArray1<'_, f64>,
     ) -> PyResult<Self> {
         let reading = rows3("reading", &reading)?;
         let var_reading = rows3("var_reading", &var_reading)?;
         let zero = rows3("zero", &zero)?;
-        let var_zero = rows3("var_zero", &var_zero)?;
-        let zero_weights = rows3("zero_weights", &zero_weights)?;
+        let var_bias = rows3("var_bias", &var_bias)?;
+        let bias_weights = rows3("bias_weights", &bias_weights)?;
         let n = reading.len();
         same_length(
             n,
             &[
                 ("var_reading", var_reading.len()),
                 ("zero", zero.len()),
-                ("var_zero", var_zero.len()),
-                ("zero_weights", zero_weights.len()),
+                ("var_bias", var_bias.len()),
+                ("bias_weights", bias_weights.len()),
             ],
         )?;
         Ok(Self {
@@ -70,11 +70,11 @@ impl AlignmentPoses {
                     reading: reading[h],
                     var_reading: var_reading[h],
                     zero: zero[h],
-                    var_zero: var_zero[h],
+                    var_bias: var_bias[h],
                 })
                 .collect(),
-            zero_weights,
-            var_zero_walk: vector3("var_zero_walk", &var_zero_walk)?,
+            bias_weights,
+            var_bias_walk: vector3("var_bias_walk", &var_bias_walk)?,
         })
     }
 }
@@ -114,7 +114,7 @@ struct AlignmentFit {
     gyroscope_scale: Py<PyArray2<f64>>,
     rate_offset: Py<PyArray1<f64>>,
     covariance: Py<PyArray2<f64>>,
-    cov_with_zero: Py<PyArray2<f64>>,
+    cov_with_bias: Py<PyArray2<f64>>,
     chi2: f64,
     dof: usize,
     rank: usize,
@@ -242,7 +242,7 @@ impl Moves {
             used: samples(&used),
             gravity: gravity_m_s2,
             noise: noise.0,
-            var_zero_walk: poses.var_zero_walk,
+            var_bias_walk: poses.var_bias_walk,
             accelerometer_basis: accelerometer.basis.clone(),
             is_accelerometer_given: accelerometer.is_given,
             is_offset_free,
@@ -268,7 +268,7 @@ impl Moves {
             ..Settings::default()
         };
         let found = super::run_long(py, || {
-            fit(&problem, &starts, &poses.zero_weights, &settings)
+            fit(&problem, &starts, &poses.bias_weights, &settings)
         })?;
         export(py, &found)
     }
@@ -298,7 +298,7 @@ fn export(py: Python<'_>, found: &Fit) -> PyResult<AlignmentFit> {
         gyroscope_scale: of3(py, &found.model.gyroscope_scale)?.unbind(),
         rate_offset: found.model.rate_offset.as_slice().to_pyarray(py).unbind(),
         covariance: matrix(py, &found.covariance)?.unbind(),
-        cov_with_zero: matrix(py, &found.cov_with_zero)?.unbind(),
+        cov_with_bias: matrix(py, &found.cov_with_bias)?.unbind(),
         chi2: found.chi2,
         dof: found.dof,
         rank: found.certainty.rank,

@@ -75,18 +75,18 @@ impl NormKalman {
     }
 
     /// Take one pose; innovation and its predicted variance.
-    #[pyo3(signature = (reading, start_s, hold_s, extra_variance=[0.0; 3]))]
+    #[pyo3(signature = (reading, start_s, pose_s, extra_variance=[0.0; 3]))]
     fn add(
         &mut self,
         py: Python<'_>,
         reading: [f64; 3],
         start_s: f64,
-        hold_s: f64,
+        pose_s: f64,
         extra_variance: [f64; 3],
     ) -> PyResult<(f64, f64)> {
         let filter = &mut self.inner;
         let seen = super::run(py, || {
-            filter.add(&pose(reading, start_s, hold_s, extra_variance))
+            filter.add(&pose(reading, start_s, pose_s, extra_variance))
         })?;
         Ok((seen.value, seen.variance))
     }
@@ -97,18 +97,18 @@ impl NormKalman {
         py: Python<'_>,
         readings: PyReadonlyArray2<'_, f64>,
         start_s: PyReadonlyArray1<'_, f64>,
-        hold_s: PyReadonlyArray1<'_, f64>,
+        pose_s: PyReadonlyArray1<'_, f64>,
         extra_variance: PyReadonlyArray2<'_, f64>,
     ) -> PyResult<()> {
         let rows = rows3("readings", &readings)?;
         let extra = rows3("extra_variance", &extra_variance)?;
-        if [start_s.len(), hold_s.len(), extra.len()] != [rows.len(); 3] {
+        if [start_s.len(), pose_s.len(), extra.len()] != [rows.len(); 3] {
             return Err(PyValueError::new_err(format!(
-                "start_s, hold_s and extra_variance must have {} rows like the readings",
+                "start_s, pose_s and extra_variance must have {} rows like the readings",
                 rows.len()
             )));
         }
-        let (t, hold) = (start_s.as_array(), hold_s.as_array());
+        let (t, hold) = (start_s.as_array(), pose_s.as_array());
         let poses: Vec<NormPose> = (0..rows.len())
             .map(|i| pose(rows[i].into(), t[i], hold[i], extra[i].into()))
             .collect();
@@ -128,11 +128,11 @@ impl NormKalman {
         py: Python<'_>,
         reading: [f64; 3],
         start_s: f64,
-        hold_s: f64,
+        pose_s: f64,
     ) -> PyResult<()> {
         let filter = &mut self.inner;
         super::run(py, || {
-            filter.imagine(&pose(reading, start_s, hold_s, [0.0; 3]))
+            filter.imagine(&pose(reading, start_s, pose_s, [0.0; 3]))
         })
     }
 

@@ -13,6 +13,7 @@ mod allan;
 mod arrays;
 mod attitude;
 mod audit;
+mod bias_process;
 mod block_motion;
 mod chi_square;
 mod doorway;
@@ -35,9 +36,8 @@ mod session_model;
 mod simulate;
 mod sinusoid;
 mod spectral_likelihood;
-mod stamps;
 mod stillness;
-mod zero_process;
+mod timestamps;
 
 pub(crate) use doorway::{run, run_long};
 
@@ -73,9 +73,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     simulate::register(module)?;
     sinusoid::register(module)?;
     spectral_likelihood::register(module)?;
-    stamps::register(module)?;
+    timestamps::register(module)?;
     stillness::register(module)?;
-    zero_process::register(module)?;
+    bias_process::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.
     module.delattr("__all__")?;
     Ok(())

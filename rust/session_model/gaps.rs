@@ -36,7 +36,7 @@ impl Gap {
     }
 }
 
-/// The gaps of a move, found by its own usual step (stamps of bursts lie further apart than samples, all of them).
+/// The gaps of a move, found by its own usual step (timestamps of bursts lie further apart than samples, all of them).
 #[must_use]
 pub fn gaps(steps: &[StepWeights], force: &[Vector3<f64>], rate: &[Vector3<f64>]) -> Vec<Gap> {
     let mut lengths: Vec<f64> = steps.iter().map(|step| step.h).collect();

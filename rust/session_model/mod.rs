@@ -5,6 +5,7 @@
 //! that no sensor can buy itself a smaller residual by shrinking. Rest rows speak of one pose, moves and walks of two
 //! neighbours: the normal equations are a chain with a border ([`chain`]).
 
+mod bias_rows;
 mod blocks;
 pub mod chain;
 mod elimination;
@@ -24,12 +25,11 @@ pub mod predict;
 pub mod response;
 mod rest_rows;
 pub mod rows;
-pub mod session_zero;
+pub mod session_bias;
 pub mod state;
 pub mod strength_search;
 pub mod strengths;
 mod weighed_moves;
-mod zero_rows;
 
 use std::sync::Arc;
 

@@ -102,8 +102,8 @@ impl Session {
             force_scale: state.force_scale,
             force_bias: state.force_bias,
             rate_scale: state.rate_scale,
-            rate_zero: [state.rate_zero[i], state.rate_zero[j]],
-            force_zero: [state.force_zero[i], state.force_zero[j]],
+            pose_rate_bias: [state.pose_rate_bias[i], state.pose_rate_bias[j]],
+            pose_force_bias: [state.pose_force_bias[i], state.pose_force_bias[j]],
             up: [state.up[i], state.up[j]],
             plane,
             force_effect: part(effects.force.as_ref()),
@@ -183,15 +183,15 @@ impl Session {
         let Sums {
             force_model,
             rate_model,
-            rate_zero,
-            force_zero,
+            pose_rate_bias,
+            pose_force_bias,
         } = &passed.sums;
         rows.border.columns_mut(0, 9).copy_from(force_model);
         rows.border.columns_mut(9, 9).copy_from(rate_model);
-        rows.here.columns_mut(2, 3).copy_from(&rate_zero[0]);
-        rows.next.columns_mut(2, 3).copy_from(&rate_zero[1]);
-        rows.here.columns_mut(5, 3).copy_from(&force_zero[0]);
-        rows.next.columns_mut(5, 3).copy_from(&force_zero[1]);
+        rows.here.columns_mut(2, 3).copy_from(&pose_rate_bias[0]);
+        rows.next.columns_mut(2, 3).copy_from(&pose_rate_bias[1]);
+        rows.here.columns_mut(5, 3).copy_from(&pose_force_bias[0]);
+        rows.next.columns_mut(5, 3).copy_from(&pose_force_bias[1]);
         let (from, to) = (tangent_plane(&state.up[i]), tangent_plane(&state.up[j]));
         rows.here
             .view_mut((0, 0), (2, 2))

@@ -116,9 +116,9 @@ pub struct Sees<'a> {
     /// Gyro `S`.
     pub rate_scale: Matrix3<f64>,
     /// Raw zeros of the gyro in the holds before and after.
-    pub rate_zero: [Vector3<f64>; 2],
+    pub pose_rate_bias: [Vector3<f64>; 2],
     /// Raw zeros of the accelerometer there.
-    pub force_zero: [Vector3<f64>; 2],
+    pub pose_force_bias: [Vector3<f64>; 2],
     /// Verticals there.
     pub up: [Vector3<f64>; 2],
     /// Plane in which the vertical after is compared.
@@ -136,7 +136,7 @@ pub struct MoveNoise {
     pub force_density: Vector3<f64>,
     /// White noise of the gyro, raw unit · √s.
     pub rate_density: Vector3<f64>,
-    /// Scatter of sample instants about their stamps, s.
+    /// Scatter of sample instants about their timestamps, s.
     pub jitter_s: f64,
     /// Usual sample step, s.
     pub nominal_step_s: f64,
@@ -174,13 +174,13 @@ pub fn carry(one: &Move, sees: &Sees<'_>) -> Carried {
     let mut force = Vec::with_capacity(n);
     for k in 0..n {
         let x = one.fraction[k];
-        let zero = sees.rate_zero[0] * (1.0 - x) + sees.rate_zero[1] * x;
+        let zero = sees.pose_rate_bias[0] * (1.0 - x) + sees.pose_rate_bias[1] * x;
         let mut w = sees.rate_scale * (one.rate[k] - zero);
         if let Some(effect) = sees.rate_effect {
             w -= effect[k];
         }
         rate.push(w);
-        let zero = sees.force_zero[0] * (1.0 - x) + sees.force_zero[1] * x;
+        let zero = sees.pose_force_bias[0] * (1.0 - x) + sees.pose_force_bias[1] * x;
         let mut f = sees.force_scale * (one.force[k] - zero) + sees.force_bias;
         if let Some(effect) = sees.force_effect {
             f -= effect[k];

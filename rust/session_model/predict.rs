@@ -90,7 +90,7 @@ impl Fit {
         let mut map = force_map(&self.state, layout, &origins[0], 24);
         let mut bias = Vector3::zeros();
         let mut beyond = Matrix3::zeros();
-        if let Some(one) = self.session_zero(session) {
+        if let Some(one) = self.session_bias(session) {
             let scale = &self.state.rate_scale;
             let zero = origins[1] + one.mean;
             bias = -(scale * zero);
@@ -191,7 +191,7 @@ impl Fit {
 /// (11.16b).
 fn force_map(state: &State, layout: Layout, origin: &Vector3<f64>, n: usize) -> DMatrix<f64> {
     let mut map = DMatrix::zeros(layout.n(), n);
-    let zero = origin + state.mean_force_zero();
+    let zero = origin + state.mean_pose_force_bias();
     let share = 1.0 / layout.n_poses as f64;
     for (c, &(i, j)) in LOWER.iter().enumerate() {
         map[(c, 3 * i + j)] = 1.0;

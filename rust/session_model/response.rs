@@ -161,9 +161,9 @@ pub struct Sums {
     /// With respect to the gyro's `S`, row by row.
     pub rate_model: SMatrix<f64, N_MOVE, 9>,
     /// With respect to the raw zeros of the gyro before and after.
-    pub rate_zero: [SMatrix<f64, N_MOVE, 3>; 2],
+    pub pose_rate_bias: [SMatrix<f64, N_MOVE, 3>; 2],
     /// With respect to the raw zeros of the accelerometer before and after.
-    pub force_zero: [SMatrix<f64, N_MOVE, 3>; 2],
+    pub pose_force_bias: [SMatrix<f64, N_MOVE, 3>; 2],
 }
 
 /// Sums of the response over the samples.
@@ -176,8 +176,8 @@ pub fn sums(one: &Move, sees: &Sees<'_>, response: &Response, lower: &[(usize, u
     for k in 0..one.n_samples() {
         let x = one.fraction[k];
         let (r, f) = (&response.by_rate[k], &response.by_force[k]);
-        let w = one.rate[k] - (sees.rate_zero[0] * (1.0 - x) + sees.rate_zero[1] * x);
-        let a = one.force[k] - (sees.force_zero[0] * (1.0 - x) + sees.force_zero[1] * x);
+        let w = one.rate[k] - (sees.pose_rate_bias[0] * (1.0 - x) + sees.pose_rate_bias[1] * x);
+        let a = one.force[k] - (sees.pose_force_bias[0] * (1.0 - x) + sees.pose_force_bias[1] * x);
         for i in 0..3 {
             for j in 0..3 {
                 rate_model
@@ -205,8 +205,8 @@ pub fn sums(one: &Move, sees: &Sees<'_>, response: &Response, lower: &[(usize, u
     Sums {
         force_model,
         rate_model,
-        rate_zero: rates.map(|part| -part * sees.rate_scale),
-        force_zero: forces.map(of_velocity),
+        pose_rate_bias: rates.map(|part| -part * sees.rate_scale),
+        pose_force_bias: forces.map(of_velocity),
     }
 }
 

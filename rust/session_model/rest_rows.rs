@@ -27,7 +27,7 @@ impl Session {
                 &mut asked,
             );
             let read = inverse * asked;
-            let mut group = at_rest(&self.force, i, &(read + state.force_zero[i]), layout);
+            let mut group = at_rest(&self.force, i, &(read + state.pose_force_bias[i]), layout);
             let weight = weight_of(&self.force, i);
             for (c, &(row, column)) in LOWER.iter().enumerate() {
                 set(
@@ -80,7 +80,7 @@ impl Session {
             let mut asked = Vector3::zeros();
             add_effect(distortion.rate.as_ref(), distortion.k, i, state, &mut asked);
             let read = inverse * asked;
-            let mut group = at_rest(rate, i, &(read + state.rate_zero[i]), layout);
+            let mut group = at_rest(rate, i, &(read + state.pose_rate_bias[i]), layout);
             let weight = weight_of(rate, i);
             for row in 0..3 {
                 for column in 0..3 {

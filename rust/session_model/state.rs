@@ -30,9 +30,9 @@ pub struct State {
     /// Vertical in the body, unit.
     pub up: Vec<Vector3<f64>>,
     /// Raw zero of the gyro in each pose.
-    pub rate_zero: Vec<Vector3<f64>>,
+    pub pose_rate_bias: Vec<Vector3<f64>>,
     /// Raw zero of the accelerometer in each pose, beside `b`.
-    pub force_zero: Vec<Vector3<f64>>,
+    pub pose_force_bias: Vec<Vector3<f64>>,
     /// The share of either zero that is one pose's alone (accelerometer, gyro); zero without scatter.
     pub own: [Vec<Vector3<f64>>; 2],
     /// Effect parameters.
@@ -89,8 +89,8 @@ impl State {
             let three = |first: usize| {
                 Vector3::new(step[at + first], step[at + first + 1], step[at + first + 2])
             };
-            out.rate_zero[h] += three(2);
-            out.force_zero[h] += three(5);
+            out.pose_rate_bias[h] += three(2);
+            out.pose_force_bias[h] += three(5);
             if layout.pose == N_POSE_SCATTER {
                 out.own[1][h] += three(8);
                 out.own[0][h] += three(11);
@@ -101,15 +101,15 @@ impl State {
 
     /// Mean of the accelerometer's raw zeros over the poses, without what is one pose's alone.
     #[must_use]
-    pub fn mean_force_zero(&self) -> Vector3<f64> {
-        let all = self.force_zero.iter().zip(&self.own[0]);
-        all.map(|(zero, own)| zero - own).sum::<Vector3<f64>>() / self.force_zero.len() as f64
+    pub fn mean_pose_force_bias(&self) -> Vector3<f64> {
+        let all = self.pose_force_bias.iter().zip(&self.own[0]);
+        all.map(|(zero, own)| zero - own).sum::<Vector3<f64>>() / self.pose_force_bias.len() as f64
     }
 
     /// Accelerometer `b`, on centred readings, with one zero for the session (docs/model-session.md, 11.16b).
     #[must_use]
     pub fn session_force_bias(&self) -> Vector3<f64> {
-        self.force_bias - self.force_scale * self.mean_force_zero()
+        self.force_bias - self.force_scale * self.mean_pose_force_bias()
     }
 
     /// The 18 parameters of the linear models.

@@ -138,7 +138,7 @@ fn the_answer_does_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn repeated_stamps_do_not_turn_and_bad_samples_are_named() {
+fn repeated_timestamps_do_not_turn_and_bad_samples_are_named() {
     let (mut time, mut rate) = log_of(600, 1.0);
     time[300] = time[299];
     let samples = Samples::new(&time, &rate, RateModel::Constant).expect("good samples");

@@ -20,7 +20,7 @@ fn session(turns: &[Vector3<f64>], start: Vector3<f64>) -> Alignment {
         reading: force,
         var_reading: Vector3::repeat(1e-6),
         zero: Vector3::zeros(),
-        var_zero: Vector3::repeat(1e-10),
+        var_bias: Vector3::repeat(1e-10),
     };
     let mut holds = vec![pose(force)];
     for turn in turns {
@@ -58,7 +58,7 @@ fn session(turns: &[Vector3<f64>], start: Vector3<f64>) -> Alignment {
             sigma_time_s: 0.0,
             nominal_step_s: h,
         },
-        var_zero_walk: Vector3::zeros(),
+        var_bias_walk: Vector3::zeros(),
         accelerometer_basis: DMatrix::zeros(12, 0),
         is_accelerometer_given: true,
         is_offset_free: false,

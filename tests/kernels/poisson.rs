@@ -20,7 +20,7 @@ fn noise(k: usize) -> f64 {
     2.0 * (x - x.floor()) - 1.0
 }
 
-fn stamps(n: usize, span: f64, jitter: f64) -> Vec<f64> {
+fn timestamps(n: usize, span: f64, jitter: f64) -> Vec<f64> {
     let h = span / (n - 1) as f64;
     (0..n)
         .map(|k| {
@@ -66,7 +66,7 @@ fn scale() -> Matrix3<f64> {
 
 #[test]
 fn a_constant_rate_gives_the_exact_exponential_under_every_model() {
-    let time = stamps(40, 3.0, 0.3);
+    let time = timestamps(40, 3.0, 0.3);
     let w = Vector3::new(0.7, -1.1, 0.4);
     for model in MODELS {
         let turn = run(
@@ -82,9 +82,9 @@ fn a_constant_rate_gives_the_exact_exponential_under_every_model() {
 }
 
 #[test]
-fn each_model_converges_at_its_order_on_irregular_stamps() {
+fn each_model_converges_at_its_order_on_irregular_timestamps() {
     let reference = {
-        let time = stamps(40_001, 2.0, 0.0);
+        let time = timestamps(40_001, 2.0, 0.0);
         let raw = sampled(&time, 1.0);
         run(
             &prepared(&time, &raw, RateModel::Coning),
@@ -96,7 +96,7 @@ fn each_model_converges_at_its_order_on_irregular_stamps() {
     };
     for (model, order) in MODELS.into_iter().zip([1.0, 2.0, 4.0]) {
         let error = |n: usize| {
-            let time = stamps(n, 2.0, 0.2);
+            let time = timestamps(n, 2.0, 0.2);
             let p = prepared(&time, &sampled(&time, 1.0), model);
             let b = run(&p, &scale(), &Vector3::zeros(), &Vector3::zeros()).rotation;
             log(&(b * reference.transpose())).norm()
@@ -114,7 +114,7 @@ fn each_model_converges_at_its_order_on_irregular_stamps() {
 fn sensitivities_match_differences_at_zero_tiny_and_ordinary_rates() {
     for model in MODELS {
         for magnitude in [0.0, 1e-7, 1.0] {
-            let time = stamps(60, 2.5, 0.2);
+            let time = timestamps(60, 2.5, 0.2);
             let p = prepared(&time, &sampled(&time, magnitude), model);
             let (b0, b1) = (
                 Vector3::new(0.01, -0.02, 0.005) * magnitude,
@@ -164,7 +164,7 @@ fn sensitivities_match_differences_at_zero_tiny_and_ordinary_rates() {
 
 #[test]
 fn the_same_bias_at_both_anchors_is_a_constant_rate() {
-    let time = stamps(80, 2.0, 0.3);
+    let time = timestamps(80, 2.0, 0.3);
     let b = Vector3::new(0.3, -0.2, 0.5);
     let p = prepared(&time, &vec![Vector3::zeros(); 80], RateModel::Coning);
     let turn = run(&p, &scale(), &b, &b);
@@ -176,7 +176,7 @@ fn the_same_bias_at_both_anchors_is_a_constant_rate() {
 
 #[test]
 fn a_turn_there_and_back_returns_to_the_identity() {
-    let there: Vec<f64> = stamps(200, 2.0, 0.0);
+    let there: Vec<f64> = timestamps(200, 2.0, 0.0);
     let n = there.len();
     let mut raw = sampled(&there, 1.0);
     let mut time = there.clone();
@@ -197,7 +197,7 @@ fn a_turn_there_and_back_returns_to_the_identity() {
 
 #[test]
 fn white_noise_of_the_rate_gives_the_predicted_covariance() {
-    let time = stamps(200, 2.0, 0.0);
+    let time = timestamps(200, 2.0, 0.0);
     let h = 2.0 / 199.0;
     let clean = sampled(&time, 1.0);
     let sigma = 0.02;
@@ -244,8 +244,8 @@ fn white_noise_of_the_rate_gives_the_predicted_covariance() {
 }
 
 #[test]
-fn lost_rows_and_repeated_stamps_are_bridged() {
-    let time = stamps(101, 2.0, 0.0);
+fn lost_rows_and_repeated_timestamps_are_bridged() {
+    let time = timestamps(101, 2.0, 0.0);
     let w = Vector3::new(0.4, 0.1, -0.2);
     let mut raw = vec![w; 101];
     raw[40] = Vector3::repeat(f64::NAN);
@@ -267,7 +267,7 @@ fn lost_rows_and_repeated_stamps_are_bridged() {
 
 #[test]
 fn a_lost_sample_widens_the_covariance() {
-    let mut time = stamps(101, 2.0, 0.0);
+    let mut time = timestamps(101, 2.0, 0.0);
     let mut raw = sampled(&time, 1.0);
     let noise = RateNoise {
         nominal_step_s: 0.02,
@@ -288,7 +288,7 @@ fn a_lost_sample_widens_the_covariance() {
 
 #[test]
 fn a_range_outside_the_record_is_refused() {
-    let time = stamps(10, 1.0, 0.0);
+    let time = timestamps(10, 1.0, 0.0);
     let raw = vec![Vector3::zeros(); 10];
     let mut wrong = range(&time);
     wrong.stop = 11;
@@ -377,7 +377,7 @@ fn every_instruction_set_gives_the_sums_of_single_steps() {
     // Fewer steps than lanes, not a multiple of them; steps tiny, ordinary, and beyond the series of half a radian.
     for n in [2, 4, 9, 60, 331] {
         for magnitude in [0.0, 1e-7, 1.0, 60.0] {
-            let time = stamps(n, 0.01 * n as f64, 0.3);
+            let time = timestamps(n, 0.01 * n as f64, 0.3);
             let raw = sampled(&time, magnitude);
             for model in MODELS {
                 let p = prepared(&time, &raw, model);

@@ -35,7 +35,7 @@ impl Uniform {
 const N_POSES: usize = 7;
 const G: f64 = 9.81;
 
-/// A session read without noise by a known instrument, smooth turns between poses, with uneven stamps and one repeated.
+/// A session read without noise by a known instrument, smooth turns between poses, with uneven timestamps and one repeated.
 fn made(scatter: bool) -> (Session, State) {
     let mut random = Uniform(7);
     let force_scale = Matrix3::new(0.9, 0.0, 0.0, 0.01, 1.1, 0.0, -0.02, 0.03, 1.05);
@@ -54,7 +54,7 @@ fn made(scatter: bool) -> (Session, State) {
     let mut up = vec![Vector3::new(0.3, -0.5, 0.8).normalize()];
     let mut moves = Vec::new();
     let mut first_point = 0;
-    let hold_time: Vec<f64> = (0..N_POSES).map(|i| 5.0 * i as f64).collect();
+    let pose_time: Vec<f64> = (0..N_POSES).map(|i| 5.0 * i as f64).collect();
     let (inverse_force, inverse_rate) = (
         force_scale.try_inverse().unwrap_or_default(),
         rate_scale.try_inverse().unwrap_or_default(),
@@ -74,7 +74,7 @@ fn made(scatter: bool) -> (Session, State) {
             let angle =
                 1.8 * (x - (2.0 * std::f64::consts::PI * x).sin() / (2.0 * std::f64::consts::PI));
             let speed = 1.8 / span * (1.0 - (2.0 * std::f64::consts::PI * x).cos());
-            let fraction = (t - hold_time[m]) / (hold_time[m + 1] - hold_time[m]);
+            let fraction = (t - pose_time[m]) / (pose_time[m + 1] - pose_time[m]);
             let zero = zeros[m] * (1.0 - fraction) + zeros[m + 1] * fraction;
             let offset = slow[m] * (1.0 - fraction) + slow[m + 1] * fraction;
             rate.push(inverse_rate * (axis * speed) + zero);
@@ -87,7 +87,7 @@ fn made(scatter: bool) -> (Session, State) {
             &time,
             rate,
             force,
-            [hold_time[m], hold_time[m + 1]],
+            [pose_time[m], pose_time[m + 1]],
             [Vector3::zeros(); 2],
             first_point,
         ));
@@ -104,7 +104,7 @@ fn made(scatter: bool) -> (Session, State) {
         .collect();
     let session = Session {
         gravity: G,
-        time_s: hold_time,
+        time_s: pose_time,
         force: at_rest(force_mean, noise_force),
         rate: Some(at_rest(zeros.clone(), noise_rate)),
         moves: std::sync::Arc::new(moves),
@@ -123,8 +123,8 @@ fn made(scatter: bool) -> (Session, State) {
         force_bias,
         rate_scale,
         up,
-        rate_zero: zeros,
-        force_zero: slow,
+        pose_rate_bias: zeros,
+        pose_force_bias: slow,
         own: [
             vec![Vector3::zeros(); N_POSES],
             vec![Vector3::zeros(); N_POSES],
@@ -386,7 +386,7 @@ fn the_score_vanishes_at_the_truth_on_average_though_zeros_scatter() {
                 rest.mean[i][c] += zeros[i][c] + rest.sigma[i][c] * random.normal();
                 session.force.mean[i][c] += session.force.sigma[i][c] * random.normal();
             }
-            state.rate_zero[i] = rest.mean[i];
+            state.pose_rate_bias[i] = rest.mean[i];
         }
         for one in std::sync::Arc::make_mut(&mut session.moves) {
             for k in 0..one.rate.len() {

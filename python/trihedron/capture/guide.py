@@ -17,13 +17,13 @@ from trihedron.records.guiding import Accuracy, Examination, GuideView, Phase
 
 Examine = Callable[[], Examination]
 
-FIRST_HOLD_S = 6.0
+FIRST_POSE_S = 6.0
 """The first pose also measures the noise."""
 
 SAME_POSE_DEG = 15.0
 N_CHECKS = 3
 MOST_POSES = 60
-RETRY_HOLD_S = 2.0
+RETRY_POSE_S = 2.0
 MOVED_DEG = 8.0
 
 
@@ -55,7 +55,7 @@ class Guide:
         self._stillness = Stillness()
         self._time_s = 0.0
         self._is_taken = False
-        self._asked_s = FIRST_HOLD_S
+        self._asked_s = FIRST_POSE_S
         self._taken_up: FloatArray | None = None
         self._checks: list[FloatArray] = []
         self._target: FloatArray | None = None
@@ -137,7 +137,7 @@ class Guide:
         self._asked_s = examination.pose_s
         if len(examination.poses_up) <= before and before:
             self._remark = "This pose is not long enough yet: hands off."
-            self._asked_s = self._stillness.still_for_s + RETRY_HOLD_S
+            self._asked_s = self._stillness.still_for_s + RETRY_POSE_S
             if self._stillness.still_for_s > 3.0 * examination.pose_s:
                 self._remark = "This pose was counted before: turn the board on."
                 self._accepted()
@@ -173,7 +173,7 @@ class Guide:
         if up is not None:
             self._checks.append(up)
         self._accepted()
-        self._asked_s = self.examination.pose_s if self.examination else FIRST_HOLD_S
+        self._asked_s = self.examination.pose_s if self.examination else FIRST_POSE_S
         if len(self._checks) >= self._n_checks:
             self.phase, self._target = Phase.DONE, None
         else:

@@ -132,8 +132,8 @@ def _of_biases(answer: Answer) -> list[dict[str, Any]]:
             twin, obs = model.fitted.twin, model.obs
             path = twin.accel_bias if one.effect.sensor == 0 else twin.gyro_bias
             extra["curve"] = {
-                "time_s": obs.hold_time_s.tolist(), "value": path.T.tolist(),
-                "sigma": [[float(s)] * obs.n_holds for s in one.std], "unit": one.effect.unit,
+                "time_s": obs.pose_time_s.tolist(), "value": path.T.tolist(),
+                "sigma": [[float(s)] * obs.n_poses for s in one.std], "unit": one.effect.unit,
             }  # fmt: skip
         # Half of a chi-square with one degree of freedom: the strength lies at its boundary without it.
         p = float(np.exp(-0.5 * max(one.gain, 0.0)))

@@ -134,7 +134,7 @@ def take_off(
     zero = np.zeros((recording.n_samples, 3))
     read_f = zero if raw_f is None else raw_f @ S_f.T + b_f
     read_w = zero if raw_w is None else raw_w @ S_w.T + b_w
-    obs = cast(Observations, SimpleNamespace(recording=recording, raw_rate=raw_w, raw_force=raw_f, n_holds=0))
+    obs = cast(Observations, SimpleNamespace(recording=recording, raw_rate=raw_w, raw_force=raw_f, n_poses=0))
     left_out: dict[str, str] = {}
     known = {effect.id: effect for effect in catalogue()}
     force, rate = read_f, read_w

@@ -95,7 +95,7 @@ def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
     # Strengths of noise are in every hypothesis: none is searched for among mechanisms. Each axis beyond the first is
     # one more that was fitted, known to 1/sqrt(2n) in its logarithm: it pays for that as a parameter does.
     n_strengths = 3 if effect.sensor == 1 and not effect.walks else 1
-    paid = (n_strengths - 1) * float(np.log(2.0 * max(model.obs.n_holds, 1)))
+    paid = (n_strengths - 1) * float(np.log(2.0 * max(model.obs.n_poses, 1)))
     return BiasStrength(effect, gain, gain - paid, size, std, parameters, statement, without, is_large)
 
 
@@ -112,18 +112,18 @@ def _walked(model: Hypothesis, sensor: int) -> float:
     twin, obs = model.fitted.twin, model.obs
     path = (twin.accel_bias, twin.gyro_bias)[sensor]
     unit = _units(model)[sensor] * model.context.si_per_raw(("accelerometer", "gyroscope")[sensor])
-    return float(np.sqrt(np.mean(path.var(axis=0)) / np.mean(unit**2))) if obs.n_holds else 0.0
+    return float(np.sqrt(np.mean(path.var(axis=0)) / np.mean(unit**2))) if obs.n_poses else 0.0
 
 
 def _units(model: Hypothesis) -> FloatArray:
     obs = model.obs
-    return scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma, obs.force_up)
+    return scatter_unit(obs.pose_force_sigma, obs.pose_rate_sigma, obs.force_up)
 
 
 def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArray]:
     """(3,) SI by axis, and its standard error: one sigma of a scatter, the range that a drift runs through."""
     sensor = ("accelerometer", "gyroscope")[effect.sensor]
-    n = model.obs.n_holds
+    n = model.obs.n_poses
     if not effect.walks:
         scatter = np.array(model.strengths[1])
         raw = (scatter[1:] if effect.sensor else scatter[0]) * _units(model)[effect.sensor]
@@ -132,7 +132,7 @@ def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArra
     twin = model.fitted.twin
     path = twin.accel_bias if effect.sensor == 0 else twin.gyro_bias
     obs = model.obs
-    sigma = obs.hold_force_sigma if effect.sensor == 0 else obs.hold_rate_sigma
+    sigma = obs.pose_force_sigma if effect.sensor == 0 else obs.pose_rate_sigma
     assert sigma is not None
     error = np.median(sigma, axis=0) * model.context.si_per_raw(sensor)
     return np.ptp(path, axis=0), np.asarray(np.sqrt(2.0) * error)

@@ -56,7 +56,7 @@ class Context:
     def time_s(self) -> FloatArray:
         """(points,) middle of each hold, time of each sample."""
         times: FloatArray = self.obs.time_s[self.fitted.line.path.point_samples].copy()
-        times[: self.obs.n_holds] = self.obs.hold_time_s
+        times[: self.obs.n_poses] = self.obs.pose_time_s
         return times
 
     @cached_property
@@ -93,9 +93,9 @@ class Context:
     @cached_property
     def gravity_in_moves(self) -> FloatArray:
         """(points, 3) minus gravity in the body, carried by the gyro from each move's start; the force in holds."""
-        path, twin, h = self.fitted.line.path, self.fitted.twin, self.obs.n_holds
+        path, twin, h = self.fitted.line.path, self.fitted.twin, self.obs.n_poses
         out = self.force.copy()
-        for where, (before, _) in zip(self.moves, self.obs.move_holds, strict=True):
+        for where, (before, _) in zip(self.moves, self.obs.move_poses, strict=True):
             out[where] = twin.gravity * path.attitude[where.start - h : where.stop - h] @ twin.up[before]
         return out
 
@@ -138,7 +138,7 @@ class Context:
     def at_points(self, samples: FloatArray) -> FloatArray:
         """Values of a whole-recording signal (n, ...) at the points: hold means, then move samples."""
         out = np.array(samples[self.fitted.line.path.point_samples], dtype=np.float64)
-        out[: self.obs.n_holds] = self.obs.hold_means(samples)
+        out[: self.obs.n_poses] = self.obs.pose_means(samples)
         return out
 
     @cached_property
@@ -159,7 +159,7 @@ class Context:
         if logged is None or not np.isfinite(logged).any():
             return None
         values = self.at_points(logged)
-        centred: FloatArray = values - np.nanmean(values[: self.obs.n_holds])
+        centred: FloatArray = values - np.nanmean(values[: self.obs.n_poses])
         return np.where(np.isfinite(centred), centred, 0.0)
 
     @cached_property
@@ -180,7 +180,7 @@ class Context:
         if logged is None or not np.isfinite(logged).any():
             return None
         values = self.at_points(logged)
-        relative: FloatArray = values / np.nanmean(values[: self.obs.n_holds]) - 1.0
+        relative: FloatArray = values / np.nanmean(values[: self.obs.n_poses]) - 1.0
         return np.where(np.isfinite(relative), relative, 0.0)
 
     @property
@@ -189,14 +189,14 @@ class Context:
         recording, out = self.obs.recording, {}
         for name, logged in (("temperature_degc", recording.temperature_degc), ("supply_v", recording.supply_v)):
             if logged is not None and np.isfinite(logged).any():
-                out[name] = float(np.nanmean(self.at_points(logged)[: self.obs.n_holds]))
+                out[name] = float(np.nanmean(self.at_points(logged)[: self.obs.n_poses]))
         return out
 
     @cached_property
-    def hold_power(self) -> FloatArray:
+    def pose_power(self) -> FloatArray:
         """(holds, 3) variance of the accelerometer inside each hold, SI², along the instrument axes."""
         obs, S = self.obs, self.fitted.twin.accel_S
-        out: FloatArray = np.einsum("ij,hjk,ik->hi", S, obs.hold_scatter, S)
+        out: FloatArray = np.einsum("ij,hjk,ik->hi", S, obs.pose_scatter, S)
         for i in np.flatnonzero(np.isnan(out).any(axis=1)):
             out[i] = np.nanvar(obs.raw_force[obs.segments.poses[i].samples()] @ S.T, axis=0)
         return out
@@ -216,10 +216,10 @@ class Context:
         made good by the ratio that the shaken holds show.
         """
         obs = self.obs
-        holds = self.hold_power
+        holds = self.pose_power
         floor = np.quantile(holds, 0.1, axis=0)
         out = np.zeros((self.n_points, 3))
-        out[: obs.n_holds] = np.maximum(holds - floor, 0.0)
+        out[: obs.n_poses] = np.maximum(holds - floor, 0.0)
         width = max(round(VIBRATION_WINDOW_S * obs.recording.rate_hz), 7) | 1
 
         # What a parabola by least squares has in the middle (the filter of Savitzky and Golay).
@@ -241,24 +241,24 @@ class Context:
             out[where] = np.maximum(rough(self.force[where]) - quiet, 0.0) / np.clip(passed, 0.1, 1.0)
         return out
 
-    def between_holds(self, per_hold: FloatArray) -> FloatArray:
+    def between_poses(self, per_pose: FloatArray) -> FloatArray:
         """(points, ...) a per-hold quantity, carried linearly in time through the moves."""
-        out = np.zeros((self.n_points, *per_hold.shape[1:]))
-        out[: self.obs.n_holds] = per_hold
-        for where, (before, after) in zip(self.moves, self.obs.move_holds, strict=True):
+        out = np.zeros((self.n_points, *per_pose.shape[1:]))
+        out[: self.obs.n_poses] = per_pose
+        for where, (before, after) in zip(self.moves, self.obs.move_poses, strict=True):
             t = self.time_s[where]
-            blend = ((t - t[0]) / max(t[-1] - t[0], 1e-12)).reshape(-1, *([1] * (per_hold.ndim - 1)))
-            out[where] = per_hold[before] * (1 - blend) + per_hold[after] * blend
+            blend = ((t - t[0]) / max(t[-1] - t[0], 1e-12)).reshape(-1, *([1] * (per_pose.ndim - 1)))
+            out[where] = per_pose[before] * (1 - blend) + per_pose[after] * blend
         return out
 
     @cached_property
-    def hold_attitude(self) -> FloatArray:
+    def pose_attitude(self) -> FloatArray:
         """(holds, 3, 3) local level (z up, arbitrary azimuth) → body, chained through the moves and levelled at holds.
 
         Holds that no chain of moves reaches keep NaN.
         """
         obs, twin, path = self.obs, self.fitted.twin, self.fitted.line.path
-        out = np.full((obs.n_holds, 3, 3), np.nan)
+        out = np.full((obs.n_poses, 3, 3), np.nan)
 
         def levelled(x_guess: FloatArray, up: FloatArray) -> FloatArray:
             x = x_guess - up * (up @ x_guess)
@@ -267,9 +267,9 @@ class Context:
 
         up = twin.up
         out[0] = levelled(np.eye(3)[np.abs(up[0]).argmin()], up[0])
-        for where, (before, after) in zip(self.moves, obs.move_holds, strict=True):
+        for where, (before, after) in zip(self.moves, obs.move_poses, strict=True):
             if np.isfinite(out[before]).all():
-                turned = path.attitude[where.stop - 1 - obs.n_holds] @ out[before]
+                turned = path.attitude[where.stop - 1 - obs.n_poses] @ out[before]
                 out[after] = levelled(turned[:, 0], up[after])
         return out
 

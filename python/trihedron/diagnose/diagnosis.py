@@ -20,9 +20,9 @@ from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.relation_records import records
 from trihedron.diagnose.residuals.before_after import residuals_before_after, with_covariance
 from trihedron.diagnose.residuals.creep import settling, with_settling
-from trihedron.diagnose.residuals.goodness_of_fit import hidden_zeros, judge_rows
+from trihedron.diagnose.residuals.goodness_of_fit import hidden_biases, judge_rows
 from trihedron.diagnose.residuals.timing import judge_timing
-from trihedron.diagnose.residuals.within_holds import judge_within_holds
+from trihedron.diagnose.residuals.within_poses import judge_within_poses
 from trihedron.diagnose.sample_evidence import Observed, look
 from trihedron.diagnose.search import Found, search, with_shapes
 from trihedron.diagnose.session.observations import Observations, observe
@@ -110,7 +110,7 @@ def diagnose_recording(
 def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
     """White noise, and what the bias does, of both sensors."""
     twin, obs = model.fitted.twin, model.obs
-    accel, gyro = hidden_zeros(model.fitted)
+    accel, gyro = hidden_biases(model.fitted)
     return MappingProxyType(
         {
             "accelerometer_density": np.sqrt((twin.accel_S**2) @ obs.force_density**2).tolist(),
@@ -198,7 +198,7 @@ def _all_domains(context: Context, alpha: float, refused: Collection[str] = ()) 
     common = common_time_error(step_errors(context), 1.0 / context.obs.recording.rate_hz)
     return (
         *judge_rows(context.fitted, alpha),
-        judge_within_holds(context.obs, alpha),
+        judge_within_poses(context.obs, alpha),
         judge_timing(common, _found(context, refused) if np.isfinite(common[1]) else [], alpha),
     )
 

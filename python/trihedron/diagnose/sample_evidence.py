@@ -86,7 +86,7 @@ def _with_one(
     if evidence.reweigh is not None:
         found = [*(one.evidence for one in observed.seen), evidence]
         obs = evidence.reweigh(observed.obs) if evidence.touched is None else _changed(observed.bare, found)
-        begin = fitted.twin if obs.n_holds == observed.obs.n_holds else start
+        begin = fitted.twin if obs.n_poses == observed.obs.n_poses else start
         fitted = tune_noise(obs, replace(begin, effect=np.zeros(0)), NO_DISTORTION, prior)
         if not effect.is_proof and not _mends(observed.fitted, fitted, evidence.touched):
             return replace(observed, refused=observed.refused | {effect.id})

@@ -104,7 +104,7 @@ def _by_session(
     left_out = held_out_of_session(recording.time_s, observed, measured, anchors, solution, options.n_folds)
     covariance = solution.covariance + _by_averaging(recording, segments, measured, aligned, gravity_m_s2, solution)
     if measured.attitude is not None:
-        more = solution.S_w @ np.diag(measured.attitude.var_zero) @ solution.S_w.T
+        more = solution.S_w @ np.diag(measured.attitude.var_bias) @ solution.S_w.T
         covariance[21:, 21:] += np.diag(np.maximum(np.diag(more) - np.diag(covariance[21:, 21:]), 0.0))
     own_sigma = relative_sigma(covariance[12:, 12:], solution.S_w)
     losses = PossibleLosses()
@@ -204,7 +204,7 @@ def _poses_above_noise(quality: FitQuality, solution: SessionSolution) -> tuple[
             floor_m_s2=quality.floor,
             chi2_per_dof=quality.chi2 / quality.dof,
             dof=quality.dof,
-            bias_repeatability_m_s2=solution.accel_zero_rms,
+            bias_repeatability_m_s2=solution.accel_bias_rms,
         ),
     )
 

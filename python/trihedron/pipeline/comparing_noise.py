@@ -18,7 +18,7 @@ from trihedron.pipeline.comparing_draws import one_draw_for_all, uniform_for_nor
 from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
 from trihedron.records.pose_noise import Measured, PoseNoise
-from trihedron.records.sampling import StampKind
+from trihedron.records.sampling import TimestampKind
 
 Sensor = Literal["accelerometer", "gyroscope"]
 
@@ -57,7 +57,7 @@ RESEMBLES = 1.06
 SHOWS = 0.5
 """Noise of half an ADC step moves its last digit in every third reading: it cannot be overlooked."""
 _AXES = ("x", "y", "z")
-_SCATTERED = (StampKind.LATE, StampKind.SCATTERED)
+_SCATTERED = (TimestampKind.LATE, TimestampKind.SCATTERED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,7 @@ def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> 
     clock = recording.sampling
     if clock.is_even and clock.kind in _SCATTERED:
         # Reading put the samples on the even clock behind their timestamps: what these scattered by is in its report.
-        jitter = max(jitter, clock.stamp_error_s * recording.rate_hz)
+        jitter = max(jitter, clock.timestamp_error_s * recording.rate_hz)
     return Sampled(noise, excess, count, likeness, recording.rate_hz, jitter)
 
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.against import FREE_CURVES
+from trihedron.estimate.noise.of_biases import PoseBiases, SlowDifference, compare_slow
 from trihedron.estimate.noise.of_norms import PoseNorms, compare_slow_norms
-from trihedron.estimate.noise.of_zeros import PoseZeros, SlowDifference, compare_slow
 from trihedron.pipeline.comparing_noise import Sensor
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, NoiseTerm
@@ -43,7 +43,7 @@ def slow_noise(model: Side, recording: Side, *, alpha: float) -> tuple[NoiseDiff
     """
     out: list[NoiseDifference] = []
     # A free curve through a simulation's zeros is no mechanism: its walk is. A recording's may be one.
-    zeros = gyro_zeros(*model, with_curve=True), gyro_zeros(*recording, with_curve=_has_curve(model[0]))
+    zeros = gyro_biases(*model, with_curve=True), gyro_biases(*recording, with_curve=_has_curve(model[0]))
     rate_hz = model[1].rate_hz
     if zeros[0] and zeros[1]:
         is_open = _drifts(recording[0], "gyroscope", but_curve=_has_curve(model[0]))
@@ -99,13 +99,13 @@ def _drifts(found: Diagnosis, sensor: Sensor, *, but_curve: bool = False) -> boo
 def _has_curve(found: Diagnosis, sensor: Sensor = "gyroscope") -> bool:
     """Whether the one effect on a sensor's biases, beside their scatter, is a drift along a curve of any shape."""
     domain, drift = DOMAINS[sensor], f"{'gyro' if sensor == 'gyroscope' else 'accel'}-bias-drift"
-    of_zeros = [e for e in found.effects if any(h.domain == domain for h in e.held_out) and e.id not in NO_SHAPE]
-    return len(of_zeros) == 1 and of_zeros[0].id == drift and of_zeros[0].model.get("variant") in FREE_CURVES
+    of_biases = [e for e in found.effects if any(h.domain == domain for h in e.held_out) and e.id not in NO_SHAPE]
+    return len(of_biases) == 1 and of_biases[0].id == drift and of_biases[0].model.get("variant") in FREE_CURVES
 
 
-def gyro_zeros(
+def gyro_biases(
     found: Diagnosis, recording: Recording, segments: Segments, *, with_curve: bool = False
-) -> tuple[PoseZeros, ...]:
+) -> tuple[PoseBiases, ...]:
     """Zeros of a session's poses per axis, what effects make of them taken off; none without a gyro.
 
     ``with_curve``: a drift along a free curve stays on them where nothing else was taken off.
@@ -119,7 +119,7 @@ def gyro_zeros(
         values, time_s = shown.before, shown.time_before_s
     length = _poses(time_s, recording, segments).length_s
     white: FloatArray = np.asarray(density, dtype=np.float64)
-    return tuple(PoseZeros(values[:, k], white[k] / np.sqrt(length), time_s, length, scatters=True) for k in range(3))
+    return tuple(PoseBiases(values[:, k], white[k] / np.sqrt(length), time_s, length, scatters=True) for k in range(3))
 
 
 def accel_norms(
@@ -143,7 +143,7 @@ def accel_norms(
     force = correct(poses.means, S, b)
     up = force / np.linalg.norm(force, axis=1, keepdims=True)
     white = np.sqrt((up**2 @ np.asarray(density, dtype=np.float64) ** 2) / poses.length_s)
-    norms = PoseZeros(values[:, 0], white, time_s, poses.length_s, scatters=True)
+    norms = PoseBiases(values[:, 0], white, time_s, poses.length_s, scatters=True)
     return PoseNorms(norms, up)
 
 

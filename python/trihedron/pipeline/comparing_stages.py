@@ -12,9 +12,9 @@ from trihedron.records.diagnosis import NoiseDifference, Stage, StageDomain
 from trihedron.records.pose_noise import PoseNoise
 
 DECIBEL = 20.0 / math.log(10.0)
-FEWEST_HOLDS = 4
+FEWEST_POSES = 4
 """Two holds for either half."""
-NOISE_IN_HOLDS = frozenset({"N", "B", "Q", "octave", "bandwidth", "resolution", "line"})
+NOISE_IN_POSES = frozenset({"N", "B", "Q", "octave", "bandwidth", "resolution", "line"})
 """Terms of the comparison that change what the octaves of a pose show."""
 
 
@@ -34,10 +34,10 @@ def with_noise_stage(
     that is no number, as of a model without any noise.
     """
     given = own = None
-    if segments.n_poses >= FEWEST_HOLDS:
+    if segments.n_poses >= FEWEST_POSES:
         taught, seen = (sampled(recording, segments.poses[first::2], fit) for first in (0, 1))
         given, own = _misfit(model, seen), _misfit(taught, seen)
-    if given is not None and not any(one.significant and one.term in NOISE_IN_HOLDS for one in compared):
+    if given is not None and not any(one.significant and one.term in NOISE_IN_POSES for one in compared):
         own = given
     out: list[Stage] = []
     for stage in stages:

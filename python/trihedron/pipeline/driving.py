@@ -56,7 +56,7 @@ def driven(
 def _sensed(scenario: Scenario, seed: int) -> Recording:
     """What the instrument makes of its motion, timestamps as a reader settles them."""
     simulated, _ = simulate(scenario, seed)
-    if scenario.clock.stamp_jitter_s > 0.0 or scenario.clock.jitter_s > 0.0:
+    if scenario.clock.timestamp_jitter_s > 0.0 or scenario.clock.jitter_s > 0.0:
         return _as_read(simulated)
     return simulated
 

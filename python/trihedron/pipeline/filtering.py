@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from trihedron.channel_facts.at_rest import SHORTEST as SHORTEST_HOLD
+from trihedron.channel_facts.at_rest import SHORTEST as SHORTEST_POSE
 from trihedron.errors import RefusedError
 from trihedron.estimate.kalman import (
     NormFrame,
@@ -165,7 +165,7 @@ def _check_converter(given: Sequence[AxisNoise], recording: Recording, segments:
     readings = recording.accelerometer
     if readings is None or not segments.poses:
         return
-    windows = [(pose.start, pose.stop) for pose in segments.poses if pose.stop - pose.start >= SHORTEST_HOLD]
+    windows = [(pose.start, pose.stop) for pose in segments.poses if pose.stop - pose.start >= SHORTEST_POSE]
     if not windows:
         return
     inside = noise_of_poses(readings, recording.rate_hz, windows)

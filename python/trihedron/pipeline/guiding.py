@@ -39,10 +39,10 @@ from trihedron.units import (
 PRIOR = 0.1
 """What is believed of a board before its first pose: scales within 10 %, axes within 0.1 rad, zeros within 0.1 g."""
 
-SHORTEST_HOLD_S, LONGEST_HOLD_S = 3.0, 12.0
-USUAL_HOLD_S = 4.0
+SHORTEST_POSE_S, LONGEST_POSE_S = 3.0, 12.0
+USUAL_POSE_S = 4.0
 _NOT_THE_FIT = (FindingCode.GRAVITY_DEFAULTED, FindingCode.UNIT_CONTRADICTED)
-HOLDS_PER_GOAL = 2.5
+POSES_PER_GOAL = 2.5
 """A pose's own error may be so many times the accuracy wanted: a dozen poses average the rest away."""
 
 GYRO_NAMES = tuple(
@@ -294,9 +294,9 @@ def _why(uncertain: tuple[Uncertain, ...]) -> str:
 
 def _pose_s(known: Known, accuracy: Accuracy, segments: Segments) -> float:
     """Long enough that one pose is known to a few times what is wanted; noise falls with the root of the time."""
-    held = float(np.median(segments.duration_s)) if segments.n_poses else USUAL_HOLD_S
-    excess = known.pose_sigma / (HOLDS_PER_GOAL * accuracy.accelerometer)
-    return float(np.clip(held * excess**2, SHORTEST_HOLD_S, LONGEST_HOLD_S))
+    held = float(np.median(segments.duration_s)) if segments.n_poses else USUAL_POSE_S
+    excess = known.pose_sigma / (POSES_PER_GOAL * accuracy.accelerometer)
+    return float(np.clip(held * excess**2, SHORTEST_POSE_S, LONGEST_POSE_S))
 
 
 def _warnings(recording: Recording, segments: Segments) -> tuple[str, ...]:

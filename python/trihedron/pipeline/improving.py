@@ -269,4 +269,4 @@ def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisR
         if n.significant and n.term == "rate" and n.recording is not None:
             tables["clock"]["rate_hz"] = n.recording
         elif n.significant and n.term == "jitter" and n.recording is not None:
-            tables["clock"] |= {"stamp_jitter_s": n.recording, "jitter_s": 0.0}
+            tables["clock"] |= {"timestamp_jitter_s": n.recording, "jitter_s": 0.0}

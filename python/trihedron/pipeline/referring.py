@@ -33,7 +33,7 @@ from trihedron.units import acceleration_to_si
 
 AnyReference = ReferenceMotion | Recording | str | os.PathLike[str]
 
-NOMINAL_SCALE, NOMINAL_ZERO_M_S2 = 0.1, 0.5
+NOMINAL_SCALE, NOMINAL_BIAS_M_S2 = 0.1, 0.5
 """How wrong an accelerometer is that nobody calibrated: 10 % where only its reading at rest tells the scale."""
 
 
@@ -149,7 +149,7 @@ def _nominal(recording: Recording, gravity: float) -> tuple[SensorCalibration, F
     scale = acceleration_to_si(recording.accelerometer_unit)
     if scale is None:
         scale = gravity / float(np.nanmedian(np.linalg.norm(raw, axis=1)))
-    covariance = np.diag([*np.full(9, (NOMINAL_SCALE * scale) ** 2), *np.full(3, NOMINAL_ZERO_M_S2**2)])
+    covariance = np.diag([*np.full(9, (NOMINAL_SCALE * scale) ** 2), *np.full(3, NOMINAL_BIAS_M_S2**2)])
     finding = Finding.of(FindingCode.ACCELEROMETER_NOMINAL, scale=scale)
     unit = recording.accelerometer_unit.value
     return SensorCalibration(scale * np.eye(3), np.zeros(3), covariance, unit, "m/s^2", "nominal"), finding

@@ -24,7 +24,7 @@ from trihedron.records import Finding, FindingCode, Onboard
 _PARAMETERS = re.compile(r"INS_(ACC|GYR|TCAL)|AHRS_(ORIENTATION|CUSTOM_)")
 """What the readings have been through is told by these (the INS library of ArduPilot)."""
 _TYPES = ["PARM", "IMU", "IMU2", "IMU3", "ACC", "GYR", "ACC1", "ACC2", "ACC3", "GYR1", "GYR2", "GYR3"]
-_STAMPS = (("SampleUS", "us"), ("TimeUS", "us"), ("TimeMS", "ms"))
+_TIMESTAMPS = (("SampleUS", "us"), ("TimeUS", "us"), ("TimeMS", "ms"))
 _FIELDS = {
     "IMU": ("AccX", "AccY", "AccZ", "GyrX", "GyrY", "GyrZ", "T", "Temp"),
     "ACC": ("AccX", "AccY", "AccZ"),
@@ -116,7 +116,7 @@ def _keep(
     instance = str(fields.get("I", int(number or 1) - 1))
     key = (word, instance)
     if key not in names:
-        stamp, unit = next(((s, u) for s, u in _STAMPS if s in fields), ("", ""))
+        stamp, unit = next(((s, u) for s, u in _TIMESTAMPS if s in fields), ("", ""))
         if not stamp:
             raise RefusedError(f"{message.get_type()} has no timestamp")
         names[key] = [f"{stamp} [{unit}]", *(name for name in _FIELDS[word] if name in fields)]

@@ -31,9 +31,9 @@ def read_kitti(folder: Path) -> Table:
     rows: list[list[float]] = []
     path = folder / "timestamps.txt"
     try:
-        stamps = path.read_text(encoding="utf-8", errors="replace")
-        digest.update(stamps.encode())
-        times = np.array([line.strip() for line in stamps.splitlines() if line.strip()], dtype="datetime64[ns]")
+        timestamps = path.read_text(encoding="utf-8", errors="replace")
+        digest.update(timestamps.encode())
+        times = np.array([line.strip() for line in timestamps.splitlines() if line.strip()], dtype="datetime64[ns]")
         for path in sorted((folder / "data").glob("*.txt")):
             text = path.read_text(encoding="utf-8", errors="replace")
             digest.update(text.encode())

@@ -183,10 +183,10 @@ def _floats(kind: str, name: str, array: npt.NDArray[Any]) -> FloatArray:
     return np.ascontiguousarray(values)
 
 
-def _seconds(stamps: npt.NDArray[Any]) -> FloatArray:
-    whole = stamps.astype(np.int64)
+def _seconds(timestamps: npt.NDArray[Any]) -> FloatArray:
+    whole = timestamps.astype(np.int64)
     seconds = np.asarray(whole / 1e9, dtype=np.float64)
-    seconds[np.isnat(stamps)] = np.nan
+    seconds[np.isnat(timestamps)] = np.nan
     return seconds
 
 

@@ -92,7 +92,7 @@ def merge(
             f"{gyr_t[0]:.3f} to {gyr_t[-1]:.3f} s); log both sensors by one clock."
         )
     if len(acc_t) == len(gyr_t) and np.array_equal(acc_t, gyr_t):
-        note = Finding.of(FindingCode.CLOCKS_MERGED, "same-stamps")
+        note = Finding.of(FindingCode.CLOCKS_MERGED, "same-timestamps")
         return Merged(
             accelerometer_s, accelerometer_start_s, accelerometer, gyroscope, "accelerometer", 0, len(acc_t), (note,)
         )

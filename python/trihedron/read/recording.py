@@ -34,7 +34,7 @@ from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
 
-STAMPS = "timestamps as logged [s]"
+TIMESTAMPS = "timestamps as logged [s]"
 """Name under which timestamps that gave way to an even clock are kept."""
 
 
@@ -190,8 +190,10 @@ def audited(
         gyr_unit = RateUnit(judged.unit)
         findings = with_gyro(findings, judged.confirms_clock) + list(judged.findings)
     if sensors.has_clock:
-        findings += audit_timing(time_s, rate, sensors.place, sensors.sampling, sensors.lost_behind, sensors.stamps_s)
-        findings += audit_pace(time_s if sensors.stamps_s is None else sensors.stamps_s, sensors)
+        findings += audit_timing(
+            time_s, rate, sensors.place, sensors.sampling, sensors.lost_behind, sensors.timestamps_s
+        )
+        findings += audit_pace(time_s if sensors.timestamps_s is None else sensors.timestamps_s, sensors)
     facts = facts_in(present, windows, extremes)
     counter = sensors.columns.counter
     if counter is not None:
@@ -289,8 +291,8 @@ def _auxiliary(sensors: Sensors, n: int) -> dict[str, FloatArray]:
         kept = np.array(_kept(sensors, i, n))
         kept.setflags(write=False)
         out[key] = kept
-    if sensors.stamps_s is not None:
-        stamps = np.array(sensors.stamps_s)
-        stamps.setflags(write=False)
-        out[STAMPS] = stamps
+    if sensors.timestamps_s is not None:
+        timestamps = np.array(sensors.timestamps_s)
+        timestamps.setflags(write=False)
+        out[TIMESTAMPS] = timestamps
     return out

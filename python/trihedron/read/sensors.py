@@ -52,7 +52,7 @@ class Options:
 class Sensors:
     """Both triads on one time base, and where each sample stood in the file.
 
-    ``sampling``, ``lost_behind`` (n - 1,) once the clock is settled, and ``stamps_s`` (n,), the timestamps it replaced.
+    ``sampling``, ``lost_behind`` (n - 1,) once the clock is settled, and ``timestamps_s`` (n,), what it replaced.
     """
 
     time_s: FloatArray
@@ -67,7 +67,7 @@ class Sensors:
     gyroscope_unit: str = ""
     sampling: Sampling = UNJUDGED
     lost_behind: npt.NDArray[np.int64] | None = None
-    stamps_s: FloatArray | None = None
+    timestamps_s: FloatArray | None = None
     findings: tuple[Finding, ...] = field(default=())
     rows_in_file: int = 0
     rows_read: int = 0
@@ -244,7 +244,7 @@ def settled(sensors: Sensors) -> Sensors:
         start_s=found.start_s,
         sampling=found.sampling,
         lost_behind=found.lost_behind,
-        stamps_s=sensors.time_s if found.sampling.is_even else None,
+        timestamps_s=sensors.time_s if found.sampling.is_even else None,
         findings=(*sensors.findings, *found.findings),
     )
 

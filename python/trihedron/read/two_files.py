@@ -29,8 +29,10 @@ def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
             f"{accelerometer.table.path}: {len(accelerometer.time_s)} rows here and {len(gyroscope.time_s)} in "
             f"{gyroscope.table.path.name}, and no time column to match them by; log both with timestamps."
         )
-    same_stamps = accelerometer.start_s == gyroscope.start_s and np.array_equal(accelerometer.time_s, gyroscope.time_s)
-    if not same_stamps:
+    is_same_clock = accelerometer.start_s == gyroscope.start_s and np.array_equal(
+        accelerometer.time_s, gyroscope.time_s
+    )
+    if not is_same_clock:
         accelerometer, gyroscope = settled(accelerometer), settled(gyroscope)
     assert accelerometer.accelerometer is not None
     assert gyroscope.gyroscope is not None
@@ -68,7 +70,7 @@ def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
         _unit_before(gyroscope.gyroscope_unit, gyroscope.gyroscope),
         base.sampling,
         None if base.lost_behind is None else base.lost_behind[kept][: len(merged.time_s) - 1],
-        None if base.stamps_s is None else base.stamps_s[kept],
+        None if base.timestamps_s is None else base.timestamps_s[kept],
         (*accelerometer.findings, *extra, *merged.findings),
         accelerometer.rows_in_file + gyroscope.rows_in_file,
         accelerometer.rows_read + gyroscope.rows_read - merged.rows_left_out,

@@ -55,7 +55,7 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
     except Exception as error:
         raise ReadError(f"{path}: pyulog cannot read this log ({first_line(error)}); copy it again.") from None
     data = _unrolled(log)
-    counts = {key: len(columns[_stamp(columns)]) for key, columns in data.items()}
+    counts = {key: len(columns[_timestamp(columns)]) for key, columns in data.items()}
     combined = counts.get((_COMBINED, 0), 0)
     raw, batches = (_pairs(counts, suffix) for suffix in ("", SUFFIX))
     streams = raw + batches + ([Stream(_COMBINED, combined)] if (_COMBINED, 0) in counts else [])
@@ -125,7 +125,7 @@ def _table(
     findings: tuple[Finding, ...],
 ) -> Table:
     # The sample's own timestamp, where the log has it; `timestamp` is when the message was published.
-    stamp = _stamp(data)
+    stamp = _timestamp(data)
     names, columns = ["timestamp [us]"], [np.asarray(data[stamp], dtype=np.float64)]
     for name, values in data.items():
         if name not in _SKIP and np.asarray(values).dtype.kind in "iufb":
@@ -164,7 +164,7 @@ def _onboard(log: Any, topic: str, instance: int) -> Onboard | None:
     return held.onboard("px4", (numbers[0], numbers[1]), stage)
 
 
-def _stamp(data: dict[str, Any]) -> str:
+def _timestamp(data: dict[str, Any]) -> str:
     return "timestamp_sample" if "timestamp_sample" in data else "timestamp"
 
 

@@ -37,7 +37,7 @@ from trihedron.records.noise import (
 )
 from trihedron.records.onboard import Onboard
 from trihedron.records.recording import Recording
-from trihedron.records.sampling import Sampling, StampKind
+from trihedron.records.sampling import Sampling, TimestampKind
 from trihedron.records.segments import Move, Pose, Segments
 from trihedron.records.truth import TrueSegment, Truth
 from trihedron.records.verification import Verification
@@ -76,8 +76,8 @@ __all__ = [
     "Severity",
     "SlowPair",
     "SpectralLine",
-    "StampKind",
     "TermName",
+    "TimestampKind",
     "TrueSegment",
     "Truth",
     "Verification",

@@ -44,7 +44,7 @@ def _readonly(array: npt.ArrayLike, name: str, shape: tuple[int | None, ...]) ->
     return out
 
 
-def spread_stamps(time_s: FloatArray, step_s: float) -> FloatArray:
+def spread_timestamps(time_s: FloatArray, step_s: float) -> FloatArray:
     """Strictly increasing timestamps (n,) from non-decreasing ones: those that are shared, spread evenly to one side.
 
     Samples that were timestamped when they arrived together have a long step before their timestamp and were taken in
@@ -161,8 +161,8 @@ class Recording(Presented):
         freeze(self)
 
     def with_distinct_timestamps(self) -> Recording:
-        """This recording with no two samples at one instant: shared timestamps are spread (:func:`spread_stamps`)."""
-        distinct = spread_stamps(self.time_s, 1.0 / self.rate_hz)
+        """This recording with no two samples at one instant: shared ones are spread (:func:`spread_timestamps`)."""
+        distinct = spread_timestamps(self.time_s, 1.0 / self.rate_hz)
         return self if distinct is self.time_s else self.with_same_readings(time_s=distinct)
 
     def knowing(self, facts: RecordingFacts) -> Recording:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 
-class StampKind(str, Enum):
+class TimestampKind(str, Enum):
     """What a log's timestamps are.
 
     ``NONE``: no timestamps, or too few to tell. ``EXACT``: even. ``ROUNDED``: even, rounded to a grid. ``LATE``: even
@@ -26,16 +26,16 @@ class StampKind(str, Enum):
 class Sampling:
     """The clock of a recording.
 
-    ``period_s`` with standard error ``sigma_period_s``; ``stamp_error_s`` rms of the timestamps about the even clock;
+    ``period_s`` with standard error ``sigma_period_s``; ``timestamp_error_s`` rms about the even clock;
     ``is_even``: ``time_s`` is that even clock and not the timestamps; ``n_lost`` samples and ``n_losses`` places, where
     ``counts_losses`` (else unknown); ``followed`` share of the timestamps' scatter which readings follow (1: samples
     were taken when timestamped, 0: evenly) with ``sigma_followed`` (infinite without motion).
     """
 
-    kind: StampKind = StampKind.NONE
+    kind: TimestampKind = TimestampKind.NONE
     period_s: float = 0.0
     sigma_period_s: float = 0.0
-    stamp_error_s: float = 0.0
+    timestamp_error_s: float = 0.0
     is_even: bool = False
     counts_losses: bool = False
     n_lost: int = 0

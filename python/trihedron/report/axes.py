@@ -26,7 +26,7 @@ class Axes:
     sensitivity: FloatArray
     sigma_sensitivity: FloatArray
     zero: FloatArray
-    sigma_zero: FloatArray
+    sigma_bias: FloatArray
     skew_rad: FloatArray
     sigma_skew_rad: FloatArray
 
@@ -49,5 +49,5 @@ def axes_of(sensor: SensorCalibration) -> Axes:
         wrt[3 + k, 3 * i : 3 * i + 3] = slope * (unit[j] - cosine * unit[i]) / sensitivity[i]
         wrt[3 + k, 3 * j : 3 * j + 3] = slope * (unit[i] - cosine * unit[j]) / sensitivity[j]
     sigma = np.sqrt(np.maximum(np.diag(wrt @ covariance @ wrt.T), 0.0))
-    sigma_zero = np.sqrt(np.maximum(np.diag(covariance)[9:], 0.0))
-    return Axes(sensitivity, sigma[:3], zero, sigma_zero, skew, sigma[3:])
+    sigma_bias = np.sqrt(np.maximum(np.diag(covariance)[9:], 0.0))
+    return Axes(sensitivity, sigma[:3], zero, sigma_bias, skew, sigma[3:])

@@ -13,7 +13,7 @@ from trihedron.records import Finding, FindingCode, Pose, Recording
 from trihedron.segment.channels import Channels
 from trihedron.segment.noise import MeanNoise
 from trihedron.segment.range_ends import RangeEnd, is_cut
-from trihedron.segment.runs import MIN_HOLD_S, Run, means_of
+from trihedron.segment.runs import MIN_POSE_S, Run, means_of
 
 CREEP_CHANCE = 1e-3
 """Chance that some steady pose of a log is called settling though none is."""
@@ -142,7 +142,7 @@ def judge_log(
         found.append(Finding.of(FindingCode.NOT_STATIC, duration_s=duration, poses=0))
         return found
     # Shorter stretches are the ends of moves, not turns of their own.
-    turns = [(a, b) for a, b in ranges_of(turning) if b - a >= channels.blocks(MIN_HOLD_S)]
+    turns = [(a, b) for a, b in ranges_of(turning) if b - a >= channels.blocks(MIN_POSE_S)]
     if turns:
         total = sum(b - a for a, b in turns) * channels.step_s
         found.append(

@@ -21,7 +21,7 @@ from trihedron.segment.means import average_poses
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
 from trihedron.segment.range_ends import range_ends
 from trihedron.segment.runs import (
-    MIN_HOLD_S,
+    MIN_POSE_S,
     SWAY_RAD,
     EdgeNoise,
     Run,
@@ -106,7 +106,7 @@ def segment_blocks(
         quiet &= ~turning
         drifting = drifting_blocks(channels, quiet, ranges_of(quiet), centre, activity.white_variance)
         quiet = cut_slow_motion(
-            channels, quiet, ranges_of(quiet), drifting, SWAY_RAD * gravity, channels.blocks(MIN_HOLD_S)
+            channels, quiet, ranges_of(quiet), drifting, SWAY_RAD * gravity, channels.blocks(MIN_POSE_S)
         )
     loose = loose_blocks(activity, channels.is_valid) & ~turning
     found = _find_runs(recording, channels, quiet, loose)
@@ -128,7 +128,7 @@ def _find_runs(recording: Recording, channels: Channels, quiet: BoolArray, loose
     noise = pool_mean_noise(channels, core, is_robust=True)
     edges = EdgeNoise.of(channels, noise)
     joined = join_quiet(channels, quiet, loose, noise)
-    steady = [trim_edges(channels, run, edges) for run in long_enough(channels, joined, MIN_HOLD_S)]
+    steady = [trim_edges(channels, run, edges) for run in long_enough(channels, joined, MIN_POSE_S)]
     unsteady = find_unsteady(channels, loose, steady, _gravity_reading(recording, channels))
     other = set_down(channels, joined, loose, [*steady, *unsteady])
     short = [trim_edges(channels, run, edges) for run in other]

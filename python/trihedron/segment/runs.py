@@ -14,7 +14,7 @@ from trihedron.segment.channels import WINDOW_BLOCKS, Channels
 from trihedron.segment.floor import Activity
 from trihedron.segment.noise import MeanNoise
 
-MIN_HOLD_S = 1.0
+MIN_POSE_S = 1.0
 """A hand that hesitates stops for a few tenths of a second; a person who holds, holds a second."""
 SEEN_S = 0.8
 """What is left to see of the shortest pose at the noise floor: its ends share their blocks with the moves."""
@@ -217,7 +217,7 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
     zero = (
         medians(np.vstack([channels.mean[a:b] for run in steady for a, b in run.quiet_ranges()])) if (steady) else None
     )
-    shortest, bump = channels.blocks(MIN_HOLD_S), channels.blocks(BUMP_S)
+    shortest, bump = channels.blocks(MIN_POSE_S), channels.blocks(BUMP_S)
     found: list[Run] = []
     for first, last in ranges_of(free):
         run = Run(first, last, (), True)

@@ -9,7 +9,7 @@ from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.quantiles import medians
 from trihedron.ranges import Range, ranges_of
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
-from trihedron.segment.runs import CREEP_PART, MIN_HOLD_S, SAME_POSE, SWAY_RAD, speed_of_moves
+from trihedron.segment.runs import CREEP_PART, MIN_POSE_S, SAME_POSE, SWAY_RAD, speed_of_moves
 
 TURN_SIGMAS = 6.0
 """A quiet gyro that reads further than this from the common zero, in robust standard deviations, is turning."""
@@ -37,7 +37,7 @@ def turning_blocks(
         # Inside the quiet stretch only: the move next to it has its own say.
         second[a:b] = rolling_mean(reading[a:b], channels.blocks(1.0))
     zero, scatter = _densest(second[quiet])
-    long = _edges([(a, b) for a, b in ranges if b - a >= channels.blocks(MIN_HOLD_S)])
+    long = _edges([(a, b) for a, b in ranges if b - a >= channels.blocks(MIN_POSE_S)])
     if len(long) > 2:
         nearest = np.minimum.reduceat(np.abs(second[: long[-1]] - zero), long[:-1], axis=0)[::2]
         scatter = np.maximum(scatter, 1.4826 * medians(nearest))

@@ -38,7 +38,7 @@ MARGIN = 3.0
 def unresolved_variance(
     readings: FloatArray,
     move_ranges: tuple[tuple[int, int], ...],
-    hold_ranges: list[tuple[int, int]],
+    pose_ranges: list[tuple[int, int]],
     step_s: float,
     quantum: FloatArray,
     time_s: FloatArray | None = None,
@@ -49,29 +49,29 @@ def unresolved_variance(
     ----------
     readings : (n, 3)
         Raw readings of one sensor.
-    move_ranges, hold_ranges : half-open sample ranges
+    move_ranges, pose_ranges : half-open sample ranges
         The holds give the power of the noise in both bands (their median), which is taken off.
     step_s : float
         Sample step, s.
     quantum : (3,)
         Step of the converter, whose rounding no hold shows where the zero stays inside one step, and every move does.
     time_s : (n,)
-        Stamps: filters run from gap to gap, across which smooth motion would look fast.
+        Timestamps: filters run from gap to gap, across which smooth motion would look fast.
 
     Returns
     -------
     (moves, 3) array, (raw unit · s)²
     """
     moves = np.array(move_ranges, dtype=np.int64).reshape(-1, 2)
-    holds = np.array([(a, b) for a, b in hold_ranges if b - a > 8], dtype=np.int64).reshape(-1, 2)
+    holds = np.array([(a, b) for a, b in pose_ranges if b - a > 8], dtype=np.int64).reshape(-1, 2)
     n_whole = np.maximum(moves[:, 1] - moves[:, 0] - (LENGTH - 1), 0)[:, None]
-    n_holds = (holds[:, 1] - holds[:, 0] - (LENGTH - 1))[:, None]
+    n_poses = (holds[:, 1] - holds[:, 0] - (LENGTH - 1))[:, None]
     pieces, of_move = _between_gaps(moves, time_s, step_s)
     n_moves = np.bincount(of_move, pieces[:, 1] - pieces[:, 0] - (LENGTH - 1), len(moves))[:, None]
 
     def excess(taps: list[float]) -> FloatArray:
         power = _core.band_power(readings, taps, np.concatenate([holds, pieces]))
-        level = medians(power[: len(holds)] / n_holds) if len(holds) else np.zeros(3)
+        level = medians(power[: len(holds)] / n_poses) if len(holds) else np.zeros(3)
         level = np.maximum(level, quantum**2 / 12.0)
         # Neighbouring outputs of five taps share samples: about a third as many independent squares.
         usual = level * (1.0 + MARGIN * np.sqrt(6.0 / np.maximum(n_moves, 1)))
@@ -94,7 +94,7 @@ def unresolved_variance(
 def _between_gaps(ranges: IntArray, time_s: FloatArray | None, step_s: float) -> tuple[IntArray, IntArray]:
     """Half-open sample ranges (p, 2) that hold a filter and no gap, and which of ``ranges`` (m, 2) each is a piece of.
 
-    A range whose steps are mostly long has stamps that say little of the samples, and stays whole.
+    A range whose steps are mostly long has timestamps that say little of the samples, and stays whole.
     """
     after = np.zeros(0, dtype=np.int64) if time_s is None else np.flatnonzero(np.diff(time_s) > GAP * step_s) + 1
     if not len(after):

@@ -15,10 +15,10 @@ MAY_EXCEED = 2.5
 
 
 def coloured_variance(
-    hold_sigma: FloatArray,
+    pose_sigma: FloatArray,
     halves: FloatArray,
     density: FloatArray,
-    hold_duration_s: FloatArray,
+    pose_duration_s: FloatArray,
     move_duration_s: FloatArray,
 ) -> FloatArray:
     """Variance that slow noise adds to every move's integral, beyond that of white noise.
@@ -29,21 +29,21 @@ def coloured_variance(
 
     Parameters
     ----------
-    hold_sigma : (holds, 3)
+    pose_sigma : (holds, 3)
         Standard errors of pose means that do not assume whiteness, raw units.
     halves : (holds, 3)
         Mean of every pose's second half minus that of its first, raw units.
     density : (3,)
         White noise, raw units per √Hz.
-    hold_duration_s, move_duration_s : (holds,), (moves,)
+    pose_duration_s, move_duration_s : (holds,), (moves,)
 
     Returns
     -------
     (moves, 3) array, (raw unit · s)²
     """
-    white = density / np.sqrt(hold_duration_s)[:, None]
+    white = density / np.sqrt(pose_duration_s)[:, None]
     quiet = (quantiles(np.abs(halves / white), [QUIET])[0] / (2.0 * QUIET_OF_NORMAL)) ** 2
-    pooled = medians((hold_sigma / white) ** 2)
+    pooled = medians((pose_sigma / white) ** 2)
     colour = np.maximum(np.minimum(pooled, MAY_EXCEED * quiet), 1.0)
     out: FloatArray = np.outer(move_duration_s, (colour - 1.0) * density**2)
     return out

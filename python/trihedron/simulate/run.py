@@ -60,15 +60,15 @@ def simulate(scenario: Scenario, seed: int = 0) -> tuple[Recording, Truth]:
         )
     }
     kept = _kept(clock, true_s, seed)
-    stamps = _stamps(clock, true_s, kept, seed)
+    timestamps = _timestamps(clock, true_s, kept, seed)
     temperature = _pick(place.temperature.at(true_s), kept)
     supply = _pick(place.supply.at(true_s), kept)
     a, w = _pick(readings["accelerometer"], kept), _pick(readings["gyroscope"], kept)
     recording = Recording(
-        time_s=stamps,
+        time_s=timestamps,
         accelerometer=a,
         gyroscope=w,
-        rate_hz=float(1.0 / np.median(np.diff(stamps))) if len(stamps) > 1 else clock.rate_hz,
+        rate_hz=float(1.0 / np.median(np.diff(timestamps))) if len(timestamps) > 1 else clock.rate_hz,
         accelerometer_unit=accel.unit,
         gyroscope_unit=gyro.unit,
         temperature_degc=_steps(temperature, place.temperature.step_k) if place.temperature.logged else None,
@@ -181,18 +181,18 @@ def _kept(clock: Clock, true_s: FloatArray, seed: int) -> npt.NDArray[np.bool_]:
     return kept
 
 
-def _stamps(clock: Clock, true_s: FloatArray, kept: npt.NDArray[np.bool_], seed: int) -> FloatArray:
+def _timestamps(clock: Clock, true_s: FloatArray, kept: npt.NDArray[np.bool_], seed: int) -> FloatArray:
     n = int(np.count_nonzero(kept))
     index = np.arange(n) if clock.restamped else np.flatnonzero(kept)
-    stamps: FloatArray = index / clock.rate_hz
+    timestamps: FloatArray = index / clock.rate_hz
     if clock.instants_s and not clock.restamped:
-        stamps = np.array(clock.instants_s)[kept]
-    elif clock.stamps_show_jitter and not clock.restamped:
-        stamps = true_s[kept] * (1.0 + clock.rate_error)
-    if clock.stamp_jitter_s > 0.0:
-        noise = clock.stamp_jitter_s * stream(seed, "clock/stamps").standard_normal(len(true_s))[kept]
-        stamps = np.maximum.accumulate(stamps + noise)
-    since_first: FloatArray = stamps - stamps[0]
+        timestamps = np.array(clock.instants_s)[kept]
+    elif clock.timestamps_show_jitter and not clock.restamped:
+        timestamps = true_s[kept] * (1.0 + clock.rate_error)
+    if clock.timestamp_jitter_s > 0.0:
+        noise = clock.timestamp_jitter_s * stream(seed, "clock/timestamps").standard_normal(len(true_s))[kept]
+        timestamps = np.maximum.accumulate(timestamps + noise)
+    since_first: FloatArray = timestamps - timestamps[0]
     return since_first
 
 

@@ -122,8 +122,8 @@ class Clock:
     """When samples are taken and what the timestamps say.
 
     ``rate_error``: the true rate is ``rate_hz (1 + rate_error)`` while the timestamps believe in ``rate_hz``.
-    ``jitter_s``: rms of the true instants about the grid; ``stamps_show_jitter`` writes it into the timestamps.
-    ``stamp_jitter_s``: rms error of the timestamps alone. ``gyroscope_offset_s``: the gyro samples that much later
+    ``jitter_s``: rms of the true instants about the grid; ``timestamps_show_jitter`` writes it into the timestamps.
+    ``timestamp_jitter_s``: rms error of the timestamps alone. ``gyroscope_offset_s``: the gyro samples that much later
     under the same stamp. Samples are lost as listed in ``losses`` and at random with ``loss_probability``;
     ``restamped`` then counts on as if nothing were missing. ``instants_s`` gives every true instant, from 0, instead of
     a grid: timestamps and gaps of a real log. ``oversample`` fine steps per sample where a sensor has dynamics (0: 8).
@@ -132,8 +132,8 @@ class Clock:
     rate_hz: float = 100.0
     rate_error: float = 0.0
     jitter_s: float = 0.0
-    stamps_show_jitter: bool = False
-    stamp_jitter_s: float = 0.0
+    timestamps_show_jitter: bool = False
+    timestamp_jitter_s: float = 0.0
     gyroscope_offset_s: float = 0.0
     losses: tuple[Loss, ...] = ()
     loss_probability: float = 0.0
@@ -144,8 +144,10 @@ class Clock:
     def __post_init__(self) -> None:
         if not 0.0 < self.rate_hz < 1e6:
             raise RefusedError(f"rate_hz must be a positive number, got {self.rate_hz}")
-        if not (0.0 <= self.loss_probability < 1.0 and self.jitter_s >= 0.0 and self.stamp_jitter_s >= 0.0):
-            raise RefusedError("loss_probability must be in [0, 1); jitter_s and stamp_jitter_s must not be negative")
+        if not (0.0 <= self.loss_probability < 1.0 and self.jitter_s >= 0.0 and self.timestamp_jitter_s >= 0.0):
+            raise RefusedError(
+                "loss_probability must be in [0, 1); jitter_s and timestamp_jitter_s must not be negative"
+            )
         if np.any(np.diff(self.instants_s) < 0.0):
             raise RefusedError("instants_s must not run backward")
         if not -0.5 < self.rate_error < 0.5:

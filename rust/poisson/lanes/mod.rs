@@ -211,7 +211,7 @@ impl Sums {
     }
 
     fn add(&mut self, instructions: Instructions, rows: &[StepRow], rate: &Rate) {
-        // Stamps with errors let the rate's change over every step count, lost samples that over some.
+        // Timestamps with errors let the rate's change over every step count, lost samples that over some.
         let is_jumpy =
             rate.var_time > 0.0 || rows.iter().any(|row| row.h.iter().any(|&h| h > rate.gap_s));
         add_steps(instructions, rows, rate, is_jumpy, self);

@@ -64,7 +64,7 @@ for_each_instruction_set! {
     ) = fill_cubics_body
 }
 
-/// Stamps and readings of some sample of every stretch.
+/// Timestamps and readings of some sample of every stretch.
 struct Samples {
     time_s: Row,
     raw: [Row; 3],

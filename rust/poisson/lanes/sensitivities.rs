@@ -211,7 +211,7 @@ fn sensitivities<const FUSED: bool>(
     }
 }
 
-/// The covariance from stamps with errors, and from lost samples: they leave the rate anywhere between its neighbours,
+/// The covariance from timestamps with errors, and from lost samples: they leave the rate anywhere between its neighbours,
 /// uniform, so h²/12.
 #[inline(always)]
 fn jumps<const FUSED: bool>(row: &StepRow, rate: &Rate, to_start: &[Row; 9], cov: &mut [Row; 6]) {

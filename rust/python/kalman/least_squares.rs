@@ -18,17 +18,17 @@ pub(super) fn kalman_noise_covariance<'py>(
     py: Python<'py>,
     model: &AxisKalmanModel,
     start_s: PyReadonlyArray1<'py, f64>,
-    hold_s: PyReadonlyArray1<'py, f64>,
+    pose_s: PyReadonlyArray1<'py, f64>,
     extra_variance: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Array2<'py>> {
-    if hold_s.len() != start_s.len() || extra_variance.len() != start_s.len() {
+    if pose_s.len() != start_s.len() || extra_variance.len() != start_s.len() {
         return Err(PyValueError::new_err(
-            "start_s, hold_s and extra_variance must have the same length",
+            "start_s, pose_s and extra_variance must have the same length",
         ));
     }
     let (t, hold, extra) = (
         start_s.as_array(),
-        hold_s.as_array(),
+        pose_s.as_array(),
         extra_variance.as_array(),
     );
     let poses: Vec<Pose> = (0..t.len())

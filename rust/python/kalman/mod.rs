@@ -107,13 +107,13 @@ impl AxisKalmanModel {
     }
 
     /// Variance of a reading over a hold that is white from pose to pose.
-    fn white_variance(&self, hold_s: f64) -> f64 {
-        self.inner.white_variance(hold_s)
+    fn white_variance(&self, pose_s: f64) -> f64 {
+        self.inner.white_variance(pose_s)
     }
 
     /// Variance of a reading without the slow terms.
-    fn fast_variance(&self, hold_s: f64) -> f64 {
-        self.inner.fast_variance(hold_s)
+    fn fast_variance(&self, pose_s: f64) -> f64 {
+        self.inner.fast_variance(pose_s)
     }
 }
 
@@ -158,21 +158,21 @@ impl AxisKalman {
     }
 
     /// Take one pose; innovation and its predicted variance.
-    #[pyo3(signature = (reading, reference, start_s, hold_s, extra_variance=0.0))]
+    #[pyo3(signature = (reading, reference, start_s, pose_s, extra_variance=0.0))]
     fn add(
         &mut self,
         py: Python<'_>,
         reading: f64,
         reference: [f64; 3],
         start_s: f64,
-        hold_s: f64,
+        pose_s: f64,
         extra_variance: f64,
     ) -> PyResult<(f64, f64)> {
         let pose = Pose {
             reading,
             reference,
             start: start_s,
-            hold: hold_s,
+            hold: pose_s,
             extra_variance,
         };
         let filter = &mut self.inner;
@@ -186,10 +186,10 @@ impl AxisKalman {
         py: Python<'_>,
         reference: [f64; 3],
         start_s: f64,
-        hold_s: f64,
+        pose_s: f64,
     ) -> PyResult<()> {
         let filter = &mut self.inner;
-        super::run(py, || filter.imagine(reference, start_s, hold_s))
+        super::run(py, || filter.imagine(reference, start_s, pose_s))
     }
 
     /// An independent filter in the same state.

@@ -20,7 +20,7 @@ impl KalmanPoses {
         readings: PyReadonlyArray1<'_, f64>,
         references: PyReadonlyArray2<'_, f64>,
         start_s: PyReadonlyArray1<'_, f64>,
-        hold_s: PyReadonlyArray1<'_, f64>,
+        pose_s: PyReadonlyArray1<'_, f64>,
         extra_variance: PyReadonlyArray1<'_, f64>,
     ) -> PyResult<Self> {
         let rows = rows3("references", &references)?;
@@ -28,7 +28,7 @@ impl KalmanPoses {
         for (name, array) in [
             ("readings", &readings),
             ("start_s", &start_s),
-            ("hold_s", &hold_s),
+            ("pose_s", &pose_s),
             ("extra_variance", &extra_variance),
         ] {
             if array.len() != n {
@@ -41,7 +41,7 @@ impl KalmanPoses {
         let (z, t, hold, extra) = (
             readings.as_array(),
             start_s.as_array(),
-            hold_s.as_array(),
+            pose_s.as_array(),
             extra_variance.as_array(),
         );
         let poses = (0..n)

@@ -81,13 +81,13 @@ impl SessionFit {
     }
 
     #[getter]
-    fn rate_zero<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        vectors(py, &self.fit.state.rate_zero)
+    fn pose_rate_bias<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        vectors(py, &self.fit.state.pose_rate_bias)
     }
 
     #[getter]
-    fn force_zero<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        vectors(py, &self.fit.state.force_zero)
+    fn pose_force_bias<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        vectors(py, &self.fit.state.pose_force_bias)
     }
 
     #[getter]

@@ -82,12 +82,12 @@ pub(super) struct SessionMoves {
 
 #[pymethods]
 impl SessionMoves {
-    /// `hold_time_s` `(h,)`; whole recording `time_s` `(n,)`, `force`, `rate` `(n, 3)` raw and centred; `ranges` `(m, 2)` of
+    /// `pose_time_s` `(h,)`; whole recording `time_s` `(n,)`, `force`, `rate` `(n, 3)` raw and centred; `ranges` `(m, 2)` of
     /// samples, the pose `before` `(m,)` each, `unresolved` `(m, 2, 3)` variances of their integrals.
     #[new]
-    #[pyo3(signature = (*, hold_time_s, time_s, force, rate, ranges, before, unresolved))]
+    #[pyo3(signature = (*, pose_time_s, time_s, force, rate, ranges, before, unresolved))]
     fn new(
-        hold_time_s: Array1<'_>,
+        pose_time_s: Array1<'_>,
         time_s: Array1<'_>,
         force: Array2<'_>,
         rate: Option<Array2<'_>>,
@@ -97,7 +97,7 @@ impl SessionMoves {
     ) -> PyResult<Self> {
         let moves = moves_of(
             &samples(&time_s),
-            &samples(&hold_time_s),
+            &samples(&pose_time_s),
             &force,
             rate.as_ref(),
             &ranges,
@@ -120,14 +120,14 @@ pub(super) struct SessionState {
 impl SessionState {
     /// `S_a`, `b_a`, `S_w` on centred readings; of every pose the vertical and both zeros, raw, `(h, 3)`; effects `(k,)`.
     #[new]
-    #[pyo3(signature = (*, force_scale, force_bias, rate_scale, up, rate_zero, force_zero, effect))]
+    #[pyo3(signature = (*, force_scale, force_bias, rate_scale, up, pose_rate_bias, pose_force_bias, effect))]
     fn new(
         force_scale: Array2<'_>,
         force_bias: Array1<'_>,
         rate_scale: Array2<'_>,
         up: Array2<'_>,
-        rate_zero: Array2<'_>,
-        force_zero: Array2<'_>,
+        pose_rate_bias: Array2<'_>,
+        pose_force_bias: Array2<'_>,
         effect: Array1<'_>,
     ) -> PyResult<Self> {
         let up = rows3("up", &up)?;
@@ -137,12 +137,12 @@ impl SessionState {
             force_bias: vector3("force_bias", &force_bias)?,
             rate_scale: matrix3("rate_scale", &rate_scale)?,
             up,
-            rate_zero: rows3("rate_zero", &rate_zero)?,
-            force_zero: rows3("force_zero", &force_zero)?,
+            pose_rate_bias: rows3("pose_rate_bias", &pose_rate_bias)?,
+            pose_force_bias: rows3("pose_force_bias", &pose_force_bias)?,
             own: [vec![Vector3::zeros(); h], vec![Vector3::zeros(); h]],
             effect: DVector::from_vec(samples(&effect)),
         };
-        if [state.rate_zero.len(), state.force_zero.len()] != [h; 2] {
+        if [state.pose_rate_bias.len(), state.pose_force_bias.len()] != [h; 2] {
             return Err(PyValueError::new_err(format!(
                 "the state needs one zero of each sensor for each of {h} poses"
             )));
@@ -153,7 +153,7 @@ impl SessionState {
 
 fn moves_of(
     time_s: &[f64],
-    hold_time_s: &[f64],
+    pose_time_s: &[f64],
     force: &Array2<'_>,
     rate: Option<&Array2<'_>>,
     ranges: &PyReadonlyArray2<'_, i64>,
@@ -204,7 +204,7 @@ fn moves_of(
                 time_s.len()
             )));
         }
-        if hold + 1 >= hold_time_s.len() {
+        if hold + 1 >= pose_time_s.len() {
             return Err(PyValueError::new_err(format!(
                 "move {k} begins in pose {hold} and there is none after it"
             )));
@@ -215,7 +215,7 @@ fn moves_of(
             &time_s[start..stop],
             rows(&rate, start, stop),
             rows(&force, start, stop),
-            [hold_time_s[hold], hold_time_s[hold + 1]],
+            [pose_time_s[hold], pose_time_s[hold + 1]],
             extra,
             first_point,
         ));

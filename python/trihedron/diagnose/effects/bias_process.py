@@ -14,7 +14,7 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain
 from trihedron.records.words import Words, why_not
 
-FEWEST_HOLDS = 6
+FEWEST_POSES = 6
 """Two processes on three axes are not told apart by fewer poses."""
 
 
@@ -31,7 +31,7 @@ class BiasProcess(Effect):
     def unavailable(self, context: Context) -> str | None:
         if self.sensor == 1 and context.obs.raw_rate is None:
             return why_not("no-gyro")
-        return why_not("six-poses") if context.obs.n_holds < FEWEST_HOLDS else None
+        return why_not("six-poses") if context.obs.n_poses < FEWEST_POSES else None
 
     def variants(self, context: Context) -> list[Variant]:  # noqa: ARG002
         return []

@@ -11,7 +11,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms
-from trihedron.diagnose.residuals.within_holds import LOUD, hold_scatter
+from trihedron.diagnose.residuals.within_poses import LOUD, pose_scatter
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, folds_of, leverage, predict_held_out
 from trihedron.diagnose.session.twin import NO_DISTORTION, STATIC_ACCEL
@@ -82,12 +82,12 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
     if len(twin.effect):
         return ()
     whole = replace(observe(obs.recording, obs.whole, obs.averaging), jitter_s=obs.jitter_s)
-    force = whole.hold_force @ twin.accel_S.T + twin.accel_b
-    n = whole.n_holds
+    force = whole.pose_force @ twin.accel_S.T + twin.accel_b
+    n = whole.n_poses
     start = replace(
         twin,
         up=force / np.linalg.norm(force, axis=1, keepdims=True),
-        gyro_bias=np.zeros((n, 3)) if whole.hold_rate is None else whole.hold_rate @ twin.gyro_S.T,
+        gyro_bias=np.zeros((n, 3)) if whole.pose_rate is None else whole.pose_rate @ twin.gyro_S.T,
         accel_bias=np.zeros((n, 3)),
     )
     fits = (fit(whole, start, NO_DISTORTION, context.fitted.line.prior), context.fitted)
@@ -106,7 +106,7 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
 
 def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
     """Poses that shake throughout: the level of one half, not that of the other poses, predicts the other half."""
-    scatter = hold_scatter(obs)
+    scatter = pose_scatter(obs)
     own = np.array([not hold.is_unsteady for hold in obs.segments.poses])
     loud = own[:, None] & (scatter.ratio > LOUD) & (scatter.p_value * scatter.p_value.size < SHAKES_P)
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
@@ -133,11 +133,11 @@ def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
     obs, fitted = context.obs, context.fitted
     rows = np.flatnonzero((fitted.system.domain == STATIC_ACCEL) & (fitted.system.walk == 0))
     poses, free = fitted.system.segment[rows], 1.0 - leverage(fitted)[rows]
-    chi2 = np.bincount(poses, fitted.system.residual[rows] ** 2, minlength=obs.n_holds)
+    chi2 = np.bincount(poses, fitted.system.residual[rows] ** 2, minlength=obs.n_poses)
     out: npt.NDArray[np.bool_] = chi2 > OWN_SIGMA**2 * np.maximum(
-        np.bincount(poses, free, minlength=obs.n_holds), LEAST_DOF
+        np.bincount(poses, free, minlength=obs.n_poses), LEAST_DOF
     )
-    for halves, sigma in zip(obs.half_means, (obs.hold_force_sigma, obs.hold_rate_sigma), strict=True):
+    for halves, sigma in zip(obs.half_means, (obs.pose_force_sigma, obs.pose_rate_sigma), strict=True):
         if halves is not None and sigma is not None:
             # Each half's mean has twice the variance of the whole's, their difference four times.
             out |= (np.abs(halves[:, 1] - halves[:, 0]) > 2.0 * OWN_SIGMA * sigma).any(axis=1)
@@ -167,7 +167,7 @@ class DisturbedPose(DirectEffect):
         if bumped:
             held = (*held, max(bumps.values(), key=lambda bump: bump.chi2_per_dof_before))
         restless, predicted = _restless(obs)
-        if len(restless) > MOST * obs.n_holds:
+        if len(restless) > MOST * obs.n_poses:
             restless = []
         if restless and predicted is not None:
             held = (*held, predicted)
@@ -185,7 +185,7 @@ class DisturbedPose(DirectEffect):
         parameters = tuple(EffectParameter("pose_at", 0.5 * (a + b), 0.5 * max(b - a, 0.1), "s") for a, b in spans[:6])
         return Evidence(
             1e-30, strength, parameters, told, "within-static",
-            Where((), tuple(f"pose {i + 1}" for i in restless), spans), held, share=min(len(spans) / obs.n_holds, 1.0),
+            Where((), tuple(f"pose {i + 1}" for i in restless), spans), held, share=min(len(spans) / obs.n_poses, 1.0),
         )  # fmt: skip
 
     def variants(self, context: Context) -> list[Variant]:

@@ -66,7 +66,7 @@ def warm_up_variant(
 
 def shortest_time_constant(context: Context) -> float:
     """s; a faster exponential is over before the third pose."""
-    middles = context.obs.hold_time_s
+    middles = context.obs.pose_time_s
     if len(middles) < FEWEST_POSES_OF_A_DRIFT:
         return 0.0
     return float(middles[FEWEST_POSES_OF_A_DRIFT - 1] - middles[0]) / float(-np.log(STILL_THERE))

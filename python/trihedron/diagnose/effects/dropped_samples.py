@@ -1,4 +1,4 @@
-"""Samples lost without a trace in the time stamps."""
+"""Samples lost without a trace in the time timestamps."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ def _by_gravity(context: Context, losses: list[Loss]) -> tuple[dict[int, int], d
     counts = {loss.sample: loss.count for loss in losses}
     sigmas = {loss.sample: 0.5 + UNSETTLED * loss.count for loss in losses}
     obs, twin = context.obs, context.fitted.twin
-    ranges, holds = without_moves(obs.move_ranges, obs.move_holds, {loss.move for loss in losses})
+    ranges, holds = without_moves(obs.move_ranges, obs.move_poses, {loss.move for loss in losses})
     if not losses or len(ranges) < 3 or len(twin.effect):
         return counts, sigmas
-    clean = fit(replace(obs, move_ranges=ranges, move_holds=holds), twin, NO_DISTORTION, context.fitted.line.prior).twin
+    clean = fit(replace(obs, move_ranges=ranges, move_poses=holds), twin, NO_DISTORTION, context.fitted.line.prior).twin
     for m in sorted({loss.move for loss in losses}):
         own = sorted((loss for loss in losses if loss.move == m), key=lambda one: -one.gain)
         trial = {loss.sample: loss.count for loss in own}
@@ -91,7 +91,7 @@ def _misfit(obs: Observations, twin: Twin, m: int, losses: dict[int, int]) -> fl
         raw_force=force,
         raw_rate=rate,
         move_ranges=((0, len(time)),),
-        move_holds=obs.move_holds[m : m + 1],
+        move_poses=obs.move_poses[m : m + 1],
     )
     return float(move_misfit(one, twin)[0])
 

@@ -115,11 +115,11 @@ class EarthRate(Effect):
         return None
 
     def variants(self, context: Context) -> list[Variant]:
-        attitude = context.hold_attitude
+        attitude = context.pose_attitude
         attitude = np.where(np.isfinite(attitude), attitude, 0.0)
         return [
             Variant(
-                rate_only(context.between_holds(attitude)), ("horizontal_x", "horizontal_y", "vertical"),
+                rate_only(context.between_poses(attitude)), ("horizontal_x", "horizontal_y", "vertical"),
                 ("rad/s",) * 3, given={"gravity": context.fitted.twin.gravity},
             )
         ]  # fmt: skip

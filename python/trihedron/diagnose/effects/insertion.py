@@ -1,4 +1,4 @@
-"""Lost samples put back: a cubic bridge across every gap, stamps and poses behind it moved."""
+"""Lost samples put back: a cubic bridge across every gap, timestamps and poses behind it moved."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def insert_samples(recording: Recording, segments: Segments, losses: dict[int, i
     """Put ``n`` samples behind sample ``k`` for every ``k: n``, on a cubic through the two samples on either side.
 
     A cubic Hermite bridge keeps value and slope at both edges of the gap, so that the rotation integrated across it is
-    right to the fifth power of its length. Time stamps behind a gap move by what was lost.
+    right to the fifth power of its length. Time timestamps behind a gap move by what was lost.
     """
     n_old = recording.n_samples
     step = 1.0 / recording.rate_hz

@@ -135,7 +135,7 @@ def _true_moves(context: Context) -> list[slice]:
 
 
 def _written(context: Context) -> _Moves:
-    holds = context.obs.n_holds
+    holds = context.obs.n_poses
     spans = _true_moves(context)
     short = float(np.quantile([where.stop - where.start for where in spans], SHORT))
     n_shapes = int(np.clip(short // SAMPLES_PER_SHAPE, 1, N_SHAPES))

@@ -10,7 +10,7 @@ from scipy.special import ndtr
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.residuals.within_holds import CHANNELS
+from trihedron.diagnose.residuals.within_poses import CHANNELS
 from trihedron.diagnose.session.observations import Observations
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
@@ -147,7 +147,7 @@ class Quantisation(DirectEffect):
             return old
 
         worst = max(found, key=lambda one: one.step / one.sigma)
-        strength = float(sum((one.step / one.sigma) ** 2 for one in found) * obs.n_holds)
+        strength = float(sum((one.step / one.sigma) ** 2 for one in found) * obs.n_poses)
         grid = worst.step**2 / 12.0  # variance of the staircase, beside that of the noise in front of it
         names = tuple(CHANNELS[one.channel] for one in found)
         told = self.told(
@@ -226,8 +226,8 @@ def _resolved(obs: Observations, one: Lattice) -> Observations:
     """Observations with one channel's hold means and noise as the codes truly tell them."""
     is_accel = one.channel < 3
     k = one.channel % 3
-    mean = (obs.hold_force if is_accel else obs.hold_rate).copy()  # type: ignore[union-attr]
-    sigma = (obs.hold_force_sigma if is_accel else obs.hold_rate_sigma).copy()  # type: ignore[union-attr]
+    mean = (obs.pose_force if is_accel else obs.pose_rate).copy()  # type: ignore[union-attr]
+    sigma = (obs.pose_force_sigma if is_accel else obs.pose_rate_sigma).copy()  # type: ignore[union-attr]
     density = (obs.force_density if is_accel else obs.rate_density).copy()  # type: ignore[union-attr]
     mean[:, k] += one.mean_shift
     sigma[:, k] = np.hypot(sigma[:, k] * min(one.sigma / max(one.scatter, 1e-300), 1.0), one.mean_sigma)
@@ -238,7 +238,7 @@ def _resolved(obs: Observations, one: Lattice) -> Observations:
         if along is not None:
             # The vertical's share of what the codes change.
             up, error = along
-            changed = up[:, k] ** 2 * (sigma[:, k] ** 2 - obs.hold_force_sigma[:, k] ** 2)
+            changed = up[:, k] ** 2 * (sigma[:, k] ** 2 - obs.pose_force_sigma[:, k] ** 2)
             along = up, np.sqrt(np.maximum(error**2 + changed, LEAST_LEFT * error**2))
-        return replace(obs, hold_force=mean, hold_force_sigma=sigma, force_density=density, force_up=along)
-    return replace(obs, hold_rate=mean, hold_rate_sigma=sigma, rate_density=density)
+        return replace(obs, pose_force=mean, pose_force_sigma=sigma, force_density=density, force_up=along)
+    return replace(obs, pose_rate=mean, pose_rate_sigma=sigma, rate_density=density)

@@ -74,8 +74,8 @@ class _Saturation(DirectEffect):
         bad = set(touched)
 
         def reweigh(old: Observations) -> Observations:
-            ranges, holds = without_moves(old.move_ranges, old.move_holds, bad)
-            return replace(old, move_ranges=ranges, move_holds=holds)
+            ranges, holds = without_moves(old.move_ranges, old.move_poses, bad)
+            return replace(old, move_ranges=ranges, move_poses=holds)
 
         prefix = "g" if is_gyro else "a"
         channels = tuple(sorted({prefix + AXES[r.axis] for r in runs}))
@@ -94,7 +94,7 @@ class _Saturation(DirectEffect):
             restate=lambda later: self._limits(later, runs, sigma),  # false moves had bent the scale factors
         )  # fmt: skip
 
-    def _scale_and_zero(self, context: Context) -> tuple[FloatArray, FloatArray]:
+    def _scale_and_bias(self, context: Context) -> tuple[FloatArray, FloatArray]:
         """SI per raw unit along each axis, and what a centred raw reading of zero means in SI."""
         if self.sensor == "gyro":
             return context.si_per_raw("gyroscope"), np.zeros(3)
@@ -106,7 +106,7 @@ class _Saturation(DirectEffect):
         is_gyro = self.sensor == "gyro"
         raw = obs.raw_rate if is_gyro else obs.raw_force
         assert raw is not None
-        scale, zero = self._scale_and_zero(context)
+        scale, zero = self._scale_and_bias(context)
         origin = obs.rate_origin if is_gyro else obs.force_origin
         limit = min(abs((run.limit.value - origin[run.axis]) * scale[run.axis] + zero[run.axis]) for run in runs)
         close = {m for m, (a, b) in enumerate(obs.move_ranges)
@@ -116,7 +116,7 @@ class _Saturation(DirectEffect):
 
     def _limits(self, context: Context, runs: list[Plateau], sigma: FloatArray) -> tuple[EffectParameter, ...]:
         """Limits in SI along every channel, with the exact code where readings end on one."""
-        scale, zero = self._scale_and_zero(context)
+        scale, zero = self._scale_and_bias(context)
         obs = context.obs
         is_gyro = self.sensor == "gyro"
         origin = obs.rate_origin if is_gyro else obs.force_origin

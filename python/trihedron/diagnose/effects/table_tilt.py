@@ -54,14 +54,14 @@ class TableTilt(DirectEffect):
         twin, obs = context.fitted.twin, context.obs
         chi2, dof, tilts, weights, noises = 0.0, 0, [], [], []
         for turn in table_turns(context):
-            before, after = obs.move_holds[turn.move]
+            before, after = obs.move_poses[turn.move]
             half = abs(np.sin(turn.angle_rad / 2.0))
             if half < LEAST_SINE:
                 continue
             change = twin.up[after] - twin.up[before]
             sigma = float(
                 np.sqrt(
-                    ((twin.accel_S**2) @ (obs.hold_force_sigma[before] ** 2 + obs.hold_force_sigma[after] ** 2)).mean()
+                    ((twin.accel_S**2) @ (obs.pose_force_sigma[before] ** 2 + obs.pose_force_sigma[after] ** 2)).mean()
                 )
             )
             sigma /= twin.gravity

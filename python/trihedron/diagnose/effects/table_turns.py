@@ -34,10 +34,10 @@ class TableTurn:
 
 def table_turns(context: Context) -> list[TableTurn]:
     """Moves whose axis is the vertical throughout: the vertical ends where it began in the body."""
-    twin, path, h = context.fitted.twin, context.fitted.line.path, context.obs.n_holds
+    twin, path, h = context.fitted.twin, context.fitted.line.path, context.obs.n_poses
     out = []
     for m, where in enumerate(context.moves):
-        before, after = context.obs.move_holds[m]
+        before, after = context.obs.move_poses[m]
         up = twin.up[before]
         if up @ twin.up[after] < np.cos(np.radians(MOST_SWING_DEG)):
             continue

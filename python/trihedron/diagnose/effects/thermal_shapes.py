@@ -52,7 +52,7 @@ def thermal_bias_variants(
     ]  # fmt: skip
     speed = context.temperature_rate
     # Taken off another log the shape is what was fitted, whatever that log's temperature does.
-    is_fitted = context.obs.n_holds > 0
+    is_fitted = context.obs.n_poses > 0
     if speed is None:
         return out
     if is_fitted and (not speed.any() or np.ptp(speed) < LEAST_RATE_RANGE * np.abs(speed).max()):

@@ -1,4 +1,4 @@
-"""Samples taken at other instants than their time stamps say, every one by a little."""
+"""Samples taken at other instants than their time timestamps say, every one by a little."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scipy.special import ndtr
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.sample_steps import StepErrors, step_errors
-from trihedron.diagnose.effects.stamp_errors import CLEAR, stamp_errors
+from trihedron.diagnose.effects.timestamp_errors import CLEAR, timestamp_errors
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import why_not
@@ -61,13 +61,13 @@ class TimingJitter(DirectEffect):
         return why_not("no-moves") if not context.moves else None
 
     def find(self, context: Context) -> Evidence | None:
-        return self._wrong_stamps(context) or self._uneven_samples(context)
+        return self._wrong_timestamps(context) or self._uneven_samples(context)
 
-    def _wrong_stamps(self, context: Context) -> Evidence | None:
-        stamps = stamp_errors(context.obs)
-        if stamps is None or stamps.sigma > CLEAR or abs(stamps.followed) > CLEAR + 3.0 * stamps.sigma:
+    def _wrong_timestamps(self, context: Context) -> Evidence | None:
+        found = timestamp_errors(context.obs)
+        if found is None or found.sigma > CLEAR or abs(found.followed) > CLEAR + 3.0 * found.sigma:
             return None
-        even = stamps.even_s
+        even = found.even_s
 
         def reweigh(obs: Observations) -> Observations:
             if len(even) != len(obs.time_s):
@@ -76,15 +76,15 @@ class TimingJitter(DirectEffect):
             return replace(
                 again,
                 move_ranges=obs.move_ranges,
-                move_holds=obs.move_holds,
+                move_poses=obs.move_poses,
                 jitter_s=obs.jitter_s,
                 bumped_s=obs.bumped_s,
             )
 
         return Evidence(
-            float(max(ndtr((stamps.followed - 1.0) / max(stamps.sigma, 1e-3)), 1e-300)), max(stamps.gain, 1.0),
-            (EffectParameter("stamp_error", stamps.rms_s, stamps.rms_s * max(stamps.sigma, 1e-3), "s"),),
-            self.told("stamps", rms_s=stamps.rms_s, followed=stamps.followed, sigma=stamps.sigma),
+            float(max(ndtr((found.followed - 1.0) / max(found.sigma, 1e-3)), 1e-300)), max(found.gain, 1.0),
+            (EffectParameter("timestamp_error", found.rms_s, found.rms_s * max(found.sigma, 1e-3), "s"),),
+            self.told("timestamps", rms_s=found.rms_s, followed=found.followed, sigma=found.sigma),
             "timing", reweigh=reweigh,
         )  # fmt: skip
 

@@ -26,7 +26,7 @@ class VibrationRectification(Effect):
         return np.full(3, GYRO_PER_POWER if variant.distortion.force is None else ACCEL_PER_POWER)
 
     def unavailable(self, context: Context) -> str | None:
-        power = context.hold_power.sum(axis=1)
+        power = context.pose_power.sum(axis=1)
         if power.max() < STANDS_OUT * np.median(power):
             return why_not("even-vibration")
         return None
@@ -34,7 +34,7 @@ class VibrationRectification(Effect):
     def variants(self, context: Context) -> list[Variant]:
         excess = context.vibration_power
         # What shakes on the way is hard to tell from the haste of the hand: once with it, once without.
-        still = np.where(np.arange(len(excess))[:, None] < context.obs.n_holds, excess, 0.0)
+        still = np.where(np.arange(len(excess))[:, None] < context.obs.n_poses, excess, 0.0)
         names, units = per_axis("accel_bias_per_power"), ("1/(m/s^2)",) * 3
         out = [
             Variant(force_only(context.on_accelerometers(power)), names, units, label=label)

@@ -44,7 +44,7 @@ def signals(context: Context) -> list[Signal]:
     if context.obs.raw_rate is not None:
         out += _forces(context, "gyroscope") + _gyro_only(context) + _history(context, "gyroscope")
         out += _warming(context, "gyroscope") + _motion(context)
-    h = context.obs.n_holds
+    h = context.obs.n_poses
     return [_centred(one, h) for one in out if np.isfinite(one.values).all() and (np.ptp(one.values, axis=0) > 0).all()]
 
 
@@ -53,8 +53,8 @@ def room(context: Context) -> FloatArray | None:
 
     ``None`` where a chain of moves is broken.
     """
-    attitude = context.hold_attitude
-    return context.between_holds(attitude) if np.isfinite(attitude).all() else None
+    attitude = context.pose_attitude
+    return context.between_poses(attitude) if np.isfinite(attitude).all() else None
 
 
 def _centred(signal: Signal, n_poses: int) -> Signal:
@@ -78,7 +78,7 @@ def _gyro_only(context: Context) -> list[Signal]:
     out += [Signal("gyroscope", "force", (f"u_{AXES[a]}^3",), f[:, [a]] ** 3, ("g^3",)) for a in range(3)]
     out += [Signal("gyroscope", "force", (f"|u_{AXES[a]}|",), np.abs(f[:, [a]]), ("g",)) for a in range(3)]
     up = context.fitted.twin.up
-    before = context.between_holds(np.vstack([up[:1], up[:-1]]))
+    before = context.between_poses(np.vstack([up[:1], up[:-1]]))
     return out + [
         Signal("gyroscope", "previous pose", (f"previous u_{AXES[a]}",), before[:, [a]], ("g",)) for a in range(3)
     ]
@@ -87,10 +87,10 @@ def _gyro_only(context: Context) -> list[Signal]:
 def _history(context: Context, sensor: Sensor) -> list[Signal]:
     """The turn that led to a pose."""
     turn = np.zeros_like(context.fitted.twin.up)
-    for where, (_, after) in zip(context.moves, context.obs.move_holds, strict=True):
+    for where, (_, after) in zip(context.moves, context.obs.move_poses, strict=True):
         turn[after] = np.trapezoid(context.rate[where], context.time_s[where], axis=0)
-    angle, sign = context.between_holds(turn), context.between_holds(np.sign(turn))
-    size = context.between_holds(np.linalg.norm(turn, axis=1, keepdims=True))
+    angle, sign = context.between_poses(turn), context.between_poses(np.sign(turn))
+    size = context.between_poses(np.linalg.norm(turn, axis=1, keepdims=True))
     out = [Signal(sensor, "last turn", (f"last turn about {AXES[a]}",), angle[:, [a]], ("rad",)) for a in range(3)]
     out += [
         Signal(sensor, "last turn", (f"sign of the last turn about {AXES[a]}",), sign[:, [a]], ("1",)) for a in range(3)

@@ -52,9 +52,9 @@ def residuals_before_after(before: Fit, after: Fit, named: Collection[int] = ())
 
 def _shown(fitted: Fit, named: Collection[int] = ()) -> dict[str, _Shown]:
     line, twin, obs = fitted.line, fitted.twin, fitted.line.obs
-    h = obs.n_holds
+    h = obs.n_poses
     out: dict[str, _Shown] = {}
-    force = obs.hold_force @ twin.accel_S.T + (
+    force = obs.pose_force @ twin.accel_S.T + (
         line.core.force_bias - twin.accel_bias if 0 in named else line.core.session_force_bias
     )
     if line.distortion.force is not None:
@@ -62,14 +62,14 @@ def _shown(fitted: Fit, named: Collection[int] = ()) -> dict[str, _Shown]:
     size = np.linalg.norm(force, axis=1)
     along = (force / size[:, None]) @ twin.accel_S
     sigma = obs.norm_sigma(along)
-    out["static-accel"] = _Shown(obs.hold_time_s, (size - twin.gravity)[:, None], sigma)
-    if obs.hold_rate is not None and obs.hold_rate_sigma is not None:
-        rate = obs.hold_rate @ twin.gyro_S.T
+    out["static-accel"] = _Shown(obs.pose_time_s, (size - twin.gravity)[:, None], sigma)
+    if obs.pose_rate is not None and obs.pose_rate_sigma is not None:
+        rate = obs.pose_rate @ twin.gyro_S.T
         if line.distortion.rate is not None:
             rate = rate - line.distortion.rate[:h] @ twin.effect
-        spread = np.sqrt((obs.hold_rate_sigma**2 @ (twin.gyro_S**2).T).mean(axis=1))
+        spread = np.sqrt((obs.pose_rate_sigma**2 @ (twin.gyro_S**2).T).mean(axis=1))
         bias = twin.gyro_bias if 1 in named else rate.mean(axis=0)
-        out["static-gyro"] = _Shown(obs.hold_time_s, rate - bias, spread)
+        out["static-gyro"] = _Shown(obs.pose_time_s, rate - bias, spread)
     if obs.n_moves:
         residual, noise = line.move_errors
         variance = np.einsum("mii->mi", noise)

@@ -83,7 +83,7 @@ def with_settling(context: Context, found: Settling) -> Observations:
     its mean is (eq. 8.7f). That the rates at rest disagree is still judged by their own noise.
     """
     obs = context.obs
-    assert obs.hold_rate_sigma is not None
+    assert obs.pose_rate_sigma is not None
     lasts = np.array([hold.stop - hold.start for hold in obs.segments.poses]) / obs.recording.rate_hz
     fades = np.exp(-lasts / found.tau_s)
     mean = found.tau_s * (1.0 - fades) / lasts
@@ -91,13 +91,15 @@ def with_settling(context: Context, found: Settling) -> Observations:
     begins, ends = turned * (1.0 - mean), turned * (mean - fades)
     si_per_raw = context.si_per_raw("gyroscope")
     unresolved = dict(obs.unresolved)
-    for before, after in obs.move_holds:
+    for before, after in obs.move_poses:
         key = int(before), int(after)
         wider = np.zeros((2, 3)) if key not in unresolved else unresolved[key].copy()
         wider[1] += (ends[before] ** 2 + begins[after] ** 2) / si_per_raw**2
         unresolved[key] = wider
     creep = found.rate_rad_s * mean[:, None] / si_per_raw
-    return replace(obs, unresolved=unresolved, hold_rate_sigma=np.hypot(obs.hold_rate_sigma, creep), hold_creep=creep)
+    return replace(
+        obs, unresolved=unresolved, pose_rate_sigma=np.hypot(obs.pose_rate_sigma, creep), pose_settling=creep
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +154,7 @@ class _Direction:
 
 def _directions(context: Context) -> list[_Direction]:
     obs, twin = context.obs, context.fitted.twin
-    noise = obs.hold_rate_noise
+    noise = obs.pose_rate_noise
     if obs.raw_rate is None or noise is None:
         return []
     out = []
@@ -174,7 +176,7 @@ def _directions(context: Context) -> list[_Direction]:
             if abs(float(axis @ up)) < LEVEL:
                 # Turned force reads along the other level axis; its white noise is that of the quiet floor.
                 across = np.cross(axis, up) @ twin.accel_S
-                tilt = float(np.sqrt((across**2 * obs.hold_force_sigma[i] ** 2).sum() * N_BLOCKS)) / twin.gravity
+                tilt = float(np.sqrt((across**2 * obs.pose_force_sigma[i] ** 2).sum() * N_BLOCKS)) / twin.gravity
                 y = np.concatenate([y, CONTRASTS @ angle @ axis / tilt])
             out.append(_Direction(axis, y, own, tilt, begins, ends))
     return out

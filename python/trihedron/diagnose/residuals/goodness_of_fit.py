@@ -76,9 +76,9 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
 def _unsettled(fitted: Fit, label: int, rows: npt.NDArray[np.bool_]) -> FloatArray:
     """(rows,) what makes residuals of rates at rest those over their own noise again, where creep was added to it."""
     obs, system = fitted.line.obs, fitted.system
-    noise, spread = obs.hold_rate_noise, obs.hold_rate_sigma
+    noise, spread = obs.pose_rate_noise, obs.pose_rate_sigma
     out = np.ones(int(np.count_nonzero(rows)))
-    if label != STATIC_GYRO or obs.hold_creep is None or noise is None or spread is None:
+    if label != STATIC_GYRO or obs.pose_settling is None or noise is None or spread is None:
         return out
     direct = system.walk[rows] == 0
     ratio = spread / noise
@@ -110,14 +110,14 @@ that jumps between poses passes, or drifts by two errors."""
 def _strayed(fitted: Fit, label: int) -> tuple[float, float, Where]:
     """p (0 or 1), ratio of variances: a walk as strong as the model allows stands in for something else."""
     k = 0 if label == STATIC_ACCEL else 1
-    stray = None if fitted.has_free_strengths else hidden_zeros(fitted)[k]
+    stray = None if fitted.has_free_strengths else hidden_biases(fitted)[k]
     if stray is None or not stray.is_strayed:
         return 1.0, 1.0, Where()
     return 0.0, (stray.rms / stray.noise) ** 2, Where(_CHANNELS[label])
 
 
 @dataclass(frozen=True)
-class HiddenZero:
+class HiddenBias:
     """What the model's walk of a sensor's zero absorbed, SI: ``rms`` about its mean, ``noise`` the median error of a
     pose's mean, with scatter where that was named, and whether the walk is as strong as the model allows."""
 
@@ -131,12 +131,12 @@ class HiddenZero:
         return self.is_at_edge and self.rms >= AT_EDGE * self.noise
 
 
-def hidden_zeros(fitted: Fit) -> tuple[HiddenZero, HiddenZero | None]:
+def hidden_biases(fitted: Fit) -> tuple[HiddenBias, HiddenBias | None]:
     """Accelerometer, gyro: zeros of the holds about their session mean, absorbed by hidden states."""
     twin, obs = fitted.twin, fitted.line.obs
     edge = [corner <= AT_END * NOISE_CORNER_S for corner in fitted.line.core.strengths[0]]
-    out: list[HiddenZero | None] = []
-    rates = obs.hold_rate_sigma
+    out: list[HiddenBias | None] = []
+    rates = obs.pose_rate_sigma
     sides = (
         (twin.accel_bias, obs.norm_sigma(twin.up @ twin.accel_S), edge[0]),
         (
@@ -150,7 +150,7 @@ def hidden_zeros(fitted: Fit) -> tuple[HiddenZero, HiddenZero | None]:
             out.append(None)
             continue
         rms = float(np.sqrt(np.mean((zero - zero.mean(axis=0)) ** 2)))
-        out.append(HiddenZero(rms, float(np.median(noise)), bool(is_at_edge)))
+        out.append(HiddenBias(rms, float(np.median(noise)), bool(is_at_edge)))
     assert out[0] is not None
     return out[0], out[1]
 
@@ -166,13 +166,13 @@ def locate(fitted: Fit, label: int, n_most: int = 5) -> Where:
     per_channel = np.array([squared[system.channel[rows] == c].sum() for c in range(3)])
     names = _CHANNELS[label]
     channels = tuple(names[c] for c in np.argsort(-per_channel) if per_channel[c] > CARRIES * per_channel.sum())
-    is_hold = label in (STATIC_ACCEL, STATIC_GYRO)
+    is_pose = label in (STATIC_ACCEL, STATIC_GYRO)
     t = obs.time_s
     spans = []
     for s in heavy:
-        first, last = (obs.segments.poses[s].start, obs.segments.poses[s].stop) if is_hold else obs.move_ranges[s]
+        first, last = (obs.segments.poses[s].start, obs.segments.poses[s].stop) if is_pose else obs.move_ranges[s]
         spans.append((float(t[first]), float(t[last - 1])))
-    kind = "pose" if is_hold else "move"
+    kind = "pose" if is_pose else "move"
     return Where(channels, tuple(f"{kind} {s + 1}" for s in heavy), tuple(spans))
 
 
@@ -184,7 +184,7 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[
     line, system = fitted.line, fitted.system
     r = system.residual if rows_residual is None else rows_residual
     out: dict[int, float] = {}
-    h = line.obs.n_holds
+    h = line.obs.n_poses
     direct = system.walk == 0
     rows = np.flatnonzero((system.domain == STATIC_ACCEL) & direct)
     error = np.linalg.solve(line.accel_white, r[rows].reshape(h, 3, 1))[:, :, 0]

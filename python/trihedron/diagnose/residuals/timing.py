@@ -13,7 +13,7 @@ from trihedron.records.domains import DomainTest, Where
 
 
 class Seen(Protocol):
-    """What a sharper look at the sampling found: lost samples, instants that are not those of the stamps."""
+    """What a sharper look at the sampling found: lost samples, instants that are not those of the timestamps."""
 
     @property
     def p_value(self) -> float:

@@ -14,14 +14,14 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
-from trihedron.diagnose.residuals.within_holds import judge_within_holds
+from trihedron.diagnose.residuals.within_poses import judge_within_poses
+from trihedron.diagnose.rest.curve import DriftCurve, smooth_curve
 from trihedron.diagnose.rest.heat import Curve, branch_gap, thermal_curve
 from trihedron.diagnose.rest.pieces import RestPieces, rest_pieces
+from trihedron.diagnose.rest.process import BiasReadings
+from trihedron.diagnose.rest.slow_change import slow_change
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
-from trihedron.diagnose.rest.curve import DriftCurve, smooth_curve
-from trihedron.diagnose.rest.slow_change import slow_change
-from trihedron.diagnose.rest.process import ZeroReadings
 from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
 from trihedron.records.domains import Domain, DomainTest, HeldOut, Where
@@ -257,7 +257,7 @@ def _drift(pieces: RestPieces, sensor: Sensor) -> tuple[DriftCurve | None, float
     ``None`` where they do not change slowly. A walk is what every sensor's noise becomes; a smooth drift is not.
     """
     parts = [pieces.readings(sensor, axis, []) for axis in range(3)]
-    together = ZeroReadings(
+    together = BiasReadings(
         np.vstack([r.values for r in parts]), np.vstack([r.sigma for r in parts]), parts[0].time_s,
         parts[0].length_s, parts[0].pose, parts[0].design, parts[0].direction,
     )  # fmt: skip
@@ -309,7 +309,7 @@ def _lines(
     force = quick(recording.accelerometer, pieces.force)
     rate = None if recording.gyroscope is None or pieces.rate is None else quick(recording.gyroscope, pieces.rate)
     samples = cast(Observations, _Samples(recording, t, force, rate, SimpleNamespace(poses=holds)))
-    test = judge_within_holds(samples, alpha)
+    test = judge_within_poses(samples, alpha)
     S = [np.eye(3) if side is None else np.array(side["S"]) for side in (model.accelerometer, model.gyroscope)]
     fitted = cast(Fit, SimpleNamespace(twin=SimpleNamespace(accel_S=S[0], gyro_S=S[1])))
     effect = PeriodicInterference()

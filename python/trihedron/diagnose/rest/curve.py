@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.rest.process import INITIAL_SLOPE, ZeroProcess, unit_kernels
+from trihedron.diagnose.rest.process import INITIAL_SLOPE, BiasProcess, unit_kernels
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class DriftCurve:
         return np.asarray(np.ptp(self.values, axis=1))
 
 
-def covariance_of(process: ZeroProcess, axis: int, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+def covariance_of(process: BiasProcess, axis: int, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(n, n) covariance of the readings, and the share of walk and drift in it."""
     r = process.readings
     W, D, _, _ = unit_kernels(r)
@@ -39,7 +39,7 @@ def covariance_of(process: ZeroProcess, axis: int, sigma: FloatArray) -> tuple[F
     return V, slow
 
 
-def smooth_curve(process: ZeroProcess, keep: list[int], sigma: FloatArray, time_s: FloatArray) -> DriftCurve:
+def smooth_curve(process: BiasProcess, keep: list[int], sigma: FloatArray, time_s: FloatArray) -> DriftCurve:
     """Mean and standard error of walk plus drift at ``time_s`` (m,), its mean over those times taken off.
 
     Of readings of a length, which see three walks along the vertical (``direction`` of three columns), three curves.

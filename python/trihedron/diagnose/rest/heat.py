@@ -10,7 +10,7 @@ from scipy.special import chdtrc
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.effects.thermal_shapes import BRANCH_K_S
 from trihedron.diagnose.rest.pieces import RestPieces
-from trihedron.diagnose.rest.process import DRIFT, SCATTER, WALK, ZeroProcess
+from trihedron.diagnose.rest.process import DRIFT, SCATTER, WALK, BiasProcess
 
 LEAST_SWING_K = 0.5
 """A logged temperature that changes by less explains no zero."""
@@ -94,8 +94,8 @@ def thermal_curve(pieces: RestPieces, sensor: str) -> Curve | None:
     return _curve(pieces, sensor, chosen, columns, np.array([terms[k][1] for k in chosen]), gained, cost * len(chosen))
 
 
-def _process(pieces: RestPieces, sensor: str, axis: int, columns: list[FloatArray]) -> ZeroProcess:
-    return ZeroProcess.of(pieces.readings(sensor, axis, columns))
+def _process(pieces: RestPieces, sensor: str, axis: int, columns: list[FloatArray]) -> BiasProcess:
+    return BiasProcess.of(pieces.readings(sensor, axis, columns))
 
 
 def _likelihood(pieces: RestPieces, sensor: str, columns: list[FloatArray]) -> float:

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.diagnose.rest.process import BiasReadings
 from trihedron.diagnose.session.slopes import smoothed_slope
-from trihedron.diagnose.rest.process import ZeroReadings
 from trihedron.records import Recording
 from trihedron.records.channel_facts import ChannelFacts
 
@@ -60,14 +60,14 @@ class RestPieces:
         """Number of orientations."""
         return int(self.pose.max()) + 1
 
-    def readings(self, sensor: str, axis: int, columns: list[FloatArray]) -> ZeroReadings:
+    def readings(self, sensor: str, axis: int, columns: list[FloatArray]) -> BiasReadings:
         """One axis as the process of zeros takes it: a zero for every orientation, then ``columns`` (n,) each."""
         values, sigma = (self.force, self.force_sigma) if sensor == "accelerometer" else (self.rate, self.rate_sigma)
         assert values is not None
         assert sigma is not None
         levels = [np.ones(len(self.time_s))]
         levels += [(self.pose == k).astype(np.float64) for k in range(1, self.n_poses)]
-        return ZeroReadings(
+        return BiasReadings(
             values[None, :, axis], (sigma[axis] / np.sqrt(self.count))[None], self.time_s, self.length_s, self.piece,
             np.column_stack([*levels, *columns]), np.ones((len(self.time_s), 1)),
         )  # fmt: skip

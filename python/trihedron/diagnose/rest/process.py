@@ -39,7 +39,7 @@ CONTRADICTED = 0.5e-3
 
 
 @dataclass(frozen=True, eq=False)
-class ZeroReadings:
+class BiasReadings:
     """Zeros of one sensor, two means a pose or more, in the order of time.
 
     ``values``, ``sigma`` (axes, n) the means and their standard errors; ``time_s`` (n,) their middles, ``length_s``
@@ -57,7 +57,7 @@ class ZeroReadings:
     direction: FloatArray
 
 
-def unit_kernels(r: ZeroReadings) -> tuple[FloatArray, FloatArray, float, float]:
+def unit_kernels(r: BiasReadings) -> tuple[FloatArray, FloatArray, float, float]:
     """``(W, D, walk, drift)``: kernels (n, n) of unit mean square about the mean, and what they were divided by."""
     span = max(float(r.time_s[-1] - r.time_s[0]), 1e-9)
     t = (r.time_s - r.time_s[0]) / span
@@ -112,21 +112,21 @@ class Grams:
 
 
 @dataclass(frozen=True, eq=False)
-class ZeroProcess:
+class BiasProcess:
     """The likelihood of zeros under every mixture of scatter, walk and drift.
 
     ``axis_factor`` (axes,) are sizes of the axes relative to each other, ``noise_factor`` multiplies the stated
     variances of the means.
     """
 
-    readings: ZeroReadings
+    readings: BiasReadings
     axis_factor: FloatArray
     noise_factor: float = 1.0
 
     @staticmethod
-    def of(readings: ZeroReadings) -> ZeroProcess:
+    def of(readings: BiasReadings) -> BiasProcess:
         """The process with relative sizes of the axes and the noise of the means as the readings show them."""
-        process = ZeroProcess(readings, np.ones(len(readings.values)))
+        process = BiasProcess(readings, np.ones(len(readings.values)))
         contradicted = process.halves_contradict()
         if contradicted:
             columns = list(range(readings.design.shape[1]))
@@ -150,7 +150,7 @@ class ZeroProcess:
         p = float(chdtrc(dof, float(away.sum())))
         return int(p < CONTRADICTED) - int(1.0 - p < CONTRADICTED)
 
-    def _with_axis_factors(self) -> ZeroProcess:
+    def _with_axis_factors(self) -> BiasProcess:
         """Sizes of the axes relative to each other, where equal ones are plainly refuted.
 
         Three axes together tell a strength better than each its own: with freely fitted factors the errors of
@@ -205,7 +205,7 @@ class ZeroProcess:
             strengths = np.stack(
                 [s, w / walk, d / drift, INITIAL_SLOPE * d / drift, np.full(len(s), self.noise_factor)], axis=1
             )
-            one = _core.zero_process_grams(
+            one = _core.bias_process_grams(
                 np.column_stack([values, r.design]), sigma**2, t, r.length_s / span, r.pose, r.direction, strengths
             )
             log_det.append(one[0])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.rest.process import DRIFT, SCATTER, WALK, ZeroProcess, ZeroReadings
+from trihedron.diagnose.rest.process import DRIFT, SCATTER, WALK, BiasProcess, BiasReadings
 
 SMOOTH = 8.75
 """1 % point of 3/8 χ²(1) + 3/8 χ²(2) + 1/8 χ²(3): one strength more where the others may be 0."""
@@ -23,7 +23,7 @@ class SlowChange:
     beside scatter and walk.
     """
 
-    process: ZeroProcess
+    process: BiasProcess
     sigma: FloatArray
     p_value: float
     drift_ratio: float
@@ -39,9 +39,9 @@ class SlowChange:
         return self.drift_ratio > SMOOTH
 
 
-def slow_change(readings: ZeroReadings) -> SlowChange:
+def slow_change(readings: BiasReadings) -> SlowChange:
     """Test the biases of one log, every column of its design allowed for."""
-    process = ZeroProcess.of(readings)
+    process = BiasProcess.of(readings)
     every = list(range(readings.design.shape[1]))
     top, sigma = process.maximum((SCATTER, WALK, DRIFT), every, restricted=True)
     alone, walk, drift = (

@@ -30,16 +30,16 @@ class Observations:
 
     ``segments`` has its poses cut at bumps, ``whole`` as they were found.
     ``raw_force`` (n, 3), ``raw_rate`` (n, 3) are raw readings minus ``force_origin`` / ``rate_origin`` (the mean over
-    the holds): counts around 32768 would cost the normal equations ten digits. ``hold_force``, ``hold_rate`` (h, 3) are
-    the centred hold means, ``hold_force_sigma``, ``hold_rate_sigma`` (h, 3) their standard errors. ``move_ranges`` are
+    the holds): counts around 32768 would cost the normal equations ten digits. ``pose_force``, ``pose_rate`` (h, 3) are
+    the centred hold means, ``pose_force_sigma``, ``pose_rate_sigma`` (h, 3) their standard errors. ``move_ranges`` are
     half-open sample ranges that include the last sample of the hold before and the first of the hold after, so that
-    neighbouring still samples bracket the whole motion; ``move_holds`` (m, 2) their holds. ``force_density`` and
+    neighbouring still samples bracket the whole motion; ``move_poses`` (m, 2) their holds. ``force_density`` and
     ``rate_density`` (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sample instants about
-    their stamps, once a diagnosis has found it; ``bumped_s`` are stretches of poses that were seen disturbed.
+    their timestamps, once a diagnosis has found it; ``bumped_s`` are stretches of poses that were seen disturbed.
     ``unresolved`` maps a move's two holds to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
     by motion faster than the samples, by noise slower than a move and by shaking that stands in a pose's end.
-    ``hold_creep`` (h, 3), once it was seen: by how much (one sigma,
-    raw units) poses turn that settle; it is in ``hold_rate_sigma``.
+    ``pose_settling`` (h, 3), once it was seen: by how much (one sigma,
+    raw units) poses turn that settle; it is in ``pose_rate_sigma``.
     ``force_up`` are verticals (h, 3), raw unit vectors, and the errors (h,) of the means along them; ``force_scatter``
     and ``rate_scatter`` are how far 1/f noise lets a bias scatter, raw; ``averaging`` by how much the sensors average
     over the sample interval (0 to 1).
@@ -53,28 +53,28 @@ class Observations:
     raw_rate: FloatArray | None
     force_origin: FloatArray
     rate_origin: FloatArray
-    hold_force: FloatArray
-    hold_rate: FloatArray | None
-    hold_force_sigma: FloatArray
-    hold_rate_sigma: FloatArray | None
-    hold_time_s: FloatArray
+    pose_force: FloatArray
+    pose_rate: FloatArray | None
+    pose_force_sigma: FloatArray
+    pose_rate_sigma: FloatArray | None
+    pose_time_s: FloatArray
     move_ranges: tuple[tuple[int, int], ...]
-    move_holds: npt.NDArray[np.intp]
+    move_poses: npt.NDArray[np.intp]
     force_density: FloatArray
     rate_density: FloatArray | None
     jitter_s: float = 0.0
     bumped_s: tuple[tuple[float, float], ...] = ()
     unresolved: Mapping[tuple[int, int], FloatArray] = field(default_factory=dict)
-    hold_creep: FloatArray | None = None
+    pose_settling: FloatArray | None = None
     force_up: Along | None = None
     force_scatter: float = 0.0
     rate_scatter: float = 0.0
     averaging: float = 0.0
 
     @property
-    def n_holds(self) -> int:
+    def n_poses(self) -> int:
         """Number of still poses."""
-        return len(self.hold_force)
+        return len(self.pose_force)
 
     @property
     def n_moves(self) -> int:
@@ -82,16 +82,16 @@ class Observations:
         return len(self.move_ranges)
 
     @property
-    def hold_rate_noise(self) -> FloatArray | None:
+    def pose_rate_noise(self) -> FloatArray | None:
         """(h, 3) standard errors of the gyro's means without the creep of poses."""
-        if self.hold_rate_sigma is None or self.hold_creep is None:
-            return self.hold_rate_sigma
-        out: FloatArray = np.sqrt(self.hold_rate_sigma**2 - self.hold_creep**2)
+        if self.pose_rate_sigma is None or self.pose_settling is None:
+            return self.pose_rate_sigma
+        out: FloatArray = np.sqrt(self.pose_rate_sigma**2 - self.pose_settling**2)
         return out
 
     def norm_sigma(self, gradient: FloatArray) -> FloatArray:
         """(h,) standard errors of the length of gravity, SI, that grows with the raw means by ``gradient`` (h, 3)."""
-        return along_gradient(self.hold_force_sigma, self.force_up, gradient)
+        return along_gradient(self.pose_force_sigma, self.force_up, gradient)
 
     @cached_property
     def _still(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], FloatArray]:
@@ -100,7 +100,7 @@ class Observations:
         lengths = np.array([len(one) for one in samples])
         return np.concatenate(samples), np.cumsum(lengths) - lengths, lengths.astype(np.float64)
 
-    def hold_means(self, samples: FloatArray) -> FloatArray:
+    def pose_means(self, samples: FloatArray) -> FloatArray:
         """(holds, ...) means over each hold of a whole-recording signal (n, ...), missing readings left out."""
         index, first, n = self._still
         values = samples[index]
@@ -122,14 +122,14 @@ class Observations:
 
         def of(raw: FloatArray) -> FloatArray:
             every = [np.array_split(raw[hold.start : hold.stop], parts) for hold in self.segments.poses]
-            return np.array([[np.nanmean(part, axis=0) for part in of_hold] for of_hold in every])
+            return np.array([[np.nanmean(part, axis=0) for part in of_pose] for of_pose in every])
 
         return of(self.raw_force), None if self.raw_rate is None else of(self.raw_rate)
 
     @cached_property
-    def hold_scatter(self) -> FloatArray:
+    def pose_scatter(self) -> FloatArray:
         """(holds, 3, 3) covariance of raw accelerometer readings inside every hold; NaN where some are missing."""
-        out = np.empty((self.n_holds, 3, 3))
+        out = np.empty((self.n_poses, 3, 3))
         for i, hold in enumerate(self.segments.poses):
             away = self.raw_force[hold.start : hold.stop]
             away = away - away.mean(axis=0)
@@ -145,17 +145,17 @@ class Observations:
     def core_moves(self) -> _core.SessionMoves:
         """The samples of the moves, arranged once for many fits."""
         unresolved = np.zeros((self.n_moves, 2, 3))
-        for m, (before, after) in enumerate(self.move_holds):
+        for m, (before, after) in enumerate(self.move_poses):
             found = self.unresolved.get((int(before), int(after)))
             if found is not None:
                 unresolved[m] = found
         return _core.SessionMoves(
-            hold_time_s=np.ascontiguousarray(self.hold_time_s, dtype=np.float64),
+            pose_time_s=np.ascontiguousarray(self.pose_time_s, dtype=np.float64),
             time_s=np.ascontiguousarray(self.time_s),
             force=self._sharpened(self.raw_force),
             rate=None if self.raw_rate is None else self._sharpened(self.raw_rate),
             ranges=np.array(self.move_ranges, dtype=np.int64).reshape(-1, 2),
-            before=np.ascontiguousarray(self.move_holds[:, 0] if self.n_moves else np.zeros(0), dtype=np.int64),
+            before=np.ascontiguousarray(self.move_poses[:, 0] if self.n_moves else np.zeros(0), dtype=np.int64),
             unresolved=unresolved,
         )
 
@@ -181,11 +181,11 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
     bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for hold in whole.poses for a, b in hold.disturbed)
     force_origin = segments.accelerometer_mean.mean(axis=0)
     rate_origin = np.zeros(3)
-    raw_rate = hold_rate = None
+    raw_rate = pose_rate = None
     if recording.gyroscope is not None and segments.gyroscope_mean is not None:
         rate_origin = segments.gyroscope_mean.mean(axis=0)
         raw_rate = recording.gyroscope - rate_origin
-        hold_rate = segments.gyroscope_mean - rate_origin
+        pose_rate = segments.gyroscope_mean - rate_origin
     ranges, holds = [], []
     for move in segments.moves:
         start, stop = max(move.start - 1, 0), min(move.stop + 1, recording.n_samples)
@@ -210,13 +210,13 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         raw_rate=raw_rate,
         force_origin=force_origin,
         rate_origin=rate_origin,
-        hold_force=segments.accelerometer_mean - force_origin,
-        hold_rate=hold_rate,
-        hold_force_sigma=noise.force_sigma,
-        hold_rate_sigma=noise.rate_sigma,
-        hold_time_s=np.array([0.5 * (t[hold.start] + t[hold.stop - 1]) for hold in segments.poses]),
+        pose_force=segments.accelerometer_mean - force_origin,
+        pose_rate=pose_rate,
+        pose_force_sigma=noise.force_sigma,
+        pose_rate_sigma=noise.rate_sigma,
+        pose_time_s=np.array([0.5 * (t[hold.start] + t[hold.stop - 1]) for hold in segments.poses]),
         move_ranges=tuple(ranges) if raw_rate is not None else (),
-        move_holds=np.array(holds if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
+        move_poses=np.array(holds if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
         force_density=noise.force_density,
         rate_density=noise.rate_density,
         bumped_s=bumped,

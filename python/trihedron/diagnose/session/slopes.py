@@ -15,7 +15,7 @@ thousands of samples is one of dozens."""
 def smoothed_slope(values: FloatArray, time_s: FloatArray, width: float) -> FloatArray:
     """(n,) rate of change, per second, of ``values`` (n,) smoothed by a Gaussian of ``width`` samples.
 
-    Stamps are smoothed alike: a straight line keeps its slope across pauses, and to the ends.
+    Timestamps are smoothed alike: a straight line keeps its slope across pauses, and to the ends.
     """
     length = max(round(width / BLOCKS_OF_WIDTH), 1)
     starts = np.arange(0, len(values), length)

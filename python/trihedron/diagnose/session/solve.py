@@ -161,7 +161,7 @@ def folds_of(fitted: Fit, n_folds: int = 8) -> list[npt.NDArray[np.bool_]]:
     system, obs = fitted.system, fitted.line.obs
     direct = system.walk == 0
     out = []
-    for labels, count in (((STATIC_ACCEL, STATIC_GYRO), obs.n_holds), ((MOVES, DYNAMICS), obs.n_moves)):
+    for labels, count in (((STATIC_ACCEL, STATIC_GYRO), obs.n_poses), ((MOVES, DYNAMICS), obs.n_moves)):
         for block in np.array_split(np.arange(count), min(n_folds, max(count // 2, 1))):
             held = np.isin(system.domain, labels) & direct & np.isin(system.segment, block)
             if held.any():

@@ -46,9 +46,9 @@ def start_twin(obs: Observations, calibration: Calibration) -> Twin:
     Q, L = lower_frame(calibration.accelerometer.S)
     b = Q.T @ calibration.accelerometer.b + L @ obs.force_origin
     gyro_S = np.eye(3) if calibration.gyroscope is None else Q.T @ calibration.gyroscope.S
-    force = obs.hold_force @ L.T + b
-    n = obs.n_holds
-    bias = np.zeros((n, 3)) if obs.hold_rate is None else obs.hold_rate @ gyro_S.T
+    force = obs.pose_force @ L.T + b
+    n = obs.n_poses
+    bias = np.zeros((n, 3)) if obs.pose_rate is None else obs.pose_rate @ gyro_S.T
     return Twin(
         gravity=calibration.gravity_m_s2,
         accel_S=L,
@@ -77,7 +77,7 @@ def nominal_start(obs: Observations, calibration: Calibration) -> tuple[Twin, Pr
     that of its unit, or of counts the one that turns gravity by what the poses show. Axes are taken as documented.
     """
     known_scale = acceleration_to_si(obs.recording.accelerometer_unit)
-    raw = obs.hold_force + obs.force_origin
+    raw = obs.pose_force + obs.force_origin
     by_length = calibration.gravity_m_s2 / float(np.median(np.linalg.norm(raw, axis=1)))
     scale = by_length if known_scale is None else known_scale
     force = scale * raw
@@ -90,14 +90,14 @@ def nominal_start(obs: Observations, calibration: Calibration) -> tuple[Twin, Pr
             rate_sigma = np.where(is_whole, WHOLE_SCALE, TYPICAL_SCALE)
         else:
             rate_scales = np.full(3, known_rate)
-    n = obs.n_holds
+    n = obs.n_poses
     twin = Twin(
         gravity=calibration.gravity_m_s2,
         accel_S=scale * np.eye(3),
         accel_b=scale * obs.force_origin,
         gyro_S=np.diag(rate_scales),
         up=up,
-        gyro_bias=np.zeros((n, 3)) if obs.hold_rate is None else rate_scales * obs.hold_rate,
+        gyro_bias=np.zeros((n, 3)) if obs.pose_rate is None else rate_scales * obs.pose_rate,
         accel_bias=np.zeros((n, 3)),
         effect=np.zeros(0),
     )
@@ -116,7 +116,7 @@ def _rate_scales_of_counts(obs: Observations, up: FloatArray) -> tuple[FloatArra
     """
     assert obs.raw_rate is not None
     ratios, turns = [], []
-    for (a, b), (before, after) in zip(obs.move_ranges, obs.move_holds, strict=True):
+    for (a, b), (before, after) in zip(obs.move_ranges, obs.move_poses, strict=True):
         angle = float(np.arccos(np.clip(up[before] @ up[after], -1.0, 1.0)))
         read = trapezoid(obs.raw_rate[a:b], obs.time_s[a:b], axis=0)
         if angle > LEAST_ANGLE_RAD and np.linalg.norm(read) > 0.0:

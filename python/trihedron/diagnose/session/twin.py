@@ -140,7 +140,7 @@ class Linearisation:
     @cached_property
     def path(self) -> Trajectory:
         """The motion at every point, corrected (eq. 11.3)."""
-        h = self.obs.n_holds
+        h = self.obs.n_poses
         rate, force, attitude = self.core.path()
         slices, first = [], h
         for start, stop in self.obs.move_ranges:
@@ -164,10 +164,10 @@ class Linearisation:
     @cached_property
     def gyro_white(self) -> FloatArray | None:
         """(holds, 3, 3) the same of the gyro; ``None`` without one."""
-        if self.obs.hold_rate_sigma is None:
+        if self.obs.pose_rate_sigma is None:
             return None
         inverse = np.linalg.inv(self.twin.gyro_S)
-        white: FloatArray = inverse / self.obs.hold_rate_sigma[:, :, None]
+        white: FloatArray = inverse / self.obs.pose_rate_sigma[:, :, None]
         return white
 
     @cached_property
@@ -188,14 +188,14 @@ def contiguous(values: FloatArray | None) -> FloatArray | None:
 
 def core_poses(obs: Observations) -> _core.SessionPoses:
     """The poses of some observations, in the core."""
-    has_rate = obs.hold_rate is not None and obs.hold_rate_sigma is not None and obs.rate_density is not None
+    has_rate = obs.pose_rate is not None and obs.pose_rate_sigma is not None and obs.rate_density is not None
     return _core.SessionPoses(
-        time_s=np.ascontiguousarray(obs.hold_time_s, dtype=np.float64),
-        force=np.ascontiguousarray(obs.hold_force),
-        force_sigma=np.ascontiguousarray(obs.hold_force_sigma),
+        time_s=np.ascontiguousarray(obs.pose_time_s, dtype=np.float64),
+        force=np.ascontiguousarray(obs.pose_force),
+        force_sigma=np.ascontiguousarray(obs.pose_force_sigma),
         force_density=np.ascontiguousarray(obs.force_density),
-        rate=contiguous(obs.hold_rate) if has_rate else None,
-        rate_sigma=contiguous(obs.hold_rate_sigma) if has_rate else None,
+        rate=contiguous(obs.pose_rate) if has_rate else None,
+        rate_sigma=contiguous(obs.pose_rate_sigma) if has_rate else None,
         rate_density=contiguous(obs.rate_density) if has_rate else None,
         force_along=obs.force_up,
     )
@@ -207,7 +207,7 @@ def core_model(
     """The Rust model of some observations; with ``is_scatter_free`` biases may differ from pose to pose."""
     scatter = None
     if is_scatter_free:
-        unit = scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma, obs.force_up)
+        unit = scatter_unit(obs.pose_force_sigma, obs.pose_rate_sigma, obs.force_up)
         scatter = (unit, obs.force_scatter / float(unit[0, 0]))
     return _core.SessionModel(
         gravity_m_s2=gravity_m_s2,
@@ -228,8 +228,8 @@ def core_state(twin: Twin) -> _core.SessionState:
         force_bias=np.ascontiguousarray(twin.accel_b),
         rate_scale=np.ascontiguousarray(twin.gyro_S),
         up=np.ascontiguousarray(twin.up),
-        rate_zero=np.ascontiguousarray(np.linalg.solve(twin.gyro_S, twin.gyro_bias.T).T),
-        force_zero=np.ascontiguousarray(np.linalg.solve(twin.accel_S, twin.accel_bias.T).T),
+        pose_rate_bias=np.ascontiguousarray(np.linalg.solve(twin.gyro_S, twin.gyro_bias.T).T),
+        pose_force_bias=np.ascontiguousarray(np.linalg.solve(twin.accel_S, twin.accel_bias.T).T),
         effect=np.ascontiguousarray(twin.effect, dtype=np.float64),
     )
 
@@ -239,6 +239,6 @@ def twin_of(core: _core.SessionFit, gravity_m_s2: float) -> Twin:
     accel_S, gyro_S = np.asarray(core.force_scale), np.asarray(core.rate_scale)
     return Twin(
         gravity=gravity_m_s2, accel_S=accel_S, accel_b=np.asarray(core.force_bias), gyro_S=gyro_S,
-        up=np.asarray(core.up), gyro_bias=core.rate_zero @ gyro_S.T, accel_bias=core.force_zero @ accel_S.T,
+        up=np.asarray(core.up), gyro_bias=core.pose_rate_bias @ gyro_S.T, accel_bias=core.pose_force_bias @ accel_S.T,
         effect=np.asarray(core.effect), strengths=core.strengths,
     )  # fmt: skip

@@ -110,7 +110,7 @@ class _Session:
         for _ in range(int(np.clip(np.ceil(passes), 2, MOST_PASSES))):
             S = np.asarray(aligned.fit.gyroscope_scale)
             hidden = np.linalg.pinv(S) @ np.asarray(aligned.fit.rate_offset)
-            zero = measured.zero_mean - np.clip(hidden, -0.5 * quantum, 0.5 * quantum)
+            zero = measured.bias_mean - np.clip(hidden, -0.5 * quantum, 0.5 * quantum)
             read = np.where(is_still, zero, rate)
             measured = self._read_as(replace(measured, still=still), read, measured.reading_variance)
             aligned = align_screened(measured, self.part, self.gravity_m_s2, S[None], self.options)

@@ -218,9 +218,9 @@ def _core_align(
             reading=measured.reading,
             var_reading=measured.var_reading,
             zero=measured.zero,
-            var_zero=measured.var_zero,
-            zero_weights=measured.zero_weights,
-            var_zero_walk=measured.var_zero_walk,
+            var_bias=measured.var_bias,
+            bias_weights=measured.bias_weights,
+            var_bias_walk=measured.var_bias_walk,
         ),
         noise=_core.RateNoise(measured.noise_density, measured.sigma_time_s, measured.nominal_step_s),
         accelerometer=_core.AlignmentAccelerometer(model.S, model.b, accelerometer.basis, accelerometer.is_given),
@@ -249,13 +249,13 @@ def assemble(
     S = np.asarray(fit.gyroscope_scale)
     k = accelerometer.basis.shape[1]
     p = fit.covariance.shape[0]
-    of_fit, sigma_zero = np.asarray(fit.covariance), np.sqrt(measured.var_zero_mean)
+    of_fit, sigma_bias = np.asarray(fit.covariance), np.sqrt(measured.var_bias_mean)
     # How (fit parameters, z̄, given accelerometer) follow errors of unit size: of z̄, and of the given directions.
     given = accelerometer.basis if accelerometer.is_given else np.zeros((12, 0))
     follows = np.zeros((p + 15, 3 + given.shape[1]))
-    follows[:p, :3] = fit.cov_with_zero / np.maximum(sigma_zero, TINY)
+    follows[:p, :3] = fit.cov_with_bias / np.maximum(sigma_bias, TINY)
     follows[:p, 3:] = of_fit[:, : given.shape[1]]
-    follows[p : p + 3, :3] = np.diag(sigma_zero)
+    follows[p : p + 3, :3] = np.diag(sigma_bias)
     follows[p + 3 :, 3:] = given
     own = _positive(inflation * (of_fit + _unseen(fit, S, k)) - follows[:p] @ follows[:p].T)
     narrower = np.ones(p)
@@ -271,14 +271,14 @@ def assemble(
         to_all[:12, :k] = accelerometer.basis
     to_all[12:21, k : k + 9] = np.eye(9)
     for i in range(3):
-        to_all[21 + i, k + 3 * i : k + 3 * i + 3] = -measured.zero_mean
+        to_all[21 + i, k + 3 * i : k + 3 * i + 3] = -measured.bias_mean
     to_all[21:, p : p + 3] = -S
     if p > k + 9:
         to_all[21:, k + 9 : k + 12] = np.eye(3)
     covariance = to_all @ joint @ to_all.T
     return Aligned(
         fit=fit,
-        gyroscope_bias=np.asarray(fit.rate_offset) - S @ measured.zero_mean,
+        gyroscope_bias=np.asarray(fit.rate_offset) - S @ measured.bias_mean,
         covariance=0.5 * (covariance + covariance.T),
         parameters_covariance=joint[:p, :p],
         used=used,

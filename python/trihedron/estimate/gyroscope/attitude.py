@@ -17,13 +17,13 @@ FALSE_ALARM = 1e-4
 class AttitudeDependence:
     """``z(f) = z₀ + A f``: the raw bias (n, 3) of the poses against their specific force.
 
-    ``A`` (3, 3) in raw unit per m/s²; ``zero`` (3,) is ``z₀`` with ``cov_zero`` variances (3,); ``p_value`` of ``A =
+    ``A`` (3, 3) in raw unit per m/s²; ``zero`` (3,) is ``z₀`` with ``cov_bias`` variances (3,); ``p_value`` of ``A =
     0``; ``scatter_before``, ``scatter_after`` (3,) the standard deviation of the pose biases without and with it, raw.
     """
 
     A: FloatArray
     zero: FloatArray
-    var_zero: FloatArray
+    var_bias: FloatArray
     p_value: float
     scatter_left: float
 
@@ -33,7 +33,7 @@ class AttitudeDependence:
         return self.p_value < FALSE_ALARM
 
 
-def attitude_dependence(zero: FloatArray, var_zero: FloatArray, force: FloatArray) -> AttitudeDependence | None:
+def attitude_dependence(zero: FloatArray, var_bias: FloatArray, force: FloatArray) -> AttitudeDependence | None:
     """Regress the pose biases on specific force (n, 3), m/s²; ``None`` with fewer than 9 poses or poses in one plane.
 
     The three axes share one F test: 9 slopes against what is left of 3 n numbers.
@@ -45,7 +45,7 @@ def attitude_dependence(zero: FloatArray, var_zero: FloatArray, force: FloatArra
     A, z0, var_z0 = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     chi2_mean = chi2_line = 0.0
     for axis in range(3):
-        weight = 1.0 / np.maximum(var_zero[:, axis], 1e-30 + 1e-24 * zero[:, axis] ** 2)
+        weight = 1.0 / np.maximum(var_bias[:, axis], 1e-30 + 1e-24 * zero[:, axis] ** 2)
         root = np.sqrt(weight)
         mean = float(np.average(zero[:, axis], weights=weight))
         solution, *_ = np.linalg.lstsq(design * root[:, None], zero[:, axis] * root, rcond=None)

@@ -145,17 +145,17 @@ def _attitude_findings(measured: MoveMeasurements, S: FloatArray) -> list[Findin
 
 def _drift_findings(measured: MoveMeasurements, S: FloatArray) -> list[Finding]:
     dof = len(measured.zero) - 1
-    if dof < 1 or chdtrc(dof, float(measured.zero_excess.max())) > FALSE_ALARM / 3.0:
+    if dof < 1 or chdtrc(dof, float(measured.bias_excess.max())) > FALSE_ALARM / 3.0:
         return []
     rates = np.abs(np.diagonal(S)) if np.all(np.abs(np.diagonal(S)) > 0) else np.linalg.norm(S, axis=0)
     change = np.ptp(measured.zero, axis=0) * rates
-    axis = int(np.argmax(measured.zero_excess))
+    axis = int(np.argmax(measured.bias_excess))
     return [
         Finding.of(
             FindingCode.GYRO_BIAS_DRIFT,
             "poses",
             change_rad_s=change[axis],
             axis=axis + 1,
-            times=np.sqrt(measured.zero_excess[axis] / dof),
+            times=np.sqrt(measured.bias_excess[axis] / dof),
         )
     ]

@@ -108,7 +108,7 @@ def left_out_as_by_losses(time_s: FloatArray, measured: MoveMeasurements, aligne
     for move in aligned.outliers:
         begin, end = measured.edges[move]
         before, after = measured.links[move]
-        rate = np.nan_to_num(measured.rate[begin : end + 1] - measured.zero_mean) @ S.T
+        rate = np.nan_to_num(measured.rate[begin : end + 1] - measured.bias_mean) @ S.T
         off = _lost_at_each_instant(rate, f[before], step_s)
         _, _, axes = np.linalg.svd(f[after][None])
         across = axes[1:]
@@ -175,7 +175,7 @@ def losses_that_fit(
     if measured.sigma_time_s > EVEN * step_s or not could_be_remade(time_s, step_s):
         return PossibleLosses()
     angle_deg, floor2 = missed
-    speed2 = np.sum(((measured.rate - measured.zero_mean) @ S.T) ** 2, axis=1)
+    speed2 = np.sum(((measured.rate - measured.bias_mean) @ S.T) ** 2, axis=1)
     # ∫ω² dt times the step: the variance of a move's angle if one sample was lost in all, times the samples.
     room = ACROSS_VERTICAL * step_s**2 * np.array([float(np.nansum(speed2[a:b])) for a, b in measured.edges])
     length = np.maximum(measured.edges[:, 1] - measured.edges[:, 0], 1)

@@ -12,14 +12,14 @@ from trihedron._core import Moves
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
+from trihedron.estimate.gyroscope.biases import excess_variance, pool_biases, shrink
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, Clipped, bridge_clipping, clipped_time
 from trihedron.estimate.gyroscope.rounding import (
-    common_zero,
+    common_bias,
     density_without_rounding,
     rounding_variance,
     undithered_axes,
 )
-from trihedron.estimate.gyroscope.zeros import excess_variance, pool_zeros, shrink
 from trihedron.probability import chdtrc
 from trihedron.quantiles import median, medians
 from trihedron.records.calibration import SensorCalibration
@@ -39,14 +39,14 @@ the correlation that an anti-alias filter leaves between samples."""
 class MoveMeasurements:
     """Everything the alignment needs, in raw units of each sensor.
 
-    ``reading``, ``zero`` (n, 3) are the pose means of accelerometer and gyro, ``var_reading``, ``var_zero`` (n, 3) the
+    ``reading``, ``zero`` (n, 3) are the pose means of accelerometer and gyro, ``var_reading``, ``var_bias`` (n, 3) the
     variances of these means; ``links`` (m, 2) the poses each move joins, ``edges`` (m, 2) its samples;
-    ``noise_density`` (3,) the angle random walk in raw unit · √s; ``var_zero_walk`` (3,) the variance by which the
+    ``noise_density`` (3,) the angle random walk in raw unit · √s; ``var_bias_walk`` (3,) the variance by which the
     true bias changes from pose to pose; ``clipped_s`` (m,) is the time in each move that the gyro spent at
     its limit. ``attitude`` is the dependence of the bias on specific force where it was removed: ``rate``
-    (samples, 3) are the raw gyro readings without it, and so are the biases. ``zero_weights`` (n, 3) make the
-    session's bias ``zero_mean`` (3,) of variance ``var_zero_mean`` (3,). ``is_undithered`` (3,) are the axes
-    whose zero lies hidden inside an LSB. ``zero_read``, ``var_zero_read`` (n, 3) are the biases as each
+    (samples, 3) are the raw gyro readings without it, and so are the biases. ``bias_weights`` (n, 3) make the
+    session's bias ``bias_mean`` (3,) of variance ``var_bias_mean`` (3,). ``is_undithered`` (3,) are the axes
+    whose zero lies hidden inside an LSB. ``bias_read``, ``var_bias_read`` (n, 3) are the biases as each
     hold alone shows them, ``var_reading_noise`` (n, 3) the variance of the pose means by noise alone,
     ``reading_variance`` (samples, 3) that of gyro readings which were bridged or rounded; ``still`` (3,) the part of
     the moves' samples in which an axis stands at its bias, so that an offset fitted to moves does not act there;
@@ -60,22 +60,22 @@ class MoveMeasurements:
     reading: FloatArray
     var_reading: FloatArray
     zero: FloatArray
-    var_zero: FloatArray
-    zero_weights: FloatArray
-    zero_mean: FloatArray
-    var_zero_mean: FloatArray
-    var_zero_walk: FloatArray
+    var_bias: FloatArray
+    bias_weights: FloatArray
+    bias_mean: FloatArray
+    var_bias_mean: FloatArray
+    var_bias_walk: FloatArray
     noise_density: FloatArray
     sigma_time_s: float
     nominal_step_s: float
     clipped_s: FloatArray
     is_gapped: BoolArray
-    zero_excess: FloatArray
+    bias_excess: FloatArray
     attitude: AttitudeDependence | None
     rate: FloatArray
     is_undithered: BoolArray
-    zero_read: FloatArray
-    var_zero_read: FloatArray
+    bias_read: FloatArray
+    var_bias_read: FloatArray
     var_reading_noise: FloatArray
     reading_variance: FloatArray | None
     still: FloatArray = field(default_factory=lambda: np.zeros(3))
@@ -151,10 +151,10 @@ def measure_moves(
     edges, links = _edges_and_links(_moves_of(recording, segments))
     reading, zero = (np.ascontiguousarray(mean, dtype=np.float64) for mean in (accelerometer_mean, gyroscope_mean))
     quantum = recording.facts.of("gyroscope").step
-    var_zero = _mean_variance(segments.gyroscope_sigma_mean)
+    var_bias = _mean_variance(segments.gyroscope_sigma_mean)
     force = reading @ accelerometer.S.T + accelerometer.b
     undithered = _undithered(quantum, segments.gyroscope_sigma)
-    attitude = attitude_dependence(zero, var_zero, force) if is_attitude_removed is not False else None
+    attitude = attitude_dependence(zero, var_bias, force) if is_attitude_removed is not False else None
     if attitude is not None and (attitude.is_present or is_attitude_removed):
         rate = gyroscope - (raw_force @ accelerometer.S.T + accelerometer.b) @ attitude.A.T
         zero = np.ascontiguousarray(zero - force @ attitude.A.T)
@@ -167,16 +167,16 @@ def measure_moves(
     mid_s = np.ascontiguousarray(segments.time_mid_s[links])
     prepared = Moves(recording.time_s, rate, edges, mid_s, links, rate_degree, extra)
     var_reading = _mean_variance(segments.accelerometer_sigma_mean)
-    zero_read, var_zero_read = zero, var_zero
-    walk = excess_variance(zero[links[:, 1]] - zero[links[:, 0]], var_zero[links[:, 1]] + var_zero[links[:, 0]])
-    weights, mean, var_mean, excess, _ = pool_zeros(zero, var_zero)
-    zero, var_zero = shrink(zero, var_zero, mean)
+    bias_read, var_bias_read = zero, var_bias
+    walk = excess_variance(zero[links[:, 1]] - zero[links[:, 0]], var_bias[links[:, 1]] + var_bias[links[:, 0]])
+    weights, mean, var_mean, excess, _ = pool_biases(zero, var_bias)
+    zero, var_bias = shrink(zero, var_bias, mean)
     if np.any(undithered):
-        zero, var_zero = _with_hidden_zero(zero, var_zero, segments, quantum, undithered)
-        weights, mean, var_mean = _pooled_hidden(zero, var_zero, undithered, (weights, mean, var_mean))
+        zero, var_bias = _with_hidden_bias(zero, var_bias, segments, quantum, undithered)
+        weights, mean, var_mean = _pooled_hidden(zero, var_bias, undithered, (weights, mean, var_mean))
     seen = rate_noise_density(recording, segments)
     density = density_without_rounding(seen, quantum, 1.0 / recording.rate_hz, undithered)
-    var_mean = var_mean if attitude is None else np.maximum(var_mean, attitude.var_zero)
+    var_mean = var_mean if attitude is None else np.maximum(var_mean, attitude.var_bias)
     steps, nominal, jitter = _steps_of(recording)
     return MoveMeasurements(
         moves=prepared,
@@ -186,22 +186,22 @@ def measure_moves(
         reading=reading,
         var_reading=var_reading + _unexplained_reading_variance(accelerometer),
         zero=zero,
-        var_zero=var_zero,
-        zero_weights=weights,
-        zero_mean=mean,
-        var_zero_mean=var_mean,
-        var_zero_walk=walk,
+        var_bias=var_bias,
+        bias_weights=weights,
+        bias_mean=mean,
+        var_bias_mean=var_mean,
+        var_bias_walk=walk,
         noise_density=density,
         sigma_time_s=jitter,
         nominal_step_s=nominal,
         clipped_s=clipped_time(clipped, edges, nominal),
         is_gapped=_gapped(steps, nominal, edges),
-        zero_excess=excess,
+        bias_excess=excess,
         attitude=attitude,
         rate=rate,
         is_undithered=undithered,
-        zero_read=zero_read,
-        var_zero_read=var_zero_read,
+        bias_read=bias_read,
+        var_bias_read=var_bias_read,
         var_reading_noise=var_reading,
         reading_variance=extra,
     )
@@ -226,17 +226,17 @@ def _bridged(
     return rate, clipped.variance if extra is None else clipped.variance + np.where(clipped.is_clipped, 0.0, extra)
 
 
-def _with_hidden_zero(
-    zero: FloatArray, var_zero: FloatArray, segments: Segments, quantum: FloatArray, undithered: BoolArray
+def _with_hidden_bias(
+    zero: FloatArray, var_bias: FloatArray, segments: Segments, quantum: FloatArray, undithered: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
     # Rounding hides the same part of every pose's zero: what it hides is fitted to the moves, as one offset.
     hidden = np.where(undithered, quantum**2 / 12.0, 0.0)
     own = np.maximum(np.asarray(segments.gyroscope_sigma_mean, dtype=np.float64) ** 2 - hidden, 0.0)
-    return common_zero(zero, np.where(undithered, own, var_zero), undithered)
+    return common_bias(zero, np.where(undithered, own, var_bias), undithered)
 
 
 def _pooled_hidden(
-    zero: FloatArray, var_zero: FloatArray, undithered: BoolArray, pooled: tuple[FloatArray, FloatArray, FloatArray]
+    zero: FloatArray, var_bias: FloatArray, undithered: BoolArray, pooled: tuple[FloatArray, FloatArray, FloatArray]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Weights, mean and variance of the session's bias, on undithered axes without what their step hides.
 
@@ -248,7 +248,7 @@ def _pooled_hidden(
     return (
         weights,
         np.where(undithered, zero.mean(axis=0), mean),
-        np.where(undithered, var_zero.mean(axis=0) / n, var_mean),
+        np.where(undithered, var_bias.mean(axis=0) / n, var_mean),
     )
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from trihedron._core import integrate_raw_rate
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
+from trihedron.estimate.gyroscope.biases import pool_biases
 from trihedron.estimate.gyroscope.measurements import BLOCK_S
 from trihedron.estimate.gyroscope.turn_rounding import HiddenAngles, hidden_angles
-from trihedron.estimate.gyroscope.zeros import pool_zeros
 from trihedron.records.recording import Recording
 from trihedron.units import rate_to_si
 
@@ -101,8 +101,8 @@ def _unit(axis: int, direction: tuple[float, float, float] | None) -> FloatArray
 class MeasuredTurns:
     """``raw_angle`` (k, 3) = ∫w' dt and ``duration_s`` (k,) of the turns, the same of the zero turns, and their noise.
 
-    ``var_rate`` (3,) is ``N²`` in raw unit² · s; ``zero_spread`` (3,) the variance of the true bias between
-    zero turns, ``zero_excess`` (3,) the χ² of its constancy. ``hidden``: what a coarse ADC hides of them.
+    ``var_rate`` (3,) is ``N²`` in raw unit² · s; ``bias_spread`` (3,) the variance of the true bias between
+    zero turns, ``bias_excess`` (3,) the χ² of its constancy. ``hidden``: what a coarse ADC hides of them.
     """
 
     raw_angle: FloatArray
@@ -110,9 +110,9 @@ class MeasuredTurns:
     zero_angle: FloatArray
     zero_duration_s: FloatArray
     var_rate: FloatArray
-    zero_spread: FloatArray
-    zero_excess: FloatArray
-    zero_mean: FloatArray
+    bias_spread: FloatArray
+    bias_excess: FloatArray
+    bias_mean: FloatArray
     hidden: HiddenAngles | None = None
 
 
@@ -153,7 +153,7 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], zeros: Sequence[t
     var_rate = np.maximum(sums / count, recording.facts.of("gyroscope").step ** 2 / 12.0 * step_s)
     zero_s = np.array(zero_duration)
     rates = zero_angle / zero_s[:, None]
-    _, mean, _, excess, spread = pool_zeros(rates, var_rate / zero_s[:, None])
+    _, mean, _, excess, spread = pool_biases(rates, var_rate / zero_s[:, None])
     hidden = hidden_angles(
         gyroscope, step_s, recording.facts.of("gyroscope").step, [(t.start, t.stop) for t in turns], zeros, raw_angle
     )
@@ -210,7 +210,7 @@ def scale_of_stated(measured: MeasuredTurns, turns: Sequence[Turn]) -> FloatArra
     directions = angles / np.linalg.norm(angles, axis=1, keepdims=True)
     if np.linalg.svd(directions, compute_uv=False)[-1] < MIN_SPREAD:
         return None
-    raw = (measured.raw_angle - np.outer(measured.duration_s, measured.zero_mean))[index]
+    raw = (measured.raw_angle - np.outer(measured.duration_s, measured.bias_mean))[index]
     # Every turn counts alike, whatever its size, until they contradict each other.
     size = np.linalg.norm(angles, axis=1)
     weight: FloatArray = 1.0 / size
@@ -236,7 +236,7 @@ def identify_turns(
     Small turns come first: each refines the scale by which the next larger one is read, so that eight whole turns are
     recognised although the nominal scale is off by ``tolerance``.
     """
-    seen = (measured.raw_angle - np.outer(measured.duration_s, measured.zero_mean)) @ nominal.T
+    seen = (measured.raw_angle - np.outer(measured.duration_s, measured.bias_mean)) @ nominal.T
     size = np.linalg.norm(seen, axis=1)
     axes = [_axis_of(turn, vector) for turn, vector in zip(turns, seen, strict=True)]
     sums = np.zeros((3, 2))

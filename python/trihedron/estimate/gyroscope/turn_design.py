@@ -45,8 +45,8 @@ def design_least_squares(
     information = t + zero_s / noise_density**2 - float(np.sum(p**2 / q))
     if not information > 1e-12 * (t + zero_s / noise_density**2):
         raise RefusedError("nothing determines the bias: turn there and back, or keep still for some seconds")
-    var_zero = 1.0 / information
-    return TurnDesign(np.sqrt(1.0 / q + (p / q) ** 2 * var_zero), math.sqrt(var_zero))
+    var_bias = 1.0 / information
+    return TurnDesign(np.sqrt(1.0 / q + (p / q) ** 2 * var_bias), math.sqrt(var_bias))
 
 
 def design_zero_first(
@@ -69,8 +69,8 @@ def design_zero_first(
     q, p, _ = _sums(axes, angles_rad, durations_s, noise_density, sigma_turn_rad)
     if not zero_s > 0.0:
         raise RefusedError("this route needs a stretch without rotation: keep still for some seconds")
-    var_zero = noise_density**2 / zero_s
-    return TurnDesign(np.sqrt(1.0 / q + (p / q) ** 2 * var_zero), math.sqrt(var_zero))
+    var_bias = noise_density**2 / zero_s
+    return TurnDesign(np.sqrt(1.0 / q + (p / q) ** 2 * var_bias), math.sqrt(var_bias))
 
 
 def _sums(

@@ -74,15 +74,15 @@ def _not_a_multiple(index: int, turn: KnownTurn, quantum_rad: float) -> Finding:
 def _drift(screened: Screened) -> list[Finding]:
     measured = screened.system.measured
     dof = len(measured.zero_duration_s) - 1
-    if dof < 1 or chdtrc(dof, float(measured.zero_excess.max())) > FALSE_ALARM / 3.0:
+    if dof < 1 or chdtrc(dof, float(measured.bias_excess.max())) > FALSE_ALARM / 3.0:
         return []
-    axis = int(np.argmax(measured.zero_excess))
+    axis = int(np.argmax(measured.bias_excess))
     return [
         Finding.of(
             FindingCode.GYRO_BIAS_DRIFT,
             "turns",
-            times=np.sqrt(measured.zero_excess[axis] / dof),
+            times=np.sqrt(measured.bias_excess[axis] / dof),
             axis=axis + 1,
-            chi2_per_dof=measured.zero_excess[axis] / dof,
+            chi2_per_dof=measured.bias_excess[axis] / dof,
         )
     ]

@@ -34,7 +34,7 @@ class HiddenAngles:
         out: FloatArray = np.sum(self.turns**2, axis=2) + self.passing
         return out
 
-    def variance_of_zeros(self) -> FloatArray:
+    def variance_of_biases(self) -> FloatArray:
         """(z, 3) raw²."""
         out: FloatArray = np.sum(self.zeros**2, axis=2)
         return out

@@ -67,14 +67,14 @@ class TurnSystem:
         hidden = self.measured.hidden
         return self._noise(self.measured.duration_s, None if hidden is None else hidden.variance_of_turns())
 
-    def noise_of_zeros(self) -> FloatArray:
+    def noise_of_biases(self) -> FloatArray:
         """(z, 3, 3) of the raw zero turns."""
         hidden = self.measured.hidden
-        return self._noise(self.measured.zero_duration_s, None if hidden is None else hidden.variance_of_zeros())
+        return self._noise(self.measured.zero_duration_s, None if hidden is None else hidden.variance_of_biases())
 
     def _noise(self, duration_s: FloatArray, rounding: FloatArray | None) -> FloatArray:
         t = duration_s[:, None]
-        variance = self.measured.var_rate * t + self.measured.zero_spread * t**2
+        variance = self.measured.var_rate * t + self.measured.bias_spread * t**2
         if rounding is not None:
             variance = variance + rounding
         noise: FloatArray = variance[:, :, None] * np.eye(3)
@@ -89,22 +89,22 @@ class TurnSystem:
             matrix[:, i, 9 + i] = duration_s
         return matrix
 
-    def whitened(self, used: BoolArray, with_zeros: bool = True) -> tuple[FloatArray, FloatArray]:
+    def whitened(self, used: BoolArray, with_biases: bool = True) -> tuple[FloatArray, FloatArray]:
         """Whitened design (n, 12) and raw turns (n,) of the used turns, then of the zero turns."""
         measured = self.measured
         factor = self.factor(used)
         design = factor @ self.designs(self.angles[used], measured.duration_s[used]).reshape(-1, 12)
         side = factor @ measured.raw_angle[used].ravel()
-        if with_zeros:
+        if with_biases:
             still = self.designs(np.zeros_like(measured.zero_angle), measured.zero_duration_s)
-            of_zeros = np.linalg.inv(np.linalg.cholesky(self.noise_of_zeros()))
-            design = np.concatenate([design, (of_zeros @ still).reshape(-1, 12)])
-            side = np.concatenate([side, (of_zeros @ measured.zero_angle[:, :, None]).ravel()])
+            of_biases = np.linalg.inv(np.linalg.cholesky(self.noise_of_biases()))
+            design = np.concatenate([design, (of_biases @ still).reshape(-1, 12)])
+            side = np.concatenate([side, (of_biases @ measured.zero_angle[:, :, None]).ravel()])
         return design, side
 
     def pull(self, fit: Solution, used: BoolArray, errors: FloatArray) -> FloatArray:
         """(12, m) by what errors of the turns (k, 3, m), rad, that all of them share, pull the solution."""
-        matrix, _ = self.whitened(used, with_zeros=False)
+        matrix, _ = self.whitened(used, with_biases=False)
         moved = (fit.S_w @ errors[used]).reshape(len(matrix), -1)
         out: FloatArray = fit.covariance @ matrix.T @ (self.factor(used) @ moved)
         return out
@@ -116,12 +116,12 @@ class TurnSystem:
             return np.zeros((12, 12))
         matrix, _ = self.whitened(used)
         n = 3 * int(np.count_nonzero(used))
-        of_zeros = np.linalg.inv(np.linalg.cholesky(self.noise_of_zeros()))
+        of_biases = np.linalg.inv(np.linalg.cholesky(self.noise_of_biases()))
         errors = np.concatenate([hidden.turns[used], hidden.zeros])
         # (n, 12, 3): by what an error of each row pulls the solution.
         pulls = matrix @ fit.covariance
         of_turns = (self.factor(used).T @ pulls[:n]).reshape(-1, 3, 12)
-        still = np.swapaxes(of_zeros, 1, 2) @ pulls[n:].reshape(-1, 3, 12)
+        still = np.swapaxes(of_biases, 1, 2) @ pulls[n:].reshape(-1, 3, 12)
         gain = np.swapaxes(np.concatenate([of_turns, still]), 1, 2)
         together = np.einsum("rjk,rkm->jm", gain, errors)
         apart = np.einsum("rjk,rk,rlk->jl", gain, np.sum(errors**2, axis=2), gain)
@@ -166,7 +166,7 @@ def solve_zero_first(system: TurnSystem, used: BoolArray) -> Solution:
     """
     measured = system.measured
     zero_s = measured.zero_duration_s[:, None]
-    var = measured.var_rate / zero_s + measured.zero_spread
+    var = measured.var_rate / zero_s + measured.bias_spread
     weight = 1.0 / var
     total = weight.sum(axis=0)
     rates = measured.zero_angle / zero_s
@@ -174,9 +174,9 @@ def solve_zero_first(system: TurnSystem, used: BoolArray) -> Solution:
     cov_b = np.diag(1.0 / total)
     if measured.hidden is not None:
         # What a step hides of the bias is the same in every zero turn.
-        cov_b += np.diag(np.mean(measured.hidden.variance_of_zeros() / zero_s**2, axis=0))
+        cov_b += np.diag(np.mean(measured.hidden.variance_of_biases() / zero_s**2, axis=0))
     chi2 = float(np.sum(weight * (rates - b_w) ** 2))
-    matrix, side = system.whitened(used, with_zeros=False)
+    matrix, side = system.whitened(used, with_biases=False)
     to_scale, to_bias = matrix[:, :9], matrix[:, 9:]
     inner = np.linalg.inv(to_scale.T @ to_scale)
     gain = inner @ to_scale.T

@@ -19,15 +19,15 @@ class Goal:
     """Good enough: standard error of sensitivities relative to the axis' own, and of the bias in m/s²."""
 
     sensitivity: float = 1e-3
-    zero_m_s2: float = 0.02
+    bias_m_s2: float = 0.02
 
     def __post_init__(self) -> None:
-        if not (self.sensitivity > 0 and self.zero_m_s2 > 0):
-            raise RefusedError(f"a goal must be positive, got {self.sensitivity} and {self.zero_m_s2} m/s²")
+        if not (self.sensitivity > 0 and self.bias_m_s2 > 0):
+            raise RefusedError(f"a goal must be positive, got {self.sensitivity} and {self.bias_m_s2} m/s²")
 
     def shortfall(self, relative_sigma: FloatArray) -> float:
         """Largest standard error (3, 4) over its limit: 1 or less is good enough."""
-        return float(np.max(relative_sigma / np.array([self.sensitivity] * 3 + [self.zero_m_s2])))
+        return float(np.max(relative_sigma / np.array([self.sensitivity] * 3 + [self.bias_m_s2])))
 
 
 def _directions() -> FloatArray:

@@ -65,7 +65,7 @@ class LiveNormCalibration:
         options = options or ShapingOptions()
         models = [shaping_model(n, options, session_s=session_s, pose_s=pose_s) for n in noise_per_axis(noise)]
         size = np.abs(np.diag(start.S)).mean()
-        sigma = np.array([start.sigma_relative * size] * 6 + [start.sigma_zero_m_s2] * 3)
+        sigma = np.array([start.sigma_relative * size] * 6 + [start.sigma_bias_m_s2] * 3)
         mean = np.array([start.S[i, j] for i, j in ENTRIES] + [0.0] * 3)
         self._filter = _core.NormKalman(
             models[0], models[1], models[2], frame == "symmetric", gravity_m_s2, mean, sigma

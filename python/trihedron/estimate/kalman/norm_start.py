@@ -15,14 +15,14 @@ from trihedron.errors import RefusedError
 class NormStart:
     """Where the filter starts: ``f = S (raw − zero)`` with S (3, 3) and bias (3,).
 
-    S is good to ``sigma_relative`` of its size, the bias to ``sigma_zero_m_s2``. The signs of S decide
+    S is good to ``sigma_relative`` of its size, the bias to ``sigma_bias_m_s2``. The signs of S decide
     the signs of the result: the length of a vector cannot.
     """
 
     S: FloatArray
     zero: FloatArray
     sigma_relative: float = 0.1
-    sigma_zero_m_s2: float = 1.0
+    sigma_bias_m_s2: float = 1.0
 
     def __post_init__(self) -> None:
         S, zero = np.array(self.S, dtype=np.float64), np.array(self.zero, dtype=np.float64)
@@ -32,7 +32,7 @@ class NormStart:
             raise RefusedError(
                 "a start needs three independent axes: S = 0 is no calibration, but the filter would stay there"
             )
-        if not (self.sigma_relative > 0 and self.sigma_zero_m_s2 > 0):
+        if not (self.sigma_relative > 0 and self.sigma_bias_m_s2 > 0):
             raise RefusedError("the uncertainty of a start must be positive")
         object.__setattr__(self, "S", S)
         object.__setattr__(self, "zero", zero)
@@ -56,4 +56,4 @@ class NormStart:
         if np.any(half <= 0):
             raise RefusedError(f"{'XYZ'[int(np.argmin(half))]} never changed: turn it both ways up, or give a start")
         zero = (a.max(axis=0) + a.min(axis=0)) / 2.0
-        return cls(np.diag(gravity_m_s2 / half), zero, sigma_relative=0.3, sigma_zero_m_s2=3.0)
+        return cls(np.diag(gravity_m_s2 / half), zero, sigma_relative=0.3, sigma_bias_m_s2=3.0)

@@ -9,7 +9,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.records.kalman import AxisNoise
 
-SLOWEST_PER_SESSION, FASTEST_PER_HOLD = 0.3, 6.0
+SLOWEST_PER_SESSION, FASTEST_PER_POSE = 0.3, 6.0
 """Extreme inverse correlation times, over those of the session and of a pose. With one Gauss-Markov process per decade
 between them the Allan deviation follows flicker within 2 %."""
 
@@ -41,7 +41,7 @@ def shaping_model(
     """Compiled shaping filter of one axis for a session of ``session_s`` with poses of about ``pose_s``."""
     rates = options.flicker_rates_per_s
     if not rates:
-        slow, fast = SLOWEST_PER_SESSION / session_s, FASTEST_PER_HOLD / pose_s
+        slow, fast = SLOWEST_PER_SESSION / session_s, FASTEST_PER_POSE / pose_s
         n = max(2, int(np.ceil(np.log10(fast / slow))) + 1)
         rates = tuple(float(rate) for rate in np.geomspace(slow, fast, n))
     return _core.AxisKalmanModel(

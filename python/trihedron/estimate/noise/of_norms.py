@@ -1,8 +1,8 @@
 """Bias instability and walk of an accelerometer, as the length of gravity in the poses of a session shows them.
 
 A pose tells one number of an accelerometer's bias: its part along gravity. With ``u`` (n, 3) the directions of gravity
-in the poses and ``V_B``, ``V_K`` the covariance of one axis' bias per B² and per K² (:mod:`of_zeros`), the residuals of
-the lengths have
+in the poses and ``V_B``, ``V_K`` the covariance of one axis' bias per B² and per K² (:mod:`of_biases`), the residuals
+of the lengths have
 
     V = σ² + s² I + Σ_k (u_k u_kᵀ) ∘ (B_k² V_B + K_k² V_K)
 
@@ -20,13 +20,13 @@ import numpy as np
 from scipy.stats import chi2, qmc
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.noise.of_zeros import (
+from trihedron.estimate.noise.of_biases import (
     FEWEST_CONTRASTS,
     HIGHEST,
     LEAST_SIDE,
     LOWEST,
     MIDDLE_OF_WALK,
-    PoseZeros,
+    PoseBiases,
     SlowDifference,
     best_scatter,
     kernels,
@@ -49,7 +49,7 @@ INTERVAL = np.array([0.025, 0.5, 0.975])
 class PoseNorms:
     """Lengths of gravity less g (n,), as any calibration leaves them, with directions ``up`` (n, 3) in the sensor."""
 
-    norms: PoseZeros
+    norms: PoseBiases
     up: FloatArray
 
     @property

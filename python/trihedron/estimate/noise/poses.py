@@ -23,7 +23,7 @@ from trihedron.records.channel_facts import LowPass
 from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise
 from trihedron.transforms import cosine_transform
 
-FEWEST_HOLDS = 3
+FEWEST_POSES = 3
 """Poses that must show an octave, where there are as many: the scatter of one is not known."""
 LEVEL_KNOWN = 1.0
 """Standard error of the logarithm of a density below a corner, from which on the differences of readings say more."""
@@ -61,7 +61,7 @@ def noise_of_poses(
     --------
     >>> import numpy as np
     >>> x = np.random.default_rng(1).normal(size=(5000, 1))
-    >>> axis = noise_of_holds(x, 100.0, [(k, k + 400) for k in range(0, 5000, 500)])[0]
+    >>> axis = noise_of_poses(x, 100.0, [(k, k + 400) for k in range(0, 5000, 500)])[0]
     >>> axis.white.lower < 0.1 < axis.white.upper, axis.lines, axis.corner_hz
     (True, (), None)
     """
@@ -180,7 +180,7 @@ def _octaves(parts: Sequence[FloatArray], rate_hz: float) -> tuple[OctaveNoise, 
     out = []
     for octave in sorted(found):
         # One long pose, perhaps with the hand still on it, is not the sensor's low octave.
-        if len(found[octave][0]) < min(FEWEST_HOLDS, len(parts)):
+        if len(found[octave][0]) < min(FEWEST_POSES, len(parts)):
             continue
         pooled = pooled_logarithm(np.array(found[octave][0]), np.array(found[octave][1]))
         if pooled.sigma > 1.0 or not math.isfinite(pooled.mean):

@@ -42,7 +42,7 @@ def refuse_two_clocks(found: MotionFit, k: int) -> None:
         raise RefusedError(
             f"{side.reference.motion.source}: the motion fits two offsets of the reference's clock, {at:+.4g} s and "
             f"{at + shifts[best]:+.4g} s (evidence {2.0 * (here - there):.1f} apart, {ACCEPTED:g} needed): shake the "
-            "unit once, irregularly, or give the reference stamps of the log's own clock."
+            "unit once, irregularly, or give the reference timestamps of the log's own clock."
         )
 
 

@@ -46,20 +46,20 @@ def grid_of(recording: Recording) -> Grid:
     assert gyroscope is not None
     readings = gyroscope if recording.accelerometer is None else np.hstack([gyroscope, recording.accelerometer])
     is_there = np.all(np.isfinite(readings), axis=1)
-    stamps = recording.time_s[is_there]
+    timestamps = recording.time_s[is_there]
     step = 1.0 / recording.rate_hz
-    n = int((stamps[-1] - stamps[0]) / step) + 1
-    time = stamps[0] + step * np.arange(n)
-    values = CubicSpline(stamps, readings[is_there])(time)
+    n = int((timestamps[-1] - timestamps[0]) / step) + 1
+    time = timestamps[0] + step * np.arange(n)
+    values = CubicSpline(timestamps, readings[is_there])(time)
     accelerometer = None if recording.accelerometer is None else values[:, 3:]
-    return Grid(time, step, values[:, :3], accelerometer, within(stamps, time, step))
+    return Grid(time, step, values[:, :3], accelerometer, within(timestamps, time, step))
 
 
-def within(stamps: FloatArray, time: FloatArray, step: float) -> Mask:
+def within(timestamps: FloatArray, time: FloatArray, step: float) -> Mask:
     """Whether times (n,) lie among timestamps (m,) that are no more than ``LONGEST_GAP`` steps apart there."""
-    after = np.clip(np.searchsorted(stamps, time), 1, len(stamps) - 1)
-    is_close = stamps[after] - stamps[after - 1] <= LONGEST_GAP * step
-    return np.asarray(is_close & (time >= stamps[0]) & (time <= stamps[-1]), dtype=bool)
+    after = np.clip(np.searchsorted(timestamps, time), 1, len(timestamps) - 1)
+    is_close = timestamps[after] - timestamps[after - 1] <= LONGEST_GAP * step
+    return np.asarray(is_close & (time >= timestamps[0]) & (time <= timestamps[-1]), dtype=bool)
 
 
 class Reference:

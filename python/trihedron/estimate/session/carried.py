@@ -97,11 +97,11 @@ def carried_each(
     skew[:, [1, 2, 0], [0, 1, 2]] = start[:, [2, 0, 1]]
     turn = rotation @ skew
 
-    sigma_force, sigma_zero = (np.sqrt(variance)[:, None, :] for variance in (measured.var_reading, measured.var_zero))
+    sigma_force, sigma_bias = (np.sqrt(variance)[:, None, :] for variance in (measured.var_reading, measured.var_bias))
     # Roots of covariances side by side: sums of squares do not go negative by rounding, as turns of gravity about
     # itself make differences of large parts do.
     roots = [turn @ _root(cov_rate), rotation @ (S_a * sigma_force[before]), S_a * sigma_force[after],
-             turn @ wrt_before @ (S_w * sigma_zero[before]), turn @ wrt_after @ (S_w * sigma_zero[after])]  # fmt: skip
+             turn @ wrt_before @ (S_w * sigma_bias[before]), turn @ wrt_after @ (S_w * sigma_bias[after])]  # fmt: skip
     root = np.concatenate(roots, axis=2)
     across = np.eye(3) - unit_end[:, :, None] * unit_end[:, None, :]
     floor2 = np.sum((across @ root) ** 2, axis=(1, 2))

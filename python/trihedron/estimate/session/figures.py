@@ -48,10 +48,10 @@ def norm_quality(
 
 def norm_errors(observed: Observed, S_a: FloatArray, b_a: FloatArray) -> tuple[FloatArray, FloatArray]:
     """``|S a' + b| - |g|`` (n,) and its noise."""
-    force = (observed.hold_force + observed.force_origin) @ S_a.T + b_a
+    force = (observed.pose_force + observed.force_origin) @ S_a.T + b_a
     norm = np.linalg.norm(force, axis=1)
     gain = (force / norm[:, None]) @ S_a
-    return norm - observed.gravity_m_s2, along_gradient(observed.hold_force_sigma, observed.force_up, gain)
+    return norm - observed.gravity_m_s2, along_gradient(observed.pose_force_sigma, observed.force_up, gain)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,16 +76,16 @@ def held_out(
     Strengths of the zeros and widening of the moves are those of the whole session; what the others say is one linear
     step from its optimum (eq. 11.15).
     """
-    n, m = len(observed.hold_force), len(observed.before)
+    n, m = len(observed.pose_force), len(observed.before)
     if n_folds < 2 or m - -(-m // n_folds) < N_GYROSCOPE // 2 + 1 or n - -(-n // n_folds) < N_ACCELEROMETER:
         return None
     core = solution.core
     labels = core.labels
     is_reading = labels[:, 3] == 0
-    is_hold = is_reading & (labels[:, 0] == STATIC_FORCE)
+    is_pose = is_reading & (labels[:, 0] == STATIC_FORCE)
     is_move = is_reading & ((labels[:, 0] == MOVES) | (labels[:, 0] == DYNAMICS))
     is_of_fold = labels[:, 1] % n_folds == np.arange(n_folds)[:, None]
-    rests = core.without(np.concatenate([is_hold & is_of_fold, is_move & is_of_fold]), observed.force_origin)
+    rests = core.without(np.concatenate([is_pose & is_of_fold, is_move & is_of_fold]), observed.force_origin)
     norm, norm_sigma = np.full(n, np.nan), np.full(n, np.nan)
     for fold, (S, b, _, covariance) in enumerate(rests[:n_folds]):
         holds = np.arange(n) % n_folds == fold
@@ -105,9 +105,9 @@ def held_out(
 
 def _of_model(observed: Observed, S: FloatArray, b_centred: FloatArray, covariance: FloatArray) -> FloatArray:
     """(n,) variance of the norm by the model's own uncertainty, ``J C Jᵀ`` with ``J = (u ⊗ a', u)``."""
-    force = observed.hold_force @ S.T + b_centred
+    force = observed.pose_force @ S.T + b_centred
     up = force / np.linalg.norm(force, axis=1, keepdims=True)
-    means = observed.hold_force + observed.force_origin
+    means = observed.pose_force + observed.force_origin
     jacobian = np.concatenate([(up[:, :, None] * means[:, None, :]).reshape(-1, 9), up], axis=1)
     out: FloatArray = np.maximum(np.einsum("ni,ij,nj->n", jacobian, covariance, jacobian), 0.0)
     return out

@@ -30,7 +30,7 @@ class SessionSolution:
 
     ``S_a``, ``b_a``, ``S_w``, ``b_w`` with their ``covariance`` (24, 24); the zeros are those of one for the session.
     ``moves_chi2`` over ``moves_dof`` degrees of freedom of gravity after the moves, in the noise of the samples.
-    ``inflation`` of the moves' standard errors; ``accel_zero_rms``, ``gyro_zero_rms`` what the zeros of the holds
+    ``inflation`` of the moves' standard errors; ``accel_bias_rms``, ``gyro_bias_rms`` what the zeros of the holds
     differ from the session's by, m/s² and rad/s: as far as S, b alone must miss.
     """
 
@@ -42,8 +42,8 @@ class SessionSolution:
     moves_chi2: float
     moves_dof: float
     inflation: tuple[float, float]
-    accel_zero_rms: float
-    gyro_zero_rms: float
+    accel_bias_rms: float
+    gyro_bias_rms: float
     is_converged: bool
     stopped_because: str
     iterations: int
@@ -87,8 +87,8 @@ def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths) -> 
         force_bias=core.force_bias,
         rate_scale=core.rate_scale,
         up=core.up,
-        rate_zero=core.rate_zero,
-        force_zero=core.force_zero,
+        pose_rate_bias=core.pose_rate_bias,
+        pose_force_bias=core.pose_force_bias,
         effect=np.zeros(0),
     )
     return observed.model().fit(state=state, strengths=strengths, force_effect=None, rate_effect=None)
@@ -99,7 +99,7 @@ def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
     chi2, dof = (float(of_domains[MOVES]) for of_domains in _misfits(core))
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
-    away = core.force_zero @ S_a.T, (core.rate_zero - core.rate_zero.mean(axis=0)) @ S_w.T
+    away = core.pose_force_bias @ S_a.T, (core.pose_rate_bias - core.pose_rate_bias.mean(axis=0)) @ S_w.T
     return SessionSolution(
         S_a=S_a,
         b_a=np.asarray(core.session_force_bias) - S_a @ observed.force_origin,
@@ -109,8 +109,8 @@ def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
         moves_chi2=chi2 * inflation[0] ** 2,
         moves_dof=dof,
         inflation=inflation,
-        accel_zero_rms=float(np.sqrt(np.mean(away[0] ** 2))),
-        gyro_zero_rms=float(np.sqrt(np.mean(away[1] ** 2))),
+        accel_bias_rms=float(np.sqrt(np.mean(away[0] ** 2))),
+        gyro_bias_rms=float(np.sqrt(np.mean(away[1] ** 2))),
         is_converged=core.is_converged,
         stopped_because=words(core.stopped_because),
         iterations=core.iterations,
@@ -134,14 +134,14 @@ def fitted(
     S_w: FloatArray,
 ) -> _core.SessionFit:
     """One fit on centred readings, its strengths chosen; velocities are not heard."""
-    force = observed.hold_force @ S_a.T + b_a
+    force = observed.pose_force @ S_a.T + b_a
     state = _core.SessionState(
         force_scale=np.ascontiguousarray(S_a),
         force_bias=np.ascontiguousarray(b_a),
         rate_scale=np.ascontiguousarray(S_w),
         up=np.ascontiguousarray(force / np.linalg.norm(force, axis=1, keepdims=True)),
-        rate_zero=np.ascontiguousarray(observed.hold_rate),
-        force_zero=np.zeros((len(force), 3)),
+        pose_rate_bias=np.ascontiguousarray(observed.pose_rate),
+        pose_force_bias=np.zeros((len(force), 3)),
         effect=np.zeros(0),
     )
     return observed.model().fit(

@@ -27,12 +27,12 @@ class Observed:
     gravity_m_s2: float
     force_origin: FloatArray
     rate_origin: FloatArray
-    hold_time_s: FloatArray
-    hold_force: FloatArray
-    hold_force_sigma: FloatArray
+    pose_time_s: FloatArray
+    pose_force: FloatArray
+    pose_force_sigma: FloatArray
     force_density: FloatArray
-    hold_rate: FloatArray
-    hold_rate_sigma: FloatArray
+    pose_rate: FloatArray
+    pose_rate_sigma: FloatArray
     rate_density: FloatArray
     moves: _core.SessionMoves
     before: npt.NDArray[np.int64]
@@ -44,16 +44,16 @@ class Observed:
     def model(self) -> _core.SessionModel:
         """The Rust model; zeros may scatter from pose to pose as far as the evidence goes."""
         poses = _core.SessionPoses(
-            time_s=self.hold_time_s,
-            force=self.hold_force,
-            force_sigma=self.hold_force_sigma,
+            time_s=self.pose_time_s,
+            force=self.pose_force,
+            force_sigma=self.pose_force_sigma,
             force_density=self.force_density,
-            rate=self.hold_rate,
-            rate_sigma=self.hold_rate_sigma,
+            rate=self.pose_rate,
+            rate_sigma=self.pose_rate_sigma,
             rate_density=self.rate_density,
             force_along=self.force_up,
         )
-        unit = scatter_unit(self.hold_force_sigma, self.hold_rate_sigma, self.force_up)
+        unit = scatter_unit(self.pose_force_sigma, self.pose_rate_sigma, self.force_up)
         return _core.SessionModel(
             gravity_m_s2=self.gravity_m_s2,
             poses=poses,
@@ -70,7 +70,7 @@ def arranged(
     """Arrange measured holds and the moves in use; neighbouring still samples bracket each move."""
     assert recording.accelerometer is not None
     n = recording.n_samples
-    force_origin, rate_origin = measured.reading.mean(axis=0), measured.zero_read.mean(axis=0)
+    force_origin, rate_origin = measured.reading.mean(axis=0), measured.bias_read.mean(axis=0)
     ranges: list[tuple[int, int]] = []
     before = []
     for (start, stop), (hold, after), is_used in zip(measured.edges, measured.links, used, strict=True):
@@ -91,21 +91,21 @@ def arranged(
         # What rounding and bridged clipping leave open, beside what any session has.
         for k, (a, b) in enumerate(ranges):
             unresolved[k, 1] += measured.reading_variance[a:b].sum(axis=0) * measured.nominal_step_s**2
-    hold_time_s = np.ascontiguousarray(segments.time_mid_s, dtype=np.float64)
+    pose_time_s = np.ascontiguousarray(segments.time_mid_s, dtype=np.float64)
     return Observed(
         gravity_m_s2=gravity_m_s2,
         force_origin=force_origin,
         rate_origin=rate_origin,
-        hold_time_s=hold_time_s,
-        hold_force=measured.reading - force_origin,
+        pose_time_s=pose_time_s,
+        pose_force=measured.reading - force_origin,
         # Where readings dither too little their rounding does not average out: the larger of the two.
-        hold_force_sigma=np.maximum(noise.force_sigma, np.sqrt(measured.var_reading_noise)),
+        pose_force_sigma=np.maximum(noise.force_sigma, np.sqrt(measured.var_reading_noise)),
         force_density=noise.force_density,
-        hold_rate=measured.zero_read - rate_origin,
-        hold_rate_sigma=np.maximum(noise.rate_sigma, np.sqrt(measured.var_zero_read)),
+        pose_rate=measured.bias_read - rate_origin,
+        pose_rate_sigma=np.maximum(noise.rate_sigma, np.sqrt(measured.var_bias_read)),
         rate_density=noise.rate_density,
         moves=_core.SessionMoves(
-            hold_time_s=hold_time_s,
+            pose_time_s=pose_time_s,
             time_s=np.ascontiguousarray(recording.time_s),
             force=np.ascontiguousarray(force - force_origin),
             rate=np.ascontiguousarray(measured.rate - rate_origin),

@@ -11,7 +11,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.read.clock.rate import usual_step
 from trihedron.read.clock.steps import steps_of
-from trihedron.records import Finding, FindingCode, Sampling, Severity, StampKind
+from trihedron.records import Finding, FindingCode, Sampling, Severity, TimestampKind
 from trihedron.records.sampling import UNJUDGED
 
 Place = Callable[[int], str]
@@ -31,12 +31,12 @@ def audit_timing(
     place: Place,
     sampling: Sampling = UNJUDGED,
     lost_behind: npt.NDArray[np.int64] | None = None,
-    stamps_s: FloatArray | None = None,
+    timestamps_s: FloatArray | None = None,
 ) -> list[Finding]:
     """Findings on timestamps that were in the log. ``place(i)`` names sample i for people.
 
     ``lost_behind`` (n - 1,) are the samples lost behind each, where the clock tells them; else long steps count.
-    ``stamps_s`` (n,) are the timestamps as logged where an even clock took their place.
+    ``timestamps_s`` (n,) are the timestamps as logged where an even clock took their place.
     """
     if len(time_s) < 3:
         return []
@@ -44,13 +44,13 @@ def audit_timing(
     if not usual > 0:
         return []
     findings: list[Finding] = []
-    if steps_of(time_s if stamps_s is None else stamps_s).same:
+    if steps_of(time_s if timestamps_s is None else timestamps_s).same:
         findings += _duplicates(
-            np.diff(time_s if stamps_s is None else stamps_s), place, is_mended=stamps_s is not None
+            np.diff(time_s if timestamps_s is None else timestamps_s), place, is_mended=timestamps_s is not None
         )
     if lost_behind is not None:
         findings += _lost(np.diff(time_s), lost_behind, place) if lost_behind.any() else []
-    elif sampling.kind in (StampKind.LATE, StampKind.SCATTERED):
+    elif sampling.kind in (TimestampKind.LATE, TimestampKind.SCATTERED):
         pass  # a late timestamp looks like a loss: how many are lost is not told
     else:
         batched = bool(findings) and steps_of(time_s).same > 0.2 * (len(time_s) - 1)
@@ -60,16 +60,16 @@ def audit_timing(
             lost = np.zeros(len(step), dtype=np.int64)
             lost[gaps] = np.maximum(np.rint(step[gaps] / usual) - 1, 0)
             findings += _gap(step, gaps, lost, place)
-    stamps = time_s
-    if stamps_s is not None:
-        usual, stamps = usual_step(stamps_s), stamps_s
-    count, total, jitter, least, most = _core.inside_steps(stamps, 0.0, GAP_STEPS * usual)
+    timestamps = time_s
+    if timestamps_s is not None:
+        usual, timestamps = usual_step(timestamps_s), timestamps_s
+    count, total, jitter, least, most = _core.inside_steps(timestamps, 0.0, GAP_STEPS * usual)
     mean = total / count
     if jitter > JITTER_STEPS * mean:
         findings.append(
             Finding.of(
                 FindingCode.TIME_JITTER,
-                severity=Severity.NOTE if jitter < MUCH_JITTER * mean or stamps_s is not None else Severity.WARNING,
+                severity=Severity.NOTE if jitter < MUCH_JITTER * mean or timestamps_s is not None else Severity.WARNING,
                 jitter_s=jitter,
                 median_step_s=usual,
                 median_rate_hz=1 / usual,
@@ -78,7 +78,7 @@ def audit_timing(
                 least_s=least,
                 largest_s=most,
                 rate_hz=rate_hz,
-                is_irregular=sampling.kind is StampKind.IRREGULAR,
+                is_irregular=sampling.kind is TimestampKind.IRREGULAR,
             )
         )
     return findings

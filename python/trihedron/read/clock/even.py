@@ -14,7 +14,7 @@ from trihedron.quantiles import median, quantiles
 from trihedron.read.clock.losses import STALL_STEPS, ahead, behind_late_rows, block_rows, earliest, lateness, track
 from trihedron.read.clock.period import Period, find_period
 from trihedron.read.clock.rounded import numbers_of_rounded
-from trihedron.records.sampling import StampKind
+from trihedron.records.sampling import TimestampKind
 
 FEWEST_ROWS = 100
 """Fewer timestamps tell no kind of clock."""
@@ -39,12 +39,12 @@ class EvenClock:
     the timestamps; ``kind``; ``counts_losses``: whether ``tick`` says what was lost; ``pauses`` (m,) rows behind which
     the logger paused; ``wanders``: the rate changes over the log."""
 
-    kind: StampKind
+    kind: TimestampKind
     period_s: float
     sigma_period_s: float
     tick: IntArray
     even_s: FloatArray
-    stamp_error_s: float
+    timestamp_error_s: float
     counts_losses: bool
     pauses: IntArray
     grid_s: float = 0.0
@@ -74,7 +74,7 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
     if counter is None and found.grid_s > 0.0:
         numbers = numbers_of_rounded(time_s, found.grid_s)
         numbered = None if numbers is None else _clock_of(time_s, numbers, found)
-        if numbered is not None and numbered.kind is not StampKind.IRREGULAR:
+        if numbered is not None and numbered.kind is not TimestampKind.IRREGULAR:
             return numbered
     return _clock_of(time_s, counter, found)
 
@@ -112,9 +112,9 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
     on_grid = 0.0 < found.grid_s < 1.3 * period and _range(error) < 1.3 * found.grid_s
     growth = 0.0 if on_grid else _growth(error, pauses, UNSEEN * period)
     if moved_back > TAKEN_BACK or growth > GROWTH or (not sees and growth > 0.5 * GROWTH):
-        return EvenClock(StampKind.IRREGULAR, period, sigma, np.arange(n), time_s, 0.0, False, pauses)
+        return EvenClock(TimestampKind.IRREGULAR, period, sigma, np.arange(n), time_s, 0.0, False, pauses)
     kind = _kind(error, period, found.grid_s)
-    if kind is not StampKind.LATE:
+    if kind is not TimestampKind.LATE:
         # Two-sided errors have their middle, not their edge, on the clock.
         even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, True, room, CLOSE_PIECES)
         error = _error(time_s, even)
@@ -125,7 +125,7 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
 
 def _error(time_s: FloatArray, even: FloatArray) -> FloatArray:
     """``time_s - even`` in the place of ``even``, which is the timestamps less their error again when it is wanted."""
-    _core.stamp_errors(time_s, even)
+    _core.timestamp_errors(time_s, even)
     return even
 
 
@@ -228,17 +228,17 @@ def _range(error: FloatArray) -> float:
     return float(high - low)
 
 
-def _kind(error: FloatArray, period: float, grid: float) -> StampKind:
+def _kind(error: FloatArray, period: float, grid: float) -> TimestampKind:
     """Kind of timestamps from their errors (n,) about the even clock."""
     probe = error[:: max(len(error) // 100_000, 1)]
     low, middle, high = quantiles(probe[:, None], [0.002, 0.5, 0.998])[:, 0]
     rms = float(np.std(probe))
     if rms < EXACT * period:
-        return StampKind.EXACT
+        return TimestampKind.EXACT
     if 0.0 < grid < 1.3 * period and _range(error) < 1.3 * grid:
-        return StampKind.ROUNDED
+        return TimestampKind.ROUNDED
     # One-sided: the early edge is sharp, the late one runs out; or samples come in packets.
     together = _core.errors_falls(error, 0.7 * period) / max(len(error) - 1, 1)
     if high - middle > 2.0 * (middle - low) or together > 0.02 or high - low > 1.0 * period:
-        return StampKind.LATE
-    return StampKind.SCATTERED
+        return TimestampKind.LATE
+    return TimestampKind.SCATTERED

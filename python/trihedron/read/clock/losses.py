@@ -41,12 +41,12 @@ def block_rows(time_s: FloatArray, period: float, coherence: float) -> int:
 
 def earliest(late: FloatArray, width: int) -> IntArray:
     """Row of the earliest timestamp of every block of ``width`` rows (the last one may be longer)."""
-    return _core.earliest_stamps(late, width)
+    return _core.earliest_timestamps(late, width)
 
 
 def lateness(time_s: FloatArray, tick: IntArray | None, period: float, room: FloatArray) -> FloatArray:
     """``time_s - period * tick`` in ``room`` (n,); without ticks each row is its own."""
-    _core.stamp_lateness(time_s, tick, period, room)
+    _core.timestamp_lateness(time_s, tick, period, room)
     return room
 
 

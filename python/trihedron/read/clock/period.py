@@ -33,7 +33,7 @@ ALIASED, COARSE_COHERENCE = 0.75, 0.15
 itself if its phase sum is shorter than the second."""
 MANY, PLAIN = 0.15, 0.25
 """A period by which more than this share of samples is lost needs a power of its phase sum above the second."""
-FEWEST_STAMPS = 100
+FEWEST_TIMESTAMPS = 100
 """Distinct timestamps that a period needs."""
 WHOLE = 0.005
 """A packet holds a whole number of samples if the rows come this near to it."""
@@ -72,7 +72,7 @@ def find_period(time_s: FloatArray) -> Period:
     line = _first_line(windows, mean_step, spectrum)
     grid = mean_step / line if line else 0.0
     best = _choose(spectrum, line, _shortest_step(windows) / mean_step)
-    if best is None or sum(np.count_nonzero(np.diff(w) > 0.2 * mean_step) for w in windows) < FEWEST_STAMPS:
+    if best is None or sum(np.count_nonzero(np.diff(w) > 0.2 * mean_step) for w in windows) < FEWEST_TIMESTAMPS:
         return Period(mean_step, 0.0, grid, False)
     k = int(np.argmin(np.abs(spectrum.per_step - best)))
     reach = spectrum.lobe

@@ -11,7 +11,7 @@ from trihedron.read.clock.even import EXACT, EvenClock, find_even_clock
 from trihedron.read.clock.followed import followed
 from trihedron.read.clock.steps import steps_of
 from trihedron.records import Finding, FindingCode
-from trihedron.records.sampling import Sampling, StampKind
+from trihedron.records.sampling import Sampling, TimestampKind
 
 WORTH = 0.03
 """Times this part of a step (rms) about an even clock are as good as even (those rounded to a tenth of a step are):
@@ -48,26 +48,26 @@ def settle_clock(
     """
     clock = find_even_clock(time_s)
     numbers = None if counter is None else sample_numbers(counter)
-    if clock is not None and numbers is not None and clock.kind not in (StampKind.EXACT, StampKind.ROUNDED):
+    if clock is not None and numbers is not None and clock.kind not in (TimestampKind.EXACT, TimestampKind.ROUNDED):
         counted = find_even_clock(time_s, numbers)
-        if counted is not None and counted.kind is not StampKind.IRREGULAR:
+        if counted is not None and counted.kind is not TimestampKind.IRREGULAR:
             clock = counted
     if clock is None:
         return Settled(time_s, start_s, Sampling(), None, ())
-    if clock.kind is StampKind.IRREGULAR:
-        return Settled(time_s, start_s, Sampling(StampKind.IRREGULAR, clock.period_s), None, ())
+    if clock.kind is TimestampKind.IRREGULAR:
+        return Settled(time_s, start_s, Sampling(TimestampKind.IRREGULAR, clock.period_s), None, ())
     lost = clock.lost_behind
     share, sigma = 0.0, float("inf")
     shared = steps_of(time_s).same / (len(time_s) - 1)
     is_even = False
-    if clock.stamp_error_s > _worth(clock.kind) * clock.period_s:
+    if clock.timestamp_error_s > _worth(clock.kind) * clock.period_s:
         share, sigma = followed(time_s, clock.even_s, clock.tick, triads)
         follows = share - STANDARD_ERRORS * sigma > SYSTEMATIC
         ignores = share + STANDARD_ERRORS * sigma < 1.0 - SYSTEMATIC
-        by_itself = shared > SHARED or clock.kind is StampKind.ROUNDED
+        by_itself = shared > SHARED or clock.kind is TimestampKind.ROUNDED
         is_even = not follows and (ignores or by_itself)
     sampling = Sampling(
-        clock.kind, clock.period_s, clock.sigma_period_s, clock.stamp_error_s, is_even, clock.counts_losses,
+        clock.kind, clock.period_s, clock.sigma_period_s, clock.timestamp_error_s, is_even, clock.counts_losses,
         int(lost.sum()) if clock.counts_losses else 0, int(np.count_nonzero(lost)) if clock.counts_losses else 0,
         share, sigma,
     )  # fmt: skip
@@ -82,9 +82,9 @@ def settle_clock(
     return Settled(np.maximum.accumulate(even, out=even), start_s + start, sampling, told, findings)
 
 
-def _worth(kind: StampKind) -> float:
+def _worth(kind: TimestampKind) -> float:
     # Rounding is the file's, not the sensor's, however small: left in the timestamps it would be found as jitter.
-    return EXACT if kind is StampKind.ROUNDED else WORTH
+    return EXACT if kind is TimestampKind.ROUNDED else WORTH
 
 
 def sample_numbers(counter: FloatArray) -> IntArray | None:
@@ -107,7 +107,7 @@ def sample_numbers(counter: FloatArray) -> IntArray | None:
 
 
 def _findings(sampling: Sampling, clock: EvenClock, shared: float) -> tuple[Finding, ...]:
-    if sampling.stamp_error_s <= _worth(sampling.kind) * sampling.period_s:
+    if sampling.timestamp_error_s <= _worth(sampling.kind) * sampling.period_s:
         return ()
     follows = sampling.followed - STANDARD_ERRORS * sampling.sigma_followed > SYSTEMATIC
     follows_wholly = follows and sampling.followed + STANDARD_ERRORS * sampling.sigma_followed > 1.0 - SYSTEMATIC
@@ -121,10 +121,10 @@ def _findings(sampling: Sampling, clock: EvenClock, shared: float) -> tuple[Find
             period_s=sampling.period_s,
             sigma_period_s=sampling.sigma_period_s,
             rate_hz=1.0 / sampling.period_s,
-            stamp_error_s=sampling.stamp_error_s,
-            is_rounded=sampling.kind is StampKind.ROUNDED,
+            timestamp_error_s=sampling.timestamp_error_s,
+            is_rounded=sampling.kind is TimestampKind.ROUNDED,
             grid_s=clock.grid_s,
-            is_late=sampling.kind is StampKind.LATE,
+            is_late=sampling.kind is TimestampKind.LATE,
             motion_tells=sampling.sigma_followed < VAGUE,
             followed=sampling.followed,
             sigma_followed=sampling.sigma_followed,

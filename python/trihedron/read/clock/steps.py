@@ -22,4 +22,4 @@ class Steps:
 
 def steps_of(time_s: FloatArray) -> Steps:
     """Steps of timestamps (n,)."""
-    return Steps(*_core.stamp_steps(np.asarray(time_s, dtype=np.float64)))
+    return Steps(*_core.timestamp_steps(np.asarray(time_s, dtype=np.float64)))

@@ -82,8 +82,8 @@ def seconds(cells: pl.Series, form: str) -> FloatArray:
         return np.asarray(3600.0 * hours + 60.0 * minutes + secs, dtype=np.float64)
     if form.startswith("%Y"):
         text = text.str.replace(r"(Z|[+-]\d\d:?\d\d)$", "")
-    stamps = text.str.to_datetime(form, time_unit="ns", strict=False)
-    return np.asarray(stamps.dt.timestamp("ns").cast(pl.Float64).to_numpy() / 1e9, dtype=np.float64)
+    timestamps = text.str.to_datetime(form, time_unit="ns", strict=False)
+    return np.asarray(timestamps.dt.timestamp("ns").cast(pl.Float64).to_numpy() / 1e9, dtype=np.float64)
 
 
 def past_midnight(time_of_day_s: FloatArray) -> FloatArray:

@@ -30,7 +30,7 @@ _PAIR = re.compile(
     rf"([A-Za-z_][\w.\[\]()/^°² -]*?)\s*[:=]\s*({_VALUE})(?![\d:])(?:\s*([A-Za-zµ°][\w/^°²*]*)(?!\s*[:=\w\[(]))?"
 )
 _HAS_LABEL = re.compile(r".*?[A-Za-z_\])]\s*[:=]")
-_BARE_STAMP = re.compile(rf"\s*({_VALUE})\s*[,;]?\s+(?=[A-Za-z])")
+_BARE_TIMESTAMP = re.compile(rf"\s*({_VALUE})\s*[,;]?\s+(?=[A-Za-z])")
 _THREE = re.compile(
     rf"([A-Za-z_]\w*)\s*[:=]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})(?![\d:.])(?!\s*[,;\s]\s*[-+.\d])"
 )
@@ -50,26 +50,28 @@ def rewrite(text: str) -> Rewritten | None:
     """The text without its dialect; None where it speaks none."""
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     prefix = _prefix_of(lines)
-    stamps: list[str] | None = None
+    timestamps: list[str] | None = None
     rests = lines
     if prefix is not None:
         found = [prefix.match(line) for line in lines]
-        stamps = [m.group(1) if m else "" for m in found]
+        timestamps = [m.group(1) if m else "" for m in found]
         rests = [line[m.end() :] if m else line for line, m in zip(lines, found, strict=True)]
     labelled = _labelled(rests)
     if labelled is not None:
         preamble, names, rows, numbers = labelled
-        if stamps is not None:
+        if timestamps is not None:
             names = ["arrival time", *names]
-            rows = [f"{stamps[i - 1]},{row}" if stamps[i - 1] else row for i, row in zip(numbers, rows, strict=True)]
+            rows = [
+                f"{timestamps[i - 1]},{row}" if timestamps[i - 1] else row for i, row in zip(numbers, rows, strict=True)
+            ]
         first = [numbers[0]] * (len(preamble) + 1)
         return _joined([*preamble, ",".join(names), *rows], [*first, *numbers])
-    if stamps is None:
+    if timestamps is None:
         return None
     filled = [rest for rest in rests if re.match(rf"\s*{_NUMBER}\s*[,;\t ]", rest)]
     glue = next((s for s in (",", ";", "\t") if filled and s in filled[-1]), " ")
     rows = []
-    for stamp, rest in zip(stamps, rests, strict=True):
+    for stamp, rest in zip(timestamps, rests, strict=True):
         if stamp and rest.strip():
             is_row = re.match(r"\s*[-+.\d]", rest) is not None
             rows.append(f"{stamp if is_row else 'arrival time'}{glue}{rest}")
@@ -110,9 +112,9 @@ def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[str], list[i
     sample = [line for _, line in filled[:_SAMPLE_LINES]]
     if len(sample) < 3 or not _nearly_all(_HAS_LABEL, sample):
         return None
-    has_stamp = _nearly_all(_BARE_STAMP, sample)
+    has_timestamp = _nearly_all(_BARE_TIMESTAMP, sample)
     known: dict[str, list[str]] = {}
-    parsed = [_pairs(_expanded(line, has_stamp), known) for line in sample]
+    parsed = [_pairs(_expanded(line, has_timestamp), known) for line in sample]
     if sum(not pairs for pairs in parsed) > (1.0 - NEARLY_ALL) * len(parsed):
         return None
     counts = Counter(label for pairs in parsed for label, _ in pairs)
@@ -132,7 +134,7 @@ def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[str], list[i
             row.clear()
 
     for number, line in filled:
-        pairs = _pairs(_expanded(line, has_stamp), known)
+        pairs = _pairs(_expanded(line, has_timestamp), known)
         if not pairs or any(label not in counts for label, _ in pairs):
             # A greeting above the first row is no row, nor is a line drawn between rows; the reader
             # refuses the rest by number.
@@ -151,10 +153,10 @@ def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[str], list[i
     return preamble, names, rows, numbers
 
 
-def _expanded(line: str, has_stamp: bool) -> str:
+def _expanded(line: str, has_timestamp: bool) -> str:
     """A line with a label before each of three values that share one (``Accel: 1, 2, 3``), and before a bare stamp."""
-    if has_stamp:
-        line = _BARE_STAMP.sub(r"time: \1 ", line, count=1)
+    if has_timestamp:
+        line = _BARE_TIMESTAMP.sub(r"time: \1 ", line, count=1)
     return _THREE.sub(r"\1 x: \2 \1 y: \3 \1 z: \4", line)
 
 

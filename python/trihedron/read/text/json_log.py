@@ -17,7 +17,7 @@ import numpy as np
 from trihedron.read.errors import ReadError
 from trihedron.read.text.dialect import Rewritten
 
-_STAMPS = ("timestamp", "time", "t")
+_TIMESTAMPS = ("timestamp", "time", "t")
 _AXES = "xyz"
 
 
@@ -134,7 +134,7 @@ def _spread(packets: list[Any]) -> list[list[Row]]:
         return [[row] for row in flat]
     out: list[list[Row]] = []
     for i, (row, arrays) in enumerate(zip(flat, samples, strict=True)):
-        stamp = next((k for k in row if k.rsplit(".", 1)[-1].lower() in _STAMPS), "")
+        stamp = next((k for k in row if k.rsplit(".", 1)[-1].lower() in _TIMESTAMPS), "")
         n = max(map(len, arrays.values()), default=1)
         near = flat[i + 1] if i + 1 < len(flat) else flat[i - 1]
         both = [float(x) for x in (row.get(stamp), near.get(stamp)) if isinstance(x, int | float)]

@@ -11,7 +11,7 @@ from trihedron.report.findings.entry import Entry
 NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 _INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
 
-_STAMPS = (
+_TIMESTAMPS = (
     Entry(
         Code.TIME_JITTER,
         "",
@@ -157,14 +157,14 @@ _RATES = (
 
 _EVEN = "T = {period_s:.6g !ms} ± {sigma_period_s:.1g ms} ({rate_hz:.6g} Hz)"
 _HOW = (
-    "{is_rounded:?rounded to {grid_s:.3g ms}|{is_late:?late by {stamp_error_s:.2g ms} rms, as they are when samples "
-    "are timestamped on arrival|scattered by {stamp_error_s:.2g ms} rms}}"
+    "{is_rounded:?rounded to {grid_s:.3g ms}|{is_late:?late by {timestamp_error_s:.2g ms} rms, as they are when "
+    "samples are timestamped on arrival|scattered by {timestamp_error_s:.2g ms} rms}}"
 )
 _BY_MOTION = (
     "{motion_tells:?the readings follow {followed:.2f} ± {sigma_followed:.2g} of it|no motion shows when the samples "
     "were taken}"
 )
-_WITH_THEM = ("stamp_error_s", "shared_fraction", "followed", "sigma_followed", "grid_s", "is_partly")
+_WITH_THEM = ("timestamp_error_s", "shared_fraction", "followed", "sigma_followed", "grid_s", "is_partly")
 _LOG_COUNTER = "Log the sensor's own sample counter or data-ready times if turns matter."
 
 _CLOCKS = (
@@ -179,7 +179,7 @@ _CLOCKS = (
         Code.TIMESTAMPS_KEPT,
         "",
         NOTE,
-        f"The timestamps differ from an even clock ({_EVEN}) by {{stamp_error_s:.2g ms}} rms, {_BY_MOTION}: kept.",
+        f"The timestamps differ from an even clock ({_EVEN}) by {{timestamp_error_s:.2g ms}} rms, {_BY_MOTION}: kept.",
         numbers=(*_WITH_THEM, "is_rounded", "is_late"),
     ),
     Entry(
@@ -195,7 +195,7 @@ _CLOCKS = (
     ),
     Entry(
         Code.CLOCKS_MERGED,
-        "same-stamps",
+        "same-timestamps",
         NOTE,
         "Both sensors carry the same timestamps.",
     ),
@@ -215,4 +215,4 @@ _CLOCKS = (
     ),
 )
 
-ENTRIES = (*_STAMPS, *_RATES, *_CLOCKS)
+ENTRIES = (*_TIMESTAMPS, *_RATES, *_CLOCKS)

@@ -27,7 +27,7 @@ def dropped(
 
 
 def jitter(scenario: Scenario, jitter_s: float = 0.0, rate_error: float = 0.0, shown: bool = False) -> Scenario:
-    clock = replace(scenario.clock, jitter_s=jitter_s, rate_error=rate_error, stamps_show_jitter=shown)
+    clock = replace(scenario.clock, jitter_s=jitter_s, rate_error=rate_error, timestamps_show_jitter=shown)
     return replace(scenario, clock=clock)
 
 

@@ -69,8 +69,10 @@ def effects_of(scenario: Scenario) -> MappingProxyType[str, MappingProxyType[str
     if clock.losses or clock.loss_probability:
         note("dropped-samples", probability=clock.loss_probability, restamped=clock.restamped)
         note("dropped-samples", losses=tuple((loss.time_s, loss.n) for loss in clock.losses))
-    if clock.jitter_s or clock.rate_error or clock.stamp_jitter_s:
-        note("timing-jitter", jitter_s=clock.jitter_s, rate_error=clock.rate_error, stamps_s=clock.stamp_jitter_s)
+    if clock.jitter_s or clock.rate_error or clock.timestamp_jitter_s:
+        note(
+            "timing-jitter", jitter_s=clock.jitter_s, rate_error=clock.rate_error, timestamps_s=clock.timestamp_jitter_s
+        )
     if place.earth_rate:
         note("earth-rate", latitude_deg=place.latitude_deg, heading_deg=place.heading_deg)
     _note_motion(note, scenario.motion)

@@ -18,7 +18,7 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 
 
-class HiddenDrift(BiasProcess):
+class BiasDrift(BiasProcess):
     """Warm-up exponential, straight line or slow curve per axis, or a walk stronger than the part's noise explains."""
 
     walks = True
@@ -34,7 +34,7 @@ class HiddenDrift(BiasProcess):
         """The distortion of this sensor alone."""
 
     def variants(self, context: Context) -> list[Variant]:
-        return drift_variants(context, self.on_axes(context), self.only, self.unit, self.n_waves(context.obs.n_holds))
+        return drift_variants(context, self.on_axes(context), self.only, self.unit, self.n_waves(context.obs.n_poses))
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
         return np.full(variant.distortion.n_parameters, self.typical)

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.bias_drift import BiasDrift
 from trihedron.diagnose.effects.contract import rate_only
-from trihedron.diagnose.effects.hidden_drift import HiddenDrift
 from trihedron.diagnose.session.twin import Distortion
 
 
-class GyroHiddenDrift(HiddenDrift):
+class GyroBiasDrift(BiasDrift):
     """Of the gyro: what its readings at rest show from pose to pose."""
 
     id = "gyro-bias-drift"

@@ -4,16 +4,16 @@ use rayon::prelude::*;
 
 use super::SHARE;
 
-/// Kinds of steps and of stamps, counted.
+/// Kinds of steps and of timestamps, counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Steps {
     /// Steps back.
     pub back: usize,
-    /// Stamps as the one before.
+    /// Timestamps as the one before.
     pub same: usize,
     /// Steps forward.
     pub forward: usize,
-    /// Stamps that are no finite numbers.
+    /// Timestamps that are no finite numbers.
     pub missing: usize,
 }
 
@@ -22,15 +22,15 @@ pub struct Steps {
 #[allow(clippy::float_cmp)] // the same stamp is the same to the last bit
 pub fn steps(time: &[f64]) -> Steps {
     shares(time)
-        .map(|(first, stamps)| {
+        .map(|(first, timestamps)| {
             let mut out = Steps::default();
             // Counted without branches, so that a whole vector of steps is looked at together.
-            for pair in stamps.windows(2) {
+            for pair in timestamps.windows(2) {
                 out.back += usize::from(pair[1] < pair[0]);
                 out.same += usize::from(pair[1] == pair[0]);
                 out.forward += usize::from(pair[1] > pair[0]);
             }
-            let own = &stamps[usize::from(first > 0)..];
+            let own = &timestamps[usize::from(first > 0)..];
             out.missing = own.iter().map(|t| usize::from(!t.is_finite())).sum();
             out
         })
@@ -46,16 +46,16 @@ pub fn steps(time: &[f64]) -> Steps {
 #[must_use]
 pub fn steps_above(time: &[f64], limit: f64) -> Vec<usize> {
     shares(time)
-        .map(|(first, stamps)| {
+        .map(|(first, timestamps)| {
             let start = first.saturating_sub(1);
             let longer = |pair: &[f64]| pair[1] - pair[0] > limit;
-            if !stamps
+            if !timestamps
                 .windows(2)
                 .fold(false, |any, pair| any | longer(pair))
             {
                 return Vec::new();
             }
-            stamps
+            timestamps
                 .windows(2)
                 .enumerate()
                 .filter(|(_, pair)| longer(pair))
@@ -87,10 +87,10 @@ pub fn inside(time: &[f64], above: f64, limit: f64) -> Inside {
     let kept = |step: f64| step > above && step <= limit;
     // About its own mean while a share is near: the log is walked through once.
     let parts: Vec<(Inside, f64)> = shares(time)
-        .map(|(_, stamps)| {
+        .map(|(_, timestamps)| {
             let (mut count, mut sum) = (0, 0.0);
             let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
-            for pair in stamps.windows(2) {
+            for pair in timestamps.windows(2) {
                 let step = pair[1] - pair[0];
                 let is_kept = kept(step);
                 count += usize::from(is_kept);
@@ -99,7 +99,7 @@ pub fn inside(time: &[f64], above: f64, limit: f64) -> Inside {
                 most = if is_kept && step > most { step } else { most };
             }
             let mean = sum / count as f64;
-            let squares = in_lanes(stamps, |step| {
+            let squares = in_lanes(timestamps, |step| {
                 let far = if kept(step) { step - mean } else { 0.0 };
                 far * far
             });
@@ -136,7 +136,7 @@ pub fn inside(time: &[f64], above: f64, limit: f64) -> Inside {
     }
 }
 
-/// Shares of stamps, each with the stamp before it, and where its own begin.
+/// Shares of timestamps, each with the stamp before it, and where its own begin.
 fn shares(time: &[f64]) -> impl IndexedParallelIterator<Item = (usize, &[f64])> {
     (0..time.len().div_ceil(SHARE))
         .into_par_iter()
@@ -148,30 +148,34 @@ fn shares(time: &[f64]) -> impl IndexedParallelIterator<Item = (usize, &[f64])> 
 }
 
 /// The sum of what is made of each step, eight sums side by side: an addition need not wait for the one before.
-fn in_lanes(stamps: &[f64], of: impl Fn(f64) -> f64) -> f64 {
+fn in_lanes(timestamps: &[f64], of: impl Fn(f64) -> f64) -> f64 {
     let mut sums = [0.0; 8];
-    let n = stamps.len().saturating_sub(1);
+    let n = timestamps.len().saturating_sub(1);
     let whole = n / sums.len() * sums.len();
     for first in (0..whole).step_by(sums.len()) {
-        let row: &[f64] = &stamps[first..=first + sums.len()];
+        let row: &[f64] = &timestamps[first..=first + sums.len()];
         for (k, sum) in sums.iter_mut().enumerate() {
             *sum += of(row[k + 1] - row[k]);
         }
     }
-    let rest = stamps[whole..].windows(2).map(|pair| of(pair[1] - pair[0]));
+    let rest = timestamps[whole..]
+        .windows(2)
+        .map(|pair| of(pair[1] - pair[0]));
     sums.iter().sum::<f64>() + rest.sum::<f64>()
 }
 
-/// What `visit` makes of the stamps of each share, with the one before.
+/// What `visit` makes of the timestamps of each share, with the one before.
 pub(super) fn of_each_share<R: Send>(
     time: &[f64],
     visit: impl Fn(&[f64]) -> R + Sync + Send,
 ) -> Vec<R> {
-    shares(time).map(|(_, stamps)| visit(stamps)).collect()
+    shares(time)
+        .map(|(_, timestamps)| visit(timestamps))
+        .collect()
 }
 
 /// Steps that are longer than zero, in the order of their size as integers.
-pub(super) fn forward(stamps: &[f64]) -> impl Iterator<Item = u64> {
-    let steps = stamps.windows(2).map(|pair| pair[1] - pair[0]);
+pub(super) fn forward(timestamps: &[f64]) -> impl Iterator<Item = u64> {
+    let steps = timestamps.windows(2).map(|pair| pair[1] - pair[0]);
     steps.filter(|&step| step > 0.0).map(f64::to_bits)
 }

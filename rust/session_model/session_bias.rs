@@ -7,7 +7,7 @@ use super::{AtRest, Session};
 
 /// One zero for the session, raw and centred.
 #[derive(Debug, Clone)]
-pub struct SessionZero {
+pub struct SessionBias {
     /// Weight of every pose.
     pub weights: Vec<Vector3<f64>>,
     /// The zero.
@@ -20,16 +20,16 @@ impl Fit {
     /// The session's one zero of the gyro: weights of the poses, raw mean, variance of it by poses that differ beyond
     /// their noise (11.16).
     #[must_use]
-    pub fn session_zero(&self, session: &Session) -> Option<SessionZero> {
+    pub fn session_bias(&self, session: &Session) -> Option<SessionBias> {
         let rate = session.rate.as_ref()?;
         let (weights, spread) = pooled(rate, &self.read_zeros(rate));
         let mut mean = Vector3::zeros();
         let mut variance = Vector3::zeros();
-        for (w, z) in weights.iter().zip(&self.state.rate_zero) {
+        for (w, z) in weights.iter().zip(&self.state.pose_rate_bias) {
             mean += w.component_mul(z);
             variance += w.component_mul(w).component_mul(&spread);
         }
-        Some(SessionZero {
+        Some(SessionBias {
             weights,
             mean,
             variance,

@@ -42,7 +42,7 @@ MIDDLE_OF_WALK = 6.0
 
 
 @dataclass(frozen=True, eq=False)
-class PoseZeros:
+class PoseBiases:
     """Biases of one axis (n,), their standard errors by white noise (n,), middles and lengths of the poses [s] (n,).
 
     ``scatters``: beside noise and drift every pose has an accident of its own, of a size that is then free.
@@ -85,7 +85,7 @@ class SlowDifference:
     shows: tuple[bool, bool]
 
 
-def compare_slow(first: Sequence[PoseZeros], second: Sequence[PoseZeros]) -> SlowDifference | None:
+def compare_slow(first: Sequence[PoseBiases], second: Sequence[PoseBiases]) -> SlowDifference | None:
     """Bias instability and rate random walk of two sessions, axis by axis; ``None`` where one has too few poses.
 
     Twice the log-likelihood by which B and K of either session's own beat common ones is held against χ² of two degrees
@@ -122,7 +122,7 @@ def levels(sizes: Sequence[float]) -> FloatArray:
     return out
 
 
-def _table(zeros: PoseZeros, b: FloatArray, k: FloatArray) -> FloatArray:
+def _table(zeros: PoseBiases, b: FloatArray, k: FloatArray) -> FloatArray:
     """(b, k) log-likelihood of the contrasts that are free of the constant, the best scatter for each."""
     basis = np.linalg.qr(np.ones((len(zeros.values), 1)), mode="complete")[0][:, 1:]
     white, flicker, walk = (basis.T @ kernel @ basis for kernel in (np.diag(zeros.sigma**2), *kernels(zeros)))
@@ -132,7 +132,7 @@ def _table(zeros: PoseZeros, b: FloatArray, k: FloatArray) -> FloatArray:
 def best_scatter(
     contrasts: FloatArray,
     covariances: tuple[FloatArray, FloatArray, FloatArray],
-    zeros: PoseZeros,
+    zeros: PoseBiases,
     b: FloatArray,
     k: FloatArray,
 ) -> FloatArray:
@@ -190,7 +190,7 @@ def _ratios(b: FloatArray, k: FloatArray, p: FloatArray, q: FloatArray) -> dict[
     return out
 
 
-def kernels(zeros: PoseZeros) -> tuple[FloatArray, FloatArray]:
+def kernels(zeros: PoseBiases) -> tuple[FloatArray, FloatArray]:
     """(n, n) covariance of the means of the poses per B² and per K², beside a free constant."""
     t, length = zeros.time_s - zeros.time_s[0], zeros.length_s
     begin, end = t - length / 2.0, t + length / 2.0

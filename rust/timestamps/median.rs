@@ -9,7 +9,7 @@ const ASKED: usize = 4096;
 /// Ranks on either side of theirs, in parts of all, between which the median lies: 3.8 deviations of the answer.
 const MARGIN: f64 = 0.03;
 
-/// Median of the steps forward of stamps; NaN where there is none.
+/// Median of the steps forward of timestamps; NaN where there is none.
 #[must_use]
 pub fn usual_step(time: &[f64]) -> f64 {
     // Positive doubles are ordered as their bits are.
@@ -60,10 +60,10 @@ struct About {
 /// The median in one pass, if it lies between two steps.
 #[allow(clippy::float_cmp)] // the same step is the same to the last bit
 fn between(time: &[f64], low: f64, high: f64) -> Option<f64> {
-    let parts = of_each_share(time, |stamps| {
+    let parts = of_each_share(time, |timestamps| {
         // Counted without branches, so that a whole vector of steps is looked at together.
         let (mut below, mut at_low, mut at_high, mut above, mut all) = (0, 0, 0, 0, 0);
-        for pair in stamps.windows(2) {
+        for pair in timestamps.windows(2) {
             let step = pair[1] - pair[0];
             all += usize::from(step > 0.0);
             below += usize::from(step > 0.0 && step < low);
@@ -77,7 +77,7 @@ fn between(time: &[f64], low: f64, high: f64) -> Option<f64> {
         let mut inside = Vec::new();
         if below + at_low + at_high + above < all {
             let between = |&bits: &u64| bits > low.to_bits() && bits < high.to_bits();
-            inside.extend(forward(stamps).filter(between));
+            inside.extend(forward(timestamps).filter(between));
         }
         About {
             below,
@@ -112,9 +112,9 @@ fn between(time: &[f64], low: f64, high: f64) -> Option<f64> {
 
 /// The median wherever it is, digit by digit, as in a radix sort.
 fn by_digits(time: &[f64]) -> f64 {
-    let ranges = of_each_share(time, |stamps| {
+    let ranges = of_each_share(time, |timestamps| {
         let mut out = (u64::MAX, 0, 0_usize);
-        for bits in forward(stamps) {
+        for bits in forward(timestamps) {
             out = (out.0.min(bits), out.1.max(bits), out.2 + 1);
         }
         out
@@ -132,8 +132,8 @@ fn by_digits(time: &[f64]) -> f64 {
     let lower = if upper.below < n / 2 {
         upper.bits
     } else {
-        let below = of_each_share(time, |stamps| {
-            forward(stamps)
+        let below = of_each_share(time, |timestamps| {
+            forward(timestamps)
                 .filter(|&bits| bits < upper.bits)
                 .max()
                 .unwrap_or(0)
@@ -154,9 +154,9 @@ fn at_rank(time: &[f64], rank: usize, least: u64, most: u64) -> Found {
     let (mut from, mut width, mut below) = (least, most - least, 0);
     loop {
         let shift = (u64::BITS - width.leading_zeros()).saturating_sub(DIGIT);
-        let counts = of_each_share(time, |stamps| {
+        let counts = of_each_share(time, |timestamps| {
             let mut counts = vec![0_u32; 1 << DIGIT];
-            for bits in forward(stamps) {
+            for bits in forward(timestamps) {
                 let place = bits.wrapping_sub(from);
                 if place <= width {
                     // Shifted to DIGIT bits.
@@ -187,7 +187,7 @@ mod tests {
     use super::*;
 
     /// Steps that are not all alike, some of them back or none.
-    fn stamps(n: usize, kinds: u64) -> Vec<f64> {
+    fn timestamps(n: usize, kinds: u64) -> Vec<f64> {
         let mut state = 7_u64;
         let mut at = 0.0;
         (0..n)
@@ -205,7 +205,7 @@ mod tests {
     fn every_way_finds_the_median_of_sorted_steps() {
         for kinds in [3, 4, 7, 1000, u64::MAX >> 40] {
             for n in [2, 3, 10, 9_999, 150_000, 150_001] {
-                let time = stamps(n, kinds);
+                let time = timestamps(n, kinds);
                 let mut steps: Vec<f64> = time.windows(2).map(|p| p[1] - p[0]).collect();
                 steps.retain(|&s| s > 0.0);
                 steps.sort_unstable_by(f64::total_cmp);

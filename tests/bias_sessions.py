@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.diagnose.rest.process import ZeroReadings
+from trihedron.diagnose.rest.process import BiasReadings
 
 STEP_S = 0.25
 
@@ -101,8 +101,8 @@ def draw(session: Session, seed: int) -> Zeros:
     return Zeros(np.array(values), np.array(sigma), t, np.array(lengths), np.array(pose), up[np.array(pose)], heat)
 
 
-def readings_of(session: Session, seed: int) -> ZeroReadings:
+def readings_of(session: Session, seed: int) -> BiasReadings:
     """What the tests on zeros are given of a session."""
     z = draw(session, seed)
     design = np.column_stack([np.ones(len(z.time_s)), z.up, z.temperature])
-    return ZeroReadings(z.values, z.sigma, z.time_s, z.length_s, z.pose, design, np.ones((len(z.time_s), 1)))
+    return BiasReadings(z.values, z.sigma, z.time_s, z.length_s, z.pose, design, np.ones((len(z.time_s), 1)))

@@ -1,4 +1,4 @@
-//! Time stamps of a log: what their steps are, and an even clock under or through them.
+//! Time timestamps of a log: what their steps are, and an even clock under or through them.
 //!
 //! Every pass shares pieces of fixed size between threads and joins them in order, so that answers do not depend on the
 //! number of threads.
@@ -18,7 +18,7 @@ pub use steps::{Inside, Steps, inside, steps, steps_above};
 
 use rayon::prelude::*;
 
-/// Stamps that a thread takes at a time.
+/// Timestamps that a thread takes at a time.
 const SHARE: usize = 1 << 16;
 
 /// A number of a sample on an even clock, lost ones counted.

@@ -1,4 +1,4 @@
-//! Errors of stamps about an even clock.
+//! Errors of timestamps about an even clock.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! One number of every block of stamps: the earliest, the middle, the mean of their ticks.
+//! One number of every block of timestamps: the earliest, the middle, the mean of their ticks.
 
 use rayon::prelude::*;
 

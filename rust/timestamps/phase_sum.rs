@@ -1,4 +1,4 @@
-//! The power of phase sums of stamps, from which the sampling period is read.
+//! The power of phase sums of timestamps, from which the sampling period is read.
 
 use std::f64::consts::PI;
 use std::sync::{Arc, Mutex};
@@ -44,7 +44,7 @@ fn transform_of(length: usize) -> Transform {
     made
 }
 
-/// `|mean exp(2πi f t)|²` on the grid of a transform of `length` cells, the mean of all windows by their stamps.
+/// `|mean exp(2πi f t)|²` on the grid of a transform of `length` cells, the mean of all windows by their timestamps.
 ///
 /// Windows are tapered (Hann) so that lines have no skirts; a stamp is shared linearly between neighbouring cells, which
 /// lowers a frequency by sinc², undone here. `length / 2 + 1` powers.
@@ -100,30 +100,30 @@ pub fn phase_power(windows: &[&[f64]], cell: f64, length: usize) -> Result<Vec<f
             *sum += value;
         }
     }
-    let stamps: usize = windows.iter().map(|w| w.len()).sum();
+    let timestamps: usize = windows.iter().map(|w| w.len()).sum();
     for (k, value) in power.iter_mut().enumerate() {
         let angle = PI * k as f64 / length as f64;
         let damped = if k == 0 { 1.0 } else { angle.sin() / angle };
-        *value /= stamps as f64 * damped.powi(4);
+        *value /= timestamps as f64 * damped.powi(4);
     }
     Ok(power)
 }
 
 /// Power of the mean of `exp(2πi f t)` at `count` frequencies from `first` on, `step` apart.
 #[must_use]
-pub fn direct_power(stamps: &[f64], first: f64, step: f64, count: usize) -> Vec<f64> {
+pub fn direct_power(timestamps: &[f64], first: f64, step: f64, count: usize) -> Vec<f64> {
     // A frequency on, every stamp turns by so much: the first and its turns take the place of exponentials.
-    let turn_by = |f: f64| stamps.iter().map(move |t| (2.0 * PI * f * t).sin_cos());
+    let turn_by = |f: f64| timestamps.iter().map(move |t| (2.0 * PI * f * t).sin_cos());
     let (mut re, mut im) = (
-        Vec::with_capacity(stamps.len()),
-        Vec::with_capacity(stamps.len()),
+        Vec::with_capacity(timestamps.len()),
+        Vec::with_capacity(timestamps.len()),
     );
     for (sin, cos) in turn_by(first) {
         re.push(cos);
         im.push(sin);
     }
     let turns: Vec<(f64, f64)> = turn_by(step).collect();
-    let n = stamps.len() as f64;
+    let n = timestamps.len() as f64;
     (0..count)
         .map(|_| {
             let sums = (re.iter().sum::<f64>() / n, im.iter().sum::<f64>() / n);

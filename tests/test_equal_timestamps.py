@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.records.recording import spread_stamps
+from trihedron.records.recording import spread_timestamps
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.named import _of
 from trihedron.simulate.profiles import profile_by_name
@@ -43,9 +43,9 @@ def test_spread_stamps_increase_on_the_side_with_room_and_keep_single_ones(side)
         size = rng.integers(1, 5, 400)
         stamp = np.cumsum(step * size) if side == "before" else np.cumsum(np.append(0, step * size[:-1]))
         t = np.repeat(stamp, size)
-        out = spread_stamps(t - t[0], step)
+        out = spread_timestamps(t - t[0], step)
         # An even clock batched to one side comes back even: one rounding of numbers up to 1000 steps.
         np.testing.assert_allclose(np.diff(out), step, atol=1e-12 * 1000 * step)
-    np.testing.assert_allclose(spread_stamps(np.zeros(5), 0.01), 0.01 * np.arange(5), atol=1e-15)
+    np.testing.assert_allclose(spread_timestamps(np.zeros(5), 0.01), 0.01 * np.arange(5), atol=1e-15)
     lone = np.array([0.0, 1.0, 2.0, 4.0, 4.0, 5.0])
-    np.testing.assert_allclose(spread_stamps(lone, 1.0), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0], atol=1e-15)
+    np.testing.assert_allclose(spread_timestamps(lone, 1.0), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0], atol=1e-15)

@@ -27,8 +27,13 @@ impl Session {
         out: &mut Vec<Group>,
     ) {
         let sensors = [
-            (Some(&self.force), &state.force_zero, 5, Kind::ForceWalk),
-            (self.rate.as_ref(), &state.rate_zero, 2, Kind::RateWalk),
+            (
+                Some(&self.force),
+                &state.pose_force_bias,
+                5,
+                Kind::ForceWalk,
+            ),
+            (self.rate.as_ref(), &state.pose_rate_bias, 2, Kind::RateWalk),
         ];
         for (s, (sensor, zero, column, walk)) in sensors.into_iter().enumerate() {
             let domain = [Domain::StaticForce, Domain::StaticRate][s];

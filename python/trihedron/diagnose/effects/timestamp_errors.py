@@ -1,4 +1,4 @@
-"""Stamps that scatter though the samples were taken evenly: told from the smoothness of the motion."""
+"""Timestamps that scatter though the samples were taken evenly: told from the smoothness of the motion."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ WINDOW_S = 4.0
 _CONTRAST = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0
 """A sample against the cubic through its four neighbours, on an even grid."""
 CLEAR = 0.1
-"""Standard error below which the share of the stamps' scatter that the readings follow decides between none and all."""
+"""Standard error below which the share of the scatter that readings follow decides between none and all."""
 EVEN = 0.02
-"""Scatter of stamps, in steps, that is no more than their digits: a tenth of a millisecond at 200 Hz makes 0.006."""
+"""Scatter of timestamps, in steps, no more than their digits: a tenth of a millisecond at 200 Hz makes 0.006."""
 JOLT = 6.0
 """Robust standard deviations beyond which a reading is a jolt: normal noise goes there once in 5·10⁸."""
 
 
 @dataclass(frozen=True, eq=False)
-class StampErrors:
-    """Scatter of the stamps about an even clock and the share of it that the readings follow, 1 or 0.
+class TimestampErrors:
+    """Scatter of the timestamps about an even clock and the share of it that the readings follow, 1 or 0.
 
     ``even_s`` (n,) the even clock, ``rms_s`` scatter, ``followed`` with standard error ``sigma``; ``gain`` how much
-    less chi-square the readings cost on the even clock than on the stamps.
+    less chi-square the readings cost on the even clock than on the timestamps.
     """
 
     even_s: FloatArray
@@ -37,11 +37,11 @@ class StampErrors:
     gain: float
 
 
-def stamp_errors(obs: Observations) -> StampErrors | None:
-    """Regress what the readings leave a smooth course by on what the stamps' scatter would make of it.
+def timestamp_errors(obs: Observations) -> TimestampErrors | None:
+    """Regress what the readings leave a smooth course by on what the timestamps' scatter would make of it.
 
-    A sample taken δ late reads x' δ more. If the stamps are right, the readings on an even grid jump by it; if the
-    samples were taken evenly and only the stamps scatter, they do not.
+    A sample taken δ late reads x' δ more. If the timestamps are right, the readings on an even grid jump by it; if the
+    samples were taken evenly and only the timestamps scatter, they do not.
     """
     t = obs.time_s
     n = len(t)
@@ -74,4 +74,4 @@ def stamp_errors(obs: Observations) -> StampErrors | None:
             both += float(((e - p) ** 2 - e**2)[keep].sum() / usual**2)
     if square <= 0.0:
         return None
-    return StampErrors(even, rms, top / square, float(1.0 / np.sqrt(square)), both)
+    return TimestampErrors(even, rms, top / square, float(1.0 / np.sqrt(square)), both)

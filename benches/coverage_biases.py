@@ -1,6 +1,6 @@
 """Are the uncertainties honest where biases scatter from pose to pose?
 
-    python benches/coverage_zeros.py [--sessions N] [--gyro DEG_S] [--accel MM_S2] [--jump uniform|middle|linear|own]
+    python benches/coverage_biases.py [--sessions N] [--gyro DEG_S] [--accel MM_S2] [--jump uniform|middle|linear|own]
 
 Healthy simulated sessions of 24 poses; every pose gets a bias of its own. What the bias does during a move is one of
 four stories (``--jump``): it leaps at an instant drawn anew for every move, at the middle, it runs straight from one
@@ -27,7 +27,7 @@ WANTED = 0.1
 """Standard errors by which two answers about a healthy session may differ."""
 
 
-def zeros_along(segments, n, sigma, jump, rng):
+def biases_along(segments, n, sigma, jump, rng):
     """(n, 3) zero of every sample: one of its own in every pose, and a story for the moves between."""
     own = sigma * rng.standard_normal((segments.n_poses, 3))
     out = np.zeros((n, 3))
@@ -57,8 +57,8 @@ def scores(seed, arguments):
     rng = np.random.default_rng(seed + 10_000)
     segments = segment_recording(recording)
     n = recording.n_samples
-    of_rate = zeros_along(segments, n, np.radians(arguments.gyro), arguments.jump, rng)
-    of_force = zeros_along(segments, n, 1e-3 * arguments.accel, arguments.jump, rng)
+    of_rate = biases_along(segments, n, np.radians(arguments.gyro), arguments.jump, rng)
+    of_force = biases_along(segments, n, 1e-3 * arguments.accel, arguments.jump, rng)
     recording = replace(
         recording,
         gyroscope=recording.gyroscope + np.linalg.solve(truth.gyroscope_S, of_rate.T).T,

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from bias_sessions import Session, draw, readings_of
 from trihedron import _core
 from trihedron.diagnose.rest.curve import smooth_curve
+from trihedron.diagnose.rest.process import BiasProcess
 from trihedron.diagnose.rest.slow_change import slow_change
-from trihedron.diagnose.rest.process import ZeroProcess
-from zero_sessions import Session, draw, readings_of
 
 ALL = [0, 1, 2, 3, 4]
 
@@ -38,7 +38,7 @@ def test_the_filter_whitens_as_the_dense_covariance_does(directions):
     direction = np.ones((14, 1)) if directions == 1 else rng.normal(size=(14, 3))
     columns, variance = rng.normal(size=(14, 4)), rng.uniform(0.5, 2.0, 14) * 1e-2
     strengths = np.array([[0.02, 0.3, 0.5, 2.0, 1.5], [0.0, 0.0, 0.0, 0.0, 1.0], [0.1, 0.0, 0.3, 0.0, 0.5]])
-    log_det, gram = _core.zero_process_grams(columns, variance, t, length, pose, direction, strengths)
+    log_det, gram = _core.bias_process_grams(columns, variance, t, length, pose, direction, strengths)
     for k, row in enumerate(strengths):
         V = dense_covariance(t, length, pose, variance, direction, row)
         # The drift within a stretch is read in its middle: good to 1e-3 of the noise of these long stretches.
@@ -51,7 +51,7 @@ def test_the_filter_whitens_as_the_dense_covariance_does(directions):
 def test_a_question_out_of_order_is_refused():
     one = np.ones(3)
     with pytest.raises(ValueError, match="order of time"):
-        _core.zero_process_grams(
+        _core.bias_process_grams(
             np.ones((3, 1)), one, one[::-1] * [3, 2, 1], 0 * one, np.arange(3), np.ones((3, 1)), np.ones((1, 5))
         )
 
@@ -73,7 +73,7 @@ def test_what_only_scatters_does_not_change_slowly(session):
 def test_the_curve_of_a_hidden_swing_is_drawn_within_its_band():
     session = Session(scatter=0.005, swing=0.1, n_poses=30)
     zeros = draw(session, 5)
-    process = ZeroProcess.of(readings_of(session, 5))
+    process = BiasProcess.of(readings_of(session, 5))
     _, sigma = process.maximum((0, 1, 2), ALL, restricted=True)
     t = zeros.time_s
     curve = smooth_curve(process, [0], sigma, t)

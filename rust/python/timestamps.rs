@@ -1,25 +1,25 @@
-//! Time stamps across the seam.
+//! Time timestamps across the seam.
 
 use numpy::{PyArray1, PyReadonlyArray1, PyReadwriteArray1, PyUntypedArrayMethods, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::flat1;
-use crate::stamps::{self, Course, phase_sum};
+use crate::timestamps::{self, Course, phase_sum};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(stamp_steps, module)?)?;
+    module.add_function(wrap_pyfunction!(timestamp_steps, module)?)?;
     module.add_function(wrap_pyfunction!(usual_step, module)?)?;
     module.add_function(wrap_pyfunction!(steps_above, module)?)?;
     module.add_function(wrap_pyfunction!(inside_steps, module)?)?;
-    module.add_function(wrap_pyfunction!(stamp_lateness, module)?)?;
-    module.add_function(wrap_pyfunction!(earliest_stamps, module)?)?;
+    module.add_function(wrap_pyfunction!(timestamp_lateness, module)?)?;
+    module.add_function(wrap_pyfunction!(earliest_timestamps, module)?)?;
     module.add_function(wrap_pyfunction!(block_medians, module)?)?;
     module.add_function(wrap_pyfunction!(block_mean_ticks, module)?)?;
     module.add_function(wrap_pyfunction!(robust_line, module)?)?;
     module.add_function(wrap_pyfunction!(phase_power, module)?)?;
     module.add_function(wrap_pyfunction!(direct_power, module)?)?;
-    module.add_function(wrap_pyfunction!(stamp_errors, module)?)?;
+    module.add_function(wrap_pyfunction!(timestamp_errors, module)?)?;
     module.add_function(wrap_pyfunction!(errors_deviation, module)?)?;
     module.add_function(wrap_pyfunction!(errors_falls, module)?)?;
     module.add_function(wrap_pyfunction!(lay_even_clock, module)?)
@@ -41,14 +41,14 @@ fn same_length(what: &str, expected: usize, found: usize) -> PyResult<()> {
     )))
 }
 
-/// Steps back, of zero, forward, and stamps that are not finite.
+/// Steps back, of zero, forward, and timestamps that are not finite.
 #[pyfunction]
-fn stamp_steps(
+fn timestamp_steps(
     py: Python<'_>,
     time: PyReadonlyArray1<'_, f64>,
 ) -> PyResult<(usize, usize, usize, usize)> {
     let time = flat1(&time);
-    let found = super::run(py, || Ok(stamps::steps(&time)))?;
+    let found = super::run(py, || Ok(timestamps::steps(&time)))?;
     Ok((found.back, found.same, found.forward, found.missing))
 }
 
@@ -56,7 +56,7 @@ fn stamp_steps(
 #[pyfunction]
 fn usual_step(py: Python<'_>, time: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
     let time = flat1(&time);
-    super::run(py, || Ok(stamps::usual_step(&time)))
+    super::run(py, || Ok(timestamps::usual_step(&time)))
 }
 
 /// Rows `(k,)` behind which the step is longer than `limit`.
@@ -67,7 +67,7 @@ fn steps_above<'py>(
     limit: f64,
 ) -> PyResult<Bound<'py, PyArray1<i64>>> {
     let time = flat1(&time);
-    let found = super::run(py, || Ok(stamps::steps_above(&time, limit)))?;
+    let found = super::run(py, || Ok(timestamps::steps_above(&time, limit)))?;
     let rows: Vec<i64> = found
         .into_iter()
         .map(|row| i64::try_from(row).unwrap_or(i64::MAX))
@@ -84,7 +84,7 @@ fn inside_steps(
     limit: f64,
 ) -> PyResult<(usize, f64, f64, f64, f64)> {
     let time = flat1(&time);
-    let found = super::run(py, || Ok(stamps::inside(&time, above, limit)))?;
+    let found = super::run(py, || Ok(timestamps::inside(&time, above, limit)))?;
     Ok((
         found.count,
         found.sum,
@@ -97,7 +97,7 @@ fn inside_steps(
 /// Write `time - period tick` `(n,)` to `late`; ticks are rows where there are none.
 #[pyfunction]
 #[pyo3(signature = (time, ticks, period, late))]
-fn stamp_lateness<'py>(
+fn timestamp_lateness<'py>(
     py: Python<'py>,
     time: PyReadonlyArray1<'py, f64>,
     ticks: Option<Ticks<'py>>,
@@ -109,14 +109,14 @@ fn stamp_lateness<'py>(
     same_length("late", time.len(), late.len())?;
     match &ticks {
         None => super::run(py, || {
-            stamps::lateness::<i64>(&time, None, period, late);
+            timestamps::lateness::<i64>(&time, None, period, late);
             Ok(())
         }),
         Some(Ticks::Short(ticks)) => {
             same_length("ticks", time.len(), ticks.len())?;
             let ticks = flat1(ticks);
             super::run(py, || {
-                stamps::lateness(&time, Some(&ticks), period, late);
+                timestamps::lateness(&time, Some(&ticks), period, late);
                 Ok(())
             })
         }
@@ -124,25 +124,25 @@ fn stamp_lateness<'py>(
             same_length("ticks", time.len(), ticks.len())?;
             let ticks = flat1(ticks);
             super::run(py, || {
-                stamps::lateness(&time, Some(&ticks), period, late);
+                timestamps::lateness(&time, Some(&ticks), period, late);
                 Ok(())
             })
         }
     }
 }
 
-/// Row of the earliest of every block of `width` stamps.
+/// Row of the earliest of every block of `width` timestamps.
 #[pyfunction]
-fn earliest_stamps<'py>(
+fn earliest_timestamps<'py>(
     py: Python<'py>,
     late: PyReadonlyArray1<'py, f64>,
     width: usize,
 ) -> PyResult<Bound<'py, PyArray1<i64>>> {
     let late = flat1(&late);
     if late.is_empty() {
-        return Err(PyValueError::new_err("there must be stamps, got none"));
+        return Err(PyValueError::new_err("there must be timestamps, got none"));
     }
-    let found = super::run(py, || Ok(stamps::earliest(&late, width)))?;
+    let found = super::run(py, || Ok(timestamps::earliest(&late, width)))?;
     Ok(found.to_pyarray(py))
 }
 
@@ -154,7 +154,7 @@ fn block_medians<'py>(
     width: usize,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let late = flat1(&late);
-    let found = super::run(py, || Ok(stamps::block_medians(&late, width)))?;
+    let found = super::run(py, || Ok(timestamps::block_medians(&late, width)))?;
     Ok(found.to_pyarray(py))
 }
 
@@ -168,11 +168,11 @@ fn block_mean_ticks<'py>(
     let found = match &ticks {
         Ticks::Short(ticks) => {
             let ticks = flat1(ticks);
-            super::run(py, || Ok(stamps::block_means(&ticks, width)))?
+            super::run(py, || Ok(timestamps::block_means(&ticks, width)))?
         }
         Ticks::Long(ticks) => {
             let ticks = flat1(ticks);
-            super::run(py, || Ok(stamps::block_means(&ticks, width)))?
+            super::run(py, || Ok(timestamps::block_means(&ticks, width)))?
         }
     };
     Ok(found.to_pyarray(py))
@@ -187,7 +187,7 @@ fn robust_line(
 ) -> PyResult<(f64, f64)> {
     same_length("y", u.len(), y.len())?;
     let (u, y) = (flat1(&u), flat1(&y));
-    super::run(py, || Ok(stamps::robust_line(&u, &y)))
+    super::run(py, || Ok(timestamps::robust_line(&u, &y)))
 }
 
 /// Write `slope (tick - origin) / scale + level + period tick` to `even`.
@@ -215,7 +215,7 @@ fn lay_even_clock(
             same_length("even", ticks.len(), even.len())?;
             let ticks = flat1(ticks);
             super::run(py, || {
-                stamps::lay(&ticks, &course, period, even);
+                timestamps::lay(&ticks, &course, period, even);
                 Ok(())
             })
         }
@@ -223,14 +223,14 @@ fn lay_even_clock(
             same_length("even", ticks.len(), even.len())?;
             let ticks = flat1(ticks);
             super::run(py, || {
-                stamps::lay(&ticks, &course, period, even);
+                timestamps::lay(&ticks, &course, period, even);
                 Ok(())
             })
         }
     }
 }
 
-/// Power `(length / 2 + 1,)` of the phase sums of windows of stamps on a grid of `length` cells, and that length: the
+/// Power `(length / 2 + 1,)` of the phase sums of windows of timestamps on a grid of `length` cells, and that length: the
 /// first from `least` on at which a transform is fast.
 #[pyfunction]
 fn phase_power<'py>(
@@ -246,25 +246,25 @@ fn phase_power<'py>(
     Ok((PyArray1::from_vec(py, power), length))
 }
 
-/// Power `(count,)` of the phase sum of stamps at frequencies `step` apart.
+/// Power `(count,)` of the phase sum of timestamps at frequencies `step` apart.
 #[pyfunction]
 fn direct_power<'py>(
     py: Python<'py>,
-    stamps: PyReadonlyArray1<'py, f64>,
+    timestamps: PyReadonlyArray1<'py, f64>,
     first: f64,
     step: f64,
     count: usize,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let stamps = flat1(&stamps);
+    let timestamps = flat1(&timestamps);
     let power = super::run(py, || {
-        Ok(phase_sum::direct_power(&stamps, first, step, count))
+        Ok(phase_sum::direct_power(&timestamps, first, step, count))
     })?;
     Ok(PyArray1::from_vec(py, power))
 }
 
 /// `time - even` `(n,)` in the place of `even`.
 #[pyfunction]
-fn stamp_errors(
+fn timestamp_errors(
     py: Python<'_>,
     time: PyReadonlyArray1<'_, f64>,
     mut even: PyReadwriteArray1<'_, f64>,
@@ -275,7 +275,7 @@ fn stamp_errors(
         .as_slice_mut()
         .map_err(|_| PyValueError::new_err("even must be a contiguous array"))?;
     super::run(py, || {
-        stamps::less(&time, even);
+        timestamps::less(&time, even);
         Ok(())
     })
 }
@@ -284,12 +284,12 @@ fn stamp_errors(
 #[pyfunction]
 fn errors_deviation(py: Python<'_>, errors: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
     let errors = flat1(&errors);
-    super::run(py, || Ok(stamps::deviation(&errors)))
+    super::run(py, || Ok(timestamps::deviation(&errors)))
 }
 
 /// How many errors `(n,)` are less than the one before by more than `fall`.
 #[pyfunction]
 fn errors_falls(py: Python<'_>, errors: PyReadonlyArray1<'_, f64>, fall: f64) -> PyResult<usize> {
     let errors = flat1(&errors);
-    super::run(py, || Ok(stamps::falls(&errors, fall)))
+    super::run(py, || Ok(timestamps::falls(&errors, fall)))
 }

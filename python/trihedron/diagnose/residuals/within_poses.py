@@ -68,12 +68,12 @@ class Line:
         return self.share > MIN_LINE_SHARE
 
 
-def hold_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
+def pose_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
     """``(first sample, (n, 6 or 3) raw readings minus their hold mean)`` of every hold."""
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     out = []
     # A line is looked for where the place is quiet: shaking has a spectrum of its own.
-    quiet: npt.NDArray[np.bool_] = np.asarray((hold_scatter(obs).ratio < 2.0).all(axis=1))
+    quiet: npt.NDArray[np.bool_] = np.asarray((pose_scatter(obs).ratio < 2.0).all(axis=1))
     if quiet.sum() < 3:
         quiet[:] = True
     for i in np.flatnonzero(quiet):
@@ -106,7 +106,7 @@ def _averaged_spectrum(pieces: list[tuple[int, FloatArray]], n: int) -> tuple[Fl
 @lru_cache(maxsize=4)
 def find_lines(obs: Observations, p_limit: float = 1e-4) -> list[Line]:
     """Lines that stand out of the smooth spectrum of the holds, one at most per channel."""
-    pieces = hold_pieces(obs)
+    pieces = pose_pieces(obs)
     if not pieces:
         return []
     longest = max(len(p) for _, p in pieces)
@@ -255,7 +255,7 @@ def project_piece(t: FloatArray, x: FloatArray, f: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class HoldScatter:
+class PoseScatter:
     """Fast scatter of every hold against the common level: variances ``ratio`` (holds, channels), ``dof`` (holds,)."""
 
     ratio: FloatArray
@@ -264,7 +264,7 @@ class HoldScatter:
 
 
 @lru_cache(maxsize=4)
-def hold_scatter(obs: Observations) -> HoldScatter:
+def pose_scatter(obs: Observations) -> PoseScatter:
     """Variance of first differences per hold over the median of all: blind to slow drift, sharp on shaking."""
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     ratio, dof = [], []
@@ -281,12 +281,12 @@ def hold_scatter(obs: Observations) -> HoldScatter:
     centre[centre == 0] = 1.0
     relative = ratio_array / centre
     p = chdtrc(dof_array[:, None], dof_array[:, None] * relative)
-    return HoldScatter(relative, dof_array, np.asarray(p))
+    return PoseScatter(relative, dof_array, np.asarray(p))
 
 
-def judge_within_holds(obs: Observations, alpha: float) -> DomainTest:
+def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
     """Lines and noisy poses, as one domain; the p-value is the smallest, paid for by the number of looks."""
-    scatter = hold_scatter(obs)
+    scatter = pose_scatter(obs)
     n_looks = scatter.p_value.size
     # A pose that was found shaking is said to, and weighed by its own scatter: nothing is left to explain.
     steady = np.array([not hold.is_unsteady for hold in obs.segments.poses])

@@ -7,11 +7,11 @@ use numpy::{
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
+use crate::bias_process::{Readings, Strengths};
 use crate::error::Error;
-use crate::zero_process::{Readings, Strengths};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(zero_process_grams, module)?)?;
+    module.add_function(wrap_pyfunction!(bias_process_grams, module)?)?;
     Ok(())
 }
 
@@ -22,7 +22,7 @@ type Grams<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray3<f64>>);
 /// A row of strengths: scatter, walk, drift, slope, factor on `variance` `(n,)`. `direction` is `(n, k)`.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
-fn zero_process_grams<'py>(
+fn bias_process_grams<'py>(
     py: Python<'py>,
     columns: PyReadonlyArray2<'py, f64>,
     variance: PyReadonlyArray1<'py, f64>,

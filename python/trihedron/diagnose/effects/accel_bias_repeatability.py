@@ -8,7 +8,7 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 
 
-class AccelZeroScatter(BiasProcess):
+class AccelBiasRepeatability(BiasProcess):
     """Biases drawn anew in every pose, one size for three axes: the length of gravity does not tell axes apart."""
 
     is_spread = True

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.bias_drift import BiasDrift
 from trihedron.diagnose.effects.contract import force_only
-from trihedron.diagnose.effects.hidden_drift import HiddenDrift
 from trihedron.diagnose.session.twin import Distortion
 
 FEWEST_OF_WAVES = ((25, 4), (18, 2))
@@ -15,7 +15,7 @@ FEWEST_OF_WAVES = ((25, 4), (18, 2))
 cosine, and some that are left to judge it by."""
 
 
-class AccelHiddenDrift(HiddenDrift):
+class AccelBiasDrift(BiasDrift):
     """Of the accelerometer: what the length of gravity shows from pose to pose."""
 
     id = "accel-bias-drift"

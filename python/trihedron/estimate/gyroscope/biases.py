@@ -8,15 +8,15 @@ from trihedron.arrays import FloatArray
 from trihedron.probability import chdtri
 
 
-def pool_zeros(
-    zero: FloatArray, var_zero: FloatArray
+def pool_biases(
+    zero: FloatArray, var_bias: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Random-effects mean of biases (n, 3) of variance (n, 3) (DerSimonian & Laird 1986).
 
     Returns weights (n, 3), mean (3,), its variance (3,), χ² against constancy (3,) with n − 1 degrees of freedom, and
     the variance (3,) of the true bias between poses, nothing where χ² is within chance.
     """
-    floor = np.maximum(var_zero, 1e-30 + 1e-24 * zero**2)
+    floor = np.maximum(var_bias, 1e-30 + 1e-24 * zero**2)
     weight = 1.0 / floor
     total = weight.sum(axis=0)
     mean = (weight * zero).sum(axis=0) / total
@@ -56,14 +56,14 @@ def _median(values: FloatArray) -> float:
     return float(0.5 * (ordered[(n - 1) // 2] + ordered[n // 2]))
 
 
-def shrink(zero: FloatArray, var_zero: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
+def shrink(zero: FloatArray, var_bias: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Biases of the poses drawn to the session's by their noise: ``(z/v + z̄/τ²)/(1/v + 1/τ²)`` and its variance.
 
     With a bias that changes (τ² ≫ v) each pose keeps its own; with a steady one a short pose borrows from the others.
     """
     n = len(zero)
-    tau2 = excess_variance((zero - mean) * np.sqrt(n / max(n - 1, 1)), var_zero)
-    gain = tau2 / np.maximum(tau2 + var_zero, 1e-300)
-    pooled = 1.0 / np.sum(1.0 / np.maximum(var_zero + tau2, 1e-300), axis=0)
-    variance = gain * var_zero + (1.0 - gain) ** 2 * pooled
+    tau2 = excess_variance((zero - mean) * np.sqrt(n / max(n - 1, 1)), var_bias)
+    gain = tau2 / np.maximum(tau2 + var_bias, 1e-300)
+    pooled = 1.0 / np.sum(1.0 / np.maximum(var_bias + tau2, 1e-300), axis=0)
+    variance = gain * var_bias + (1.0 - gain) ** 2 * pooled
     return np.ascontiguousarray(mean + gain * (zero - mean)), np.ascontiguousarray(variance)

@@ -8,7 +8,7 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 
 
-class GyroZeroScatter(BiasProcess):
+class GyroBiasRepeatability(BiasProcess):
     """The bias of every axis is drawn anew in every pose, beyond noise and drift."""
 
     is_spread = True
