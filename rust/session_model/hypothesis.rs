@@ -9,7 +9,7 @@ use super::elimination::eliminated;
 use super::fit::{Fit, RIDGE, chi2_of, gradient};
 use super::move_rows::{Passed, Whitening};
 use super::moves::N_MOVE;
-use super::rows::{Domain, Group, N_PROCESSES, size_row};
+use super::rows::{Group, N_PROCESSES, size_row};
 use super::strength_search::{Search, Within};
 use crate::error::{Error, Result};
 
@@ -93,7 +93,6 @@ impl Hypothesis {
             border: fit.layout().border + k,
             ..fit.layout()
         };
-        let is_move = |group: &Group| group.domain == Domain::Moves && group.rows.len() == N_MOVE;
         let mut fixed = Vec::new();
         let mut moves = Vec::new();
         let mut process: Vec<Vec<Group>> = vec![Vec::new(); N_PROCESSES];
@@ -110,7 +109,7 @@ impl Hypothesis {
                     group.rows.border.columns_mut(first, k).copy_from(own);
                 }
             }
-            if !is_move(&group) {
+            if !group.is_move() {
                 fixed.push(group);
                 continue;
             }

@@ -9,7 +9,7 @@ use super::fit::{Fit, RIDGE};
 use super::hypothesis::{Hypothesis, unweighed};
 use super::move_rows::Whitening;
 use super::moves::N_MOVE;
-use super::rows::{Domain, Group, Kind};
+use super::rows::{Group, Kind};
 use crate::error::{Error, Result};
 
 /// A fit at some strengths: normal equations factored, `Jᵀr`, what its moves' rows are multiplied by to get there, and
@@ -63,7 +63,7 @@ impl<'a> Looks<'a> {
                 .iter()
                 .map(|by| DMatrix::from_column_slice(N_MOVE, N_MOVE, by.as_slice()))
                 .collect();
-            let moves = fit.groups.iter().filter(|group| is_move(group));
+            let moves = fit.groups.iter().filter(|group| group.is_move());
             let moves = moves.map(|group| weighed(group, &turned[group.segment]));
             Ok(Look {
                 factor: chain.factor(RIDGE, None)?,
@@ -105,10 +105,10 @@ impl<'a> Looks<'a> {
             let pairs = self.fit.groups.iter().zip(columns);
             pairs.filter(|(group, _)| group.kind == Kind::Reading)
         };
-        let at_rest = self.sums(k, readings().filter(|(group, _)| !is_move(group)));
+        let at_rest = self.sums(k, readings().filter(|(group, _)| !group.is_move()));
         let each = self.each.iter().map(|look| {
             let of_moves: Vec<DMatrix<f64>> = readings()
-                .filter(|(group, _)| is_move(group))
+                .filter(|(group, _)| group.is_move())
                 .map(|(group, own)| &look.turned[group.segment] * own)
                 .collect();
             let sums = self.sums(k, look.moves.iter().zip(&of_moves));
@@ -196,10 +196,6 @@ fn judged(left: &[Left], sizes: &DVector<f64>, scales: &[f64]) -> Result<Seen> {
         estimate,
         covariance,
     })
-}
-
-fn is_move(group: &Group) -> bool {
-    group.domain == Domain::Moves && group.rows.len() == N_MOVE
 }
 
 /// Rows of a move multiplied by a triangular matrix.

@@ -30,13 +30,13 @@ pub enum Domain {
 pub enum Kind {
     /// A reading.
     Reading = 0,
-    /// Walk of the accelerometer's zero.
+    /// Walk of the accelerometer's bias.
     ForceWalk = 1,
-    /// Walk of the gyro's zero.
+    /// Walk of the gyro's bias.
     RateWalk = 2,
-    /// Scatter of the accelerometer's zero.
+    /// Scatter of the accelerometer's bias.
     ForceScatter = 3,
-    /// Scatter of the gyro's zero, by axis.
+    /// Scatter of the gyro's bias, by axis.
     RateScatterX = 4,
     /// The same.
     RateScatterY = 5,
@@ -275,6 +275,11 @@ impl Session {
 }
 
 impl Group {
+    /// Whether these are the rows of a move whose noise is weighed anew.
+    pub fn is_move(&self) -> bool {
+        self.domain == Domain::Moves && self.rows.len() == N_MOVE
+    }
+
     pub(super) fn of(
         residual: DVector<f64>,
         layout: Layout,

@@ -80,7 +80,7 @@ def diagnose_recording(
     run = _run(obs, start, prior, alpha, tell)
     answer = run.answer
     model = answer.found.model
-    relations = () if answer.found.related is None else records(answer.found.related)
+    relations = records(answer.found.related)
     verdict = verdict_of(answer, run.domains, run.remaining, has_relations=bool(relations))
     # Without anything missing the numbers are those of a calibration of this recording.
     base = run.bare.fitted
@@ -157,7 +157,7 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
         bare, found = _searched(observed, prior, alpha)
     tell(0.8, "asking what biases do by themselves")
     # What follows something is no bias that wanders.
-    biases, asked = bias_strengths(found.model if found.related is None else found.related.model, alpha)
+    biases, asked = bias_strengths(found.related.model, alpha)
     tell(0.9, "checking what remains")
     judged = again(found.model, found.model.terms, noise_bounds(found.model, tuple(one.effect for one in biases)))
     answer = Answer(found, with_shapes(found.model), biases, observed.seen, judged.fitted)

@@ -58,14 +58,14 @@ class Found:
     """
 
     model: Hypothesis
+    related: Related
+    """The final hypothesis with what else it follows."""
     tried: dict[str, Tried] = field(default_factory=dict)
     against: dict[str, str] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
     gains: tuple[float, ...] = ()
     without: tuple[Hypothesis, ...] = ()
     rivals: tuple[tuple[str, ...], ...] = ()
-    related: Related | None = None
-    """The final hypothesis with what else it follows."""
 
     @property
     def scores(self) -> tuple[float, ...]:
@@ -127,10 +127,10 @@ def _concluded(state: _State, alpha: float) -> Found:
     tried, missing = all_beside(model)
     held = {term.effect.id for term in model.terms}
     return Found(
-        model, {one.term.effect.id: one for one in reversed(tried)},
+        model, beside, {one.term.effect.id: one for one in reversed(tried)},
         {key: other for key, other in state.against.items() if other in held and key not in held}, missing,
         tuple(2.0 * (model.log_evidence - one.log_evidence) for one in judged.without), judged.without,
-        tuple(tuple(named.get(term.effect.id, ())) for term in model.terms), beside,
+        tuple(tuple(named.get(term.effect.id, ())) for term in model.terms),
     )  # fmt: skip
 
 
@@ -143,15 +143,14 @@ def _beside_relations(judged: _Judged, limit: float) -> tuple[_Judged, Related]:
     while k < len(judged.model.terms):
         # What stands beside the relations is not theirs.
         without = again(best.model, [t for j, t in enumerate(best.model.terms) if j != k])
-        if 2.0 * (best.model.log_evidence - without.log_evidence) - judged.model.terms[k].paid > limit:
-            k += 1
-            continue
-        fewer = again(judged.model, [t for j, t in enumerate(judged.model.terms) if j != k])
-        other = related(fewer, limit)
-        if other.relations and other.score > best.score + NEAR:
-            judged, best, k = _pruned(fewer, limit), other, 0
-        else:
-            k += 1
+        gained = 2.0 * (best.model.log_evidence - without.log_evidence) - judged.model.terms[k].paid
+        if gained <= limit:
+            fewer = again(judged.model, [t for j, t in enumerate(judged.model.terms) if j != k])
+            other = related(fewer, limit)
+            if other.relations and other.score > best.score + NEAR:
+                judged, best, k = _pruned(fewer, limit), other, 0
+                continue
+        k += 1
     return judged, best
 
 

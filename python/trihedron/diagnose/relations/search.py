@@ -16,7 +16,7 @@ from trihedron.diagnose.relations.signals import AXES, ROOM_VECTOR, Signal, room
 N_FITTED = 3
 """Relations whose strengths of noise are found anew before the best is chosen."""
 ALL_AXES = (0, 1, 2)
-ANY_BY_ANY = ("rate", "last turn", "rate products")
+ANY_BY_ANY = ("rate", "last rotation", "rate products")
 """Families of vectors: three of their variables may act on any axis together."""
 MOST_RELATIONS = 3
 """A longer list is no law that a person would check."""
@@ -67,9 +67,8 @@ def related(model: Hypothesis, limit: float) -> Related:
     """Relations added to a hypothesis one at a time while the best scores more than ``limit``."""
     found: list[Follows] = []
     steps: list[Hypothesis] = []
-    context = model.context
-    while len(found) < MOST_RELATIONS and context.moves:
-        best = _best(model, context, {one.signal.names for one in found})
+    while len(found) < MOST_RELATIONS and model.context.moves:
+        best = _best(model, {(one.signal.sensor, one.signal.names) for one in found})
         if best is None:
             break
         larger = again(model, [*model.terms, best.term])
@@ -81,32 +80,34 @@ def related(model: Hypothesis, limit: float) -> Related:
     return Related(model, tuple(found), tuple(steps))
 
 
-def _best(model: Hypothesis, context: Context, known: Collection[tuple[str, ...]]) -> Follows | None:
+def _best(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> Follows | None:
     """The relation that gains most of those that look best at fixed strengths, each family once."""
-    leading: list[tuple[float, Follows]] = []
+    context = model.context
+    leading: list[tuple[float, Signal, Way, float]] = []
     n_tried = 0
     # One family at a time: the columns of all of them together are larger than the log.
     for whole in _families(context):
-        ways = [way for way in _ways(whole.signal) if tuple(whole.signal.names[k] for k in way[0]) not in known]
-        m = len(whole.signal.names)
+        signal = whole.signal
+        ways = [way for way in _ways(signal) if (signal.sensor, tuple(signal.names[k] for k in way[0])) not in known]
+        m = len(signal.names)
         parts = [[a * m + k for a in axes for k in names] for names, axes in ways]
         looks = model.looked_at([whole.term], PRIOR_SCALES, parts)
         n_tried += len(ways)
-        best = max(range(len(ways)), key=lambda k: float(looks[k].gain.max()), default=None)
-        if best is not None:
-            gain = looks[best].gain.max(axis=1)
-            scale = PRIOR_SCALES[int(gain.argmax())]
-            leading.append((float(gain.max()), _part(context, whole.signal, ways[best], scale)))
+        if ways:
+            first = max(range(len(ways)), key=lambda k: float(looks[k].gain.max()))
+            gain = looks[first].gain.max(axis=1)
+            leading.append((float(gain.max()), signal, ways[first], PRIOR_SCALES[int(gain.argmax())]))
+        # Only the leaders keep their columns.
+        leading = sorted(leading, key=lambda one: -one[0])[:N_FITTED]
     paid = 2.0 * float(np.log(max(n_tried, 1) * len(PRIOR_SCALES)))
-    leading = sorted(leading, key=lambda pair: -pair[0])[:N_FITTED]
-    terms = [replace(one.term, paid=paid) for gain, one in leading if 2.0 * gain > paid]
-    if not terms:
+    each = [_part(context, *which, paid) for gain, *which in leading if 2.0 * gain > paid]
+    if not each:
         return None
-    asked = model.asked(terms)
+    asked = model.asked([one.term for one in each])
     plain = model.plain([one.strengths for one in asked])
     scores = [2.0 * (one.log_evidence - plain) - paid for one in asked]
     best = int(np.argmax(scores))
-    return replace(leading[best][1], term=terms[best]) if scores[best] > 0.0 else None
+    return each[best] if scores[best] > 0.0 else None
 
 
 Way = tuple[tuple[int, ...], tuple[int, ...]]
@@ -136,15 +137,15 @@ def _families(context: Context) -> Iterator[Follows]:
     yield from _room(context)
 
 
-def _part(context: Context, whole: Signal, way: Way, scale: float) -> Follows:
-    """Some variables of a family, expected as large as fits."""
+def _part(context: Context, whole: Signal, way: Way, scale: float, paid: float) -> Follows:
+    """Some variables of a family, expected as large as fits, and what their choice paid."""
     names, axes = way
     signal = replace(
         whole, names=tuple(whole.names[k] for k in names), units=tuple(whole.units[k] for k in names),
         values=whole.values[:, names],
     )  # fmt: skip
     one = _follows(context, signal, axes)
-    return replace(one, term=replace(one.term, sizes=scale * one.term.sizes))
+    return replace(one, term=replace(one.term, sizes=scale * one.term.sizes, paid=paid))
 
 
 def _follows(context: Context, signal: Signal, axes: tuple[int, ...]) -> Follows:

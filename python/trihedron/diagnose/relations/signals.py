@@ -85,17 +85,20 @@ def _gyro_only(context: Context) -> list[Signal]:
 
 
 def _history(context: Context, sensor: Sensor) -> list[Signal]:
-    """The turn that led to a pose."""
+    """The rotation that led to a pose."""
     turn = np.zeros_like(context.fitted.twin.up)
     for where, (_, after) in zip(context.moves, context.obs.move_poses, strict=True):
         turn[after] = np.trapezoid(context.rate[where], context.time_s[where], axis=0)
     angle, sign = context.between_poses(turn), context.between_poses(np.sign(turn))
     size = context.between_poses(np.linalg.norm(turn, axis=1, keepdims=True))
-    out = [Signal(sensor, "last turn", (f"last turn about {AXES[a]}",), angle[:, [a]], ("rad",)) for a in range(3)]
-    out += [
-        Signal(sensor, "last turn", (f"sign of the last turn about {AXES[a]}",), sign[:, [a]], ("1",)) for a in range(3)
+    out = [
+        Signal(sensor, "last rotation", (f"last rotation about {AXES[a]}",), angle[:, [a]], ("rad",)) for a in range(3)
     ]
-    return [*out, Signal(sensor, "last turn", ("size of the last turn",), size, ("rad",))]
+    out += [
+        Signal(sensor, "last rotation", (f"sign of the last rotation about {AXES[a]}",), sign[:, [a]], ("1",))
+        for a in range(3)
+    ]
+    return [*out, Signal(sensor, "last rotation", ("size of the last rotation",), size, ("rad",))]
 
 
 def _warming(context: Context, sensor: Sensor) -> list[Signal]:

@@ -10,8 +10,8 @@ AXES = ("x", "y", "z")
 def effect_file(relation: Relation, effect_id: str = "named-relation") -> str | None:
     """Source of an effect with the relation's terms (docs/adding-an-effect.md); ``None`` where a term needs the past.
 
-    Relations of force and rate follow from every sample; a previous pose, a last turn or a
-    heading do not.
+    Relations of force and rate follow from every sample; a previous pose, a last rotation or
+    a heading do not.
     """
     columns: list[tuple[int, str, str, str]] = []
     for coefficient in relation.coefficients:

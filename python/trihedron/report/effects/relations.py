@@ -21,14 +21,13 @@ _TURNED_TABLE = (
 FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
     {
         "room": FamilyWords(_TURNED_TABLE, ("a magnetic field",)),
-        "earth": FamilyWords(_TURNED_TABLE, ("the Earth's turn",)),
         "force": FamilyWords(
             "record poses on edges and corners as well as on faces, each twice", ("unequal stiffness",)
         ),
         "previous pose": FamilyWords(
             "reach one pose from six different ones, twice each", ("hysteresis", "settling after a rotation")
         ),
-        "last turn": FamilyWords(
+        "last rotation": FamilyWords(
             "reach one pose by turns of either sign, small and large, waiting unlike times",
             ("play or slip in a mounting", "memory of the readout"),
         ),
@@ -36,8 +35,6 @@ FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
             "repeat a few poses while the temperature takes another course: up, down, and held",
             ("a thermal bias of another shape",),
         ),
-        "supply": FamilyWords("repeat one pose at three supply voltages", ("a ratiometric readout",)),
-        "vibration": FamilyWords("record one pose with the vibration on and off", ("rectification",)),
         "rate products": FamilyWords(
             "turn about one axis at a time, then about two at once, at three rates; pivot about a fixed point",
             ("coupled drive modes", "displaced accelerometers"),
