@@ -276,6 +276,7 @@ impl Session {
 
 impl Group {
     /// Whether these are the rows of a move whose noise is weighed anew.
+    #[must_use]
     pub fn is_move(&self) -> bool {
         self.domain == Domain::Moves && self.rows.len() == N_MOVE
     }
