@@ -100,7 +100,7 @@ def _best(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> 
         # Only the leaders keep their columns.
         leading = sorted(leading, key=lambda one: -one[0])[:N_FITTED]
     paid = 2.0 * float(np.log(max(n_tried, 1) * len(PRIOR_SCALES)))
-    each = [_part(context, *which, paid) for gain, *which in leading if 2.0 * gain > paid]
+    each = [_part(context, signal, way, scale, paid) for gain, signal, way, scale in leading if 2.0 * gain > paid]
     if not each:
         return None
     asked = model.asked([one.term for one in each])
