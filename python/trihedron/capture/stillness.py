@@ -1,6 +1,6 @@
 """Still or moving, at once: the spread of a quarter of a second against the calmest so far.
 
-The segmentation of the whole log decides later which poses count; this is for the eye and the ear while one poses on.
+The segmentation of the whole log decides later which poses count; this is for the eye and the ear while one waits.
 """
 
 from __future__ import annotations

@@ -8,7 +8,16 @@ from typing import Annotated, Any, Optional
 import typer
 
 from trihedron.cli.calibrate_sessions import By, Labels, calibrate_beside, calibrate_many
-from trihedron.cli.options import Force, GravitySource, Json, LogsSource, Report, progress, with_options
+from trihedron.cli.options import (
+    Force,
+    GravitySource,
+    Json,
+    LogsSource,
+    ReferenceColumns,
+    Report,
+    progress,
+    with_options,
+)
 from trihedron.cli.output import Ending, check_outputs
 from trihedron.cli.streamed import Kept, Stream, calibrate_stream, needs_stream
 
@@ -48,10 +57,6 @@ Reference = Annotated[
     typer.Option(
         "--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log; one a log."
     ),
-]
-ReferenceColumns = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz', 't,wx [deg/s],...'."),
 ]
 Extended = Annotated[
     bool, typer.Option("--extended", help="Diagnose the log too, and store the effects it demands; for apply.")

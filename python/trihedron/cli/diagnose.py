@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
-from trihedron.cli.options import Force, GravitySource, Json, LogSource, Report, progress, with_options
+from trihedron.cli.options import (
+    Force,
+    GravitySource,
+    Json,
+    LogSource,
+    ReferenceColumns,
+    Report,
+    progress,
+    with_options,
+)
 from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
 
 if TYPE_CHECKING:
@@ -30,10 +39,6 @@ Against = Annotated[
 Reference = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option("--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log."),
-]
-ReferenceColumns = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz', 't,wx [deg/s],...'."),
 ]
 Improved = Annotated[
     Optional[Path],  # noqa: UP045

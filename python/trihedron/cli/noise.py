@@ -7,7 +7,16 @@ from typing import Annotated, Optional
 
 import typer
 
-from trihedron.cli.options import Force, GravitySource, Json, LogSource, Report, progress, with_options
+from trihedron.cli.options import (
+    Force,
+    GravitySource,
+    Json,
+    LogSource,
+    ReferenceColumns,
+    Report,
+    progress,
+    with_options,
+)
 from trihedron.cli.output import check_outputs, leave, put, say, show, write_json, write_report
 from trihedron.files.output import write_whole
 
@@ -21,10 +30,6 @@ Static = Annotated[
 Reference = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option("--reference", metavar="MOTION", help="Known motion beside the log: attitude, or pose."),
-]
-ReferenceColumns = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz,px [m],...'."),
 ]
 Band = Annotated[
     Optional[float],  # noqa: UP045

@@ -24,6 +24,12 @@ Json = Annotated[
     typer.Option("--json", metavar="FILE", help="Write the result as JSON; '-' (or no FILE) is stdout."),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace output files that exist.")]
+ReferenceColumns = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz,px [m]', 't,wx [deg/s],...'."
+    ),
+]
 Report = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option("--report", metavar="FILE", help="Write a report: .html with figures, .txt or .json."),

@@ -114,17 +114,17 @@ def _changed(record: Any) -> Any:
     if isinstance(record, tuple) and record and all(isinstance(part, Finding) for part in record):
         said = tuple(finding_in_python(part) for part in record)
         return None if all(new is old for new, old in zip(said, record, strict=True)) else said
-    if isinstance(record, tuple) and record and all(_pose_findings(part) for part in record):
+    if isinstance(record, tuple) and record and all(_has_findings(part) for part in record):
         parts = [_changed(part) for part in record]
         if all(part is None for part in parts):
             return None
         return tuple(old if new is None else new for new, old in zip(parts, record, strict=True))
-    if not _pose_findings(record):
+    if not _has_findings(record):
         return None
     found = {field.name: _changed(getattr(record, field.name)) for field in fields(record) if field.init}
     found = {name: value for name, value in found.items() if value is not None}
     return replace(record, **found) if found else None
 
 
-def _pose_findings(record: Any) -> bool:
+def _has_findings(record: Any) -> bool:
     return is_dataclass(record) and not isinstance(record, type) and hasattr(record, "findings")

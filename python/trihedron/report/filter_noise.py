@@ -7,7 +7,7 @@ from typing import Any
 
 from trihedron.records.filter_noise import Bounded, FilterNoise, SensorFilterNoise, StaticNoise
 from trihedron.records.plain import as_plain
-from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.filter_noise_charts import OF_SENSOR, horizon_chart
 from trihedron.report.findings import findings_block, verdict_of
@@ -161,8 +161,6 @@ def _tested(one: SensorFilterNoise) -> Block:
         )
         for c in one.consistency
     )  # fmt: skip
-    if not rows:
-        return Paragraph("The half is too short for every horizon.")
     head = (
         "horizon [s]",
         "stretches",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.records.filter_noise import FilterNoise, SensorFilterNoise
 from trihedron.report.chart import Chart, Colour, Line, Mark, Panel, Points, Scale
 from trihedron.report.numbers import plain_number
@@ -26,9 +27,14 @@ def _panel(one: SensorFilterNoise) -> Panel:
     actual, predicted = (
         factor * np.array([getattr(c, name) for c in one.consistency]) for name in ("actual", "predicted")
     )
-    told = [f"{plain_number(float(a))} {unit} over {plain_number(float(s))} s" for a, s in zip(actual, h, strict=True)]
+
+    def told(values: FloatArray) -> list[str]:
+        return [
+            f"{plain_number(float(a))} {unit} over {plain_number(float(s))} s" for a, s in zip(values, h, strict=True)
+        ]
+
     marks: list[Mark] = [Line(h, predicted, "predicted, effective N and K", "c1")]
-    marks.append(Points(h, actual, told, None, "actual error", "c1"))
+    marks.append(Points(h, actual, told(actual), None, "actual error", "c1"))
     if one.consistency[0].static_predicted is not None:
         static = [
             factor * np.array([getattr(c, name) for c in one.consistency], dtype=np.float64)
@@ -36,7 +42,7 @@ def _panel(one: SensorFilterNoise) -> Panel:
         ]
         colour: Colour = "accent"
         marks.append(Line(h, static[0], "predicted, static N and K", colour, is_dashed=True))
-        marks.append(Points(h, static[1], told, None, "actual error of that filter", colour, is_hollow=True))
+        marks.append(Points(h, static[1], told(static[1]), None, "actual error of that filter", colour, is_hollow=True))
     return Panel(
         Scale("horizon [s]", "s", is_log=True),
         Scale(f"{what} [{unit}]", unit, is_log=True),

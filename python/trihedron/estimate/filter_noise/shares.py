@@ -9,7 +9,7 @@ from scipy.integrate import trapezoid
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.filter_noise.strengths import ABSENT
-from trihedron.estimate.filter_noise.stretch import NAMES
+from trihedron.estimate.filter_noise.stretch import NAMES, matern
 from trihedron.records.filter_noise import CAUSES, Bounded, Share
 
 
@@ -24,7 +24,7 @@ def parts_of(draws: FloatArray, horizon_s: float, tilt_m_s2: float | None = None
     out = {"rest": 3.0 * s["noise"] ** 2 * h, "vibration": 3.0 * s["vibration"] ** 2 * h}
     out["bias"] = s["bias_walk"] ** 2 * h**3
     if tilt_m_s2 is None:
-        slow = sum(6.0 * s[name] ** 2 * (1.0 - _matern(h, s[f"{name}_s"])) for name in ("world", "body"))
+        slow = sum(6.0 * s[name] ** 2 * (1.0 - matern(h, s[f"{name}_s"])) for name in ("world", "body"))
         out["reference"] = 6.0 * s["white"] ** 2 + slow
     else:
         out["reference"] = 12.0 * s["white"] ** 2 + 2.0 * (tilt_m_s2 * s["world"]) ** 2 * _twice_summed(h, s["world_s"])
@@ -45,18 +45,8 @@ def bounded(values: Sequence[float] | FloatArray) -> Bounded:
     return Bounded(middle, 0.0 if is_limit else low, high, is_limit)
 
 
-def _matern(h: float, tau_s: FloatArray) -> FloatArray:
-    x = np.sqrt(3.0) * h / np.maximum(tau_s, 1e-9)
-    return np.asarray((1.0 + x) * np.exp(-x))
-
-
 def _twice_summed(h: float, tau_s: FloatArray) -> FloatArray:
     """Variance of the integral over h of a Matérn-3/2 process of variance one."""
     lag = np.linspace(0.0, h, 101)
-    kernel = _matern_all(lag, tau_s)
+    kernel = matern(lag[None, :], tau_s[:, None])
     return np.asarray(2.0 * trapezoid((h - lag) * kernel, lag, axis=1))
-
-
-def _matern_all(lag: FloatArray, tau_s: FloatArray) -> FloatArray:
-    x = np.sqrt(3.0) * lag[None, :] / np.maximum(tau_s, 1e-9)[:, None]
-    return np.asarray((1.0 + x) * np.exp(-x))

@@ -41,6 +41,11 @@ class Stretch:
     turned: FloatArray | None
     power: FloatArray
 
+    @property
+    def lag_s(self) -> FloatArray:
+        """(m, m) between the observations."""
+        return np.abs(np.subtract.outer(self.time_s, self.time_s))
+
     def covariance(self, strengths: FloatArray) -> FloatArray:
         """(3 m, 3 m) of everything random, under strengths (8,) in SI, a zero being none."""
         s = dict(zip(NAMES, strengths, strict=True))
@@ -49,12 +54,12 @@ class Stretch:
             if s[name] > 0.0:
                 out += s[name] ** 2 * basis
         if s["world"] > 0.0:
-            kernel = s["world"] ** 2 * matern(self.time_s, s["world_s"])
+            kernel = s["world"] ** 2 * matern(self.lag_s, s["world_s"])
             if self.slow is not None:
                 kernel = self.slow @ kernel @ self.slow.T
             out += np.kron(kernel, self.plane)
         if self.turned is not None and s["body"] > 0.0:
-            out += np.kron(s["body"] ** 2 * matern(self.time_s, s["body_s"]), np.ones((3, 3))) * self.turned
+            out += np.kron(s["body"] ** 2 * matern(self.lag_s, s["body_s"]), np.ones((3, 3))) * self.turned
         return out
 
     def evidence(self, strengths: FloatArray) -> float:
@@ -102,9 +107,9 @@ class Stretch:
         return replace(self, walks=(*self.walks[:2], self.bias_steps @ kernel @ self.bias_steps.T, self.walks[3]))
 
 
-def matern(time_s: FloatArray, tau_s: float) -> FloatArray:
-    """(m, m) Matérn-3/2 correlation: a smoothed truth has a derivative."""
-    x = np.sqrt(3.0) / tau_s * np.abs(np.subtract.outer(time_s, time_s))
+def matern(lag_s: FloatArray | float, tau_s: FloatArray | float) -> FloatArray:
+    """Matérn-3/2 correlation over some lags: a smoothed truth has a derivative."""
+    x = np.sqrt(3.0) * lag_s / np.maximum(tau_s, 1e-9)
     return np.asarray((1.0 + x) * np.exp(-x))
 
 

@@ -72,18 +72,13 @@ def _stretch(
         observed=observed.ravel(),
         columns=columns,
         centre=np.zeros(columns.shape[1]),
-        walks=(noise, shakes, h * walked(steps), np.kron(2.0 * eye_of(m) - neighbours(m), eye) / h**2),
+        walks=(noise, shakes, h * walked(steps), np.kron(2.0 * np.eye(m) - neighbours(m), eye) / h**2),
         bias_steps=steps,
         slow=h * np.tril(np.ones((m, m))),
         plane=gravity**2 * (eye - np.outer(up, up)),
         turned=None,
         power=vibration[1:],
     )
-
-
-def eye_of(m: int) -> FloatArray:
-    """(m, m) ones on the diagonal."""
-    return np.eye(m)
 
 
 def neighbours(m: int) -> FloatArray:

@@ -150,8 +150,8 @@ def _prepared(recording: Recording, motion: ReferenceMotion, gravity_m_s2: float
     felt = None
     if force is not None and grid.accelerometer is not None:
         felt = grid.accelerometer @ force.S.T + force.b
-    poses = grid.is_valid if motion.attitude is not None else seen
-    side = Beside(grid, reference, poses, Point(gyro.A, gyro.a, gyro.offset_s, gyro.rate), felt)
+    has_truth = grid.is_valid if motion.attitude is not None else seen
+    side = Beside(grid, reference, has_truth, Point(gyro.A, gyro.a, gyro.offset_s, gyro.rate), felt)
     return Prepared(recording, side, gyro, force, windows, wide, found, seen, is_turned)
 
 
@@ -302,8 +302,7 @@ def _estimates(found: MotionFit, k: int, effects: list[Scored]) -> dict[str, Est
         names = EFFECTS[one.ident]
         if not all(found.sides[k].has(name) for name in names):
             continue
-        poses = all(name in found.places[k] for name in names)
-        fit = found if poses else one.fitted
+        fit = found if all(name in found.places[k] for name in names) else one.fitted
         value = np.concatenate([fit.value(k, name) for name in names])
         out[one.ident] = Estimate(LABELS[one.ident], value, fit.covariance(k, names), UNITS[one.ident], one.score)
     return out

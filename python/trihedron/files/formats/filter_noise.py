@@ -96,10 +96,6 @@ def filter_noise_text(found: FilterNoise, target: str) -> str:
     if one is None:
         raise RefusedError(f"noise is not written for {target!r}; there are {', '.join(TARGETS)}.")
     figures: dict[str, SensorNoise] = {sensor.sensor: _figures(sensor) for sensor in found.sensors}
-    static: dict[str, SensorNoise] = {
-        s.sensor: SensorNoise(_figure(s.static.N), _figure(s.static.K)) for s in found.sensors if s.static
-    }
-    # A sensor that was not estimated in motion keeps what is known of it at rest.
     for name in ("accelerometer", "gyroscope"):
         if name not in figures:
             raise RefusedError(
@@ -108,7 +104,7 @@ def filter_noise_text(found: FilterNoise, target: str) -> str:
             )
     lines = [one.first] if one.first else []
     if one.comment:
-        lines += [f"{one.comment} {line}" for line in _beside(static)]
+        lines += [f"{one.comment} {line}" for line in _beside(found)]
     rows = one.rows(_both(figures, found.rate_hz))
     return "\n".join([*lines, *rows, ""])
 
@@ -126,10 +122,10 @@ def _figure(one: Bounded) -> NoiseFigure:
     return NoiseFigure(one.filter_value, one.is_limit)
 
 
-def _beside(static: dict[str, SensorNoise]) -> Sequence[str]:
-    units = {"accelerometer": "m/s^2", "gyroscope": "rad/s"}
+def _beside(found: FilterNoise) -> Sequence[str]:
     return [
-        f"static {name}: N {number(one.N.value)} {units[name]}/sqrt(Hz), "
-        f"K {'below ' if one.K.is_limit else ''}{number(one.K.value)} {units[name]}/sqrt(s)"
-        for name, one in static.items()
+        f"static {one.sensor}: N {number(one.static.N.filter_value)} {one.unit}/sqrt(Hz), "
+        f"K {'below ' if one.static.K.is_limit else ''}{number(one.static.K.filter_value)} {one.unit}/sqrt(s)"
+        for one in found.sensors
+        if one.static
     ]
