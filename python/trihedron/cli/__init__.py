@@ -64,6 +64,8 @@ COMMANDS = (
     simulate,
 )
 
+_OF_ONE_LOG = {"check", "segment", "allan", "noise", "kalman", "diagnose"}
+
 COULD_NOT_RUN = 1
 _INTERRUPTED = 130
 
@@ -247,6 +249,11 @@ def _usage_sentence(error: Exception, words: Sequence[str]) -> str:
     names = {command.__name__ for command in COMMANDS}
     command = next((word for word in words if word in names), None)
     where = f"trihedron {command} --help" if command else "trihedron --help"
+    if message.startswith("Got unexpected extra argument") and command in _OF_ONE_LOG:
+        message = (
+            f"{command} takes one log, and more were named. Where each sensor has its own, say which is which: "
+            "--accel F --gyro F; otherwise run it once for each log."
+        )
     stop = "" if message.endswith(("?", ".")) else "."
     return f"{message}{stop} `{where}` lists what there is."
 

@@ -14,6 +14,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("Turns of 90° on a table against a wall that gives the angle to 0.1°:", "trihedron plan --turn-error 0.1"),
         ("With the noise of your own sensor:", "trihedron plan --gyro-noise 0.01 --accel-noise 200"),
     ),
+    "ports": (("What is plugged in, and what it might be:", "trihedron ports"),),
     "capture": (
         ("The only board that is plugged in, for ten minutes:", "trihedron capture -o log.csv --seconds 600"),
         ("Led through a calibration:", "trihedron capture -o log.csv --guide --calibration cal.json"),
@@ -78,6 +79,12 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("What the linear model leaves out:", "trihedron diagnose log.csv --latitude 50.1 --report diagnosis.html"),
         ("Is this still the sensor of last year?", "trihedron diagnose log.csv --calibration cal.json"),
         ("Why does my simulation not fit?", "trihedron diagnose log.csv --against sim.toml --improved better.toml"),
+    ),
+    "fleet": (
+        (
+            "Every log of a folder, a folder for each device; table and page in `results`:",
+            "trihedron fleet logs -o results --latitude 50.1",
+        ),
     ),
     "apply": (("To m/s² and rad/s:", "trihedron apply cal.json log.csv -o corrected.csv"),),
     "export": (

@@ -128,6 +128,8 @@ def calibrate_sessions(
         groups.append(label)
     if len(results) < 2:
         reasons = "; ".join(f"{Path(name).name}: {reason}" for name, reason in left_out) or "one recording was given"
+        if len(recordings) > 1 and all(recording_of(given).gyroscope is None for given in recordings):
+            reasons = "no log has a gyro: the logs of both sensors of one recording are given with --accel and --gyro"
         raise RefusedError(f"two recordings at least are needed to see what repeats ({reasons}).")
     sessions = sessions_of(results, groups)
     model = combine(sessions, by, results[0].calibration, frame=frame, alpha=alpha, left_out=tuple(left_out))

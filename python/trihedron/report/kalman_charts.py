@@ -52,7 +52,7 @@ def norm_convergence_chart(outcome: NormKalmanCalibration) -> Chart:
     pose = np.arange(1, n + 1, dtype=np.float64)
     panels = []
     for k in range(12):
-        name = f"S{k // 3 + 1}{k % 3 + 1}" if k < 9 else f"b{k - 8}"
+        name = f"S_{'xyz'[k // 3]}{'xyz'[k % 3]}" if k < 9 else f"b_{'xyz'[k - 9]}"
         value, sigma = outcome.parameters[:, k], outcome.sigma[:, k]
         if sigma[-1] == 0.0:
             continue

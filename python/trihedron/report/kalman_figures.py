@@ -122,7 +122,7 @@ def draw_norm_convergence(outcome: NormKalmanCalibration) -> Figure:
         for column in range(4):
             panel = axes[4 * row + column]
             k = 3 * row + column if column < 3 else 9 + row
-            name = f"S{row + 1}{column + 1}" if column < 3 else f"b{row + 1}"
+            name = f"S_{'xyz'[row]}{'xyz'[column]}" if column < 3 else f"b_{'xyz'[row]}"
             panel.set_title(name, fontsize=9)
             value, sigma = outcome.parameters[:, k], outcome.sigma[:, k]
             if sigma[-1] == 0.0:
