@@ -54,7 +54,7 @@ def test_covariances_are_those_of_the_processes():
     assert noise[1, 3] == pytest.approx(1.5)
     # A bias that steps by one at each of three blocks' starts (the first begins at its middle): 2 s, 1.5 s, 0.5 s.
     assert still(3).walks[2][::3, ::3][2, 2] == pytest.approx(2.0**2 + 1.5**2 + 0.5**2)
-    assert matern(np.array([0.0, 1e-9, 50.0]), 1.0)[0] == pytest.approx([1.0, 1.0, 0.0], abs=1e-9)
+    assert matern(np.array([0.0, 1e-9, 50.0]), 1.0) == pytest.approx([1.0, 1.0, 0.0], abs=1e-9)
 
 
 def test_errors_are_as_large_as_predicted_when_the_strengths_are_right():

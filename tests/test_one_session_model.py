@@ -22,11 +22,13 @@ def healthy(request):
     return recording, truth.gravity_m_s2, result, diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
 
 
-@pytest.mark.xfail(
-    strict=False,
-    reason="diagnose has no prior of bends in its uncertainties, and hears velocities while it seeks strengths",
-)
-def test_calibrate_and_diagnose_agree_on_every_parameter_within_a_tenth_of_its_error(healthy):
+def test_calibrate_and_diagnose_agree_on_every_parameter_within_a_tenth_of_its_error(healthy, request):
+    if "[103]" in request.node.name:
+        request.applymarker(
+            pytest.mark.xfail(
+                reason="diagnose has no prior of bends in its uncertainties, and hears velocities while it seeks strengths"
+            )
+        )
     _, _, result, diagnosis = healthy
     for sensor, model in (
         (result.accelerometer, diagnosis.baseline.accelerometer),

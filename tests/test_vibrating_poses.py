@@ -94,7 +94,6 @@ def session(seed, shaken_share, gain, rate_line):
     return trihedron.diagnose(log, gravity_m_s2=truth.gravity_m_s2).to_dict()
 
 
-@pytest.mark.xfail(strict=False, reason="bias repeatability of the gyro is named beside it for one seed")
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_few_mm_s2_that_go_with_the_shaking_are_rectification_alone(seed):
     # 0.005 of a mean square of 1.1²/2 m²/s⁴ is 3 mm/s², of 0.8²/2 half of that.
