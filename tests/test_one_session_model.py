@@ -24,11 +24,8 @@ def healthy(request):
 
 def test_calibrate_and_diagnose_agree_on_every_parameter_within_a_tenth_of_its_error(healthy, request):
     if "[103]" in request.node.name:
-        request.applymarker(
-            pytest.mark.xfail(
-                reason="diagnose has no prior of bends in its uncertainties, and hears velocities while it seeks strengths"
-            )
-        )
+        reason = "diagnose has no prior of bends in its uncertainties, and hears velocities while it seeks strengths"
+        request.applymarker(pytest.mark.xfail(reason=reason))
     _, _, result, diagnosis = healthy
     for sensor, model in (
         (result.accelerometer, diagnosis.baseline.accelerometer),
