@@ -1,6 +1,7 @@
 """Capture over a pseudo-terminal with a simulated board at its other end.
 
 python benches/capture.py faults [FRAMES] [FAULTS] [BOARD ...]   frames sent = frames saved + frames counted lost
+python benches/capture.py firmware [RUNS] [SECONDS] [SEED]       boards drawn at random, in real time
 python benches/capture.py kill [KILLS]                           kill -9 at 1 kHz: what is lost, does every file read
 python benches/capture.py cpu [RATE_HZ] [BOARD ...]              share of a core that a recording takes
 """
@@ -15,8 +16,10 @@ import sys
 import tempfile
 import threading
 import time
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +29,7 @@ from trihedron.capture import Recorder, decoder_factory, open_source
 from trihedron.files.frame_declaration import read_frame_declaration
 from trihedron.pipeline.capturing import column_namer
 from trihedron.records import Recording
-from trihedron.simulate.device import Device, PseudoTerminal, Sent, parse_faults, serve
+from trihedron.simulate.device import Device, Faults, PseudoTerminal, Scales, Sent, parse_faults, serve
 
 DECLARED = """
 sync = "AA 55"
@@ -100,6 +103,89 @@ def faults(frames: str = "1e5", kinds: str = "1%", *only: str) -> None:
     print(f"{total[0]} frames; not accounted for: {total[1]}")
 
 
+@dataclass(frozen=True)
+class Run:
+    """One firmware run as drawn."""
+
+    seed: int
+    board: str
+    rate_hz: float
+    seconds: float
+    faults: Faults
+    declaration: str
+
+    @classmethod
+    def drawn(cls, seed: int, seconds: float) -> Run:
+        rng = random.Random(seed)
+        board = rng.choice(list(BOARDS))
+        fastest = 500.0 if "lines" in board or board.endswith("text") else 2000.0
+        away = tuple(sorted(rng.uniform(3.0, seconds - 5.0) for _ in range(rng.choice((0, 0, 1, 2)))))
+        faults = Faults(
+            missing=rng.choice((0.0, 0.001, 0.02)), cut=rng.choice((0.0, 0.002)), flipped=rng.choice((0.0, 0.002)),
+            drift_ppm=rng.uniform(-60.0, 60.0), start_text="lines" in board and rng.random() < 0.5,
+            disconnect_s=away, away_s=rng.uniform(0.3, 2.5), clean_ends=30,
+        )  # fmt: skip
+        count, ticks = rng.choice(("u8", "u16", "u32")), rng.choice(("", "u16", "u32"))
+        declaration = DECLARED.replace('"counter"\ntype = "u16"', f'"counter"\ntype = "{count}"')
+        if ticks:
+            clock = f'[[field]]\nname = "ticks"\nrole = "clock"\ntick_s = 0.0001\ntype = "{ticks}"\n'
+            declaration = declaration.replace('[[field]]\nname = "ax"', clock + '[[field]]\nname = "ax"')
+        return cls(seed, board, rng.choice((100.0, 104.0, 250.0, 416.0, 1000.0, fastest)), seconds, faults, declaration)
+
+
+def numbered(n: int, rate_hz: float) -> Recording:
+    """Ten-bit readings that say which sample they are."""
+    number = np.arange(n)
+    noise = np.random.default_rng(0).integers(400, 600, (n, 4)).astype(float)
+    accel = np.column_stack([number % 1000, number // 1000, noise[:, 0]]).astype(float)
+    return Recording(number / rate_hz, accel, noise[:, 1:], rate_hz, "counts", "counts")
+
+
+def one_run(run: Run) -> str:
+    """The account of one run; starts with ``ok`` where every sample is accounted for and time is right."""
+    read_as, n = BOARDS[run.board][0], int(run.seconds * run.rate_hz)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "declared.toml").write_text(run.declaration)
+        declaration = read_frame_declaration(folder / "declared.toml") if run.board == "declared" else None
+        line, sent = PseudoTerminal(folder / "port"), []
+        source = open_source(line.name)
+        scales = Scales(1.0, 1.0)
+        device = Device(numbered(n, run.rate_hz), declaration or run.board, run.faults, 1.0, run.seed, scales=scales)
+        thread = threading.Thread(target=lambda: sent.append(serve(device, line)))
+        recorder = Recorder(
+            source, decoder_factory(declaration or read_as, column_namer()), folder / "log.csv",
+            wait_for_return_s=4.0 if run.faults.disconnect_s else 0.0, silence_s=20.0,
+        )  # fmt: skip
+        thread.start()
+        for _ in recorder:
+            pass
+        thread.join()
+        log = trihedron.read(folder / "log.csv")
+        count = recorder.count
+    assert log.accelerometer is not None
+    values = log.accelerometer * (9.80665 if log.accelerometer_unit == "g" else 1.0)
+    number = np.rint(values[:, 0]) + 1000 * np.rint(values[:, 1])
+    missing = sent[0].frames - log.n_samples - count.lost
+    worst = 0.0
+    for begin, end in pairwise((0.0, *run.faults.disconnect_s, run.seconds)):
+        rows = (number > (begin + 0.1) * run.rate_hz) & (number < (end - 0.3) * run.rate_hz)
+        slope = np.polyfit(number[rows] / run.rate_hz, log.time_s[rows], 1)[0] if rows.sum() > 50 else 1.0
+        worst = max(worst, abs(slope - 1.0) * 1e6 if end - begin > 5.0 else 0.0)
+    is_ok = missing == 0 and worst < 100.0 and bool(np.all(np.diff(log.time_s) > 0.0))
+    account = f"sent {sent[0].frames} = saved {log.n_samples} + lost {count.lost} + {missing}; time {worst:.0f} ppm"
+    return f"{'ok ' if is_ok else 'NOT'} {run.seed} {run.board} {run.rate_hz:g} Hz: {account}; {run.faults}"
+
+
+def firmware(runs: str = "40", seconds: str = "30", seed: str = "0") -> None:
+    """Runs side by side in real time."""
+    drawn = [Run.drawn(int(seed) + number, float(seconds)) for number in range(int(runs))]
+    with ProcessPoolExecutor(4) as pool:
+        accounts = list(pool.map(one_run, drawn))
+    print(*accounts, sep="\n")
+    print(f"{sum(one.startswith('ok') for one in accounts)} of {len(accounts)} accounted for, within 100 ppm")
+
+
 def kill(kills: str = "50") -> None:
     """Seconds of readings that were sent and are not in the file."""
     lost = []
@@ -138,4 +224,4 @@ def cpu(rate_hz: str = "1000", *only: str) -> None:
 
 
 if __name__ == "__main__":
-    {"faults": faults, "kill": kill, "cpu": cpu}[sys.argv[1]](*sys.argv[2:])
+    {"faults": faults, "firmware": firmware, "kill": kill, "cpu": cpu}[sys.argv[1]](*sys.argv[2:])

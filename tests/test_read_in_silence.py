@@ -53,6 +53,17 @@ def test_ticks_of_an_unknown_size_are_asked_for(tmp_path, tick_s, unit, factor, 
     assert not serious(said)
 
 
+def test_a_wrong_clock_and_a_rare_unit_do_not_cancel(tmp_path):
+    # Ticks of 62.5 us taken for ms run 16 times too slow: deg/s then look like mrad/s that are 9 % off.
+    t, force, rate = motion(400.0)
+    ticks = [64_400_234 + round(x / 62.5e-6) for x in t]
+    log = written(tmp_path / "log.csv", *table(ticks, force, np.degrees(rate)))
+    assert serious(read_recording(log)) & {FindingCode.TIME_UNIT_DETECTED, FindingCode.UNIT_CONTRADICTED}
+    said = read_recording(log, time_unit="62.5 us")
+    assert said.gyroscope_unit is RateUnit.DEG_S
+    assert not serious(said)
+
+
 def test_a_doubtful_clock_is_settled_by_a_stated_gyro_unit_that_gravity_agrees_with(tmp_path):
     t, force, rate = motion(1000.0, n_poses=4)
     timestamps = [round(x * 1e3) for x in t]

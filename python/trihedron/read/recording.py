@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -16,7 +17,7 @@ from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, look
 from trihedron.read.audit import audit_counter, audit_readings, audit_steps, audit_timing
 from trihedron.read.audit.pace import audit_pace
-from trihedron.read.clock import mean_rate_hz, with_gyro
+from trihedron.read.clock import mean_rate_hz, was_weighed, with_gyro
 from trihedron.read.columns import Sensor
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.digest import LateSha256, hexdigest
@@ -238,6 +239,8 @@ def _judged_gyro(
     assert sensors.gyroscope is not None
     acc = sensors.accelerometer
     turning = None if acc is None else turning_of(acc, sensors.gyroscope, rate_hz)
+    if turning is not None:
+        turning = replace(turning, clock_is_weighed=any(was_weighed(one) for one in sensors.findings))
     clear = turning if turning is not None and turning.is_clear else None
     judged = judge_gyroscope(sensors.gyroscope, clear, windows, sensors.gyroscope_unit, given, extremes)
     if turning is None:

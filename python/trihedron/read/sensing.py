@@ -12,7 +12,7 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, is_integer, look
 from trihedron.read.errors import ReadError
-from trihedron.read.turning import CANDIDATES, Turning
+from trihedron.read.turning import Turning
 from trihedron.records import Finding, FindingCode
 from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si
 
@@ -167,7 +167,7 @@ def judge_gyroscope(
         return Judged(RateUnit.COUNTS, (Finding.of(FindingCode.UNIT_DETECTED, "gyro-counts"),))
     if turning is None:
         return _gyroscope_by_magnitude(extremes, windows)
-    unit = min(CANDIDATES, key=lambda unit: abs(math.log(turning.factor(unit))))
+    unit = min(turning.candidates, key=lambda unit: abs(math.log(turning.factor(unit))))
     factor, percent, correlation = turning.factor(unit), turning.percent, turning.correlation
     if turning.fits(unit):
         told = Finding.of(

@@ -20,7 +20,9 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.units import RateUnit, rate_to_si
 
-CANDIDATES = (RateUnit.RAD_S, RateUnit.DEG_S, RateUnit.MRAD_S, RateUnit.MDEG_S)
+USUAL = (RateUnit.RAD_S, RateUnit.DEG_S)
+RARE = (RateUnit.MRAD_S, RateUnit.MDEG_S)
+"""Seldom written without being named: beside a clock whose unit was weighed, ticks of another size are as likely."""
 TOLERANCE = 1.25
 """Factor by which the scale of an uncalibrated sensor and its clock may be off; candidates lie a factor 17 or 57
 apart."""
@@ -48,7 +50,7 @@ class Turning:
     gravity's change with
     the gyro's prediction, and the number of blocks behind them. ``odd_part`` (from 1; 0: none) of ``PARTS`` fits
     with other axes only, with the correlation so and
-    with those of the whole."""
+    with those of the whole. ``clock_is_weighed``: nothing said the unit of whole-numbered timestamps."""
 
     scale: float
     sigma: float
@@ -56,6 +58,12 @@ class Turning:
     n: int
     odd_part: int = 0
     odd_correlation: tuple[float, float] = (0.0, 0.0)
+    clock_is_weighed: bool = False
+
+    @property
+    def candidates(self) -> tuple[RateUnit, ...]:
+        """Units among which the scale may choose; a wrong clock and a wrong unit must not cancel."""
+        return USUAL if self.clock_is_weighed else USUAL + RARE
 
     @property
     def is_clear(self) -> bool:

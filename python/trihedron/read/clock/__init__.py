@@ -3,7 +3,7 @@
 from trihedron.read.clock.base import Clock, build_clock
 from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.clock.settle import Settled, settle_clock
-from trihedron.read.clock.unit import TICKS, Witness, counts_rows, parse_time_unit, seconds_of, with_gyro
+from trihedron.read.clock.unit import TICKS, Witness, counts_rows, parse_time_unit, seconds_of, was_weighed, with_gyro
 
 __all__ = [
     "TICKS",
@@ -16,5 +16,6 @@ __all__ = [
     "parse_time_unit",
     "seconds_of",
     "settle_clock",
+    "was_weighed",
     "with_gyro",
 ]

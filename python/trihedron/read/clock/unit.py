@@ -120,7 +120,8 @@ def time_unit(
         possible = [u for u in ranked if scores[u] > scores[choice] - 2.0 * _SURE]
     else:
         choice, sure = "s", 0.5 * usual < 60.0
-    findings.append(_statement(usual, choice, sure, possible))
+    tick_s = {"weighed_tick_s": SECONDS[choice]} if choice != "s" and not dated else {}
+    findings.append(_statement(usual, choice, sure, possible, tick_s))
     return choice
 
 
@@ -158,6 +159,11 @@ def counts_rows(raw: FloatArray) -> bool:
     return len(raw) > 2 and not _has_fractions(raw) and bool(np.mean(np.diff(raw[:_MOST_ROWS]) == 1.0) > _NEARLY_ALL)
 
 
+def was_weighed(finding: Finding) -> bool:
+    """Whether it tells whole-numbered timestamps whose unit nothing said."""
+    return finding.code is FindingCode.TIME_UNIT_DETECTED and "weighed_tick_s" in finding.numbers
+
+
 def with_gyro(findings: list[Finding], is_confirmed: bool) -> list[Finding]:
     """Findings in which a doubt about the time unit is serious, as a gyro's scale hangs on it, or none where
     gravity settled it."""
@@ -192,12 +198,13 @@ def _quickest_warming(temperature: FloatArray | None) -> float | None:
     return float(np.abs(np.diff(blocks)).max() / n)
 
 
-def _statement(usual: float, choice: str, sure: bool, possible: list[str]) -> Finding:
+def _statement(usual: float, choice: str, sure: bool, possible: list[str], tick_s: dict[str, float]) -> Finding:
     rate = 1.0 / (usual * SECONDS[choice])
     others = [words("unit-with-rate", unit=u, rate_hz=1.0 / (usual * SECONDS[u])) for u in possible if u != choice]
     return Finding.of(
         FindingCode.TIME_UNIT_DETECTED,
         "" if sure else "unsure",
+        numbers=tick_s,
         step=usual,
         unit=choice,
         rate_hz=rate,
