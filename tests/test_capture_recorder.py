@@ -12,6 +12,7 @@ import pytest
 
 import trihedron
 from board import Board, counts_recording
+from trihedron.arrivals import paced
 from trihedron.capture import (
     CaptureError,
     ClockFit,
@@ -277,3 +278,19 @@ def test_what_a_board_says_at_start_is_no_frame(tmp_path):
     recorder, _ = capture(str(raw), tmp_path / "log.csv")
     assert recorder.count.tally.saved == 100
     assert recorder.count.corrupt <= 1
+
+
+def test_frames_without_a_clock_are_paced_by_all_of_their_arrivals_when_their_log_is_read():
+    # Pieces of 8 frames, late by up to 20 ms; four seconds away after the third of ten; a counter that went on there.
+    rng, rate_hz = np.random.default_rng(0), 416.0
+    frame = np.arange(8000)
+    sent_s = frame / rate_hz + np.where(frame < 2400, 0.0, 4.0)
+    last = (frame // 8) * 8 + 7
+    host_s = sent_s[last] + rng.exponential(4e-3, 1000)[frame // 8]
+    host_s = np.maximum.accumulate(host_s)
+    time_s = paced(frame.astype(float), host_s)
+    assert np.all(np.diff(time_s) > 0.0)
+    for part in (slice(0, 2400), slice(2400, 8000)):
+        assert np.polyfit(sent_s[part], time_s[part], 1)[0] == pytest.approx(1.0, abs=1e-4)
+    # Two stretches begin each within the lateness of their earliest piece.
+    assert time_s[2400] - time_s[2399] == pytest.approx(4.0 + 1.0 / rate_hz, abs=2e-3)

@@ -12,8 +12,8 @@
 
 from __future__ import annotations
 
+from trihedron.arrivals import ClockFit, ClockLine
 from trihedron.capture.account import Count, clock_sentence
-from trihedron.capture.clock import ClockFit, ClockLine, Timeline
 from trihedron.capture.detection import Found, find_protocol
 from trihedron.capture.errors import CaptureError, DiskError, SourceEndedError, SourceLostError
 from trihedron.capture.guide import Guide
@@ -31,6 +31,7 @@ from trihedron.capture.protocols import (
 from trihedron.capture.recorder import Block, Recorder
 from trihedron.capture.sequence import Sequence, Tally
 from trihedron.capture.sources import Source, open_source
+from trihedron.capture.timeline import Timeline
 
 __all__ = [
     "PROTOCOLS",

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from trihedron.capture.clock import ClockLine, Timeline
+from trihedron.arrivals import ClockLine
 from trihedron.capture.sequence import Tally
+from trihedron.capture.timeline import Timeline
 
 MOST_PPM = 20_000.0
 """Beyond two per cent it is no clock's error: a replay at another speed, or a unit of time that was misread."""

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.arrivals import ClockLine
 from trihedron.capture.account import Count, clock_sentence
-from trihedron.capture.clock import ClockLine, Timeline
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
 from trihedron.capture.log import GrowingLog
 from trihedron.capture.protocols import Decoder
@@ -21,6 +21,7 @@ from trihedron.capture.reading import ReadingThread, SourceReturned, Stopped
 from trihedron.capture.rows import Rows
 from trihedron.capture.sequence import Placed, Sequence, Tally
 from trihedron.capture.sources import Source
+from trihedron.capture.timeline import Timeline
 
 SETTLE_S = 0.6
 """Without a device clock, rows wait this long at the start of a connection, until arrivals tell their rate."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from datetime import datetime, timezone
 
+from trihedron.arrivals import ClockLine
 from trihedron.capture.account import Count, clock_sentence
-from trihedron.capture.clock import ClockLine, Timeline
 from trihedron.capture.log import GrowingLog
 from trihedron.capture.protocols import Decoder
 from trihedron.capture.sequence import Placed
 from trihedron.capture.sources import Source
+from trihedron.capture.timeline import Timeline
 
 
 class Rows:

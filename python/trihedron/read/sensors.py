@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.read.captured import with_arrivals
 from trihedron.read.clock import TICKS, Clock, Witness, build_clock, counts_rows, mean_rate_hz, settle_clock
 from trihedron.read.clock.order import in_order
 from trihedron.read.clock.steps import steps_of
@@ -274,7 +275,13 @@ def _time_base(table: Table, chosen: Columns, options: Options, findings: list[F
         if named == "100us" and not table.clock.unit:
             named = _sample_time_fine(table, chosen.time, findings)
         clock = build_clock(
-            table, chosen.time, named, given, chosen.nanoseconds, _witness(table, chosen), table.is_private
+            with_arrivals(table, chosen.time),
+            chosen.time,
+            named,
+            given,
+            chosen.nanoseconds,
+            _witness(table, chosen),
+            table.is_private,
         )
         findings += _with_rows_left_out(clock, table.n_rows)
         rate = mean_rate_hz(clock.time_s)

@@ -42,9 +42,9 @@ _IMPOSSIBLE, _HASTY = -20.0, -4.0
 QUICKEST_TURN_S, HASTY_TURN_S = 0.03, 0.12
 """20 degrees from rest to rest in the first take 1500 rad/s², more than a wrist flicks and a table bears; in the
 second 100 rad/s², a knock."""
-LEISURELY_TURN_S, _LEISURELY = 3.0, -1.5
-SLOWEST_TURN_S, _SLOW = 60.0, -3.0
-"""The quickest change of pose in a session takes less, unless it is a drift in a chamber."""
+USUAL_TURN_S, _TURN_SPREAD, _SLOWEST = 0.35, math.log(4.0), -3.0
+"""The quickest 20 degrees of a session, 90 degrees in a second and a half, and the spread of its logarithm; a drift in
+a chamber has no limit."""
 FASTEST_KELVIN_S = 5.0
 """A part in its case does not warm faster; a chamber runs at 0.1 K/s."""
 _TURN_DEG, _SIDE = 20.0, 5
@@ -141,8 +141,8 @@ def _scores(raw: FloatArray, usual: float, possible: list[str], witness: Witness
             score += _SHORT
         if rest_to_rest is not None and rest_to_rest * row_s < HASTY_TURN_S:
             score += _IMPOSSIBLE if rest_to_rest * row_s < QUICKEST_TURN_S else _HASTY
-        if any_turn is not None and any_turn * row_s > LEISURELY_TURN_S:
-            score += _SLOW if any_turn * row_s > SLOWEST_TURN_S else _LEISURELY
+        if any_turn is not None and any_turn * row_s > USUAL_TURN_S:
+            score += max(-0.5 * (math.log(any_turn * row_s / USUAL_TURN_S) / _TURN_SPREAD) ** 2, _SLOWEST)
         if kelvin is not None and kelvin / row_s > FASTEST_KELVIN_S:
             score += _IMPOSSIBLE
         scores[unit] = score

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+
+from trihedron.arrays import FloatArray
 
 MOST_POINTS = 100_000
 MOST_BINS = 200
@@ -107,85 +110,29 @@ class ClockFit:
         )
 
 
-class Timeline:
-    """Seconds of every frame for the log: the device's clock where it has one, else its frames paced by the host's.
+LONGEST_PAUSE_S = 0.25
+"""Bytes of one connection do not stay away longer; after that another may have begun, and begins where it arrives."""
 
-    One connection is one stretch; a new stretch goes on where the host's clock says.
+
+def paced(frame: FloatArray, host_s: FloatArray) -> FloatArray:
+    """(n,) seconds of frames (n,) without a clock of their own, from their arrivals (n,): even between two pauses.
+
+    The period is that of the longest stretch without a pause, as the board's clock stays the same; a stretch begins
+    where its earliest arrivals say, and never before the one before has ended. Arrivals as they are where no stretch
+    is long enough to tell a period.
     """
-
-    def __init__(self, *, tick_s: float, modulus: int, nominal_rate_hz: float | None = None) -> None:
-        self._tick_s, self._modulus = tick_s, modulus
-        self.fit = ClockFit()
-        self._ticks: int | None = None
-        self._elapsed = 0
-        self._start_s = 0.0
-        self._index0 = 0
-        self._time_s = 0.0
-        self._host_s = 0.0
-        self._index: int | None = None
-        self._period = 1.0 / nominal_rate_hz if nominal_rate_hz else 0.0
-        self._is_given = nominal_rate_hz is not None
-        self._next_look_s = 0.0
-
-    @property
-    def has_device_clock(self) -> bool:
-        """Whether times are the device's."""
-        return self._tick_s > 0.0
-
-    @property
-    def tick_s(self) -> float:
-        """One tick of the device's clock; 0 without one."""
-        return self._tick_s
-
-    def expect(self, period_s: float) -> None:
-        """A first guess of the seconds per frame, from the first arrivals; a rate that was given stays."""
-        if not self._is_given and self._period == 0.0:
-            self._period = period_s
-
-    def place(self, index: int, ticks: int | None, host_s: float, *, restarted: bool) -> float:
-        """Time of one frame, never before the one before."""
-        if self._index is None or restarted:
-            self._begin(index, ticks, host_s)
-        elif self.has_device_clock and ticks is not None and self._ticks is not None:
-            step = ticks - self._ticks
-            if self._modulus:
-                step %= self._modulus
-                step = step - self._modulus if step > self._modulus // 2 else step
-            self._elapsed += step
-            self._ticks = ticks
-            self._time_s = max(self._start_s + self._elapsed * self._tick_s, self._time_s)
-        else:
-            self._time_s += (index - self._index) * self._step(index)
-        self._index, self._host_s = index, host_s
-        return self._time_s
-
-    def arrived(self, host_s: float) -> None:
-        """The piece of bytes that held the last placed frame came now."""
-        if self._index is None:
-            return
-        if self.has_device_clock:
-            self.fit.add(self._elapsed * self._tick_s, host_s)
-        else:
-            self.fit.add(self._index - self._index0, host_s)
-
-    def _begin(self, index: int, ticks: int | None, host_s: float) -> None:
-        if self._index is not None:
-            self._start_s = self._time_s + max(host_s - self._host_s, self._period)
-            self._time_s = self._start_s
-            self.fit = ClockFit()
-        self._ticks, self._elapsed, self._index0 = ticks, 0, index
-
-    def _step(self, index: int) -> float:
-        """Seconds per frame by the arrivals so far, and a little more or less to stay beside them."""
-        if self._is_given:
-            return self._period
-        if index - self._index0 >= self._next_look_s:
-            line = self.fit.line()
-            if line is not None:
-                self._period = line.slope
-                self._next_look_s = (index - self._index0) * 1.2
-        return self._period or STARTING_STEP_S
-
-
-STARTING_STEP_S = 0.01
-"""Taken in the first second, while the arrivals do not tell the rate."""
+    pauses = np.flatnonzero(np.diff(host_s) > LONGEST_PAUSE_S) + 1
+    stretches = [slice(*edges) for edges in pairwise([0, *pauses.tolist(), len(host_s)])]
+    longest = max(stretches, key=lambda one: host_s[one.stop - 1] - host_s[one.start])
+    fit = ClockFit()
+    for pair in zip(frame[longest].tolist(), host_s[longest].tolist(), strict=True):
+        fit.add(*pair)
+    line = fit.line()
+    if line is None:
+        return host_s
+    out, end = np.empty(len(host_s)), -math.inf
+    for one in stretches:
+        pace = line.slope * (frame[one] - frame[one.start])
+        out[one] = pace + max(float(np.min(host_s[one] - pace)), end + line.slope)
+        end = out[one.stop - 1]
+    return out
