@@ -42,7 +42,7 @@ _IMPOSSIBLE, _HASTY = -20.0, -4.0
 QUICKEST_TURN_S, HASTY_TURN_S = 0.03, 0.12
 """20 degrees from rest to rest in the first take 1500 rad/s², more than a wrist flicks and a table bears; in the
 second 100 rad/s², a knock."""
-USUAL_TURN_S, _TURN_SPREAD, _SLOWEST = 0.35, math.log(4.0), -3.0
+USUAL_TURN_S, _TURN_SPREAD, _SLOWEST = 0.35, math.log(3.0), -3.0
 """The quickest 20 degrees of a session, 90 degrees in a second and a half, and the spread of its logarithm; a drift in
 a chamber has no limit."""
 FASTEST_KELVIN_S = 5.0
