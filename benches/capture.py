@@ -25,9 +25,9 @@ from pathlib import Path
 import numpy as np
 
 import trihedron
+from trihedron.api.capturing import column_namer
 from trihedron.capture import Recorder, decoder_factory, open_source
 from trihedron.files.frame_declaration import read_frame_declaration
-from trihedron.pipeline.capturing import column_namer
 from trihedron.records import Recording
 from trihedron.simulate.device import Device, Faults, PseudoTerminal, Scales, Sent, parse_faults, serve
 

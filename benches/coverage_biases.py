@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron import calibrate, diagnose
-from trihedron.pipeline.demonstrating import truth_of_the_day
+from trihedron.api.demonstrating import truth_of_the_day
 from trihedron.segment import segment_recording
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 

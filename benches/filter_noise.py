@@ -15,9 +15,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trihedron import read
+from trihedron.api.referring import motion_of
 from trihedron.estimate.filter_noise import Asked, beside_reference
 from trihedron.estimate.filter_noise.shares import parts_of
-from trihedron.pipeline.referring import motion_of
 from trihedron.records import Recording
 from trihedron.records.filter_noise import CAUSES, Bounded, StaticNoise
 from trihedron.records.reference import ReferenceMotion

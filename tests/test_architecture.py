@@ -11,8 +11,8 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "python" / "trihedron"
 STAGES = ("read", "segment", "estimate", "diagnose", "simulate", "report", "capture")
 # What any stage may import: the nouns, the model, units. `_core` only where numbers are made.
-# A fleet is the pipeline over many logs.
-COMPOSERS = {"pipeline", "cli", "fleet", "__init__", "__main__"}
+# A fleet is `api` over many logs.
+COMPOSERS = {"api", "cli", "fleet", "__init__", "__main__"}
 # Records ask for how they are shown (to_dict, plot, a page) and for the reader of plain arrays only when asked.
 LOOKS_UP = {"records/presented.py", "records/recording.py"}
 # A finding asks the catalogue for its sentence.
@@ -138,7 +138,7 @@ def test_nothing_is_called_utils():
         assert path.stem not in {"utils", "helpers", "common", "misc"}, path
 
 
-def test_nothing_below_the_pipeline_knows_who_composes_it():
+def test_nothing_below_the_verbs_knows_who_composes_it():
     lookups = set()
     for path in PACKAGE.rglob("*.py"):
         name = path.relative_to(PACKAGE)
@@ -297,17 +297,17 @@ def test_a_refusal_is_told_from_a_defect():
     assert [name for name, bases in errors if "ValueError" in bases] == ["checked.py: WrongTypeError"]
 
 
-# Calls that a handler of ValueError may stand round; pipeline/asking.py says what it catches in Python's words.
+# Calls that a handler of ValueError may stand round; api/asking.py says what it catches in Python's words.
 CONVERSIONS = {
-    "pipeline/temperature.py: float",
-    "pipeline/capturing.py: float",
-    "pipeline/streaming.py: json.loads",
-    "pipeline/streaming.py: note.read_text",
-    "pipeline/reading.py: np.ma.asanyarray",
-    "pipeline/asking.py: result_in_python",
-    "pipeline/asking.py: verb",
-    "pipeline/arguments.py: item.item",
-    "pipeline/arguments.py: hasattr",
+    "api/temperature.py: float",
+    "api/capturing.py: float",
+    "api/streaming.py: json.loads",
+    "api/streaming.py: note.read_text",
+    "api/reading.py: np.ma.asanyarray",
+    "api/asking.py: result_in_python",
+    "api/asking.py: verb",
+    "api/arguments.py: item.item",
+    "api/arguments.py: hasattr",
     "fleet/running.py: json.loads",
     "fleet/running.py: path.read_text",
     "fleet/running.py: distributed.Client",
@@ -323,7 +323,7 @@ def is_of(handler, name):
 def test_no_handler_takes_a_defect_of_a_whole_fit_for_a_refusal():
     """Where readings become numbers, ValueError is caught only round a conversion of one value or one note."""
     found = set()
-    for room in ("estimate", "diagnose", "segment", "session", "channel_facts", "pipeline", "fleet"):
+    for room in ("estimate", "diagnose", "segment", "session", "channel_facts", "api", "fleet"):
         for path in (PACKAGE / room).rglob("*.py"):
             for node in ast.walk(ast.parse(path.read_text())):
                 if isinstance(node, ast.Try) and any(is_of(h, "ValueError") for h in node.handlers):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from trihedron import calibrate
+from trihedron.api import apply
 from trihedron.files.calibration import (
     CalibrationFileError,
     calibration_document,
@@ -16,7 +17,6 @@ from trihedron.files.calibration import (
     write_calibration,
 )
 from trihedron.files.output import OutputError
-from trihedron.pipeline import apply
 from trihedron.records.frozen import thawed
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.units import AccelerationUnit

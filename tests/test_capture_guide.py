@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 import trihedron
+from trihedron.api import simulate
+from trihedron.api.guiding import conclude, examine, part_of
+from trihedron.api.planning_poses import move_rows, shortest_path
+from trihedron.api.replaying import readings_of, steps
 from trihedron.capture.guide import Guide
 from trihedron.capture.stillness import Stillness
 from trihedron.cli import main
 from trihedron.cli.page import Page
 from trihedron.cli.screen import as_text
-from trihedron.pipeline import simulate
-from trihedron.pipeline.guiding import conclude, examine, part_of
-from trihedron.pipeline.planning_poses import move_rows, shortest_path
-from trihedron.pipeline.replaying import readings_of, steps
 from trihedron.records.guiding import Accuracy, Phase
 from trihedron.simulate import scenario_by_name
 from trihedron.simulate.following import FollowingHand

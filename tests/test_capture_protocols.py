@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from board import DECLARED, counts_recording
+from trihedron.api.capturing import column_namer
 from trihedron.capture import Sequence, decoder_factory
 from trihedron.capture.protocols.checksums import CHECKSUM_OF
 from trihedron.capture.protocols.contract import Frame
 from trihedron.files.frame_declaration import read_frame_declaration
-from trihedron.pipeline.capturing import column_namer
 from trihedron.simulate.device import Device, Faults, Sent, parse_faults
 
 COUNTED = [

@@ -12,6 +12,7 @@ import pytest
 
 import trihedron
 from board import Board, counts_recording
+from trihedron.api.capturing import column_namer, open_device
 from trihedron.arrivals import paced
 from trihedron.capture import (
     CaptureError,
@@ -23,7 +24,6 @@ from trihedron.capture import (
     open_source,
 )
 from trihedron.cli import main
-from trihedron.pipeline.capturing import column_namer, open_device
 from trihedron.simulate.device import Device, Faults, Sent, parse_faults
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")

@@ -9,11 +9,11 @@ import pytest
 
 from hand_made_sessions import Instrument, recorded
 from trihedron import _core
+from trihedron.api import identifying, streaming
 from trihedron.cli import main
 from trihedron.estimate.noise import stream_noise
 from trihedron.files import checkpoint as kept_file
 from trihedron.files.checkpoint import Checkpoint
-from trihedron.pipeline import identifying, streaming
 
 COLUMNS = "ax,ay,az,gx,gy,gz"
 
@@ -146,7 +146,7 @@ def test_the_commands_keep_and_go_on(path, tmp_path, capsys):
     assert "--checkpoint belongs to --stream" in capsys.readouterr().err
     # Killed in the midst of a pass, then run again: what is printed is what one run prints.
     killed = (
-        "import os, sys\nfrom trihedron.files.checkpoint import Checkpoint\nfrom trihedron.pipeline import streaming\n"
+        "import os, sys\nfrom trihedron.files.checkpoint import Checkpoint\nfrom trihedron.api import streaming\n"
         "from trihedron.cli import main\nstreaming.PIECE_ROWS = 700\nkeep = Checkpoint.keep\n"
         "def once(self, rows, state):\n    self.every_s = 0.0\n    keep(self, rows, state)\n    os._exit(9)\n"
         "Checkpoint.keep = once\nmain(sys.argv[1:])\n"

@@ -186,7 +186,7 @@ def test_improving_is_refused_where_it_would_overwrite_or_has_nothing_to_improve
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 4])
 def test_the_second_act_finds_what_was_sealed_and_mends_the_simulation(seed, tmp_path):
-    from trihedron.pipeline.disagreeing import disagree
+    from trihedron.api.disagreeing import disagree
 
     done = disagree(tmp_path, seed)
     assert done.found.verdict == "missing-physics"

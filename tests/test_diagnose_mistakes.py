@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trihedron
+from trihedron.api.comparing_frames import sign_of_gravity
 from trihedron.diagnose.against import FittedModel, compare_numbers
 from trihedron.estimate.gyroscope.world_rates import carried_gravity
 from trihedron.estimate.noise.of_biases import PoseBiases, compare_slow
-from trihedron.pipeline.comparing_frames import sign_of_gravity
 from trihedron.records import Pose
 from trihedron.records.sampling import Sampling, TimestampKind
 from trihedron.simulate import hand_session, scenario_by_name, simulate
@@ -149,7 +149,7 @@ def test_slow_noise_is_not_compared_with_few_poses():
 
 
 def test_stamps_that_reading_made_even_still_count_as_scattered():
-    from trihedron.pipeline.comparing_noise import compare_noise, sampled
+    from trihedron.api.comparing_noise import compare_noise, sampled
 
     rng = np.random.default_rng(4)
     body, _, _ = session_with_world_rates(3)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import trihedron
+from trihedron.api.calibrating import of_board
 from trihedron.cli import main
 from trihedron.files.calibration import calibration_document, calibration_from_document, write_calibration
 from trihedron.files.formats import ExportOptions, any_calibration, export_calibration
 from trihedron.files.formats.autopilot import orientation, parameters_in
-from trihedron.pipeline.calibrating import of_board
 from trihedron.records import Calibration, Onboard, SensorCalibration
 
 # Numbers are written with all digits; what is left is the order of operations on values below 100.

@@ -5,7 +5,7 @@ import pytest
 import tomllib
 
 import trihedron
-from trihedron.pipeline import driving, improve
+from trihedron.api import driving, improve
 from trihedron.simulate import Scenario, diagnosed_sizes, hand_session, simulate, with_effect
 from trihedron.simulate.profiles import profile_by_name
 

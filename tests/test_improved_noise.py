@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import trihedron
+from trihedron.api import driving
+from trihedron.api.comparing_noise import _are_even
+from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, driven, flicker_of_poses
+from trihedron.api.improving import _unlike
 from trihedron.estimate.noise import gain_of, noise_of_poses
-from trihedron.pipeline import driving
-from trihedron.pipeline.comparing_noise import _are_even
-from trihedron.pipeline.driving import MovedAlike, bias_in_moves, bias_of_poses, driven, flicker_of_poses
-from trihedron.pipeline.improving import _unlike
 from trihedron.records.pose_noise import Measured
 from trihedron.simulate import (
     NoiseTerms,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from noise_series import series
+from trihedron.api import noise as noise_of
 from trihedron.cli import main
-from trihedron.pipeline import noise as noise_of
 from trihedron.records import Recording
 from trihedron.report.noise import noise_report
 from trihedron.report.noise_files import curve_csv

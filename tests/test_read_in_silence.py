@@ -246,7 +246,7 @@ def test_json_lines_lists_and_columns_are_read_alike(tmp_path):
 @pytest.mark.parametrize("start", [0, 250, 65530])
 @pytest.mark.parametrize("names", [None, ("t", "ax", "ay", "az", "gx", "gy", "gz")])
 def test_a_counter_in_front_of_a_streams_lines_is_no_clock(start, names):
-    from trihedron.pipeline.capturing import column_namer
+    from trihedron.api.capturing import column_namer
 
     wrap = 256 if start == 250 else 65536
     rows = [[str((start + k) % wrap), *(f"{0.1 * j + k:.1f}" for j in range(6))] for k in range(12)]

@@ -10,9 +10,9 @@ import pytest
 from scipy import stats
 
 import trihedron
+from trihedron.api.demonstrating import compare_with_truth, truth_of_the_day
 from trihedron.cli import main
 from trihedron.estimate.gyroscope import Turn, calibrate_turns
-from trihedron.pipeline.demonstrating import compare_with_truth, truth_of_the_day
 from trihedron.records import Calibration, FindingCode, Pose, Recording, Segments, SensorCalibration
 from trihedron.sensor_model import other_form
 from trihedron.simulate import scenario_by_name, simulate

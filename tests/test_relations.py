@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from trihedron.api import diagnose
 from trihedron.diagnose.relations.written import effect_file
-from trihedron.pipeline import diagnose
 from trihedron.records.diagnosis import EffectParameter, Relation
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.text import to_text

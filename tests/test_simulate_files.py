@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from trihedron.api import read
 from trihedron.cli import main
 from trihedron.files.log import write_recording
 from trihedron.files.output import OutputError
 from trihedron.files.truth import read_truth, write_truth
-from trihedron.pipeline import read
 from trihedron.simulate import (
     Pose,
     Turn,

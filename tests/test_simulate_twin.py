@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trihedron.pipeline import calibrate, read, segment
+from trihedron.api import calibrate, read, segment
 from trihedron.records import Segments
 from trihedron.sensor_model import correct
 from trihedron.simulate import scenario_by_name, simulate, twin_scenario

@@ -10,8 +10,8 @@ import pytest
 
 import trihedron
 from hand_made_sessions import G, Instrument, recorded
+from trihedron.api import streaming
 from trihedron.cli import main
-from trihedron.pipeline import streaming
 
 COLUMNS = "ax,ay,az,gx,gy,gz"
 
@@ -97,7 +97,7 @@ def test_memory_stays_bounded(tmp_path):
     del mapped
     script = (
         "import resource, sys\n"
-        "from trihedron.pipeline import streaming\n"
+        "from trihedron.api import streaming\n"
         "import trihedron.segment\n"
         "low = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
         "log = streaming.log_on_disk(sys.argv[1], columns='ax,ay,az,gx,gy,gz', rate_hz=1000.0)\n"

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from trihedron import Recording
+from trihedron.api.reading import segments_of
 from trihedron.estimate.accelerometer import opposite_headings
-from trihedron.pipeline.reading import segments_of
 
 G, RATE = 9.81, 100.0
 LEAN = np.array([0.05, -0.08])  # m/s² in the level axes of the first heading

@@ -71,7 +71,7 @@ ASKED = (
 
 def answer(make, options, seed):
     """Calibration of one session through the public front, its truth in the same frame, CPU seconds."""
-    from trihedron import pipeline
+    from trihedron import api
     from trihedron.records import Recording
 
     options = dict(options)
@@ -89,7 +89,7 @@ def answer(make, options, seed):
     if is_stated:
         more["turns_deg"] = [angle for _, _, angle in motion.turns]
     began = time.process_time()
-    result = pipeline.calibrate(recording, gravity_m_s2=G, method=method, **more)
+    result = api.calibrate(recording, gravity_m_s2=G, method=method, **more)
     return result, (truth if method == "faces" else lower(truth)), motion, time.process_time() - began
 
 

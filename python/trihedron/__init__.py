@@ -48,12 +48,7 @@ from typing import TYPE_CHECKING, Any
 from trihedron.threads import cap_threads
 
 if TYPE_CHECKING:
-    from trihedron.errors import RefusedError
-    from trihedron.estimate.attitude import integrate_rate
-    from trihedron.estimate.noise import identify_noise
-    from trihedron.files.calibration import read_calibration
-    from trihedron.fleet import fleet
-    from trihedron.pipeline import (
+    from trihedron.api import (
         CalibrationResult,
         CheckResult,
         DiagnosisResult,
@@ -88,6 +83,11 @@ if TYPE_CHECKING:
         verify,
         write_calibration,
     )
+    from trihedron.errors import RefusedError
+    from trihedron.estimate.attitude import integrate_rate
+    from trihedron.estimate.noise import identify_noise
+    from trihedron.files.calibration import read_calibration
+    from trihedron.fleet import fleet
     from trihedron.records import (
         AllanCurve,
         Calibration,
@@ -161,7 +161,7 @@ _HOME |= {"identify_noise": "trihedron.estimate.noise", "read_calibration": "tri
 _RECORDS = ("AllanCurve", "Calibration", "Finding", "Noise", "Recording", "Segments", "SensorCalibration")
 _HOME |= dict.fromkeys(_RECORDS, "trihedron.records")
 # The others are verbs, and what they return.
-_HOME |= {name: "trihedron.pipeline" for name in __all__ if name not in _HOME and not name.startswith("_")}
+_HOME |= {name: "trihedron.api" for name in __all__ if name not in _HOME and not name.startswith("_")}
 
 
 class _Front(ModuleType):
@@ -183,7 +183,7 @@ class _Front(ModuleType):
             value = getattr(import_module(_HOME[name]), name)
             if not isinstance(value, type):
                 # The command calls the same functions as they are: there sentences name flags.
-                value = import_module("trihedron.pipeline.asking").asked_in_python(value)
+                value = import_module("trihedron.api.asking").asked_in_python(value)
         else:
             raise AttributeError(f"module 'trihedron' has no attribute {name!r}")
         super().__setattr__(name, value)

@@ -14,12 +14,12 @@ from attacks.mutations import of_bytes, of_json
 
 
 def _readers() -> dict[str, list[Callable[[Path], object]]]:
+    from trihedron.api.exporting import export
     from trihedron.files.calibration import read_calibration
     from trihedron.files.diagnosis import read_diagnosis
     from trihedron.files.frame_declaration import read_frame_declaration
     from trihedron.files.noise import read_noise
     from trihedron.files.scenario import improved_scenario
-    from trihedron.pipeline.exporting import export
     from trihedron.read import read_recording
     from trihedron.read.allan_table import read_allan_table
     from trihedron.read.axis_noise import read_axis_noise

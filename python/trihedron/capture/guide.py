@@ -1,7 +1,7 @@
 """A guided calibration as a state machine without a screen: readings in, what to show out.
 
 It knows no estimator: ``examine`` tells where the session stands (poses, uncertainties, the most useful next pose) and
-is called once per pose. Whoever composes it gives the real one (``trihedron.pipeline.guiding``) or a stand-in.
+is called once per pose. Whoever composes it gives the real one (``trihedron.api.guiding``) or a stand-in.
 """
 
 from __future__ import annotations

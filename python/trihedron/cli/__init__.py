@@ -1,4 +1,4 @@
-"""COMMAND LINE: arguments to one stage of the pipeline, nothing else.
+"""COMMAND LINE: arguments to one verb of `api`, nothing else.
 
 Results go to stdout, progress to stderr. Exit status: 0 fine; 1 could not run (one sentence says what, where and what
 to do); 2 ran, but the answer is not to be trusted; 130 and 143 interrupted by Ctrl-C and SIGTERM. One

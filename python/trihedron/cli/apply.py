@@ -42,10 +42,10 @@ def apply(
     check_format(output)
     known = read_calibration(calibration)
     recording = source.read()
-    from trihedron import pipeline
+    from trihedron import api
     from trihedron.report.machine import recording_record
 
-    done = pipeline.apply(known, recording)
+    done = api.apply(known, recording)
     write_recording(done, output, is_corrected=True, overwrite=force)
     if str(output) != "-":
         say(f"{done.n_samples} samples: {output}")

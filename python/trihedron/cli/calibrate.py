@@ -121,11 +121,11 @@ def calibrate(
     if labels is not None:
         raise typer.BadParameter("--labels belong to several logs")
     recording = sources.one().read()
-    from trihedron import pipeline
+    from trihedron import api
     from trihedron.report import calibration_report
 
     with progress("calibrating") as tell:
-        result = pipeline.calibrate(
+        result = api.calibrate(
             recording,
             gravity_m_s2=place.gravity,
             latitude_deg=place.latitude,
@@ -137,7 +137,7 @@ def calibrate(
             **choices,
         )
         if extended:
-            result = pipeline.extend(result, progress=tell)
+            result = api.extend(result, progress=tell)
     document = calibration_report(result.calibration, result.segments, recording)
     more = "Every pose and move: --full, or --report FILE.html with figures."
 

@@ -104,8 +104,8 @@ def capture(
         raise typer.BadParameter("say what to read: a port (`trihedron ports` lists them), tcp://host:port or a file")
     if output is None:
         raise typer.BadParameter("say where the log goes with -o LOG")
+    from trihedron.api.capturing import open_device
     from trihedron.files.output import check_free
-    from trihedron.pipeline.capturing import open_device
 
     check_free([output, calibration], overwrite=force, inputs=[Path(port)])
     source, found = open_device(port, protocol=protocol, baud=baud, columns=columns, time_unit=time_unit)
@@ -122,8 +122,8 @@ def capture(
     if not (guide or browser):
         record(recorder, output, seconds)
         return
+    from trihedron.api import read
     from trihedron.cli.guide import finish, run_guided
-    from trihedron.pipeline import read
 
     stop_on_signals(recorder)
     with full_disk_is_status_2():

@@ -31,12 +31,12 @@ def demo(
     target = _free_folder() if folder is None and not force else folder or Path(FOLDER)
     if folder is not None and folder.exists() and not force:
         raise RefusedError(f"{folder}: this exists and was left alone; choose another name or add --force.")
-    from trihedron.pipeline.demonstrating import demonstrate
+    from trihedron.api.demonstrating import demonstrate
     from trihedron.report import to_text
 
     done = demonstrate(target, overwrite=force, say=step)
     put(to_text(done.document, style=style()))
-    from trihedron.pipeline.disagreeing import disagree
+    from trihedron.api.disagreeing import disagree
 
     drawn = secrets.randbelow(1_000_000) if seed is None else seed
     typer.echo("")

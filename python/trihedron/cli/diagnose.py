@@ -20,7 +20,7 @@ from trihedron.cli.options import (
 from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
 
 if TYPE_CHECKING:
-    from trihedron.pipeline import DiagnosisResult
+    from trihedron.api import DiagnosisResult
 
 Calibration = Annotated[
     Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
@@ -84,13 +84,13 @@ def diagnose(
 
     known = None if calibration is None else read_calibration(calibration)
     recording = source.read()
-    from trihedron import pipeline
+    from trihedron import api
     from trihedron.files.diagnosis import diagnosis_document
     from trihedron.report import diagnosis_report
     from trihedron.report.diagnosis import first_screen
 
     with progress("diagnosing") as tell:
-        result = pipeline.diagnose(
+        result = api.diagnose(
             recording,
             gravity_m_s2=place.gravity,
             latitude_deg=place.latitude,
@@ -120,7 +120,7 @@ def diagnose(
     if not full and report is None:
         _point_to_more(result)
     if known is not None:
-        from trihedron.pipeline.applying import doubted
+        from trihedron.api.applying import doubted
 
         # What a model that nobody should trust differs by says nothing of the physics.
         leave(doubted(known))
@@ -128,12 +128,12 @@ def diagnose(
 
 def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -> None:
     """The scenario with what the log says, and what could not be put into it."""
-    from trihedron import pipeline
+    from trihedron import api
     from trihedron.files.scenario import write_scenario
 
     with progress("improving the scenario") as tell:
         tell(0.1, "moving the improved scenario as the log was")
-        better = pipeline.improve(given, result)
+        better = api.improve(given, result)
     for effect_id, why in better.left_out.items():
         say(f"effect {effect_id} is not in the scenario: {why}.")
     for what, ratio in better.unlike.items():

@@ -62,8 +62,8 @@ def export(
     if folder is not None and folder.is_file():
         raise typer.BadParameter(f"{len(calibration)} calibrations need a folder, and {output} is a file")
     check_outputs(*(() if folder else (output,)), force=force, inputs=(*calibration, noise))
+    from trihedron.api.exporting import export as made_of
     from trihedron.files.formats import any_calibration
-    from trihedron.pipeline.exporting import export as made_of
 
     known = [any_calibration(path) for path in calibration]
     options: dict[str, Any] = {"noise": noise, "rate_hz": rate, "topic": topic, "accelerometer_lsb": accel_lsb}
@@ -82,7 +82,7 @@ def export(
 
 
 def _put(made: dict[str, str], place: Path | None, to: str, force: bool, inputs: tuple[Path | None, ...]) -> None:
-    from trihedron.pipeline.exporting import placed
+    from trihedron.api.exporting import placed
 
     if place is None:
         typer.echo("\n".join(made.values()), nl=False)

@@ -46,9 +46,9 @@ def guide(
     force: Force = False,
 ) -> None:
     """Replay a log through the guide: what it would have said pose by pose, then calibrate and verify."""
+    from trihedron.api.replaying import replay
     from trihedron.cli.output import check_outputs
     from trihedron.cli.screen import as_text
-    from trihedron.pipeline.replaying import replay
     from trihedron.records.guiding import Accuracy
 
     wanted = Accuracy.parse(accuracy)
@@ -89,9 +89,9 @@ def finish(
     recording: Recording, cut_s: float | None, gravity: float | None, output: Path | None, *, force: bool
 ) -> None:
     """Calibrate, verify on the poses held back, report; status 2 where the answer is not to be trusted."""
+    from trihedron.api.guiding import conclude
     from trihedron.cli.output import leave, put, style
     from trihedron.files.calibration import write_calibration
-    from trihedron.pipeline.guiding import conclude
     from trihedron.report import calibration_report, to_text, verification_report
 
     result, check = conclude(recording, cut_s, gravity_m_s2=gravity)
@@ -119,8 +119,8 @@ def run_guided(
     seconds: float | None,
 ) -> Any:
     """Capture with the guide beside it; returns the guide, which knows where the check begins."""
-    from trihedron.pipeline import read
-    from trihedron.pipeline.guiding import examine
+    from trihedron.api import read
+    from trihedron.api.guiding import examine
     from trihedron.records.guiding import Accuracy
     from trihedron.units import STANDARD_GRAVITY_M_S2
 
@@ -145,7 +145,7 @@ def run_guided(
 
 def sensor_columns(block: Block) -> list[int]:
     """Which columns of a stream are the accelerometer and the gyro, as the log's reader sees them."""
-    from trihedron.pipeline.capturing import sensor_columns as of
+    from trihedron.api.capturing import sensor_columns as of
 
     return of(block.columns)
 

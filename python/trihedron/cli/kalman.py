@@ -50,7 +50,7 @@ def kalman(
         raise typer.BadParameter(f"--frame is one of lower, symmetric, not {frame!r}")
     check_outputs(output, json, force=force, report=report, inputs=(*source.files, reference, noise))
     recording = source.read()
-    from trihedron import pipeline
+    from trihedron import api
     from trihedron.files.calibration import write_calibration
     from trihedron.report import kalman_report
     from trihedron.report.kalman import kalman_record
@@ -58,7 +58,7 @@ def kalman(
     options: dict[str, Any] = {"frame": frame, "noise": noise, "sigma_angle_deg": angle_sigma}
     options |= {"gravity_m_s2": place.gravity, "latitude_deg": place.latitude, "height_m": place.height}
     with progress("filtering") as tell:
-        result = pipeline.kalman(recording, reference, **options, progress=tell)
+        result = api.kalman(recording, reference, **options, progress=tell)
     document = kalman_report(result.outcome, result.calibration)
     machine = kalman_record(result.outcome, result.calibration)
     show(document, json, sections=None if full else FIRST_SCREEN)

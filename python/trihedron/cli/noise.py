@@ -75,12 +75,12 @@ def noise(
     inputs = (*source.files, static, reference)
     check_outputs(json, None if to is None else output, force=force, report=report, inputs=inputs)
     recording = source.read()
-    from trihedron import pipeline
+    from trihedron import api
     from trihedron.files.formats.filter_noise import filter_noise_text
     from trihedron.report.filter_noise import filter_noise_record, filter_noise_report
 
     with progress("estimating"):
-        found = pipeline.filter_noise(
+        found = api.filter_noise(
             recording,
             static=static,
             reference=reference,

@@ -102,7 +102,7 @@ class LogSource(ReadingOptions):
         """The audited recording, with progress shown when it takes long."""
         if self.log is None and self.accel is None and self.gyro is None:
             raise typer.BadParameter("no log was named: give LOG, or --accel F and --gyro F")
-        # Not the pipeline's verb: here sentences name flags, there parameters.
+        # Not a verb of `api`: here sentences name flags, there parameters.
         from trihedron.read import read_recording
 
         with progress("reading") as report:

@@ -29,7 +29,7 @@ def plan(
     """Before an experiment: how certain would turns, poses and moves make the answer, and which are worth what?"""
     check_outputs(json, force=force, report=report)
     from trihedron import units
-    from trihedron.pipeline.planning import plan as make_plan
+    from trihedron.api.planning import plan as make_plan
     from trihedron.report.plan import plan_record, plan_report
 
     planned = make_plan(

@@ -23,12 +23,12 @@ def segment(
         segment_stream(source, report, json, checkpoint, force=force)
         return
     recording = source.read()
-    from trihedron import pipeline
+    from trihedron import api
     from trihedron.report import segments_report
     from trihedron.report.machine import segments_record
 
     with progress("segmenting") as tell:
-        segments = pipeline.segment(recording, progress=tell)
+        segments = api.segment(recording, progress=tell)
     document, machine = segments_report(recording, segments), segments_record(recording, segments)
     show(document, json, sections=None)
     write_json(machine, json, force=force)

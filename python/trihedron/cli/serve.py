@@ -23,7 +23,7 @@ def serve_recording(
     link: Path | None,
 ) -> None:
     """Send a recording over a pseudo-terminal or a socket until it ends; says where on stdout first."""
-    from trihedron.pipeline.capturing import protocol_of
+    from trihedron.api.capturing import protocol_of
     from trihedron.simulate.device import Device, PseudoTerminal, Sent, TcpServer, parse_faults, scales_of, serve
 
     kind, _, port = where.partition(":")

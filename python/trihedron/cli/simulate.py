@@ -91,11 +91,11 @@ def simulate(
         raise typer.BadParameter("--with-effects belongs to a SCENARIO; a digital twin repeats its recording as it is")
     if output is None and serve is None:
         raise typer.BadParameter("say where the log goes with -o LOG, or send it with --serve PTY")
+    from trihedron.api import read, twin
+    from trihedron.api import simulate as run
     from trihedron.files.log import LOG_SUFFIXES, write_recording
     from trihedron.files.output import OutputError
     from trihedron.files.truth import write_truth
-    from trihedron.pipeline import read, twin
-    from trihedron.pipeline import simulate as run
 
     if output is not None and output.suffix.lower() not in LOG_SUFFIXES:
         raise OutputError(f"{output}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
@@ -130,8 +130,8 @@ def simulate(
 
         typer.echo(f"effect {name}: " + ", ".join(f"{key} {in_rows(value)}" for key, value in parameters.items()))
     if calibration is not None:
+        from trihedron.api.applying import doubted
         from trihedron.files.calibration import read_calibration
-        from trihedron.pipeline.applying import doubted
 
         leave(doubted(read_calibration(calibration)))
 
@@ -139,8 +139,8 @@ def simulate(
 def _scenario(name: str, diagnosis: Path | None) -> Any:
     if diagnosis is None:
         return name
+    from trihedron.api import with_effects
     from trihedron.files.diagnosis import read_diagnosis
-    from trihedron.pipeline import with_effects
 
     made = with_effects(name, read_diagnosis(diagnosis)["effects"])
     for effect_id, why in made.left_out.items():

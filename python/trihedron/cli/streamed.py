@@ -11,7 +11,7 @@ from trihedron.cli.options import GravitySource, LogSource, progress
 from trihedron.cli.output import Ending, leave, say, show, write_json, write_report
 
 if TYPE_CHECKING:
-    from trihedron.pipeline.streaming import LogOnDisk
+    from trihedron.api.streaming import LogOnDisk
 
 Stream = Annotated[
     bool,
@@ -55,7 +55,7 @@ def opened(source: LogSource) -> LogOnDisk:
     """
     if source.log is None or source.columns is None or source.rate is None:
         raise typer.BadParameter("--stream needs LOG, --columns (as in ax,ay,az,gx,gy,gz) and --rate")
-    from trihedron.pipeline.streaming import log_on_disk
+    from trihedron.api.streaming import log_on_disk
 
     # A text is made a table first, which takes its time.
     with progress("opening"):
@@ -73,7 +73,7 @@ def segment_stream(
 ) -> None:
     """Poses of a log on disk."""
     log = opened(source)
-    from trihedron.pipeline.streaming import condensed, segment_file
+    from trihedron.api.streaming import condensed, segment_file
     from trihedron.report import segments_report
     from trihedron.report.machine import segments_record
 
@@ -98,7 +98,7 @@ def calibrate_stream(
 ) -> None:
     """A calibration from a log on disk."""
     log = opened(source)
-    from trihedron.pipeline.streaming import calibrate_file
+    from trihedron.api.streaming import calibrate_file
     from trihedron.report import calibration_report
 
     where = {"gravity_m_s2": place.gravity, "latitude_deg": place.latitude, "height_m": place.height}
@@ -117,9 +117,9 @@ def calibrate_stream(
 def apply_stream(calibration: Path, source: LogSource, output: Path, *, force: bool) -> None:
     """Corrected readings of a log on disk, as .npy."""
     log = opened(source)
+    from trihedron.api.applying import doubted
+    from trihedron.api.streaming import apply_file
     from trihedron.files.calibration import read_calibration
-    from trihedron.pipeline.applying import doubted
-    from trihedron.pipeline.streaming import apply_file
 
     known = read_calibration(calibration)
     with progress("applying") as tell:

@@ -44,7 +44,7 @@ def verify(
     best does not fit.
     """
     check_outputs(json, force=force, report=report, inputs=source.files)
-    from trihedron import pipeline
+    from trihedron import api
     from trihedron.report.machine import verification_record
     from trihedron.report.ranking import ranking_record, ranking_report
 
@@ -56,7 +56,7 @@ def verify(
     }  # fmt: skip
     if len(known) > 1:
         with progress("ranking") as tell:
-            ranking = pipeline.rank(paths, recording, progress=tell, **place_of)
+            ranking = api.rank(paths, recording, progress=tell, **place_of)
         show(ranking_report(ranking), json, sections=None if full else FIRST_SCREEN)
         write_json(ranking_record(ranking), json, force=force)
         write_report(ranking_report(ranking), ranking_record(ranking), report, force=force)
@@ -65,7 +65,7 @@ def verify(
     from trihedron.report import verification_report
 
     with progress("verifying") as tell:
-        result = pipeline.verify(known[0], recording, limit_mg=limit_mg, limit_deg=limit_deg, progress=tell, **place_of)
+        result = api.verify(known[0], recording, limit_mg=limit_mg, limit_deg=limit_deg, progress=tell, **place_of)
     document = verification_report(result.verification, result.segments, recording)
     machine = verification_record(result.verification)
     show(document, json, sections=None if full else FIRST_SCREEN)

@@ -42,8 +42,8 @@ def work(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
 
 def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
     # Imported by the worker: the process that only hands out logs needs none of it.
-    from trihedron import pipeline
-    from trihedron.pipeline.results import CalibrationResult
+    from trihedron import api
+    from trihedron.api.results import CalibrationResult
 
     reading: dict[str, Any] = {
         key: options[key] for key in ("columns", "rate_hz", "accelerometer_unit", "gyroscope_unit") if options.get(key)
@@ -52,10 +52,10 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
     if os.path.exists(path) and not os.path.isfile(path):
         kind = "a folder without logs" if os.path.isdir(path) else "a pipe or a device"
         raise RefusedError(f"{path}: this is {kind}, not a file.")
-    recording = pipeline.read(path, device=device, **reading)
+    recording = api.read(path, device=device, **reading)
     diagnosis = None
     if options.get("diagnose", True):
-        found = pipeline.diagnose(recording, **place)
+        found = api.diagnose(recording, **place)
         if found.calibration is None:
             grave = [f.seen for f in found.findings if f.severity.value != "note"]
             why = grave[0] if grave else "its poses determine no calibration."
@@ -69,7 +69,7 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
         }
         findings = {f.code.value: f for f in (*found.findings, *result.findings)}.values()
     else:
-        result = pipeline.calibrate(recording, **place)
+        result = api.calibrate(recording, **place)
         findings = {f.code.value: f for f in result.findings}.values()
     return _row(result) | {
         "diagnosis": diagnosis,
@@ -79,8 +79,8 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
 
 
 def _row(result: Any) -> Row:
+    from trihedron.api.sessions import session_of
     from trihedron.invariants import anchor_of
-    from trihedron.pipeline.sessions import session_of
     from trihedron.sensor_model import in_frame
 
     calibration = in_frame(result.calibration, "lower")

@@ -21,13 +21,13 @@ class Presented(Frozen):
 
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types, as ``--json`` of the command gives it; what is not a finite number is None."""
-        from trihedron.pipeline.presenting import as_dict
+        from trihedron.api.presenting import as_dict
 
         return as_dict(self)
 
     def as_text(self) -> str:
         """The report as plain text, as ``print`` gives it."""
-        from trihedron.pipeline.presenting import as_text
+        from trihedron.api.presenting import as_text
 
         return as_text(self)
 
@@ -39,7 +39,7 @@ class Presented(Frozen):
         ValueError
             When the library is neither polars nor pandas, or is not installed.
         """
-        from trihedron.pipeline.presenting import as_frame
+        from trihedron.api.presenting import as_frame
 
         return as_frame(self, library)
 
@@ -58,12 +58,12 @@ class Presented(Frozen):
         ValueError
             When there is no figure of that name, it has another number of panels, or matplotlib is not installed.
         """
-        from trihedron.pipeline.presenting import plot
+        from trihedron.api.presenting import plot
 
         return plot(self, name, ax=ax)
 
     def _repr_html_(self) -> str:
-        from trihedron.pipeline.presenting import as_html
+        from trihedron.api.presenting import as_html
 
         return as_html(self)
 

@@ -198,7 +198,7 @@ class Recording(Presented):
             When shapes disagree, or neither ``time_s`` nor ``rate_hz`` is given.
         """
         # The audit belongs to the reader; people look for the constructor here.
-        from trihedron.pipeline.reading import of_arrays
+        from trihedron.api.reading import of_arrays
 
         return of_arrays(
             time_s,

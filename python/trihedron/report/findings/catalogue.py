@@ -9,12 +9,12 @@ from typing import Any
 from trihedron.records.finding import FindingCode, Severity
 from trihedron.report.findings import (
     accelerometer,
+    api,
     clock,
     filter_noise,
     gyroscope,
     kalman,
     noise,
-    pipeline,
     read,
     readings,
     reference,
@@ -31,7 +31,7 @@ ENTRIES: tuple[Entry, ...] = (
     *gyroscope.ENTRIES,
     *kalman.ENTRIES,
     *noise.ENTRIES,
-    *pipeline.ENTRIES,
+    *api.ENTRIES,
     *filter_noise.ENTRIES,
     *reference.ENTRIES,
     *segment.ENTRIES,

@@ -1,0 +1,188 @@
+"""Apply a calibration: raw recording in, SI recording out."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Protocol
+
+from trihedron.api.asking import WrongTypeError
+from trihedron.api.reading import AnyRecording, recording_of
+from trihedron.api.results import CheckResult
+from trihedron.api.temperature import check_range, thermally_corrected
+from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
+from trihedron.files.calibration import read_calibration
+from trihedron.files.calibration import write_calibration as write_file
+from trihedron.files.plausible import require_plausible
+from trihedron.records import Calibration, Finding, FindingCode, Recording, SensorCalibration, Severity
+from trihedron.records.words import words
+from trihedron.sensor_model import correct
+from trihedron.units import AccelerationUnit, RateUnit
+
+
+class HasCalibration(Protocol):
+    """A result that holds a calibration."""
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """The calibration."""
+
+
+AnyCalibration = HasCalibration | Calibration | str | os.PathLike[str]
+"""A calibration, a result that holds one (of calibrate, kalman, verify), or a calibration file."""
+
+
+def calibration_of(given: AnyCalibration) -> Calibration:
+    """A calibration as a record, whether it comes from a result, a file or is one already.
+
+    Raises
+    ------
+    WrongTypeError
+        (a ``ValueError`` and a ``TypeError``) when it is none of these.
+    """
+    if isinstance(given, Calibration):
+        return given
+    if isinstance(given, str | os.PathLike):
+        return read_calibration(given)
+    # A check's is made with a standard gravity, for its uncertainties alone.
+    inside = None if isinstance(given, CheckResult) else getattr(given, "calibration", None)
+    if isinstance(inside, Calibration):
+        return inside
+    raise WrongTypeError(
+        "a calibration is what trihedron.calibrate gives, one that was read from a file, or the name of its file, not "
+        f"{type(given).__name__}."
+    )
+
+
+def write_calibration(calibration: AnyCalibration, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Write a calibration file in one step, never over another file unless told to.
+
+    Raises
+    ------
+    OutputError
+        (a ``ValueError``) when the file exists or cannot be written.
+    """
+    write_file(calibration_of(calibration), path, overwrite=overwrite)
+
+
+def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
+    """The recording in SI, in the calibration's body frame: ``S raw + b`` for every row.
+
+    Where the calibration is extended, its effects are compensated first; a finding names those that cannot be. Where it
+    follows temperature, S and b are those of each sample's temperature; outside the range for which it was made the
+    ends are held and a serious finding says so.
+
+    Returns
+    -------
+    Recording
+        Specific force [m/s²] and angular rate [rad/s] at the log's own instants.
+
+    Raises
+    ------
+    ValueError
+        When the recording is in other units than the calibration was made for, or has no sensor that was calibrated;
+        when the calibration is no sensor's (S singular, a negative variance).
+
+    Examples
+    --------
+    >>> corrected = trihedron.apply(result, recording)
+    >>> corrected.accelerometer.shape == recording.accelerometer.shape
+    True
+    """
+    known = require_plausible(calibration_of(calibration))
+    recording = recording_of(recording)
+    check_units(known, recording)
+    recording, more = without_effects(known, recording)
+    accelerometer, gyroscope = recording.accelerometer, recording.gyroscope
+    findings = (*recording.findings, *more, *doubted(known), *check_range(known, recording))
+    if gyroscope is not None and known.gyroscope is None:
+        gyroscope = None
+        findings = (*findings, _left_out())
+    if accelerometer is None and gyroscope is None:
+        raise RefusedError(f"{recording.source}: only a gyro was logged, and this calibration has none.")
+    followed = thermally_corrected(known, recording)
+    if followed is None:
+        followed = _corrected(accelerometer, known.accelerometer), _corrected(gyroscope, known.gyroscope)
+    return replace(
+        recording,
+        accelerometer=followed[0],
+        gyroscope=followed[1],
+        accelerometer_unit=AccelerationUnit.M_S2,
+        gyroscope_unit=RateUnit.RAD_S,
+        source=f"{recording.source}, calibrated",
+        findings=findings,
+    )
+
+
+def without_effects(calibration: Calibration, recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
+    """Raw readings without the effects of an extended calibration, so that ``S raw + b`` holds again.
+
+    Raises
+    ------
+    ValueError
+        When the calibration's extensions are not what a diagnosis writes.
+    """
+    effects = calibration.extensions.get("effects")
+    if not effects:
+        return recording, ()
+    # Imported here: a linear calibration needs none of it.
+    from trihedron.diagnose import take_off
+
+    references = calibration.extensions.get("references", {})
+    if not isinstance(effects, list | tuple) or not isinstance(references, dict | MappingProxyType):
+        raise RefusedError(
+            "the calibration's extensions are not those of a diagnosis: calibrate with --extended again."
+        )
+    gyroscope = calibration.gyroscope
+    done = take_off(
+        recording,
+        effects,
+        references,
+        (calibration.accelerometer.S, calibration.accelerometer.b),
+        None if gyroscope is None else (gyroscope.S, gyroscope.b),
+    )
+    findings = tuple(_not_applied(effect_id, why) for effect_id, why in done.left_out.items())
+    return replace(recording, accelerometer=done.accelerometer, gyroscope=done.gyroscope), findings
+
+
+def check_units(calibration: Calibration, recording: Recording) -> None:
+    """Refuse readings in other units than a calibration was made for.
+
+    Raises
+    ------
+    ValueError
+        Naming both units.
+    """
+    pairs = (
+        ("accelerometer", recording.accelerometer, recording.accelerometer_unit.value, calibration.accelerometer),
+        ("gyroscope", recording.gyroscope, recording.gyroscope_unit.value, calibration.gyroscope),
+    )
+    for name, readings, unit, sensor in pairs:
+        if readings is not None and sensor is not None and unit != sensor.raw_unit:
+            raise RefusedError(
+                f"{recording.source}: its {name} is in {unit}, and this calibration maps {sensor.raw_unit}: "
+                f"apply it to a log in {sensor.raw_unit}, or state the log's unit if it was detected wrongly."
+            )
+
+
+def _corrected(readings: FloatArray | None, sensor: SensorCalibration | None) -> FloatArray | None:
+    return None if readings is None or sensor is None else correct(readings, sensor.S, sensor.b)
+
+
+def _left_out() -> Finding:
+    return Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "calibration-has-none")
+
+
+def doubted(calibration: Calibration) -> tuple[Finding, ...]:
+    """What the calibration said of itself goes with everything that it is applied to."""
+    grave = [finding for finding in calibration.findings if finding.severity is Severity.SERIOUS]
+    if not grave:
+        return ()
+    return (Finding.of(FindingCode.CALIBRATION_DOUBTED, seen=words("quoted", sentence=grave[0].seen)),)
+
+
+def _not_applied(effect_id: str, why: str) -> Finding:
+    is_of_session = why == words("effect-of-session")
+    return Finding.of(FindingCode.EFFECT_NOT_APPLIED, "of-session" if is_of_session else "", effect=effect_id, why=why)

@@ -1,0 +1,147 @@
+"""Diagnose with a reference: what poses and moves say, and what known motion beside them adds."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from trihedron.api.calibrating import calibrate
+from trihedron.api.choices import settle_gravity
+from trihedron.api.reading import read, segment
+from trihedron.api.referring import (
+    AnyReference,
+    calibration_by,
+    diagnosis_by,
+    effects_of,
+    held_against,
+)
+from trihedron.api.results import DiagnosisResult
+from trihedron.errors import REFUSALS, RefusedError
+from trihedron.estimate.reference import moves_along
+from trihedron.read.reference import of_recording
+from trihedron.records import Calibration, Finding, FindingCode, Recording
+from trihedron.records.reference import AgainstReference
+from trihedron.records.words import words
+from trihedron.sensor_model import correct
+from trihedron.units import AccelerationUnit, RateUnit, rate_to_si
+
+ANOTHER_UNIT = "the log of another unit"
+FEWEST_POSES = 9
+"""Nine numbers of an accelerometer need nine poses: with fewer the poses have no model to hold against anything."""
+
+
+def beside(
+    recording: Recording,
+    reference: AnyReference,
+    columns: str | None,
+    given: Calibration | None,
+    place: tuple[float | None, float | None, float | None],
+    alpha: float,
+    ordinary: Callable[[], DiagnosisResult],
+) -> DiagnosisResult:
+    """The ordinary diagnosis with what known motion says beside it, or that alone where the log holds too few poses.
+
+    Raises
+    ------
+    ValueError
+        As :func:`trihedron.api.referring.held_against`.
+    """
+    said: tuple[Finding, ...] = ()
+    if given is not None and place == (None, None, None):
+        gravity, source = given.gravity_m_s2, "that of the calibration"
+    else:
+        gravity, source, said = settle_gravity(*place)
+    found = held_against(recording, reference, gravity, columns=columns, given=given)
+    segments = segment(recording)
+    try:
+        if segments.n_poses < FEWEST_POSES:
+            raise RefusedError(f"{segments.n_poses} poses are too few for a model of their own")
+        result = ordinary()
+    except REFUSALS as error:
+        if found.kind == ANOTHER_UNIT:
+            # What two gyros separate may be either's: with no poses nobody says whose.
+            found = replace(found, findings=(*found.findings, _shared(found)))
+        values = diagnosis_by(found, recording, gravity, given, alpha)
+        calibration = (
+            calibration_by(found, recording, gravity, source, None) if recording.accelerometer is not None else given
+        )
+        why = Finding.of(FindingCode.REFERENCE_ONLY, why=words("because", sentence=error))  # fmt: skip
+        return DiagnosisResult(
+            **values,
+            findings=(*said, *recording.findings, *found.findings, why),
+            gravity_source=source,
+            model_is_given=given is not None,
+            calibration=calibration,
+            updated=calibration,
+            reference=found,
+            segments=segments,
+            recording=recording,
+        )
+    if found.kind == ANOTHER_UNIT:
+        return replace(result, reference=found, findings=(*result.findings, *found.findings, _shared(found)))
+    # What the poses found stands; the reference adds what it alone sees, and never takes away.
+    effects = (*result.effects, *(e for e in effects_of(found) if e.id not in {o.id for o in result.effects}))
+    verdict = result.verdict
+    if len(effects) > len(result.effects) and verdict in ("consistent", "parameters-differ", "not-testable"):
+        verdict = "missing-physics"
+    return replace(
+        result, verdict=verdict, effects=effects, reference=found, findings=(*result.findings, *found.findings)
+    )
+
+
+def in_si(log: Recording, gravity: float | None) -> Recording:
+    """A log whose gyro reads rad/s or deg/s as it is; one in counts by its own calibration.
+
+    Raises
+    ------
+    ValueError
+        When it is in counts and its poses do not carry a calibration.
+    """
+    if rate_to_si(log.gyroscope_unit) is not None:
+        return log
+    own = calibrate(log, gravity_m_s2=gravity).calibration
+    if own.gyroscope is None or log.gyroscope is None or log.accelerometer is None:
+        raise RefusedError(f"{log.source}: counts of unknown scale.")
+    return replace(
+        log,
+        gyroscope=correct(log.gyroscope, own.gyroscope.S, own.gyroscope.b),
+        gyroscope_unit=RateUnit.RAD_S,
+        accelerometer=correct(log.accelerometer, own.accelerometer.S, own.accelerometer.b),
+        accelerometer_unit=AccelerationUnit.M_S2,
+    )
+
+
+def shared_log(recording: Recording, other: Any, gravity: float | None) -> Recording | None:
+    """The given log in SI where it moved as this one did (a replay, two units on one beam), else ``None``.
+
+    Two sessions of one protocol share no motion sample by sample: their turning rates do not correlate beyond what
+    unrelated hands do.
+    """
+    if isinstance(other, str | os.PathLike):
+        if Path(other).suffix.lower() == ".toml":
+            return None
+        other = read(other)
+    if not isinstance(other, Recording) or other.gyroscope is None or recording.gyroscope is None:
+        return None
+    try:
+        known = in_si(other, gravity)
+        moves_along(recording, of_recording(known))
+    except REFUSALS:
+        return None
+    return known
+
+
+def _shared(found: AgainstReference) -> Finding:
+    offset, sigma = found.clock_offset_s
+    return Finding.of(
+        FindingCode.SHARED_MOTION,
+        correlation=found.correlation,
+        offset_s=offset,
+        offset_std_s=sigma,
+        rate_rms=found.gyroscope.rms,
+        has_force=found.accelerometer is not None,
+        force_rms=0.0 if found.accelerometer is None else found.accelerometer.rms,
+    )

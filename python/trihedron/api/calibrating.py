@@ -1,0 +1,343 @@
+"""Calibrate: poses and moves in, both sensors with their certainty out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from trihedron.api.choices import settle_gravity
+from trihedron.api.reading import AnyRecording, recording_of, segments_of
+from trihedron.api.results import CalibrationResult
+from trihedron.api.turns_on_faces import opposite_on_faces, resting_spans, turns_on_faces
+from trihedron.errors import REFUSALS, RefusedError
+from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm, shared_rounding
+from trihedron.estimate.accelerometer.bending import with_bending
+from trihedron.estimate.accelerometer.face_poses import faces_up
+from trihedron.estimate.accelerometer.few_faces import calibrate_few_faces
+from trihedron.estimate.accelerometer.shapes import with_shapes
+from trihedron.estimate.gyroscope import (
+    MoveOptions,
+    calibrate_moves,
+    calibrate_turns,
+    scale_by_gravity,
+    shared_errors,
+    stated_turns,
+)
+from trihedron.estimate.gyroscope.findings import scale_findings
+from trihedron.estimate.gyroscope.missing_samples import missing_samples, unless_seen
+from trihedron.estimate.gyroscope.turn_angles import AMBIGUOUS, SCALE_TOLERANCE
+from trihedron.estimate.joint import calibrate_joint
+from trihedron.estimate.pull import pull_allowed, pull_on_accelerometer
+from trihedron.quantiles import median
+from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
+from trihedron.records.plain import as_plain
+from trihedron.records.progress import Progress
+from trihedron.records.words import words
+from trihedron.sensor_model import in_frame
+from trihedron.units import rate_to_si
+
+if TYPE_CHECKING:
+    from trihedron.api.referring import AnyReference
+
+Method = Literal["joint", "separate", "faces"]
+METHODS: tuple[Method, ...] = get_args(Method)
+"""``joint``: any poses, both sensors in one fit (method 2). ``separate``: the same, one sensor after the other.
+``faces``: faces of the case and turns by known angles (method 1)."""
+
+Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
+
+MOST_CREEPING = 0.05
+"""Share of holds that may be seen to creep. The creep that is seen is the top of what is not: with one of 18 seen, on a
+support that yields, the gyro's scale lay outside its 95 % bars in a fifth of its elements."""
+
+Found = tuple[Finding, ...]
+
+
+def calibrate(
+    recording: AnyRecording,
+    *,
+    segments: Segments | None = None,
+    gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
+    method: Method = "joint",
+    frame: Frame | None = None,
+    faces: Sequence[int] | None = None,
+    turns_deg: Sequence[float] | None = None,
+    axis_signs: Sequence[int] | None = None,
+    loss: Loss = "linear",
+    gyroscope_nominal: float | None = None,
+    reference: AnyReference | None = None,
+    reference_columns: str | None = None,
+    progress: Progress | None = None,
+) -> CalibrationResult:
+    """Calibrate both sensors from one recording of static poses and moves.
+
+    Parameters
+    ----------
+    recording : Recording, or what trihedron.read takes
+        Without a gyro the accelerometer is calibrated alone.
+    segments : Segments, optional
+        Static poses and the moves between them; found when not given.
+    gravity_m_s2 or latitude_deg, height_m : float
+        |g| at the place. When nothing is said a standard value is used, and a finding says what that may cost.
+    method : "joint", "separate" or "faces"
+        Method 2 with both sensors in one fit (default) or one after the other; or method 1.
+    frame : "lower", "symmetric" or "case"
+        Body frame: ``lower`` (triangular, X along accelerometer X) for method 2 and ``case`` for method 1 unless said.
+    faces : sequence of ±1, ±2, ±3 or 0
+        Method 1: the axis of the case that points up in every pose; 0 leaves a pose out.
+    turns_deg : sequence of float
+        The angle of every turn on a table, about the axis that points up; 0 leaves a turn out. Method 1: of the turns
+        between poses on the same face, where multiples of 90° are recognised when nothing is said and the scale is
+        known. Method 2: of the turns between poses of the same tilt, in any pose; the gyro is then calibrated by them.
+    axis_signs : three of ±1
+        Method 2: the sign with which each raw axis follows its axis of the body, by the board's documentation.
+    loss : "linear", "huber", "soft_l1" or "cauchy"
+        Method 2: how far outlying poses count; other than ``linear`` with ``separate`` or an accelerometer alone.
+    gyroscope_nominal : float
+        rad/s per raw unit, where readings are counts and too few moves tell it.
+    reference : path, Recording or ReferenceMotion
+        Known motion beside the log (rate table, optical tracking, another unit): both sensors are held against it, and
+        static poses are not needed. ``reference_columns`` says its columns where their names do not.
+
+    Returns
+    -------
+    CalibrationResult
+        ``accelerometer`` and ``gyroscope`` (None without one) with ``S`` (3, 3), ``b`` (3,), ``sigma_S``, ``sigma_b``
+        and ``covariance`` (12, 12); ``findings``, ``segments``, ``recording``. ``print`` shows the report.
+
+    Raises
+    ------
+    ValueError
+        When the question cannot be answered; one sentence says why and what to do.
+
+    Examples
+    --------
+    >>> result = trihedron.calibrate(recording, latitude_deg=59.94)
+    >>> result.accelerometer.S.shape, result.accelerometer.covariance.shape
+    ((3, 3), (12, 12))
+    >>> result.is_trustworthy
+    True
+    """
+    if method not in METHODS:
+        raise RefusedError(f"there is no method {method!r}; choose one of {', '.join(METHODS)}.")
+    gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
+    recording = recording_of(recording)
+    segments = segments_of(segments, recording, progress)
+    if reference is not None:
+        from trihedron.api.referring import calibration_by, held_against
+
+        found = held_against(recording, reference, gravity, columns=reference_columns)
+        by_motion = calibration_by(found, recording, gravity, source, frame)
+        return _result(by_motion, (*said, *by_motion.findings), segments, recording)
+    _require_poses(recording, segments)
+    if method == "faces":
+        calibration = _by_faces(recording, segments, gravity, source, faces, turns_deg, gyroscope_nominal)
+        wanted: Frame = frame or "case"
+    else:
+        if faces is not None:
+            raise RefusedError(f"faces belong to method 1: say --method faces, or leave them out of {method}.")
+        if loss != "linear" and method == "joint" and recording.gyroscope is not None:
+            raise RefusedError(
+                f"--loss {loss} belongs to --method separate: one fit of both sensors has no robust loss."
+            )
+        wanted = frame or "lower"
+        options = MoveOptions(nominal_scale=gyroscope_nominal)
+        calibration = _by_poses(
+            recording, segments, gravity, source, method, wanted, axis_signs, loss, options, turns_deg
+        )
+    calibration = in_frame(with_bending(calibration, segments), wanted)
+    findings = (*said, *recording.findings, *_as_they_weigh(segments), *_of_fit(calibration, recording, segments))
+    return _result(calibration, findings, segments, recording)
+
+
+def _result(
+    calibration: Calibration, findings: tuple[Finding, ...], segments: Segments, recording: Recording
+) -> CalibrationResult:
+    return CalibrationResult(of_board(replace(calibration, findings=findings), recording), segments, recording)
+
+
+def of_board(calibration: Calibration, recording: Recording) -> Calibration:
+    """The calibration with what a flight controller had done to the readings, which an export composes it with."""
+    if recording.onboard is None:
+        return calibration
+    extensions = {**calibration.extensions, "onboard": as_plain(recording.onboard)}
+    return replace(calibration, extensions=MappingProxyType(extensions))
+
+
+def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) -> Found:
+    """Findings of the fit, its poses, a gyro's scale that its unit does not explain, and samples that its log lost."""
+    gyro, fitted = calibration.gyroscope, with_shapes(calibration, segments)
+    if gyro is None:
+        return fitted
+    relative = np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0)
+    missing = tuple(missing_samples(recording, segments, median(relative)))
+    return (*unless_seen(fitted, missing), *scale_findings(gyro.S, recording.gyroscope_unit), *missing)
+
+
+def _as_they_weigh(segments: Segments) -> Found:
+    """Findings of the segmentation; that holds settling is serious for a calibration where it is no exception."""
+    return tuple(
+        replace(finding, severity=Severity.SERIOUS)
+        if finding.code is FindingCode.POSE_SETTLING and finding.numbers["poses"] > MOST_CREEPING * segments.n_poses
+        else finding
+        for finding in segments.findings
+    )
+
+
+def _require_poses(recording: Recording, segments: Segments) -> None:
+    if recording.accelerometer is None:
+        raise RefusedError(
+            f"{recording.source}: a gyro alone cannot be calibrated by gravity; log the accelerometer as well, "
+            "or name its columns with --columns."
+        )
+    if segments.n_poses < 3:
+        found = {0: "no pose was found", 1: "only one pose was found"}.get(
+            segments.n_poses, f"only {segments.n_poses} poses were found"
+        )
+        grave = [finding.seen for finding in segments.findings if finding.severity is not Severity.NOTE]
+        why = grave[0] + " " if grave else ""
+        raise RefusedError(
+            f"{recording.source}: {found}. {why}Hold the sensor still for 3 to 5 seconds in each of 18 or more "
+            "different poses (docs/procedure.md); `trihedron segment LOG` shows what was seen."
+        )
+
+
+def _by_poses(
+    recording: Recording,
+    segments: Segments,
+    gravity: float,
+    source: str,
+    method: Method,
+    frame: Frame,
+    axis_signs: Sequence[int] | None,
+    loss: Loss,
+    options: MoveOptions,
+    turns_deg: Sequence[float] | None,
+) -> Calibration:
+    assert segments.accelerometer_mean is not None
+    assert segments.norm_sigma is not None
+    accelerometer, found = calibrate_norm(
+        segments.accelerometer_mean,
+        segments.norm_sigma,
+        gravity,
+        raw_unit=recording.accelerometer_unit,
+        frame=frame,
+        loss=loss,
+        axis_signs=axis_signs,
+    )
+    alone = _alone(accelerometer, found, frame, gravity, source, recording)
+    if recording.gyroscope is None:
+        return alone
+    if turns_deg is not None:
+        turns = stated_turns(recording, segments, accelerometer, gravity, turns_deg)
+        shared = shared_errors(turns, accelerometer, gravity)
+        return _together(alone, *calibrate_turns(recording, turns, resting_spans(segments), shared_errors=shared))
+    try:
+        # An accelerometer that is not determined is not refined by the moves: it goes into the gyro's uncertainties.
+        if method == "joint" and alone.is_trustworthy:
+            both = calibrate_joint(recording, segments, accelerometer, gravity, source, options)
+            pull = pull_on_accelerometer(accelerometer, both.accelerometer)
+            if pull <= pull_allowed(accelerometer):
+                return replace(both, findings=(*_still_said(found, both.accelerometer), *both.findings))
+            alone = replace(alone, findings=(*found, _joint_fit_left(pull)))
+        gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, options)
+    except REFUSALS as error:
+        return _without_gyroscope(alone, str(error))
+    return _together(alone, gyroscope, more)
+
+
+def _still_said(found: Found, joint: SensorCalibration) -> Found:
+    """Findings of the accelerometer alone that hold for the joint fit: not its residual, where both count another."""
+    if joint.quality is None or joint.quality.covariance_scale > 1.0:
+        return found
+    return tuple(finding for finding in found if finding.code is not FindingCode.RESIDUAL_ABOVE_NOISE)
+
+
+def _joint_fit_left(pull: float) -> Finding:
+    """Moves that contradict the poses must not pull the accelerometer, which the poses show without them."""
+    return Finding.of(FindingCode.JOINT_FIT_LEFT, chi2_increase=pull)
+
+
+def _by_faces(
+    recording: Recording,
+    segments: Segments,
+    gravity: float,
+    source: str,
+    faces: Sequence[int] | None,
+    turns_deg: Sequence[float] | None,
+    nominal: float | None,
+) -> Calibration:
+    mean, sigma_mean = segments.accelerometer_mean, segments.accelerometer_sigma_mean
+    unit = recording.accelerometer_unit
+    assert mean is not None
+    assert sigma_mean is not None
+    up = faces_up(mean, unit, faces)
+    shared = shared_rounding(segments, recording.facts.of("accelerometer").step)
+    opposite = opposite_on_faces(recording, segments, up, turns_deg)
+    try:
+        accelerometer, found = calibrate_faces(
+            mean, sigma_mean, gravity, up=faces, raw_unit=unit, shared=shared, opposite=opposite
+        )
+    except REFUSALS:
+        if recording.gyroscope is None or turns_deg is None or segments.norm_sigma is None:
+            raise
+        # Stated turns about stated faces tell the gyro whatever was seen of the accelerometer.
+        accelerometer, found = calibrate_few_faces(mean, segments.norm_sigma, gravity, unit)
+    alone = _alone(accelerometer, found, "case", gravity, source, recording)
+    if recording.gyroscope is None:
+        return alone
+    turns = turns_on_faces(segments, up, turns_deg)
+    scale: float | np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None = nominal
+    tolerance = SCALE_TOLERANCE
+    if nominal is None and turns_deg is None and rate_to_si(recording.gyroscope_unit) is None:
+        by_gravity = scale_by_gravity(recording, segments, accelerometer, gravity)
+        if by_gravity is not None:
+            scale, tolerance = by_gravity.S, by_gravity.tolerance
+    try:
+        gyroscope, more = calibrate_turns(
+            recording, turns, resting_spans(segments), nominal_scale=scale, nominal_tolerance=tolerance
+        )
+    except REFUSALS as error:
+        if turns_deg is not None:
+            raise
+        return _without_gyroscope(alone, str(error))
+    return _together(alone, gyroscope, more)
+
+
+def _alone(
+    accelerometer: SensorCalibration, found: Found, frame: Frame, gravity: float, source: str, recording: Recording
+) -> Calibration:
+    return Calibration(
+        accelerometer=accelerometer,
+        gyroscope=None,
+        covariance=accelerometer.covariance,
+        frame=frame,
+        gravity_m_s2=gravity,
+        gravity_source=source,
+        recording_source=recording.source,
+        recording_sha256=recording.sha256,
+        findings=found,
+    )
+
+
+def _together(alone: Calibration, gyroscope: SensorCalibration, found: Found) -> Calibration:
+    """Both sensors, one after the other: what the accelerometer's error does to the gyro is in the gyro's
+    covariance."""
+    covariance = np.zeros((24, 24))
+    covariance[:12, :12] = alone.accelerometer.covariance
+    covariance[12:, 12:] = gyroscope.covariance
+    return replace(alone, gyroscope=gyroscope, covariance=covariance, findings=(*alone.findings, *found))
+
+
+def _without_gyroscope(alone: Calibration, why: str) -> Calibration:
+    if why == AMBIGUOUS:
+        finding = Finding.of(FindingCode.TURN_ANGLE_UNKNOWN)
+    else:
+        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "not-calibrated", why=words("because", sentence=why))
+    return replace(alone, findings=(*alone.findings, finding))

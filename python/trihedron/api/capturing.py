@@ -1,0 +1,271 @@
+"""Capture composed with reading: columns of a stream get the names that :func:`trihedron.read` would give them."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.api.reading import read
+from trihedron.capture import (
+    Block,
+    Found,
+    LineColumns,
+    NameColumns,
+    Port,
+    Recorder,
+    Source,
+    find_protocol,
+    list_ports,
+    open_source,
+)
+from trihedron.errors import RefusedError
+from trihedron.files.frame_declaration import read_frame_declaration
+from trihedron.files.output import check_free
+from trihedron.read.clock import TICKS, parse_time_unit, seconds_of
+from trihedron.read.columns import Columns, find_columns
+from trihedron.read.table import Table
+from trihedron.records import Recording
+from trihedron.records.frame_declaration import FrameDeclaration
+
+Cells = npt.NDArray[np.float64]
+
+PLAUSIBLE_HZ = (2.0, 20_000.0)
+"""What a board streams: slower or faster than that its step is in another unit."""
+
+USUAL_HZ = 100.0
+"""A step that fits two units is taken for the one whose rate is nearer to this, in ratio."""
+
+
+def protocol_of(text: str | None) -> str | FrameDeclaration | None:
+    """A protocol by name, a frame declared in a .toml file, or None to have it found."""
+    if text is None or text == "auto":
+        return None
+    return read_frame_declaration(text) if text.lower().endswith(".toml") else text
+
+
+def open_device(
+    where: str,
+    *,
+    protocol: str | None = None,
+    baud: int | None = None,
+    columns: str | None = None,
+    time_unit: str | None = None,
+    silence_s: float = 5.0,
+) -> tuple[Source, Found]:
+    """Open a source and find out what it speaks.
+
+    Raises
+    ------
+    CaptureError
+        When it cannot be opened, is silent, or is not understood; nothing stays open.
+    """
+    wanted = protocol_of(protocol)
+    namer = column_namer(columns, time_unit)
+    source = open_source(where, baud)
+    try:
+        return source, find_protocol(source, protocol=wanted, baud=baud, name_columns=namer, silence_s=silence_s)
+    except BaseException:
+        source.close()
+        raise
+
+
+def capture(
+    port: str,
+    output: str | os.PathLike[str],
+    *,
+    protocol: str | None = None,
+    baud: int | None = None,
+    seconds: float | None = None,
+    rate_hz: float | None = None,
+    columns: str | None = None,
+    time_unit: str | None = None,
+    wait_s: float = 60.0,
+    overwrite: bool = False,
+    on_block: Callable[[Block], bool | None] | None = None,
+) -> Recording:
+    """Record what a board sends into a log, on disk as it comes, then read the log back.
+
+    Parameters
+    ----------
+    port : str
+        A serial port (``trihedron.ports()`` lists them), ``tcp://host:port`` or a file of bytes.
+    output : path
+        The log to write.
+    protocol, baud, columns, time_unit
+        What the board speaks; found when not said.
+    seconds : float, optional
+        When to stop; Ctrl-C, or ``on_block`` that returns False, stops any time, and what came is in the log.
+    rate_hz : float, optional
+        Rate of a board that sends no time.
+    wait_s : float
+        How long to wait for a board that was unplugged.
+    on_block : callable, optional
+        Is given every block of samples as it is written.
+
+    Returns
+    -------
+    Recording
+        What was read, as ``read`` gives it from the log on disk.
+
+    Raises
+    ------
+    CaptureError
+        (a ``ValueError``) when the board is silent or not understood, or the disk is full; it says what was saved.
+    """
+    if seconds is not None and not seconds > 0.0:
+        raise RefusedError(f"seconds is how long to record, not {seconds:g}")
+    check_free([Path(output)], overwrite=overwrite)
+    source, found = open_device(port, protocol=protocol, baud=baud, columns=columns, time_unit=time_unit)
+    recorder = Recorder(
+        source,
+        found.make_decoder,
+        Path(output),
+        overwrite=overwrite,
+        rate_hz=rate_hz,
+        wait_for_return_s=wait_s,
+        first_bytes=found.first_bytes,
+    )
+    began_s = time.monotonic()
+    with stopped_by_interrupt(recorder):
+        for block in recorder:
+            is_wanted = on_block is None or on_block(block) is not False
+            if not is_wanted or (seconds is not None and time.monotonic() - began_s >= seconds):
+                recorder.stop()
+    return read(output)
+
+
+@contextmanager
+def stopped_by_interrupt(recorder: Recorder) -> Iterator[None]:
+    """Ctrl-C ends the recording in order; a second one ends the program. Elsewhere than in the main thread: nothing."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(_number: int, _frame: Any) -> None:
+        recorder.stop()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    before = signal.signal(signal.SIGINT, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def ports() -> list[Port]:
+    """The serial ports that are plugged in.
+
+    Returns
+    -------
+    list of Port
+        Each with its name, and what the system says of the device behind it.
+    """
+    return list_ports()
+
+
+def column_namer(mapping: str | None = None, time_unit: str | None = None) -> NameColumns:
+    """Roles of the fields of text lines, as in a log; ``mapping`` and ``time_unit`` are those of ``read``."""
+    given = None if time_unit is None else parse_time_unit(time_unit)
+
+    def name(names: tuple[str, ...] | None, rows: list[list[str]]) -> LineColumns:
+        cells = np.array([[_number(cell) for cell in row] for row in rows])
+        table = Table(Path("the stream"), names, tuple(np.ascontiguousarray(column) for column in cells.T))
+        try:
+            columns = find_columns(table, mapping, None)
+        except RefusedError:
+            if mapping is not None:
+                raise
+            columns = _by_content(cells) if names is None else Columns()
+        stated = given or columns.time_unit.replace(TICKS, "")
+        if columns.time is not None and not stated and _counts_lines(cells[:, columns.time]):
+            # Samples, or milliseconds at exactly 1 kHz: as a counter it tells losses, and the host's clock the rate.
+            columns = replace(columns, time=None, counter=columns.time)
+        unit = stated or _unit_of_step(cells, columns.time)
+        labels = _labels(columns, names, cells.shape[1], is_mapped=mapping is not None)
+        return LineColumns(labels, columns.time, 1e-3 if not unit else seconds_of(unit), columns.counter)
+
+    return name
+
+
+def sensor_columns(columns: tuple[str, ...]) -> list[int]:
+    """Places of the accelerometer's columns, then the gyro's, among the columns of a stream.
+
+    Raises
+    ------
+    ValueError
+        When none is an accelerometer.
+    """
+    empty = tuple(np.zeros(1) for _ in columns)
+    found = find_columns(Table(Path("the stream"), columns, empty), None, None)
+    if found.accelerometer is None:
+        raise RefusedError("the board sends no accelerometer that is recognised; name its columns with --columns.")
+    return [*found.accelerometer, *(found.gyroscope or ())]
+
+
+def _labels(columns: Columns, names: tuple[str, ...] | None, n: int, *, is_mapped: bool) -> tuple[str, ...]:
+    labels = [f"column_{i + 1}" for i in range(n)] if names is None else [name.replace(",", " ") for name in names]
+    if names is not None and not is_mapped:
+        return tuple(labels)
+    for letter, triad in (("a", columns.accelerometer), ("g", columns.gyroscope)):
+        for axis, column in zip("xyz", triad or (), strict=False):
+            labels[column] = f"{letter}{axis}"
+    for label, place in (("temperature", columns.temperature), ("supply", columns.supply)):
+        if place is not None:
+            labels[place] = label
+    return tuple(labels)
+
+
+def _by_content(cells: Cells) -> Columns:
+    """Joined after the names were sent: what counts is a counter, what only grows is the time, the next six are triads.
+
+    What remains without a role keeps its place; how the log is understood is said when it is read.
+    """
+    steps = np.diff(cells, axis=0)
+    growing = [i for i in range(cells.shape[1]) if len(steps) and np.all(steps[:, i] > 0)]
+    counter = next((i for i in growing if np.median(steps[:, i]) == 1.0), None)
+    time = next((i for i in growing if i != counter), None)
+    rest = [i for i in range(cells.shape[1]) if i not in growing]
+    triads = [(rest[k], rest[k + 1], rest[k + 2]) for k in (0, 3) if len(rest) >= k + 3]
+    return Columns(
+        time=time,
+        counter=counter,
+        accelerometer=triads[0] if triads else None,
+        gyroscope=triads[1] if len(triads) > 1 else None,
+    )
+
+
+def _counts_lines(values: Cells) -> bool:
+    """Whether numbers (n,) go up by one from line to line, but where lines are lost or the counter wraps."""
+    steps = np.diff(values)
+    return len(steps) > 1 and bool(np.mean(steps == 1.0) > 0.7) and bool(np.all(values == np.rint(values)))
+
+
+def _unit_of_step(cells: Cells, column: int | None) -> str:
+    if column is None:
+        return ""
+    steps = np.diff(cells[:, column])
+    steps = steps[np.isfinite(steps) & (steps > 0)]
+    if len(steps) == 0:
+        return ""
+    step = float(np.median(steps))
+    rates = {unit: 1.0 / (step * seconds_of(unit)) for unit in ("s", "ms", "us", "ns")}
+    fitting = {u: hz for u, hz in rates.items() if PLAUSIBLE_HZ[0] <= hz <= PLAUSIBLE_HZ[1]}
+    return min(fitting or rates, key=lambda unit: abs(math.log(rates[unit] / USUAL_HZ)))
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return math.nan

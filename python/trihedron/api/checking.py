@@ -1,0 +1,48 @@
+"""Check: may a calibration be made from this log, and how sure would it be?"""
+
+from __future__ import annotations
+
+from trihedron.api.calibrating import calibrate
+from trihedron.api.reading import AnyRecording, recording_of, segment
+from trihedron.api.results import CheckResult
+from trihedron.errors import REFUSALS
+from trihedron.records import Finding, FindingCode
+from trihedron.records.progress import Progress
+from trihedron.records.words import Words, words
+from trihedron.units import STANDARD_GRAVITY_M_S2
+
+
+def check(recording: AnyRecording, *, progress: Progress | None = None) -> CheckResult:
+    """Audit of the log, poses, and the uncertainties that a calibration from it would have.
+
+    The uncertainties come from the poses, the moves and the sensor's noise; gravity hardly matters for them and is not
+    asked for.
+
+    Returns
+    -------
+    CheckResult
+        ``is_fit``, ``findings``, the poses found and the uncertainties to expect.
+
+    Examples
+    --------
+    >>> trihedron.check(recording).is_fit
+    True
+    """
+    recording = recording_of(recording)
+    segments = segment(recording, progress=progress)
+    # A standard value: here only the size of the uncertainties is wanted, to which an error of 0.4 % means nothing.
+    try:
+        result = calibrate(recording, segments=segments, gravity_m_s2=STANDARD_GRAVITY_M_S2)
+    except REFUSALS as error:
+        why = words("because", sentence=error)
+        return CheckResult(
+            recording,
+            segments,
+            None,
+            (*recording.findings, *segments.findings, _impossible(why)),
+        )
+    return CheckResult(recording, segments, result.calibration, result.findings)
+
+
+def _impossible(why: Words) -> Finding:
+    return Finding.of(FindingCode.NOT_FIT, "no-calibration", why=why)

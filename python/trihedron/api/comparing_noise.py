@@ -1,0 +1,343 @@
+"""Noise and sampling of a simulated log against those of a recording, axis by axis, and what a ratio resembles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.stats import chi2
+
+from trihedron.api.comparing_draws import one_draw_for_all, uniform_for_normal
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.against import FittedModel
+from trihedron.errors import REFUSALS
+from trihedron.estimate.noise import noise_of_poses, ratio_of
+from trihedron.records import Pose, Recording
+from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
+from trihedron.records.pose_noise import Measured, PoseNoise
+from trihedron.records.sampling import TimestampKind
+
+Sensor = Literal["accelerometer", "gyroscope"]
+
+SHARE = 0.125
+"""Of alpha, for each kind of figure (white densities, corners, octaves of both sensors): half of alpha is spent on the
+numbers, a twelfth on slow noise."""
+LEAST_RATIO = 1.05
+"""White noise of one part differs by 5 % over 30 K (its resistors' noise goes with the root of temperature)."""
+LEAST_STEP_RATIO = math.sqrt(2.0)
+"""Ranges of an ADC come in powers of two: halfway between two of them."""
+DIGITS = 0.1
+"""Steps of a tenth of the noise add a thousandth to its variance: whether they are an ADC's changes nothing."""
+LEAST_SEEN_STEP = 1e-2
+"""Of the noise: hardly an ADC has a hundred codes to a standard deviation; sums of readings and what was taken off
+them come that near to a grid, and steps as fine cannot be told from the digits of a file."""
+FEWEST_ALIKE = 2
+"""Axes with one step, of which an ADC shows."""
+LEAST_CORNER_RATIO = 1.2
+"""Filters are chosen from lists whose neighbours differ by 1.5 to 2; within a fifth they are the same entry."""
+LEAST_RATE_RATIO = 1.02
+"""Oscillators of cheap parts are specified to 1 to 2 %."""
+LEAST_OCTAVE_RATIO = 1.5
+"""Octaves below the white floor hold a few periods a pose each: smaller differences belong to the day."""
+LEAST_JITTER = 0.05
+"""Scatter of the timestamps, in steps, from which on it matters to a session (0.05 of 10 ms is 0.5 ms)."""
+PERFECT_CLOCK = 1e-6
+"""Scatter of the timestamps, in steps, that only a clock without any has: what is left is rounding of the file."""
+SAME_ON_ALL_AXES = 1.05
+"""Three axes of a real part agree within 5 % by chance in a few of a hundred parts."""
+UNLIKE_AXES = 1.1
+"""Beyond this, and beyond chance, axes are unlike each other."""
+UNLIKE_BY_CHANCE = 0.01
+"""Equal densities that were each measured to a per cent or two spread beyond 3 % often, beyond this seldom."""
+RESEMBLES = 1.06
+"""A ratio this near to √rate, or to its inverse, is taken for it."""
+SHOWS = 0.5
+"""Noise of half an ADC step moves its last digit in every third reading: it cannot be overlooked."""
+_AXES = ("x", "y", "z")
+_SCATTERED = (TimestampKind.LATE, TimestampKind.SCATTERED)
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """Noise of both sensors in SI along their own axes, and the clock.
+
+    ``likeness`` is the smallest correlation, in size, of the noise of any two axes.
+    """
+
+    noise: dict[Sensor, tuple[PoseNoise, ...]]
+    excess: dict[Sensor, FloatArray]
+    n_differences: dict[Sensor, int]
+    likeness: dict[Sensor, float]
+    rate_hz: float
+    jitter_steps: float
+
+
+def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> Sampled:
+    """Noise inside poses of a recording, by the scale of its own fit."""
+    ranges = [(pose.start, pose.stop) for pose in poses]
+    noise: dict[Sensor, tuple[PoseNoise, ...]] = {}
+    excess: dict[Sensor, FloatArray] = {}
+    count: dict[Sensor, int] = {}
+    likeness: dict[Sensor, float] = {}
+    both: tuple[tuple[Sensor, FloatArray | None, FloatArray | None], ...] = (
+        ("accelerometer", recording.accelerometer, model.accel_S),
+        ("gyroscope", recording.gyroscope, model.gyro_S),
+    )
+    for sensor, readings, S in both:
+        if readings is None or S is None:
+            continue
+        si = readings / np.linalg.norm(np.linalg.inv(S), axis=1)
+        try:
+            noise[sensor] = noise_of_poses(si, recording.rate_hz, ranges)
+        except REFUSALS:
+            continue  # no hold is long enough: nothing to compare
+        differences = np.concatenate([np.diff(si[a:b], axis=0) for a, b in ranges if b - a > 2])
+        differences = differences[np.isfinite(differences).all(axis=1)]
+        centred = differences - differences.mean(axis=0)
+        power = np.maximum((centred**2).mean(axis=0), 1e-150)
+        excess[sensor] = (centred**4).mean(axis=0) / power**2 - 3.0
+        count[sensor] = len(differences)
+        products = np.abs(centred.T @ centred / len(centred)) / np.sqrt(np.outer(power, power))
+        likeness[sensor] = float(products.min())
+    steps = np.diff(recording.time_s)
+    nominal = 1.0 / recording.rate_hz
+    away = steps[np.abs(steps - nominal) < 0.9 * nominal] / nominal - 1.0
+    jitter = float(np.std(away)) / math.sqrt(2.0) if len(away) else 0.0
+    clock = recording.sampling
+    if clock.is_even and clock.kind in _SCATTERED:
+        # Reading put the samples on the even clock behind their timestamps: what these scattered by is in its report.
+        jitter = max(jitter, clock.timestamp_error_s * recording.rate_hz)
+    return Sampled(noise, excess, count, likeness, recording.rate_hz, jitter)
+
+
+def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
+    """Every figure that both logs have, ratio model over recording; significant beyond chance and beyond what parts do.
+
+    ``alpha``: chance that anything of two logs of one unit is called different; three eighths of it are spent here.
+    """
+    out: list[NoiseDifference] = []
+    sensors: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
+    for sensor in sensors:
+        if sensor not in model.noise or sensor not in recording.noise:
+            continue
+        pairs = list(zip(_AXES, model.noise[sensor], recording.noise[sensor], strict=True))
+        n_octaves = 2 * sum(len(r.octaves) for _, _, r in pairs)
+        white = [_white(sensor, axis, m, r, alpha * SHARE / 6.0) for axis, m, r in pairs]
+        even = _are_even([m.white for _, m, _ in pairs]) and not _are_even([r.white for _, _, r in pairs])
+        out += _resembling(sensor, [w for w in white if w is not None], model.rate_hz, even)
+        is_one_part = all(
+            len({one.corner_hz for one in side}) == 1 for side in (model.noise[sensor], recording.noise[sensor])
+        )
+        for axis, m, r in pairs:
+            out += _step(sensor, axis, (m, model.noise[sensor]), (r, recording.noise[sensor]))
+            # Axes that share a filter have one corner, measured on all of them: one question.
+            corners = [] if is_one_part and axis != _AXES[0] else [*_corner(sensor, axis, m, r, alpha * SHARE / 6.0)]
+            out += [replace(row, axis="") if is_one_part else row for row in corners]
+            out += _octaves(sensor, axis, m, r, alpha * SHARE / max(n_octaves, 1))
+        n = min(model.n_differences[sensor], recording.n_differences[sensor])
+        noise = (*model.noise[sensor], *recording.noise[sensor])
+        out += uniform_for_normal(sensor, model.excess[sensor], recording.excess[sensor], n, noise)
+        out += one_draw_for_all(sensor, model.likeness[sensor], recording.likeness[sensor], n)
+    out += _sampling(model, recording)
+    return tuple(out)
+
+
+def _measured(
+    sensor: Sensor, axis: str, term: NoiseTerm, pair: tuple[Measured, Measured], unit: str, least: float, alpha: float
+) -> NoiseDifference:
+    ratio = ratio_of(*pair)
+    is_far = max(ratio.value, 1.0 / ratio.value) > least
+    return NoiseDifference(
+        sensor, axis, term, pair[0].value, pair[1].value, ratio.value, (ratio.lower, ratio.upper), unit, ratio.p_value,
+        bool(ratio.p_value < alpha and is_far),
+    )  # fmt: skip
+
+
+def _value(figure: Measured | None) -> float | None:
+    return None if figure is None else figure.value
+
+
+def _white(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> NoiseDifference | None:
+    unit = "m/s^2/sqrt(Hz)" if sensor == "accelerometer" else "rad/s/sqrt(Hz)"
+    if m.white is None or r.white is None or not (m.white.value > 0.0 and r.white.value > 0.0):
+        if (m.white is None) == (r.white is None):
+            return None
+        return _hidden(sensor, axis, m, r, unit)
+    return _measured(sensor, axis, "N", (m.white, r.white), unit, LEAST_RATIO, alpha)
+
+
+def _hidden(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, unit: str) -> NoiseDifference:
+    """One side shows no noise: hidden by its ADC, or, where noise like the other's would show, not there."""
+    quiet, loud = (m, r) if m.white is None or not m.white.value > 0.0 else (r, m)
+    side, other = ("model", "recording") if quiet is m else ("recording", "model")
+    assert loud.white is not None
+    would_show = loud.reading_sigma > SHOWS * quiet.step
+    name = "accelerometer" if sensor == "accelerometer" else "gyro"
+    remark = f"The resolution (LSB) of the {side} hides the noise of its {name}."
+    if would_show:
+        remark = f"The {side} has no noise on the {name}; the {other} has."
+    values = _value(m.white), _value(r.white)
+    return NoiseDifference(sensor, axis, "N", *values, None, None, unit, None, would_show, remark)
+
+
+def _resembling(
+    sensor: Sensor,
+    white: Sequence[NoiseDifference],
+    rate_hz: float,
+    only_model_is_even: bool,
+) -> list[NoiseDifference]:
+    """White densities with what their ratio resembles: mistakes that simulators have made."""
+    name = "accelerometer" if sensor == "accelerometer" else "gyro"
+    known = [w for w in white if w.ratio is not None]
+    out = list(white)
+    if len(known) < 3 or not any(w.significant for w in known):
+        return out
+    ratios = np.array([w.ratio for w in known], dtype=np.float64)
+    common = float(np.exp(np.mean(np.log(ratios))))
+    root = math.sqrt(rate_hz)
+    for factor, words in (
+        (root, "the density was multiplied by the root of the rate once too often"),
+        (1.0 / root, "the density was not multiplied by the root of the rate when it was sampled"),
+    ):
+        if max(common / factor, factor / common) < RESEMBLES:
+            times = f"√{rate_hz:.4g}" if factor > 1.0 else f"1/√{rate_hz:.4g}"
+            said = f"White noise of the {name} is {common:.3g} = {times} times the recording's: {words}."
+            return [replace(w, remark=said) if w in known else w for w in out]
+    values = np.array([[w.model or 0.0, w.recording or 0.0] for w in known])
+    if only_model_is_even and values[:, 1].max() > UNLIKE_AXES * values[:, 1].min():
+        spread = float(values[:, 1].max() / values[:, 1].min())
+        said = f"White noise of the {name} is the same on all axes of the model; "
+        said += f"the recording's axes differ {spread:.2g} times."
+        return [replace(w, remark=said) if w.significant else w for w in out]
+    if ratios.max() < LEAST_OCTAVE_RATIO * ratios.min():
+        low = min(w.interval[0] for w in known if w.interval)
+        high = max(w.interval[1] for w in known if w.interval)
+        said = f"White noise of the {name} is {common:.3g} ({low:.3g} to {high:.3g}) times the recording's."
+        return [replace(w, remark=said) if w.significant else w for w in out]
+    return out
+
+
+def _are_even(white: Sequence[Measured | None]) -> bool:
+    """Whether densities of three axes are one, but for how well each is known and 5 %."""
+    known = [w for w in white if w is not None and w.value > 0.0]
+    if len(known) < len(_AXES):
+        return False
+    logs = np.log([w.value for w in known])
+    if float(np.ptp(logs)) < math.log(SAME_ON_ALL_AXES):
+        return True
+    weight = 1.0 / np.maximum([w.sigma_log for w in known], 1e-9) ** 2
+    away = logs - float(weight @ logs / weight.sum())
+    chance = float(chi2.sf(float(weight @ away**2), len(known) - 1))
+    return chance > UNLIKE_BY_CHANCE and float(np.ptp(logs)) < math.log(UNLIKE_AXES)
+
+
+def _step(
+    sensor: Sensor,
+    axis: str,
+    model: tuple[PoseNoise, Sequence[PoseNoise]],
+    recording: tuple[PoseNoise, Sequence[PoseNoise]],
+) -> Iterator[NoiseDifference]:
+    """One axis of either side, with all axes of its sensor."""
+    m, r = model[0], recording[0]
+    unit = "m/s^2" if sensor == "accelerometer" else "rad/s"
+    name = "accelerometer" if sensor == "accelerometer" else "gyro"
+    m_shows, r_shows = _shows_steps(*model), _shows_steps(*recording)
+    if not (m_shows or r_shows):
+        return
+    if not (m_shows and r_shows):
+        # Readings finer than their noise shows: only a step that matters beside the noise is missed.
+        coarse = m if m_shows else r
+        matters = coarse.step > coarse.reading_sigma
+        side = "recording" if m_shows else "model"
+        remark = f"The {side} has no resolution (LSB) on the {name}." if matters else ""
+        yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, None, None, unit, None, matters, remark)
+        return
+    ratio = m.step / r.step
+    levels = [one.reading_sigma for one in (m, r) if one.reading_sigma > 0.0]
+    # Steps far below the noise are as likely the digits of a file as an ADC's.
+    is_seen = not levels or max(m.step, r.step) > DIGITS * min(levels)
+    is_far = max(ratio, 1.0 / ratio) > LEAST_STEP_RATIO and is_seen
+    remark = f"The resolution (LSB) of the {name} is {ratio:.3g} times the recording's." if is_far else ""
+    yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, ratio, None, unit, None, is_far, remark)
+
+
+def _shows_steps(one: PoseNoise, axes: Sequence[PoseNoise]) -> bool:
+    """Whether readings go in steps: a distance of numbers far below the noise is that of chance, not of an ADC.
+
+    Nor is one that no other axis has: the axes of a sensor share an ADC.
+    """
+    alike = sum(max(one.step, other.step) < LEAST_STEP_RATIO * min(one.step, other.step) for other in axes)
+    if one.step > 0.0 and alike < min(FEWEST_ALIKE, len(axes)):
+        return False
+    return one.step > LEAST_SEEN_STEP * one.reading_sigma
+
+
+def _corner(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> Iterator[NoiseDifference]:
+    if m.corner_hz is not None and r.corner_hz is not None:
+        yield _measured(sensor, axis, "bandwidth", (m.corner_hz, r.corner_hz), "Hz", LEAST_CORNER_RATIO, alpha)
+        return
+    seen, other = (m, r) if m.corner_hz is not None else (r, m)
+    if seen.corner_hz is None:
+        return
+    is_clear = seen.corner_hz.upper * LEAST_CORNER_RATIO < other.corner_above_hz
+    values = _value(m.corner_hz), _value(r.corner_hz)
+    side = "recording" if seen is r else "model"
+    name = "accelerometer" if sensor == "accelerometer" else "gyro"
+    remark = f"The noise of the {name} is filtered in the {side} only (corner {seen.corner_hz.value:.3g} Hz)."
+    yield NoiseDifference(
+        sensor, axis, "bandwidth", *values, None, None, "Hz", None, is_clear, remark if is_clear else ""
+    )
+
+
+def _octaves(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> Iterator[NoiseDifference]:
+    """Octave by octave; significant where it differs otherwise than white noise and filter do."""
+    if m.white is None or r.white is None:
+        return
+    white = ratio_of(m.white, r.white)
+    filters_differ = any(row.significant for row in _corner(sensor, axis, m, r, alpha))
+    corners = [one.corner_hz.lower for one in (m, r) if one.corner_hz is not None]
+    there = {o.low_hz: o for o in m.octaves}
+    for octave in r.octaves:
+        twin = there.get(octave.low_hz)
+        if twin is None or not (twin.density.value > 0.0 and octave.density.value > 0.0):
+            continue
+        ratio = ratio_of(twin.density, octave.density)
+        beyond = ratio.value / white.value**2
+        is_far = max(beyond, 1.0 / beyond) > LEAST_OCTAVE_RATIO**2
+        is_off = ratio.p_value < alpha and not ratio.lower < white.value**2 < ratio.upper
+        # Above the corner it is the filter that differs, and that is said.
+        is_off = is_off and not (filters_differ and octave.high_hz > min(corners))
+        band = f"{octave.low_hz:g} to {octave.high_hz:g} Hz"
+        name = "accelerometer" if sensor == "accelerometer" else "gyro"
+        remark = f"Noise of the {name} {axis} at {band} is {math.sqrt(ratio.value):.3g} times the recording's."
+        yield NoiseDifference(
+            sensor, axis, "octave", math.sqrt(twin.density.value), math.sqrt(octave.density.value),
+            math.sqrt(ratio.value), (math.sqrt(ratio.lower), math.sqrt(ratio.upper)),
+            f"{'m/s^2' if sensor == 'accelerometer' else 'rad/s'}/sqrt(Hz)", ratio.p_value,
+            bool(is_far and is_off), remark if is_far and is_off else "", (octave.low_hz, octave.high_hz),
+        )  # fmt: skip
+
+
+def _sampling(model: Sampled, recording: Sampled) -> Iterator[NoiseDifference]:
+    ratio = model.rate_hz / recording.rate_hz
+    is_far = max(ratio, 1.0 / ratio) > LEAST_RATE_RATIO
+    remark = (
+        f"The model samples at {model.rate_hz:.5g} Hz, the recording at {recording.rate_hz:.5g} Hz." if is_far else ""
+    )
+    yield NoiseDifference("both", "", "rate", model.rate_hz, recording.rate_hz, ratio, None, "Hz", None, is_far, remark)
+    # Timestamps on an even grid scatter by their rounding only.
+    m, r = (0.0 if one.jitter_steps < PERFECT_CLOCK else one.jitter_steps / one.rate_hz for one in (model, recording))
+    larger, smaller = max(model.jitter_steps, recording.jitter_steps), min(model.jitter_steps, recording.jitter_steps)
+    is_far = larger > LEAST_JITTER and larger > 2.0 * smaller
+    which = "model" if m > r else "recording"
+    remark = (
+        f"The timestamps of the {which} scatter by {1e3 * max(m, r):.2g} ms, the other's by {1e3 * min(m, r):.2g} ms."
+    )
+    if which == "recording" and model.jitter_steps < PERFECT_CLOCK:
+        remark = f"The clock of the model is perfect; the timestamps of the recording scatter by {1e3 * r:.2g} ms."
+    yield NoiseDifference(
+        "both", "", "jitter", m, r, m / r if r > 0.0 else None, None, "s", None, is_far, remark if is_far else ""
+    )

@@ -1,0 +1,118 @@
+"""Quantisation noise Q of a simulation against the recording's, axis by axis: what rises with frequency at rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from trihedron.api.comparing_noise import Sampled, Sensor
+from trihedron.estimate.noise import ratio_of
+from trihedron.records.diagnosis import NoiseDifference
+from trihedron.records.pose_noise import Measured, PoseNoise
+
+SHARE = 1.0 / 24.0
+"""Of alpha: what white noise, corners, octaves, slow noise and the numbers leave."""
+STANDS_OUT = 4.0
+"""Standard errors of Q² above zero from which an axis shows it."""
+LEAST_RATIO = 1.5
+"""In Q, as an octave's density must differ by."""
+FEWEST_OCTAVES = 4
+_AXES = ("x", "y", "z")
+_ROUNDS = 5
+
+
+@dataclass(frozen=True)
+class WhiteAndQuantisation:
+    """N² [u²/Hz] and Q² [u² s²] of one axis, and the standard error of Q²."""
+
+    white: float
+    quantisation: float
+    sigma: float
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether Q stands out of its error."""
+        return self.quantisation > STANDS_OUT * self.sigma
+
+    def measured(self) -> Measured:
+        """Q with its interval, where it is shown."""
+        value, log = math.sqrt(self.quantisation), 0.5 * self.sigma / self.quantisation
+        return Measured(value, value * math.exp(-1.96 * log), value * math.exp(1.96 * log), log)
+
+
+def white_and_quantisation(axis: PoseNoise) -> WhiteAndQuantisation | None:
+    """Least squares of N² + 4 Q² rate sin²(πf/rate) to the densities of the octaves, errors relative to the model.
+
+    The first difference over the time step of white noise of variance Q² is what rounding of an integral leaves: an
+    Allan variance of 3 Q²/τ² (docs/noise.md, 8).
+    ``None`` where a low-pass colours the axis, or octaves are too few.
+    """
+    octaves = [o for o in axis.octaves if o.high_hz <= 0.5 * axis.rate_hz * (1.0 + 1e-9)]
+    # A corner above half the rate is no low-pass: the shape that comes nearest to a rise.
+    is_filtered = axis.corner_hz is not None and axis.corner_hz.value < 0.5 * axis.rate_hz
+    if len(octaves) < FEWEST_OCTAVES or is_filtered:
+        return None
+    density = np.array([o.density.value for o in octaves])
+    relative = np.array([o.density.sigma_log for o in octaves])
+    rising = [4.0 * axis.rate_hz * _mean_sin2(o.low_hz, o.high_hz, axis.rate_hz) for o in octaves]
+    design = np.column_stack([np.ones(len(octaves)), rising])
+    model = density
+    solution, sigma = np.zeros(2), math.inf
+    for _ in range(_ROUNDS):
+        weight = 1.0 / np.maximum(model * relative, 1e-300)
+        scaled = design * weight[:, None]
+        norms = np.linalg.norm(scaled, axis=0)
+        solution = np.linalg.lstsq(scaled / norms, density * weight, rcond=None)[0] / norms
+        inverse = np.linalg.pinv((scaled / norms).T @ (scaled / norms))
+        # Misfit of the shape widens the error, as it does that of any number.
+        spread = (density - design @ solution) * weight
+        excess = max(float(spread @ spread) / max(len(octaves) - 2, 1), 1.0)
+        sigma = math.sqrt(excess * float(inverse[1, 1])) / float(norms[1])
+        model = np.maximum(design @ np.maximum(solution, 0.0), 0.1 * density)
+    return WhiteAndQuantisation(max(float(solution[0]), 0.0), max(float(solution[1]), 0.0), sigma)
+
+
+def _mean_sin2(low_hz: float, high_hz: float, rate_hz: float) -> float:
+    """Mean of sin²(πf/rate) between two frequencies."""
+    a, b = 2.0 * math.pi * low_hz / rate_hz, 2.0 * math.pi * high_hz / rate_hz
+    return 0.5 - 0.5 * (math.sin(b) - math.sin(a)) / (b - a)
+
+
+def quantisation_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
+    """Rows of the term Q where either side shows it; ``alpha`` is the chance that anything of one unit differs."""
+    sensors: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
+    return tuple(
+        row
+        for sensor in sensors
+        for axis, m, r in zip(_AXES, model.noise.get(sensor, ()), recording.noise.get(sensor, ()), strict=False)
+        for row in _axis(sensor, axis, m, r, alpha * SHARE / (2 * len(_AXES)))
+    )
+
+
+def _axis(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> Iterator[NoiseDifference]:
+    made, seen = white_and_quantisation(m), white_and_quantisation(r)
+    if made is None or seen is None or not (made.is_shown or seen.is_shown):
+        return
+    unit = "m/s" if sensor == "accelerometer" else "rad"
+    name = "accelerometer" if sensor == "accelerometer" else "gyro"
+    values = math.sqrt(made.quantisation), math.sqrt(seen.quantisation)
+    if made.is_shown and seen.is_shown:
+        ratio = ratio_of(made.measured(), seen.measured())
+        is_off = ratio.p_value < alpha and max(ratio.value, 1.0 / ratio.value) > LEAST_RATIO
+        remark = (
+            f"Quantisation noise of the {name} {axis} is {ratio.value:.2g} times the recording's." if is_off else ""
+        )
+        yield NoiseDifference(
+            sensor, axis, "Q", *values, ratio.value, (ratio.lower, ratio.upper), unit, ratio.p_value, is_off, remark
+        )
+        return
+    difference = abs(made.quantisation - seen.quantisation)
+    p_value = math.erfc(difference / math.hypot(made.sigma, seen.sigma) / math.sqrt(2.0))
+    less, more = sorted((made, seen), key=lambda one: one.quantisation)
+    is_off = p_value < alpha and more.quantisation > LEAST_RATIO**2 * (less.quantisation + 2.0 * less.sigma)
+    side = "model" if made.is_shown else "recording"
+    remark = f"Only the {side} has quantisation noise on the {name} {axis}: noise that rises with frequency."
+    yield NoiseDifference(sensor, axis, "Q", *values, None, None, unit, p_value, is_off, remark if is_off else "")

@@ -1,0 +1,197 @@
+"""Bias instability and random walk of a given simulation against the recording's, by the biases in their poses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from trihedron.api.comparing_noise import Sensor
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.against import FREE_CURVES
+from trihedron.estimate.noise.of_biases import PoseBiases, SlowDifference, compare_slow
+from trihedron.estimate.noise.of_norms import PoseNorms, compare_slow_norms
+from trihedron.records import Recording, Segments
+from trihedron.records.diagnosis import Diagnosis, NoiseDifference, NoiseTerm
+from trihedron.records.domains import Domain
+from trihedron.records.pose_noise import Measured
+from trihedron.segment import resegment
+from trihedron.sensor_model import correct
+
+LEAST_SLOW_RATIO = 2.0
+"""Bias instability differs by half from one part of a reel to the next and with the day; makers state no spread."""
+RESEMBLES_SLOW = 1.5
+"""A session tells a walk to some 30 %: a ratio this near to the root of the rate is taken for it."""
+TESTS = 24.0
+"""Shares of alpha: a twelfth is spent on slow noise, half of it on either sensor."""
+NO_SHAPE = frozenset({"gyro-bias-repeatability", "accel-bias-repeatability", "disturbed-pose", "periodic-interference"})
+"""Effects that leave the course of a bias from pose to pose as it is."""
+DOMAINS: Mapping[str, Domain] = MappingProxyType({"gyroscope": "static-gyro", "accelerometer": "static-accel"})
+AXES = ("x", "y", "z")
+Side = tuple[Diagnosis, Recording, Segments]
+
+
+def slow_noise(model: Side, recording: Side, *, alpha: float) -> tuple[NoiseDifference, ...]:
+    """B and K of both sensors, axis by axis, where both logs have poses enough.
+
+    The gyro shows its biases at rest, the accelerometer the part of its biases along gravity. Significant where chance
+    makes such a difference in fewer than ``alpha``/24 and the ratio is beyond a factor of two; never where a drift of
+    the recording has a name of its own, or disagrees and has none: a walk would be a second name for it.
+    """
+    out: list[NoiseDifference] = []
+    # A free curve through a simulation's zeros is no mechanism: its walk is. A recording's may be one.
+    zeros = gyro_biases(*model, with_curve=True), gyro_biases(*recording, with_curve=_has_curve(model[0]))
+    rate_hz = model[1].rate_hz
+    if zeros[0] and zeros[1]:
+        is_open = _drifts(recording[0], "gyroscope", but_curve=_has_curve(model[0]))
+        out += _rows("gyroscope", compare_slow(*zeros), rate_hz, alpha, is_open=is_open)
+    has_curve = _has_curve(model[0], "accelerometer")
+    norms = accel_norms(*model, with_curve=True), accel_norms(*recording, with_curve=has_curve)
+    if norms[0] is not None and norms[1] is not None:
+        is_open = _drifts(recording[0], "accelerometer", but_curve=has_curve)
+        out += _rows("accelerometer", compare_slow_norms(norms[0], norms[1]), rate_hz, alpha, is_open=is_open)
+    return tuple(out)
+
+
+def _rows(
+    sensor: Sensor, found: SlowDifference | None, rate_hz: float, alpha: float, *, is_open: bool
+) -> list[NoiseDifference]:
+    if found is None:
+        return []
+    common = math.exp(float(np.mean([math.log(r[found.term].value) for r in found.ratio])))
+    differs = not is_open and found.p_value < alpha / TESTS and max(common, 1.0 / common) > LEAST_SLOW_RATIO
+    out = []
+    terms: tuple[NoiseTerm, NoiseTerm] = ("B", "K")
+    for term in terms:
+        unit = ("rad/s" if sensor == "gyroscope" else "m/s^2") + ("" if term == "B" else "/sqrt(s)")
+        is_it = differs and term == found.term
+        remark = _remark(sensor, found, common, rate_hz) if is_it else ""
+        for k, axis in enumerate(AXES):
+            m, r, ratio = found.first[k][term], found.second[k][term], found.ratio[k][term]
+            is_shown = m.lower > 0.0 and r.lower > 0.0
+            out.append(
+                NoiseDifference(
+                    sensor, axis, term, m.value, r.value, ratio.value if is_shown or is_it else None,
+                    (ratio.lower, ratio.upper) if is_shown or is_it else None, unit, found.p_value, is_it,
+                    remark or ("" if is_shown else _unseen(term, m, r)),
+                )
+            )  # fmt: skip
+    return out
+
+
+def _drifts(found: Diagnosis, sensor: Sensor, *, but_curve: bool = False) -> bool:
+    """Whether the biases of a recording's sensor move in a way that has another name, or that nothing explains.
+
+    ``but_curve``: a free curve through them is compared as the walk that the other side's is.
+    """
+    domain = DOMAINS[sensor]
+    if any(test.disagrees for test in found.remaining if test.domain == domain):
+        return True
+    named = [
+        e for e in found.effects if any(h.domain == domain for h in e.held_out[:1]) and e.id not in NO_SHAPE
+    ]  # fmt: skip
+    return bool(named) and not (but_curve and _has_curve(found, sensor))
+
+
+def _has_curve(found: Diagnosis, sensor: Sensor = "gyroscope") -> bool:
+    """Whether the one effect on a sensor's biases, beside their scatter, is a drift along a curve of any shape."""
+    domain, drift = DOMAINS[sensor], f"{'gyro' if sensor == 'gyroscope' else 'accel'}-bias-drift"
+    of_biases = [e for e in found.effects if any(h.domain == domain for h in e.held_out) and e.id not in NO_SHAPE]
+    return len(of_biases) == 1 and of_biases[0].id == drift and of_biases[0].model.get("variant") in FREE_CURVES
+
+
+def gyro_biases(
+    found: Diagnosis, recording: Recording, segments: Segments, *, with_curve: bool = False
+) -> tuple[PoseBiases, ...]:
+    """Zeros of a session's poses per axis, what effects make of them taken off; none without a gyro.
+
+    ``with_curve``: a drift along a free curve stays on them where nothing else was taken off.
+    """
+    density = found.noise.get("gyroscope_density")
+    shown = next((r for r in found.residuals if r.domain == "static-gyro" and len(r.after) > 1), None)
+    if density is None or shown is None:
+        return ()
+    values, time_s = shown.after, shown.time_after_s
+    if with_curve and _has_curve(found):
+        values, time_s = shown.before, shown.time_before_s
+    length = _poses(time_s, recording, segments).length_s
+    white: FloatArray = np.asarray(density, dtype=np.float64)
+    return tuple(PoseBiases(values[:, k], white[k] / np.sqrt(length), time_s, length, scatters=True) for k in range(3))
+
+
+def accel_norms(
+    found: Diagnosis, recording: Recording, segments: Segments, *, with_curve: bool = False
+) -> PoseNorms | None:
+    """Lengths of gravity in a session's poses, what effects make of them taken off, and its directions.
+
+    ``with_curve``: a drift along a free curve stays on them where nothing else was taken off.
+    """
+    density = found.noise.get("accelerometer_density")
+    shown = next((r for r in found.residuals if r.domain == "static-accel" and len(r.after) > 1), None)
+    if density is None or shown is None:
+        return None
+    values, time_s = shown.after, shown.time_after_s
+    if with_curve and _has_curve(found, "accelerometer"):
+        values, time_s = shown.before, shown.time_before_s
+    poses = _poses(time_s, recording, segments)
+    if poses.means is None:
+        return None
+    S, b = (np.array(found.extended.accelerometer[name]) for name in ("S", "b"))
+    force = correct(poses.means, S, b)
+    up = force / np.linalg.norm(force, axis=1, keepdims=True)
+    white = np.sqrt((up**2 @ np.asarray(density, dtype=np.float64) ** 2) / poses.length_s)
+    norms = PoseBiases(values[:, 0], white, time_s, poses.length_s, scatters=True)
+    return PoseNorms(norms, up)
+
+
+@dataclass(frozen=True, eq=False)
+class _Poses:
+    """Lengths (n,) [s] and mean readings (n, 3) of the poses that a diagnosis shows."""
+
+    length_s: FloatArray
+    means: FloatArray | None
+
+
+def _poses(shown_s: FloatArray, recording: Recording, segments: Segments) -> _Poses:
+    """The poses that a diagnosis shows: cut where they were bumped, or left whole.
+
+    Pieces of a pose with the length of all of it would overlap: no covariance of means then, and too small an error.
+    """
+    cut = resegment(recording, segments)
+    t = recording.time_s
+    best: tuple[float, _Poses] | None = None
+    for poses in (cut, segments if cut.whole is None else cut.whole):
+        begin = np.array([t[pose.start] for pose in poses.poses])
+        end = np.array([t[pose.stop - 1] for pose in poses.poses])
+        away = np.abs(np.subtract.outer(shown_s, 0.5 * (begin + end)))
+        nearest = np.argmin(away, axis=1)
+        missed = float(away[np.arange(len(nearest)), nearest].max())
+        if best is None or missed < best[0]:
+            mean = poses.accelerometer_mean
+            length = (end - begin)[nearest] + 1.0 / recording.rate_hz
+            best = missed, _Poses(length, None if mean is None else mean[nearest])
+    assert best is not None
+    return best[1]
+
+
+def _remark(sensor: Sensor, found: SlowDifference, common: float, rate_hz: float) -> str:
+    name = "Bias instability" if found.term == "B" else "The walk"
+    said = f"{name} of the {'gyro' if sensor == 'gyroscope' else sensor} is {common:.2g} times the recording's"
+    root = math.sqrt(rate_hz)
+    if found.term == "K":
+        for factor, words in (
+            (root, f"√{rate_hz:.4g}: its steps were not scaled by the root of the time step"),
+            (1.0 / root, f"1/√{rate_hz:.4g}: its steps were scaled by the time step instead of its root"),
+        ):
+            if max(common / factor, factor / common) < RESEMBLES_SLOW:
+                return f"{said}, about {words}."
+    return said + "."
+
+
+def _unseen(term: str, model: Measured, recording: Measured) -> str:
+    unseen = [(side, one) for side, one in (("the model", model), ("the recording", recording)) if not one.lower > 0.0]
+    bounds = " and ".join(f"{side} below {one.upper:.2g}" for side, one in unseen)
+    return f"Not long enough to show {term}: 0 is not excluded, 97.5 % of {bounds}; the figure is a median."

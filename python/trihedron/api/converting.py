@@ -1,0 +1,34 @@
+"""Convert: any log that is read, as one that every program reads."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from trihedron.api.reading import read, recording_of
+from trihedron.errors import RefusedError
+from trihedron.files.log import write_recording
+from trihedron.records import Recording
+
+
+def convert(log: Any, output: str | os.PathLike[str], *, overwrite: bool = False, **options: Any) -> Recording:
+    """Write a log as .csv, .npz or .parquet: time [s], readings in their own unit, temperature and supply.
+
+    ``log`` is a recording, or whatever :func:`trihedron.read` takes, with its ``options``. Names of columns state the
+    units, so that the file is read again without a question; missing readings are NaN. Time starts at zero.
+
+    Returns
+    -------
+    Recording
+        What was written.
+
+    Raises
+    ------
+    ValueError
+        When the log cannot be read, or the file cannot be written.
+    """
+    if options and (isinstance(log, Recording) or hasattr(log, "recording")):
+        raise RefusedError(f"{', '.join(options)}: how a log is read cannot be said of one that was read already.")
+    recording = read(log, **options) if options else recording_of(log)
+    write_recording(recording, output, overwrite=overwrite)
+    return recording

@@ -1,0 +1,207 @@
+"""A complete session on a simulated sensor, whose truth is known: log, calibration, verification, reports."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trihedron.api.calibrating import calibrate
+from trihedron.api.reading import read, segment
+from trihedron.api.results import CalibrationResult, VerificationResult
+from trihedron.api.verifying import verify
+from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
+from trihedron.files.calibration import plain, write_calibration
+from trihedron.files.output import write_whole
+from trihedron.gravity import normal_gravity
+from trihedron.records import PARAMETER_NAMES, Calibration, Comparison, Recording, Segments, Truth
+from trihedron.report import calibration_report, demonstration_report, verification_report
+from trihedron.report.document import Document
+from trihedron.report.page import to_html
+from trihedron.sensor_model import reframing
+from trihedron.simulate import Environment, Scenario, hand_session, scenario_by_name, simulate
+from trihedron.units import STANDARD_GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    from trihedron.api.disagreeing import Disagreement
+
+
+LATITUDE_DEG = 59.94
+SEED = 2020
+COUNTS_PER_G = 16384.0
+"""Sensitivity that the data sheet of the simulated accelerometer states."""
+
+
+@dataclass(frozen=True, eq=False)
+class Demonstration:
+    """What the demonstration did and where it left its files."""
+
+    result: CalibrationResult
+    verification: VerificationResult
+    comparison: Comparison
+    uncalibrated_rms_m_s2: float
+    files: tuple[tuple[Path, str], ...]
+    document: Document
+
+
+def demo(
+    folder: str | os.PathLike[str] = "trihedron-demo", *, seed: int = 0, overwrite: bool = False
+) -> tuple[Demonstration, Disagreement]:
+    """Two acts, simulated: calibrate and compare with the truth; then a simulation that a log contradicts.
+
+    Files go to ``folder``; ``seed`` draws unit and flaw of the second act. ``.document`` of each is its story, which
+    ``print`` shows.
+
+    Returns
+    -------
+    (Demonstration, Disagreement)
+        The two acts.
+
+    Raises
+    ------
+    ValueError
+        When the folder exists and may not be written into.
+    """
+    target = Path(folder)
+    if target.exists() and not overwrite:
+        raise RefusedError(f"{target}: this exists and was left alone; choose another name or say overwrite=True.")
+    from trihedron.api.disagreeing import disagree
+
+    first = demonstrate(target, overwrite=overwrite)
+    return first, disagree(target, seed, overwrite=overwrite)
+
+
+def demonstrate(folder: Path, *, overwrite: bool = False, say: Callable[[str], None] | None = None) -> Demonstration:
+    """Simulate two sessions of one sensor, calibrate by the first, verify on the second, write everything to
+    ``folder``.
+
+    The logs are written as CSV and read back like anybody's: nothing but the final comparison knows the truth.
+    """
+    tell = say or (lambda _sentence: None)
+    folder.mkdir(parents=True, exist_ok=True)
+    tell("simulating two sessions of one sensor")
+    first = _session(folder / "session.csv", 0, overwrite)
+    second = _session(folder / "second-session.csv", 1, overwrite)
+    truth = truth_of_the_day(_scenario(0), SEED)
+    tell("calibrating by the first")
+    result = calibrate(first, latitude_deg=LATITUDE_DEG)
+    tell("verifying on the second")
+    segments = segment(second)
+    judged = verify(result, second, segments=segments, latitude_deg=LATITUDE_DEG)
+    comparison = compare_with_truth(result.calibration, truth)
+    before = _uncalibrated_rms(segments, judged.verification.gravity_m_s2)
+    files = _files(folder)
+    document = demonstration_report(
+        result.calibration, result.segments, first, judged.verification, comparison, before, LATITUDE_DEG, files
+    )
+    tell("writing reports")
+    write_calibration(result.calibration, folder / "calibration.json", overwrite=overwrite)
+    write_whole(folder / "truth.json", _truth_text(truth), overwrite=overwrite)
+    pages = (
+        ("report.html", calibration_report(result.calibration, result.segments, first)),
+        ("verification.html", verification_report(judged.verification, segments, second)),
+    )
+    for name, page in pages:
+        write_whole(folder / name, to_html(page), overwrite=overwrite)
+    return Demonstration(result, judged, comparison, before, files, document)
+
+
+def compare_with_truth(calibration: Calibration, truth: Truth) -> Comparison:
+    """Estimate, truth and uncertainties of every parameter that the frame leaves free.
+
+    The truth is turned into the calibration's frame first; the rotation that does so depends on the truth alone.
+    """
+    change = reframing(truth.accelerometer_S, truth.accelerometer_b, calibration.frame)
+    sensors = [("accelerometer", calibration.accelerometer, truth.accelerometer_S, truth.accelerometer_b)]
+    if calibration.gyroscope is not None:
+        sensors.append(("gyroscope", calibration.gyroscope, truth.gyroscope_S, truth.gyroscope_b))
+    names = [f"{name}.{parameter}" for name, *_ in sensors for parameter in PARAMETER_NAMES]
+    true = np.concatenate(
+        [part for _, _, S, b in sensors for part in ((change.rotation @ S).ravel(), change.rotation @ b)]
+    )
+    estimate = np.concatenate([part for _, sensor, _, _ in sensors for part in (sensor.S.ravel(), sensor.b)])
+    sigma = np.sqrt(np.maximum(np.diag(calibration.covariance), 0.0))
+    free = np.flatnonzero(sigma > 0.0)
+    return Comparison(
+        tuple(names[k] for k in free),
+        true[free],
+        estimate[free],
+        sigma[free],
+        calibration.covariance[np.ix_(free, free)],
+    )
+
+
+def truth_of_the_day(scenario: Scenario, seed: int) -> Truth:
+    """The truth with the biases as they were on average in this session.
+
+    Flicker and walk move a bias slowly; what a session can show is its mean of that day, and no calibration knows the
+    number the factory started from. The slow part is the difference to the same session without it: every other stage
+    of the simulation draws what it drew before.
+    """
+    recording, truth = simulate(scenario, seed)
+    accelerometer, gyroscope = scenario.accelerometer, scenario.gyroscope
+    still = (0.0, 0.0, 0.0)
+    steady = replace(
+        scenario,
+        accelerometer=replace(accelerometer, noise=replace(accelerometer.noise, B=still, K=still, R=still)),
+        gyroscope=replace(gyroscope, noise=replace(gyroscope.noise, B=still, K=still, R=still)),
+    )
+    without, _ = simulate(steady, seed)
+    return replace(
+        truth,
+        accelerometer_b=truth.accelerometer_b
+        - truth.accelerometer_S @ _mean_change(recording.accelerometer, without.accelerometer),
+        gyroscope_b=truth.gyroscope_b - truth.gyroscope_S @ _mean_change(recording.gyroscope, without.gyroscope),
+    )
+
+
+def _mean_change(readings: FloatArray | None, without: FloatArray | None) -> FloatArray:
+    assert readings is not None
+    assert without is not None
+    mean: FloatArray = np.mean(readings - without, axis=0)
+    return mean
+
+
+def _scenario(layout: int) -> Scenario:
+    place = Environment(gravity_m_s2=normal_gravity(LATITUDE_DEG))
+    return replace(scenario_by_name("hand-session"), motion=hand_session(layout=layout), environment=place)
+
+
+def _session(path: Path, layout: int, overwrite: bool) -> Recording:
+    recording, _ = simulate(_scenario(layout), SEED + layout)
+    assert recording.accelerometer is not None
+    assert recording.gyroscope is not None
+    readings = np.hstack([recording.accelerometer, recording.gyroscope]).astype(np.int64)
+    lines = ["time_s,ax,ay,az,gx,gy,gz"]
+    lines += [f"{t:.4f}," + ",".join(map(str, row)) for t, row in zip(recording.time_s, readings.tolist(), strict=True)]
+    write_whole(path, "\n".join(lines) + "\n", overwrite=overwrite)
+    return read(path)
+
+
+def _uncalibrated_rms(segments: Segments, gravity_m_s2: float) -> float:
+    """Norm error [m/s²] at rest with the data sheet's sensitivity and no zero: what a user has without calibration."""
+    assert segments.accelerometer_mean is not None
+    norm = np.linalg.norm(segments.accelerometer_mean * (STANDARD_GRAVITY_M_S2 / COUNTS_PER_G), axis=1)
+    return float(np.sqrt(np.mean((norm - gravity_m_s2) ** 2)))
+
+
+def _files(folder: Path) -> tuple[tuple[Path, str], ...]:
+    return (
+        (folder / "session.csv", "the log that was calibrated: time and raw counts"),
+        (folder / "calibration.json", "the calibration with its covariance and findings"),
+        (folder / "report.html", "the report, with figures; open it in a browser"),
+        (folder / "second-session.csv", "another session of the same sensor"),
+        (folder / "verification.html", "the calibration tested on it"),
+        (folder / "truth.json", "what the simulated sensor is really made of"),
+    )
+
+
+def _truth_text(truth: Truth) -> str:
+    names = ("accelerometer_S", "accelerometer_b", "gyroscope_S", "gyroscope_b", "gravity_m_s2", "scenario", "seed")
+    return json.dumps({name: plain(getattr(truth, name)) for name in names}, indent=2) + "\n"

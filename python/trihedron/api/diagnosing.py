@@ -1,0 +1,324 @@
+"""Diagnose: hold a digital twin against a recording, name the physics it lacks, and take that physics into use."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, fields, replace
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+from trihedron.api.applying import AnyCalibration, calibration_of, check_units, without_effects
+from trihedron.api.asking import WrongTypeError
+from trihedron.api.beside import beside, shared_log
+from trihedron.api.calibrating import calibrate
+from trihedron.api.choices import settle_gravity
+from trihedron.api.comparing import compared
+from trihedron.api.comparing_correlation import correlation_times
+from trihedron.api.comparing_frames import rates_of_world, sign_of_gravity
+from trihedron.api.comparing_moved import judged_by_motion
+from trihedron.api.comparing_noise import Sampled, compare_noise, sampled
+from trihedron.api.comparing_quantisation import quantisation_noise
+from trihedron.api.comparing_ranges import stated_ranges
+from trihedron.api.comparing_slow import slow_noise
+from trihedron.api.comparing_stages import with_noise_stage
+from trihedron.api.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
+from trihedron.api.driving import driven
+from trihedron.api.reading import AnyRecording, read, recording_of, segment, segments_of
+from trihedron.api.referring import AnyReference
+from trihedron.api.results import DiagnosisResult
+from trihedron.diagnose import diagnose_recording
+from trihedron.diagnose.against import model_of_diagnosis
+from trihedron.diagnose.session.starting_point import is_open
+from trihedron.errors import REFUSALS, RefusedError
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
+from trihedron.records.diagnosis import Diagnosis, NoiseDifference
+from trihedron.records.progress import Progress
+from trihedron.segment import resegment
+from trihedron.simulate import Scenario, read_scenario
+
+GivenModel = Recording | Scenario | str | os.PathLike[str]
+"""A simulated recording or its file, or a scenario or its .toml."""
+
+
+def diagnose(
+    recording: AnyRecording,
+    *,
+    gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
+    segments: Segments | None = None,
+    calibration: AnyCalibration | None = None,
+    against: GivenModel | None = None,
+    reference: AnyReference | None = None,
+    reference_columns: str | None = None,
+    alpha: float = 0.01,
+    progress: Progress | None = None,
+) -> DiagnosisResult:
+    """Where a recording and its model differ, which physics was excluded, how big it is, and how sure that is.
+
+    Parameters
+    ----------
+    recording : Recording, or what trihedron.read takes
+        Poses and moves of one sensor.
+    gravity_m_s2 or latitude_deg, height_m : float
+        |g| at the place; with a ``calibration`` that of the calibration unless said.
+    segments : Segments, optional
+        Poses and moves; found when not given.
+    calibration : calibration or path, optional
+        The model to be held against the recording, with its uncertainties. Without it one is fitted to the recording.
+    against : Recording, Scenario or path, optional
+        The user's simulation as the model: a simulated recording, with everything that it contains, or a scenario
+        (``.toml``), whose instrument is moved as the recording was.
+    reference : path, Recording or ReferenceMotion, optional
+        Known motion beside the log: attitude, rate or pose with a clock of its own, or the log of another unit that
+        moved along (docs/reference.md). ``reference_columns`` says its columns where their names do not.
+    alpha : float
+        Chance that a healthy recording is called anything but consistent.
+
+    Returns
+    -------
+    DiagnosisResult
+        ``verdict``, ``effects`` with their parameters and uncertainties, ``domains``, ``candidates`` and ``findings``.
+
+    Raises
+    ------
+    ValueError
+        When there is nothing to hold a model against, units differ, or two models are given.
+    """
+    if calibration is not None and against is not None:
+        raise RefusedError("two models were given: a calibration or a simulated recording to compare with, not both.")
+    if not 0.0 < alpha < 0.5:
+        raise RefusedError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
+    tell = progress or (lambda _fraction, _text: None)
+    recording = recording_of(recording)
+    ordinary = partial(
+        _of_poses, recording, (gravity_m_s2, latitude_deg, height_m), segments, calibration, against, alpha, tell
+    )
+    if reference is None and against is not None:
+        reference = shared_log(recording, against, gravity_m_s2)
+    if reference is None:
+        return ordinary()
+    given = None if calibration is None else calibration_of(calibration)
+    place = (gravity_m_s2, latitude_deg, height_m)
+    return beside(recording, reference, reference_columns, given, place, alpha, ordinary)
+
+
+def _of_poses(
+    recording: Recording,
+    place: tuple[float | None, float | None, float | None],
+    segments: Segments | None,
+    calibration: AnyCalibration | None,
+    against: GivenModel | None,
+    alpha: float,
+    tell: Progress,
+) -> DiagnosisResult:
+    """What poses and the moves between them say."""
+    known = None if calibration is None else calibration_of(calibration)
+    if known is None or place != (None, None, None):
+        gravity, source, said = settle_gravity(*place)
+    else:
+        gravity, source, said = known.gravity_m_s2, "that of the calibration", ()
+    findings = [*said, *recording.findings]
+    if known is not None:
+        check_units(known, recording)
+        recording, more = without_effects(known, recording)
+        findings += more
+        segments = None if known.extensions.get("effects") else segments
+    tell(0.02, "finding poses")
+    segments = segments_of(segments, recording)
+    findings += segments.findings
+    calibrated = cache(lambda: calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration)
+    resting = None if against is not None else at_rest(recording, segments, known, gravity, calibrated)
+    if resting is not None:
+        tell(0.1, "looking at biases and spectral lines")
+        return diagnosed_at_rest(recording, segments, resting, (gravity, source), tuple(findings), alpha, known)
+    simulated: _Free | None = None
+    if against is not None:
+        simulated, recording, segments, more = _simulated(against, recording, segments, gravity, alpha, tell)
+        known = simulated.calibration
+        findings += more
+    begun = 0.05 if simulated is None else 0.45
+    tell(begun, "calibrating")
+    used, free = _start(calibrated, gravity, known, is_simulation=simulated is not None)
+    recording_used, segments_used = recording, segments
+    # Where the poses leave the model open the twin starts from nominal values, for the gyro too.
+    if recording.gyroscope is not None and used.gyroscope is None and not (free and is_open(used)):
+        findings += [f for f in used.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT] or [_gyroscope_left_out()]
+        recording_used, segments_used = _accelerometer_only(recording, segments)
+    found = diagnose_recording(
+        recording_used,
+        resegment(recording_used, segments_used),
+        used,
+        calibration_is_given=not free,
+        alpha=alpha,
+        progress=lambda fraction, text: tell(begun + (1.0 - begun) * fraction, text),
+    )
+    updated, own_effects = None, found.effects
+    if known is not None and free:
+        given = replace(known, gravity_m_s2=gravity)
+        noise: tuple[NoiseDifference, ...] = ()
+        if simulated is not None:
+            frames = _frames((simulated.segments, simulated.calibration), (segments, used))
+            noise = (*simulated.frames, *frames, *_noise(simulated, found, recording_used, segments_used, alpha))
+        free_simulation = None if simulated is None else _with_ranges(simulated, found, recording)
+        fit = model_of_diagnosis(found)
+        found = compared(found, given, free_simulation, noise, recording_used, segments_used, alpha)
+        if simulated is not None:
+            stages = with_noise_stage(found.stages, simulated.sampled, recording_used, segments_used, fit, noise)
+            moved = (simulated.scenario, recording_used, segments_used, used)
+            found = judged_by_motion(replace(found, stages=stages), *moved, alpha)
+        updated, used = used, given
+    values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
+    return DiagnosisResult(
+        **values,
+        findings=tuple(findings),
+        gravity_source=source,
+        model_is_given=known is not None,
+        calibration=used,
+        updated=updated,
+        own_effects=own_effects,
+        segments=segments,
+        recording=recording,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Free:
+    """A simulated recording, calibrated and diagnosed on its own."""
+
+    calibration: Calibration
+    segments: Segments
+    diagnosis: Diagnosis
+    sampled: Sampled
+    recording: Recording
+    frames: tuple[NoiseDifference, ...] = ()
+    scenario: Scenario | None = None
+
+
+def _with_ranges(simulated: _Free, found: Diagnosis, recording: Recording) -> tuple[Diagnosis, Recording]:
+    """The simulation and its diagnosis, with ranges that its scenario states and no reading of it came to."""
+    if simulated.scenario is None:
+        return simulated.diagnosis, simulated.recording
+    shown = {effect.id for effect in simulated.diagnosis.effects}
+    stated = [one for one in stated_ranges(simulated.scenario, found.effects, recording) if one.id not in shown]
+    return replace(simulated.diagnosis, effects=(*simulated.diagnosis.effects, *stated)), simulated.recording
+
+
+def _start(
+    calibrated: Calibrated, gravity: float, known: Calibration | None, *, is_simulation: bool
+) -> tuple[Calibration, bool]:
+    """The model that the search begins from, and whether it is the recording's own.
+
+    A given model is compared with what the recording says of itself. Where its poses are too few to say it, the numbers
+    of a calibration stay, with their uncertainties as knowledge. Those of a simulation are none: its errors say how
+    well its own log shows its numbers, and nothing of how far this unit lies from them.
+    """
+    if known is None:
+        return calibrated(), True
+    try:
+        own = calibrated()
+    except REFUSALS:
+        return replace(known, gravity_m_s2=gravity), False
+    is_poor = is_open(own) or (known.gyroscope is not None and own.gyroscope is None)
+    return (replace(known, gravity_m_s2=gravity), False) if is_poor and not is_simulation else (own, True)
+
+
+def _simulated_log(
+    against: GivenModel, recording: Recording, segments: Segments, gravity: float
+) -> tuple[Recording, Scenario | None]:
+    """The simulated log, and the scenario behind it where that was given."""
+    if isinstance(against, Recording):
+        return against, None
+    if not isinstance(against, Scenario):
+        if not isinstance(against, str | os.PathLike):
+            kind = type(against).__name__
+            raise WrongTypeError(f"against is a simulated recording, a scenario, or the file of one, not {kind}.")
+        if Path(against).suffix.lower() != ".toml":
+            return read(against), None
+        against = read_scenario(Path(against))
+    if recording.gyroscope is None:
+        raise RefusedError(
+            "a scenario is moved as the recording was, and this recording has no gyro to show how: log both sensors, "
+            "or compare with a simulated log of your own"
+        )
+    own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
+    return driven(against, recording, segments, own), against
+
+
+def _simulated(
+    against: GivenModel, recording: Recording, segments: Segments, gravity: float, alpha: float, tell: Progress
+) -> tuple[_Free, Recording, Segments, tuple[Finding, ...]]:
+    """The simulation diagnosed on its own, the recording with the sensors of both, and what is to be said of them."""
+    tell(0.05, "diagnosing the simulated recording")
+    logged = _simulated_log(against, recording, segments, gravity)
+    logged, recording, segments, one_sided = _both_sensors(logged, recording, segments)
+    simulated = _simulation(logged, gravity, alpha, lambda fraction, text: tell(0.05 + 0.4 * fraction, text))
+    return simulated, recording, segments, (*_protocol(simulated.segments, segments), *one_sided)
+
+
+def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha: float, tell: Progress) -> _Free:
+    recording, scenario = logged
+    of_world = rates_of_world(recording, segment(recording))
+    if of_world is not None:
+        recording = replace(recording, gyroscope=None)
+    try:
+        result = calibrate(recording, gravity_m_s2=gravity)
+    except REFUSALS as error:
+        raise RefusedError(f"the simulated recording cannot be calibrated: {error}") from None
+    diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=tell)
+    noise = sampled(recording, result.segments.poses, model_of_diagnosis(diagnosis))
+    frames = () if of_world is None else (of_world,)
+    return _Free(result.calibration, result.segments, diagnosis, noise, recording, frames, scenario)
+
+
+def _frames(
+    simulated: tuple[Segments, Calibration], recording: tuple[Segments, Calibration]
+) -> tuple[NoiseDifference, ...]:
+    turned = sign_of_gravity(simulated, recording)
+    return () if turned is None else (turned,)
+
+
+def _protocol(simulated: Segments, segments: Segments) -> tuple[Finding, ...]:
+    n, m = simulated.n_poses, segments.n_poses
+    if n == m:
+        return ()
+    finding = Finding.of(FindingCode.PROTOCOL_DIFFERS, n_simulated=n, n_real=m)
+    return (finding,)
+
+
+def _both_sensors(
+    logged: tuple[Recording, Scenario | None], recording: Recording, segments: Segments
+) -> tuple[tuple[Recording, Scenario | None], Recording, Segments, tuple[Finding, ...]]:
+    """Both sides without their gyro where one side has none."""
+    theirs, scenario = logged
+    if (theirs.gyroscope is None) == (recording.gyroscope is None):
+        return logged, recording, segments, ()
+    if recording.gyroscope is None:
+        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "recording-has-none")
+        return (replace(theirs, gyroscope=None), scenario), recording, segments, (finding,)
+    finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "simulation-has-none")
+    return logged, *_accelerometer_only(recording, segments), (finding,)
+
+
+def _gyroscope_left_out() -> Finding:
+    return Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "model-has-none")
+
+
+def _accelerometer_only(recording: Recording, segments: Segments) -> tuple[Recording, Segments]:
+    bare = replace(segments, gyroscope_sigma=None, gyroscope_mean=None, gyroscope_sigma_mean=None)
+    return replace(recording, gyroscope=None), bare
+
+
+def _noise(
+    simulated: _Free, found: Diagnosis, recording: Recording, segments: Segments, alpha: float
+) -> tuple[NoiseDifference, ...]:
+    """Noise and slow noise of the simulation against those of the recording."""
+    ours = sampled(recording, segments.poses, model_of_diagnosis(found))
+    theirs = (simulated.diagnosis, simulated.recording, simulated.segments)
+    return (
+        *compare_noise(simulated.sampled, ours, alpha=alpha),
+        *quantisation_noise(simulated.sampled, ours, alpha=alpha),
+        *correlation_times(simulated.sampled, ours, alpha=alpha),
+        *slow_noise(theirs, (found, recording, segments), alpha=alpha),
+    )

@@ -1,0 +1,164 @@
+"""Diagnose what holds one or two orientations: static logs, chamber logs, tables that stand still."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from trihedron.api.results import DiagnosisResult
+from trihedron.diagnose.rest.answer import diagnose_rest
+from trihedron.diagnose.session.starting_point import (
+    TYPICAL_ANGLE,
+    TYPICAL_BIAS_M_S2,
+    TYPICAL_SCALE,
+    extended_sensor,
+    is_open,
+)
+from trihedron.errors import REFUSALS
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
+from trihedron.records.diagnosis import Diagnosis, LinearModel
+from trihedron.units import acceleration_to_si, rate_to_si
+
+Calibrated = Callable[[], Calibration]
+"""The recording's own calibration, made when first asked for; raises what ``calibrate`` raises."""
+FEWEST_POSES = 3
+"""Below this nothing can be calibrated."""
+SAME_POSE_RAD = 0.15
+"""Poses whose gravity points less than 9° apart are one orientation."""
+TWO_ORIENTATIONS = 2
+MOSTLY = 0.9
+"""Share of the time at rest that two orientations take where the others are handling."""
+TURNED_RAD, MOST_TURNS = 0.7, 2
+"""A move that turns by 40° belongs to a session; a log of one or two orientations has a turn between them or two."""
+
+
+def at_rest(
+    recording: Recording, segments: Segments, known: Calibration | None, gravity_m_s2: float, calibrated: Calibrated
+) -> LinearModel | None:
+    """The model whose units a log of one or two orientations is read in; ``None`` where the log is a session."""
+    if recording.accelerometer is None or not _is_rest(recording, segments, calibrated):
+        return None
+    return _nominal(recording, segments, gravity_m_s2) if known is None else _given(known)
+
+
+def _is_rest(recording: Recording, segments: Segments, calibrated: Calibrated) -> bool:
+    mean = segments.accelerometer_mean
+    if mean is None or segments.n_poses < FEWEST_POSES:
+        return True
+    up = mean / np.linalg.norm(mean, axis=1, keepdims=True)
+    lasts = np.array([pose.stop - pose.start for pose in segments.poses], dtype=np.float64)
+    of_orientations = []
+    free = np.ones(len(up), dtype=bool)
+    while free.any():
+        first = int(np.flatnonzero(free)[lasts[free].argmax()])
+        near = free & (np.arccos(np.clip(up @ up[first], -1.0, 1.0)) < SAME_POSE_RAD)
+        of_orientations.append(float(lasts[near].sum()))
+        free &= ~near
+    # Counts about the middle of an ADC's range all point the same way: there the fit alone tells.
+    is_known = acceleration_to_si(recording.accelerometer_unit) is not None
+    if is_known and len(of_orientations) <= TWO_ORIENTATIONS:
+        return _turns(recording, segments) <= MOST_TURNS
+    longest = sum(sorted(of_orientations)[-TWO_ORIENTATIONS:])
+    if longest < MOSTLY * sum(of_orientations):
+        return False
+    try:
+        own = calibrated()
+    except REFUSALS:
+        return True
+    return is_open(own)
+
+
+def _turns(recording: Recording, segments: Segments) -> int:
+    """Moves that turn the sensor far, as its gyro has it: a table that turns about the vertical shows no other sign."""
+    scale = rate_to_si(recording.gyroscope_unit)
+    if recording.gyroscope is None or scale is None or segments.gyroscope_mean is None:
+        return 0
+    zero = segments.gyroscope_mean.mean(axis=0)
+    step = 1.0 / recording.rate_hz
+    turned = [
+        float(np.linalg.norm(np.nansum(recording.gyroscope[m.start : m.stop] - zero, axis=0))) * scale * step
+        for m in segments.moves
+    ]
+    return sum(angle > TURNED_RAD for angle in turned)
+
+
+def _nominal(recording: Recording, segments: Segments, gravity_m_s2: float) -> LinearModel:
+    """A plain triad of the unit's nominal scale, counts by the length of gravity, with what parts stray by as error."""
+    assert recording.accelerometer is not None
+    scale = acceleration_to_si(recording.accelerometer_unit)
+    if scale is None:
+        still = segments.accelerometer_mean
+        typical = recording.accelerometer if still is None or not len(still) else still
+        scale = gravity_m_s2 / float(np.nanmedian(np.linalg.norm(typical, axis=1)))
+    off = np.where(np.eye(3, dtype=bool), TYPICAL_SCALE, TYPICAL_ANGLE)
+    accelerometer = {
+        "S": (scale * np.eye(3)).tolist(), "b": [0.0] * 3, "sigma_S": (scale * np.tril(off)).tolist(),
+        "sigma_b": [TYPICAL_BIAS_M_S2] * 3, "raw_unit": recording.accelerometer_unit.value,
+    }  # fmt: skip
+    if recording.gyroscope is None:
+        return LinearModel(MappingProxyType(accelerometer), None)
+    rate = rate_to_si(recording.gyroscope_unit) or 1.0
+    zero = -rate * np.nanmedian(recording.gyroscope, axis=0)
+    gyroscope = {
+        "S": (rate * np.eye(3)).tolist(), "b": zero.tolist(), "sigma_S": (rate * off).tolist(),
+        "sigma_b": np.abs(zero).tolist(), "raw_unit": recording.gyroscope_unit.value,
+    }  # fmt: skip
+    return LinearModel(MappingProxyType(accelerometer), MappingProxyType(gyroscope))
+
+
+def _given(known: Calibration) -> LinearModel:
+    sides = [
+        None if s is None else MappingProxyType(
+            {"S": s.S.tolist(), "b": s.b.tolist(), "sigma_S": s.sigma_S.tolist(), "sigma_b": s.sigma_b.tolist(),
+             "raw_unit": s.raw_unit}
+        )
+        for s in (known.accelerometer, known.gyroscope)
+    ]  # fmt: skip
+    assert sides[0] is not None
+    return LinearModel(sides[0], sides[1])
+
+
+def diagnosed_at_rest(
+    recording: Recording,
+    segments: Segments,
+    model: LinearModel,
+    gravity: tuple[float, str],
+    findings: tuple[Finding, ...],
+    alpha: float,
+    known: Calibration | None,
+) -> DiagnosisResult:
+    """What a log of one or two orientations can say."""
+    found = diagnose_rest(recording, model, gravity[0], alpha)
+    values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
+    return DiagnosisResult(
+        **values,
+        findings=(*findings, _too_few(recording, segments)),
+        gravity_source=gravity[1],
+        model_is_given=known is not None,
+        calibration=_calibration(model, *gravity) if known is None else known,
+        own_effects=found.effects,
+        segments=segments,
+        recording=recording,
+    )
+
+
+def _calibration(model: LinearModel, gravity_m_s2: float, source: str) -> Calibration:
+    gyroscope = None if model.gyroscope is None else extended_sensor(model.gyroscope, "rad/s")
+    accelerometer = extended_sensor(model.accelerometer, "m/s^2")
+    covariance = np.zeros((12 if gyroscope is None else 24,) * 2)
+    covariance[:12, :12] = accelerometer.covariance
+    if gyroscope is not None:
+        covariance[12:, 12:] = gyroscope.covariance
+    return Calibration(
+        accelerometer=accelerometer, gyroscope=gyroscope, covariance=covariance, frame="lower",
+        gravity_m_s2=gravity_m_s2, gravity_source=source,
+    )  # fmt: skip
+
+
+def _too_few(recording: Recording, segments: Segments) -> Finding:
+    lasts = float(recording.time_s[-1] - recording.time_s[0])
+    return Finding.of(FindingCode.NOT_FIT, "few-orientations", duration_s=lasts, n_poses=segments.n_poses)

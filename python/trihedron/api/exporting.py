@@ -1,0 +1,111 @@
+"""A calibration written for another program."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+from trihedron.api.applying import AnyCalibration, calibration_of
+from trihedron.documents import DocumentError, of_path, read_text
+from trihedron.errors import RefusedError
+from trihedron.files.formats import ExportOptions, any_calibration, export_files
+from trihedron.files.noise import noise_figures, read_noise
+from trihedron.files.output import check_free, write_whole
+from trihedron.records import Noise
+from trihedron.report.noise_files import noise_record
+
+
+def export(
+    calibration: AnyCalibration,
+    target: str,
+    *,
+    noise: Noise | str | os.PathLike[str] | None = None,
+    rate_hz: float | None = None,
+    topic: str = "/imu0",
+    accelerometer_lsb: str = "",
+    gyroscope_lsb: str = "",
+    current_parameters: str | os.PathLike[str] | None = None,
+    output: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
+) -> dict[str, str]:
+    """A calibration as text in the convention of another program (docs/export.md): by the ending of each file's name.
+
+    Parameters
+    ----------
+    calibration : calibration or path
+    target : str
+        One of ``trihedron.files.formats.targets()`` (docs/export.md): kalibr, px4, gazebo, c, ...
+    noise : Noise or path, optional
+        What ``trihedron.noise`` found, or the JSON of ``trihedron allan``: white density and walk, for targets that
+        hold them.
+    rate_hz : float, optional
+        Rate of the samples; that of the static log when not given.
+    topic : str
+        Where the samples are published.
+    accelerometer_lsb, gyroscope_lsb : str
+        The size of a count that the target's driver assumes, as ``0.061 mg``, where the calibration maps counts.
+    current_parameters : path or "none", optional
+        For px4 and ardupilot, where the log did not state it: the parameters that the board held while it logged
+        (.param, .parm, QGroundControl's .params); "none" where the readings were raw.
+    output : path, optional
+        Where to write; of several files each takes its own ending.
+
+    Returns
+    -------
+    dict of str to str
+        The text of every file of the target, by its ending.
+
+    Raises
+    ------
+    ValueError
+        When the target is unknown or its convention cannot hold the calibration.
+
+    Examples
+    --------
+    >>> (header,) = trihedron.export(result, "c").values()
+    >>> "double S[3][3]" in header
+    True
+    """
+    if rate_hz is not None and not rate_hz > 0.0:
+        raise RefusedError(f"rate_hz is the number of samples per second, not {rate_hz}")
+    options = ExportOptions(
+        rate_hz=rate_hz,
+        topic=topic,
+        accel_lsb=accelerometer_lsb,
+        gyro_lsb=gyroscope_lsb,
+        current_parameters=parameters_text(current_parameters),
+    )
+    if noise is not None:
+        figures, rest_rate = noise_figures(noise_record(noise)) if isinstance(noise, Noise) else read_noise(noise)
+        options = replace(
+            options,
+            accelerometer_noise=figures.get("accelerometer"),
+            gyroscope_noise=figures.get("gyroscope"),
+            rate_hz=rate_hz or rest_rate,
+        )
+    known = any_calibration(calibration) if isinstance(calibration, str | os.PathLike) else calibration_of(calibration)
+    made = export_files(known, target, options)
+    if output is not None:
+        placed(made, Path(output), write=True, overwrite=overwrite)
+    return made
+
+
+def placed(made: dict[str, str], path: Path, *, write: bool = False, overwrite: bool = False) -> list[Path]:
+    """Where the texts of an export go: of several each takes its own ending; written there when ``write``."""
+    targets = {path.with_name(path.stem + ending) if ending else path: text for ending, text in made.items()}
+    if write:
+        check_free(list(targets), overwrite=overwrite)
+        for name, text in targets.items():
+            write_whole(name, text, overwrite=overwrite)
+    return list(targets)
+
+
+def parameters_text(current: str | os.PathLike[str] | None) -> str:
+    """The text of a file of current parameters; ``none`` stands for readings that were logged raw."""
+    if current is None or str(current) in ("", "none"):
+        return str(current or "")
+    try:
+        return read_text(Path(current), "file of parameters")
+    except DocumentError as error:
+        raise RefusedError(of_path(Path(current), error)) from None

@@ -1,0 +1,219 @@
+"""Noise for a filter: from a log, what is known of its sensor at rest, and known motion beside it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+
+from trihedron.api.asking import WrongTypeError
+from trihedron.api.choices import settle_gravity
+from trihedron.api.identifying import noise
+from trihedron.api.reading import AnyRecording, read, recording_of, segment
+from trihedron.api.referring import AnyReference, motion_of
+from trihedron.errors import REFUSALS, RefusedError
+from trihedron.estimate.filter_noise import Asked, at_rest, beside_reference, tilt_over_moves, unlike_axes
+from trihedron.files.formats.contract import NoiseFigure
+from trihedron.files.noise import read_noise
+from trihedron.records import Finding, FindingCode, Noise, Recording, Segments
+from trihedron.records.filter_noise import BiasModel, Bounded, FilterNoise, SensorFilterNoise, StaticNoise, TiltCheck
+from trihedron.units import rate_to_si
+
+UNITS = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
+HORIZONS_S = (1.0, 10.0, 60.0)
+BAND_PART = 0.25
+"""Vibration is looked for above this part of the sampling rate, where a body hardly moves."""
+SHORTEST_REST_S = 20.0
+FILE_PART = 1.1
+"""A file of noise terms is taken as right within 10 %: it tells a sensor of this kind, on another day."""
+CONSISTENT = (1.0, 9.0)
+"""NEES of three numbers within a factor of three: beyond it the covariance misleads a filter."""
+
+Static = dict[str, StaticNoise]
+
+
+def filter_noise(
+    recording: AnyRecording,
+    *,
+    static: Noise | str | os.PathLike[str] | None = None,
+    reference: AnyReference | None = None,
+    reference_columns: str | None = None,
+    band_hz: float | None = None,
+    horizons_s: Sequence[float] = HORIZONS_S,
+    gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
+) -> FilterNoise:
+    """N and K that make a filter's predicted errors right, and what those errors are made of (docs/filter-noise.md).
+
+    Parameters
+    ----------
+    recording : Recording, or what trihedron.read takes
+        The log in motion.
+    static : Noise or path, optional
+        The sensor at rest: what ``trihedron.noise`` found, a static log, or the JSON of ``trihedron allan``. Without it
+        the longest rest of the log, if it lasts 20 s.
+    reference : path, Recording or ReferenceMotion, optional
+        Attitude, and with a position also the accelerometer's part. Without it only what rests and gravity tell.
+    reference_columns : str, optional
+        Its columns, where names do not tell.
+    band_hz : float, optional
+        Vibration is looked for above this frequency; a quarter of the sampling rate otherwise.
+    horizons_s : sequence of float
+        Times [s] over which a filter carries on alone.
+    gravity_m_s2, latitude_deg, height_m : float, optional
+        |g| [m/s²], or the place.
+
+    Returns
+    -------
+    FilterNoise
+        N [SI/√Hz] and K [SI/√s] of each sensor with 95 % intervals, shares by cause, and NEES on the held-out half.
+
+    Raises
+    ------
+    ValueError
+        When a horizon or the band is impossible, the reference has no attitude, or nothing is at rest and there is no
+        reference.
+
+    Examples
+    --------
+    >>> found = trihedron.filter_noise("flight.csv", static="rest.csv", reference="truth.csv")  # doctest: +SKIP
+    >>> found.sensor("gyroscope").N.value  # doctest: +SKIP
+    0.00017
+    """
+    recording = recording_of(recording)
+    horizons = tuple(sorted(float(h) for h in horizons_s))
+    _check(recording, horizons, band_hz)
+    gravity, _, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
+    band = BAND_PART * recording.rate_hz if band_hz is None else float(band_hz)
+    segments = None if static is not None and reference is not None else _segments(recording)
+    own = None if segments is None else _of_rest(recording, segments)
+    known = _static(static) if static is not None else _sensors(own)
+    findings = (*recording.findings, *(said if reference is not None else ()))
+    tilt, source = None, ""
+    if reference is not None:
+        motion = motion_of(reference, reference_columns)
+        asked = Asked(horizons, band, gravity, known.get("gyroscope"), known.get("accelerometer"))
+        sensors = beside_reference(recording, motion, asked)
+        source, findings = motion.source, (*findings, *motion.findings, *_noticed(sensors))
+    else:
+        if own is None:
+            raise RefusedError(
+                f"{recording.source}: nothing rests in it for {SHORTEST_REST_S:.0f} s in units that are known; "
+                "give known motion beside it (--reference), or a log that begins at rest."
+            )
+        sensors = tuple(_at_rest(own, sensor, known) for sensor in UNITS if at_rest(own.axes, UNITS[sensor]))
+        tilt = None if segments is None else _tilt(recording, segments, known)
+        findings = (*findings, Finding.of(FindingCode.FILTER_NOISE_AT_REST))
+    return FilterNoise(
+        sensors, recording.source, source, recording.rate_hz, band, recording.duration_s, tilt, tuple(findings)
+    )
+
+
+def _check(recording: Recording, horizons: Sequence[float], band_hz: float | None) -> None:
+    if not horizons or not all(0.0 < h <= 3600.0 for h in horizons):
+        raise RefusedError(
+            "horizons are seconds between 0 and 3600 over which a filter carries on alone, as in 1,10,60."
+        )
+    if band_hz is not None and not 0.0 < band_hz < 0.5 * recording.rate_hz:
+        raise RefusedError(
+            f"{recording.source}: vibration cannot be looked for above {band_hz:g} Hz at {recording.rate_hz:.4g} "
+            f"samples/s; give --band between 0 and {0.5 * recording.rate_hz:.4g}."
+        )
+
+
+def _segments(recording: Recording) -> Segments | None:
+    try:
+        return segment(recording)
+    except REFUSALS:
+        return None
+
+
+def _of_rest(recording: Recording, segments: Segments) -> Noise | None:
+    """Noise of the longest rest; None where none is long enough."""
+    if not segments.poses:
+        return None
+    longest = max(segments.poses, key=lambda pose: pose.stop - pose.start)
+    at = slice(longest.start, longest.stop)
+    if recording.time_s[longest.stop - 1] - recording.time_s[longest.start] < SHORTEST_REST_S:
+        return None
+    part = Recording.from_arrays(
+        recording.time_s[at],
+        None if recording.accelerometer is None else recording.accelerometer[at],
+        None if recording.gyroscope is None else recording.gyroscope[at],
+        accelerometer_unit=recording.accelerometer_unit,
+        gyroscope_unit=recording.gyroscope_unit,
+    )
+    try:
+        found = noise(part)
+    except REFUSALS:
+        return None
+    return found if _sensors(found) else None
+
+
+def _sensors(found: Noise | None) -> Static:
+    if found is None:
+        return {}
+    told = {sensor: at_rest(found.axes, unit) for sensor, unit in UNITS.items()}
+    return {sensor: one for sensor, one in told.items() if one is not None}
+
+
+def _static(given: Noise | str | os.PathLike[str]) -> Static:
+    """What is known of the sensor at rest, by sensor."""
+    if isinstance(given, str | os.PathLike) and os.fspath(given).lower().endswith(".json"):
+        figures, _ = read_noise(given)
+        return {name: StaticNoise(_told(one.N), _told(one.K)) for name, one in figures.items()}
+    if isinstance(given, str | os.PathLike):
+        given = noise(read(given))
+    if not isinstance(given, Noise):
+        raise WrongTypeError(
+            f"static is what trihedron.noise found, or the name of a file, not {type(given).__name__}."
+        )
+    known = _sensors(given)
+    if not known:
+        raise RefusedError(f"{given.source}: the static log is in counts; say its units, or the size of a count.")
+    return known
+
+
+def _told(figure: NoiseFigure) -> Bounded:
+    value, is_limit = figure.value, figure.is_limit
+    return Bounded(0.0 if is_limit else value, 0.0 if is_limit else value / FILE_PART, value * FILE_PART, is_limit)
+
+
+def _at_rest(own: Noise, sensor: str, known: Static) -> SensorFilterNoise:
+    """A sensor as this log's own rest shows it, static values beside."""
+    unit = UNITS[sensor]
+    found = at_rest(own.axes, unit)
+    assert found is not None
+    return SensorFilterNoise(
+        "gyroscope" if sensor == "gyroscope" else "accelerometer", unit, found.N, found.K, known.get(sensor),
+        BiasModel("walk", 0.0), unlike_axes(own.axes, unit), is_only_static=True,
+    )  # fmt: skip
+
+
+def _tilt(recording: Recording, segments: Segments, known: Static) -> TiltCheck | None:
+    scale = rate_to_si(recording.gyroscope_unit)
+    if recording.gyroscope is None or scale is None or "gyroscope" not in known:
+        return None
+    rate = np.nan_to_num(recording.gyroscope * scale)
+    return tilt_over_moves(recording.with_distinct_timestamps().time_s, rate, segments, known["gyroscope"])
+
+
+def _noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
+    out = []
+    for one in sensors:
+        if one.static is None:
+            out.append(Finding.of(FindingCode.FILTER_NOISE_NO_STATIC, sensor=one.sensor))
+        mixed = one.reference is not None and (one.K.is_limit or one.reference.slow.is_limit)
+        if mixed:
+            out.append(Finding.of(FindingCode.FILTER_NOISE_NOT_SEPARATED, sensor=one.sensor))
+        tested = [c for c in one.consistency if c.n_apart >= 3]
+        worst = next((c for c in tested if not CONSISTENT[0] <= c.nees <= CONSISTENT[1]), None)
+        if worst is not None:
+            out.append(
+                Finding.of(
+                    FindingCode.FILTER_NOISE_INCONSISTENT, sensor=one.sensor, nees=worst.nees, horizon_s=worst.horizon_s
+                )
+            )
+    return tuple(out)

@@ -1,0 +1,183 @@
+"""Calibrate by Kalman filter: in known attitudes where there is a pose table, by the length of gravity otherwise."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from trihedron.api.asking import WrongTypeError
+from trihedron.api.choices import settle_gravity
+from trihedron.api.reading import AnyRecording, recording_of, segments_of
+from trihedron.channel_facts.at_rest import SHORTEST as SHORTEST_POSE
+from trihedron.errors import RefusedError
+from trihedron.estimate.kalman import (
+    NormFrame,
+    calibrate_session,
+    calibrate_session_without_references,
+    check_same_converter,
+    check_same_gravity,
+    noise_from_identified,
+)
+from trihedron.estimate.noise import identify_noise, noise_of_poses
+from trihedron.read import read_axis_noise, read_pose_table, read_recording
+from trihedron.records import (
+    AxisNoise,
+    Calibration,
+    Finding,
+    KalmanCalibration,
+    NormKalmanCalibration,
+    PoseTable,
+    Recording,
+    Segments,
+    Severity,
+)
+from trihedron.records.noise import Noise
+from trihedron.records.presented import Presented
+from trihedron.records.progress import Progress
+from trihedron.sanitise import one_line
+
+NoiseSource = AxisNoise | Sequence[AxisNoise] | Noise | str | os.PathLike[str]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class KalmanResult(Presented):
+    """What the filter found, with the segments and the recording that it was made from. ``print`` gives the report."""
+
+    outcome: KalmanCalibration | NormKalmanCalibration
+    calibration: Calibration
+    segments: Segments
+    recording: Recording
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Everything noticed, by every stage."""
+        return self.calibration.findings
+
+    @property
+    def is_trustworthy(self) -> bool:
+        """No serious finding."""
+        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
+
+    def __repr__(self) -> str:
+        return f"<KalmanResult of {one_line(self.recording.source)}: {self.calibration.accelerometer.method}>"
+
+    def __str__(self) -> str:
+        from trihedron.report import kalman_report, to_text
+
+        return to_text(kalman_report(self.outcome, self.calibration))
+
+
+def kalman(
+    recording: AnyRecording,
+    reference: PoseTable | str | os.PathLike[str] | None = None,
+    *,
+    segments: Segments | None = None,
+    gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
+    sigma_angle_deg: float = 0.0,
+    noise: NoiseSource | None = None,
+    frame: NormFrame = "lower",
+    progress: Progress | None = None,
+) -> KalmanResult:
+    """Calibrate the accelerometer by Kalman filter with its noise in the state (docs/kalman.md).
+
+    Parameters
+    ----------
+    recording : Recording, or what trihedron.read takes
+        The log of poses.
+    reference : PoseTable or file, optional
+        Attitudes of the poses: pitch and roll, or directions. Without it the length of gravity must do.
+    sigma_angle_deg : float
+        Standard error of the angles in the file.
+    noise : AxisNoise, three of them, Noise, or file
+        Noise of the raw readings: as written down (a JSON file), as identified, or a static log to identify it from.
+        Without it, what is seen inside the poses.
+    frame : "lower" or "symmetric"
+        Body frame where there is no reference; with one it is the frame of the reference.
+
+    Returns
+    -------
+    KalmanResult
+        ``calibration`` of the accelerometer with the track of its constants, pose by pose.
+
+    Raises
+    ------
+    ValueError
+        When the question cannot be answered; one sentence says why and what to do.
+    """
+    gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
+    recording = recording_of(recording)
+    table = reference
+    if table is not None and not isinstance(table, PoseTable | str | os.PathLike):
+        raise WrongTypeError(f"a reference is a pose table or the name of its file, not {type(table).__name__}.")
+    if isinstance(table, str | os.PathLike):
+        table = read_pose_table(table, gravity_m_s2=gravity, sigma_angle_deg=sigma_angle_deg)
+    given, noted, identified = _settle_noise(noise, recording)
+    segments = segments_of(segments, recording, progress)
+    if identified is not None and isinstance(given, Sequence):
+        _check_converter(given, recording, segments)
+    outcome: KalmanCalibration | NormKalmanCalibration
+    if table is None:
+        outcome = calibrate_session_without_references(
+            recording, segments, gravity_m_s2=gravity, noise=given, frame=frame
+        )
+    else:
+        outcome = calibrate_session(recording, segments, table, noise=given)
+    if identified is not None:
+        check_same_gravity(identified.axes, outcome.accelerometer, gravity)
+    findings = (*said, *noted, *recording.findings, *segments.findings, *outcome.findings)
+    calibration = Calibration(
+        accelerometer=outcome.accelerometer,
+        gyroscope=None,
+        covariance=outcome.accelerometer.covariance,
+        frame=frame if table is None else "case",
+        gravity_m_s2=gravity,
+        gravity_source=source,
+        recording_source=recording.source,
+        recording_sha256=recording.sha256,
+        findings=findings,
+    )
+    return KalmanResult(replace(outcome, findings=findings), calibration, segments, recording)
+
+
+def _settle_noise(
+    noise: NoiseSource | None, recording: Recording
+) -> tuple[AxisNoise | Sequence[AxisNoise] | None, tuple[Finding, ...], Noise | None]:
+    """Noise in raw units, what was noticed while it was identified, and what was identified from a log."""
+    if isinstance(noise, str | os.PathLike):
+        if os.fspath(noise).lower().endswith(".json"):
+            return read_axis_noise(noise), (), None
+        noise = _identify(read_recording(noise))
+    if isinstance(noise, Noise):
+        noticed = [*noise.findings, *(finding for axis in noise.axes for finding in axis.findings)]
+        weighty = tuple(finding for finding in noticed if finding.severity is not Severity.NOTE)
+        return noise_from_identified(noise.axes, recording.accelerometer_unit), weighty, noise
+    is_axes = isinstance(noise, Sequence) and all(isinstance(axis, AxisNoise) for axis in noise)
+    if noise is not None and not isinstance(noise, AxisNoise) and not is_axes:
+        raise WrongTypeError(f"noise is what trihedron.noise found, or the name of a file, not {type(noise).__name__}.")
+    return noise, (), None
+
+
+def _check_converter(given: Sequence[AxisNoise], recording: Recording, segments: Segments) -> None:
+    """Refuse the noise of a static log that another ADC wrote."""
+    readings = recording.accelerometer
+    if readings is None or not segments.poses:
+        return
+    windows = [(pose.start, pose.stop) for pose in segments.poses if pose.stop - pose.start >= SHORTEST_POSE]
+    if not windows:
+        return
+    inside = noise_of_poses(readings, recording.rate_hz, windows)
+    # Codes between the poses count too: inside a hold a coarse ADC shows one.
+    steps = recording.facts.of("accelerometer").step.tolist()
+    octaves = [axis.octaves for axis in inside]
+    check_same_converter(given, steps, octaves, recording.rate_hz, recording.source)
+
+
+def _identify(rest: Recording) -> Noise:
+    if rest.accelerometer is None:
+        raise RefusedError(f"{rest.source}: there is no accelerometer whose noise could be identified in this log")
+    unit = rest.accelerometer_unit.value
+    names = ("accelerometer x", "accelerometer y", "accelerometer z")
+    return identify_noise(rest.accelerometer, rest.rate_hz, names=names, units=(unit, unit, unit), source=rest.source)

@@ -1,0 +1,327 @@
+"""Where a guided session stands, by the same verbs as ever: segment, calibrate, and the covariance run ahead.
+
+The one place where the guide meets the estimators: whatever `calibrate` does inside, only its covariances are used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from trihedron.api.calibrating import calibrate
+from trihedron.api.planning_poses import (
+    Known,
+    best_next,
+    move_rows,
+    path_of,
+    poses_needed,
+    shortest_path,
+    sigma_of,
+)
+from trihedron.api.reading import segment
+from trihedron.api.results import CalibrationResult, VerificationResult
+from trihedron.api.verifying import verify
+from trihedron.arrays import FloatArray
+from trihedron.errors import REFUSALS
+from trihedron.estimate.accelerometer.poses import ENTRIES, design_rows, parameter_names, pose_in_words
+from trihedron.records import Calibration, FindingCode, Recording, Segments, Severity
+from trihedron.records.guiding import LEAST_POSES, Accuracy, Examination, Uncertain
+from trihedron.sensor_model import in_frame
+from trihedron.units import (
+    STANDARD_GRAVITY_M_S2,
+    acceleration_to_si,
+    degrees_from_radians,
+    mg_from_m_s2,
+    rate_to_si,
+)
+
+PRIOR = 0.1
+"""What is believed of a board before its first pose: scales within 10 %, axes within 0.1 rad, zeros within 0.1 g."""
+
+SHORTEST_POSE_S, LONGEST_POSE_S = 3.0, 12.0
+USUAL_POSE_S = 4.0
+_NOT_THE_FIT = (FindingCode.GRAVITY_DEFAULTED, FindingCode.UNIT_CONTRADICTED)
+POSES_PER_GOAL = 2.5
+"""A pose's own error may be so many times the accuracy wanted: a dozen poses average the rest away."""
+
+GYRO_NAMES = tuple(
+    f"scale of {'XYZ'[i]}" if i == j else f"{'XYZ'[j]} into {'XYZ'[i]}" for i in range(3) for j in range(3)
+)
+
+
+def examine(
+    recording: Recording, accuracy: Accuracy, *, gravity_m_s2: float = STANDARD_GRAVITY_M_S2, look_ahead: bool = True
+) -> Examination:
+    """Poses so far, every parameter's uncertainty now and after the next pose, and which pose that should be.
+
+    ``look_ahead`` also counts the poses that are still needed. Never raises for too few poses: what is unknown is None.
+    """
+    segments = segment(recording)
+    calibration = _calibration(recording, segments, gravity_m_s2)
+    centre, matrix = _rough_model(recording, segments, calibration)
+    up = _unit((_means(segments) - centre) @ matrix.T)
+    known = _known(recording, segments, calibration, up, matrix, gravity_m_s2)
+    now_a, now_g = _now(calibration, gravity_m_s2)
+    # What the covariance of the fit adds to the plan's own (noise underrated, correlated poses) goes on to hold.
+    ratio_a = _ratio(now_a, known.accelerometer)
+    ratio_g = 1.0 if known.gyroscope is None else _ratio(now_g, known.gyroscope)
+    wanted = np.concatenate([np.full(9, accuracy.accelerometer), np.full(9, accuracy.gyroscope)])
+    factor = np.concatenate([np.full(9, ratio_a), np.full(9, ratio_g)])
+    best, future = best_next(known, wanted, factor)
+    after = sigma_of(future) * factor
+    now = np.concatenate([now_a, now_g])
+    shortfall = float(
+        np.max(np.where(np.isfinite(now), now / wanted, np.inf)[: 18 if known.gyroscope is not None else 9])
+    )
+    needed = poses_needed(known, wanted, factor, shortfall) if look_ahead else None
+    if needed is not None:
+        needed = max(needed, LEAST_POSES - len(up))
+    uncertain = _uncertain(now, after, wanted, has_gyroscope=known.gyroscope is not None)
+    return Examination(
+        poses_up=up,
+        uncertain=uncertain,
+        shortfall=shortfall,
+        next_up=best,
+        next_words=pose_in_words(best),
+        why=_why(uncertain),
+        poses_needed=needed,
+        pose_s=_pose_s(known, accuracy, segments),
+        warnings=(*_doubts(calibration), *_warnings(recording, segments))[:4],
+        rate_hz=recording.rate_hz,
+        doubts=_doubts(calibration),
+        noise=_noise(recording, segments, matrix, calibration),
+        centre=centre,
+        matrix=matrix,
+    )
+
+
+def part_of(recording: Recording, start_s: float, stop_s: float) -> Recording:
+    """The samples with ``start_s <= time < stop_s``, as a recording of its own that starts at zero."""
+    first, last = (int(i) for i in np.searchsorted(recording.time_s, [start_s, stop_s]))
+    rows = slice(first, max(last, first + 1))
+
+    def cut(values: FloatArray | None) -> FloatArray | None:
+        return None if values is None else values[rows]
+
+    return replace(
+        recording,
+        time_s=recording.time_s[rows] - recording.time_s[rows][0],
+        accelerometer=cut(recording.accelerometer),
+        gyroscope=cut(recording.gyroscope),
+        temperature_degc=cut(recording.temperature_degc),
+        supply_v=cut(recording.supply_v),
+        sha256="",
+        auxiliary=type(recording.auxiliary)({}),
+    )
+
+
+def conclude(
+    recording: Recording,
+    cut_s: float | None,
+    *,
+    gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
+) -> tuple[CalibrationResult, VerificationResult | None]:
+    """Calibrate from what came before ``cut_s`` and verify on the poses held back after it.
+
+    Raises
+    ------
+    ValueError
+        When no calibration can be made.
+    """
+    before = recording if cut_s is None else part_of(recording, -np.inf, cut_s)
+    result = calibrate(before, gravity_m_s2=gravity_m_s2, latitude_deg=latitude_deg, height_m=height_m)
+    if cut_s is None or cut_s >= recording.time_s[-1]:
+        return result, None
+    # The last pose of the calibration is where the first move of the check starts.
+    last = before.time_s[result.segments.poses[-1].start] + before.time_s[0] if result.segments.n_poses else cut_s
+    held_back = part_of(recording, float(last), np.inf)
+    segments = segment(held_back)
+    # A check of three poses is no calibration: that it has few is as it should be.
+    kept = tuple(finding for finding in segments.findings if finding.code is not FindingCode.FEW_POSES)
+    try:
+        return result, verify(result.calibration, held_back, segments=replace(segments, findings=kept))
+    except REFUSALS:
+        return result, None
+
+
+def _means(segments: Segments) -> FloatArray:
+    return np.zeros((0, 3)) if segments.accelerometer_mean is None else segments.accelerometer_mean
+
+
+def _calibration(recording: Recording, segments: Segments, gravity: float) -> Calibration | None:
+    if segments.n_poses < 6:
+        return None
+    try:
+        made = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
+    except REFUSALS:
+        return None
+    return in_frame(made, "lower")
+
+
+def _is_determined(calibration: Calibration | None) -> bool:
+    if calibration is None:
+        return False
+    observability = calibration.accelerometer.observability
+    return observability is not None and observability.rank >= 9
+
+
+def _rough_model(
+    recording: Recording, segments: Segments, calibration: Calibration | None
+) -> tuple[FloatArray, FloatArray]:
+    """(centre (3,), matrix (3, 3)) that turn a raw reading into a vector along up."""
+    if calibration is not None and _is_determined(calibration):
+        S = calibration.accelerometer.S
+        centre: FloatArray = np.asarray(-np.linalg.solve(S, calibration.accelerometer.b), dtype=np.float64)
+        return centre, S
+    means = _means(segments)
+    readings = recording.accelerometer
+    if readings is None or acceleration_to_si(recording.accelerometer_unit) is not None:
+        return np.zeros(3), np.eye(3)
+    lowest, highest = float(np.nanmin(readings)), float(np.nanmax(readings))
+    if lowest >= 0.0:
+        # An ADC without sign: zero lies near the middle of its range.
+        bits = max(int(np.ceil(np.log2(highest + 1.0))), 1)
+        return np.full(3, 2.0 ** (bits - 1)), np.eye(3)
+    if len(means) >= 6:
+        return 0.5 * (means.min(axis=0) + means.max(axis=0)), np.eye(3)
+    return np.zeros(3), np.eye(3)
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    out: FloatArray = vectors / np.where(length > 0.0, length, 1.0)
+    return out
+
+
+def _known(
+    recording: Recording,
+    segments: Segments,
+    calibration: Calibration | None,
+    up: FloatArray,
+    matrix: FloatArray,
+    gravity: float,
+) -> Known:
+    """The plan's own covariances, from where the poses lie, how the moves went and the noise: known at any moment."""
+    relative = np.full(len(up), 1e-3)
+    if segments.norm_sigma is not None and len(up):
+        length = np.linalg.norm((_means(segments) - _centre_of(segments, up)) @ matrix.T, axis=1)
+        size = gravity if _is_determined(calibration) else float(np.median(length)) or 1.0
+        relative = np.sqrt(np.mean((segments.norm_sigma @ np.abs(matrix).T) ** 2, axis=1)) / size
+    relative = np.maximum(relative, 1e-6)
+    rows = design_rows(up) / relative[:, None] if len(up) else np.zeros((0, 9))
+    accelerometer = np.linalg.inv(rows.T @ rows + np.eye(9) / PRIOR**2)
+    pose = float(np.median(relative)) if len(relative) else 1e-3
+    if recording.gyroscope is None:
+        return Known(up, accelerometer, None, pose, pose)
+    scale = rate_to_si(recording.gyroscope_unit)
+    S = None if scale is None else scale * np.eye(3)
+    if calibration is not None and calibration.gyroscope is not None:
+        S = calibration.gyroscope.S
+    noise = 0.0
+    if S is not None and segments.gyroscope_sigma is not None:
+        step = 1.0 / recording.rate_hz
+        noise = float(np.nanmean(np.abs(np.diag(S)) * segments.gyroscope_sigma)) * step * np.sqrt(2.0 / step)
+    sigma = float(np.hypot(np.sqrt(2.0) * pose, 0.0 if not np.isfinite(noise) else noise))
+    information = np.eye(9) / PRIOR**2
+    for move in segments.moves:
+        path = path_of(recording, segments, S, move.pose_before, move.pose_after, move.start, move.stop)
+        path = shortest_path(up[move.pose_before], up[move.pose_after]) if path is None else path
+        design = move_rows(path, up[move.pose_after]) / sigma
+        information += design.T @ design
+    gyroscope: FloatArray = np.asarray(np.linalg.inv(information), dtype=np.float64)
+    return Known(up, accelerometer, gyroscope, pose, sigma)
+
+
+def _centre_of(segments: Segments, up: FloatArray) -> FloatArray:
+    means = _means(segments)
+    if len(means) < 4:
+        return np.zeros(3)
+    # Mean reading = centre + size · up: two numbers per axis by least squares.
+    design = np.column_stack([np.ones(len(up) * 3), up.ravel()])
+    offset = np.linalg.lstsq(design, means.ravel(), rcond=None)[0][0]
+    return np.full(3, float(offset))
+
+
+def _now(calibration: Calibration | None, gravity: float) -> tuple[FloatArray, FloatArray]:
+    """Relative standard errors by the fit: accelerometer (9,), gyro (9,); NaN where it does not tell."""
+    nan = np.full(9, np.nan)
+    if calibration is None or not _is_determined(calibration):
+        return nan, nan
+    sensor = calibration.accelerometer
+    sigma = np.sqrt(np.maximum(np.diag(sensor.covariance), 0.0))
+    scale = np.linalg.norm(sensor.S, axis=0)
+    matrix = sigma[:9].reshape(3, 3) / scale
+    accelerometer = np.array([*(matrix[j, k] for j, k in ENTRIES), *(sigma[9:] / gravity)])
+    gyroscope = calibration.gyroscope
+    if gyroscope is None or (gyroscope.observability is not None and gyroscope.observability.rank < 9):
+        return accelerometer, nan
+    size = np.linalg.norm(gyroscope.S, axis=0)
+    errors = np.sqrt(np.maximum(np.diag(gyroscope.covariance)[:9], 0.0)).reshape(3, 3) / size
+    return accelerometer, errors.ravel()
+
+
+def _ratio(now: FloatArray, covariance: FloatArray) -> float:
+    if not np.all(np.isfinite(now)):
+        return 1.0
+    return float(np.clip(np.median(now / np.sqrt(np.diag(covariance))), 0.2, 20.0))
+
+
+def _uncertain(now: FloatArray, after: FloatArray, wanted: FloatArray, *, has_gyroscope: bool) -> tuple[Uncertain, ...]:
+    names = [*(("accelerometer", name) for name in parameter_names()), *(("gyro", name) for name in GYRO_NAMES)]
+
+    def number(value: float) -> float | None:
+        return float(value) if np.isfinite(value) else None
+
+    return tuple(
+        Uncertain(sensor, name, number(now[i]), number(after[i]), float(wanted[i]))
+        for i, (sensor, name) in enumerate(names[: 18 if has_gyroscope else 9])
+    )
+
+
+def _why(uncertain: tuple[Uncertain, ...]) -> str:
+    worst = max(uncertain, key=lambda one: (np.inf if one.now is None else one.now) / one.wanted)
+    if worst.now is None:
+        open_ones = [one for one in uncertain if one.now is None]
+        after = max(open_ones, key=lambda one: (one.after_next or 0.0) / one.wanted)
+        count = f"{len(open_ones)} of {len(uncertain)} parameters"
+        return f"Not yet determined: {count}, {after.sensor} {after.name} the worst."
+    then = "" if worst.after_next is None else f"; this pose brings it to {100 * worst.after_next:.2g} %"
+    return f"Worst is {worst.sensor} {worst.name}: {100 * worst.now:.2g} %, wanted {100 * worst.wanted:.2g} %{then}."
+
+
+def _pose_s(known: Known, accuracy: Accuracy, segments: Segments) -> float:
+    """Long enough that one pose is known to a few times what is wanted; noise falls with the root of the time."""
+    held = float(np.median(segments.duration_s)) if segments.n_poses else USUAL_POSE_S
+    excess = known.pose_sigma / (POSES_PER_GOAL * accuracy.accelerometer)
+    return float(np.clip(held * excess**2, SHORTEST_POSE_S, LONGEST_POSE_S))
+
+
+def _warnings(recording: Recording, segments: Segments) -> tuple[str, ...]:
+    quiet = {"few-poses", "unit-detected", "no-initial-pose"}
+    found = [*recording.findings, *segments.findings]
+    return tuple(f.seen for f in found if f.severity is not Severity.NOTE and f.code.value not in quiet)[:4]
+
+
+def _doubts(calibration: Calibration | None) -> tuple[str, ...]:
+    if calibration is None:
+        return ()
+    return tuple(f.seen for f in calibration.findings if f.severity is Severity.SERIOUS and f.code not in _NOT_THE_FIT)
+
+
+def _noise(recording: Recording, segments: Segments, matrix: FloatArray, calibration: Calibration | None) -> str:
+    parts = []
+    sigma = segments.accelerometer_sigma
+    scale = acceleration_to_si(recording.accelerometer_unit) or (1.0 if _is_determined(calibration) else 0.0)
+    if sigma is not None and scale:
+        size = float(np.mean(np.abs(np.diag(matrix)) * sigma)) * (1.0 if _is_determined(calibration) else scale)
+        parts.append(f"accel {mg_from_m_s2(size):.2g} mg")
+    if segments.gyroscope_sigma is not None:
+        rate = rate_to_si(recording.gyroscope_unit)
+        if calibration is not None and calibration.gyroscope is not None:
+            rate = float(np.mean(np.abs(np.diag(calibration.gyroscope.S))))
+        if rate:
+            parts.append(f"gyro {degrees_from_radians(rate * float(np.mean(segments.gyroscope_sigma))):.2g} deg/s")
+    return ", ".join(parts)

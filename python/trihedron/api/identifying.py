@@ -1,0 +1,214 @@
+"""Noise of a static log: identified from a recording, or from a file read in pieces."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.api.reading import AnyRecording, recording_of
+from trihedron.errors import RefusedError
+from trihedron.estimate.noise.from_curve import identify_curve
+from trihedron.estimate.noise.grid import readings_of, refuse_size_of_a_unit
+from trihedron.estimate.noise.identify import identify_noise
+from trihedron.estimate.noise.planning import recording_length_s
+from trihedron.estimate.noise.streamed import stream_noise
+from trihedron.files.checkpoint import Checkpoint, made_of
+from trihedron.read.allan_table import read_allan_table
+from trihedron.read.chunks import open_chunks
+from trihedron.read.errors import ReadError
+from trihedron.records import Noise, TermName
+from trihedron.units import (
+    AccelerationUnit,
+    RateUnit,
+    acceleration_lsb_to_si,
+    acceleration_to_si,
+    rate_lsb_to_si,
+    rate_to_si,
+)
+
+IN_MEMORY_BYTES = 1 << 29
+"""A log up to this size is taken whole even when it is read in pieces: events can then be found and left out."""
+
+
+def noise(
+    recording: AnyRecording,
+    *,
+    exclude_s: Sequence[tuple[float, float]] = (),
+    automatic: bool = True,
+    clusters: Sequence[int] | None = None,
+    accelerometer_lsb: str | None = None,
+    gyroscope_lsb: str | None = None,
+) -> Noise:
+    """Noise terms of every axis of a static recording, in SI units where the log tells them (docs/noise.md).
+
+    ``accelerometer_lsb`` and ``gyroscope_lsb`` say the size of a count of a log in counts, as in ``"0.05 deg/s"``.
+
+    Returns
+    -------
+    Noise
+        Q, N, B, K and R of every axis with 95 % intervals, and the best averaging time.
+
+    Raises
+    ------
+    ValueError
+        When the log is too short or has too many gaps; one sentence says why and what to do.
+    """
+    recording = recording_of(recording)
+    readings, names, units = readings_of(
+        recording,
+        None if gyroscope_lsb is None else rate_lsb_to_si(gyroscope_lsb),
+        None if accelerometer_lsb is None else acceleration_lsb_to_si(accelerometer_lsb),
+    )
+    found = identify_noise(
+        readings,
+        recording.rate_hz,
+        names=names,
+        units=units,
+        exclude_s=exclude_s,
+        automatic=automatic,
+        clusters=clusters,
+        source=recording.source,
+    )
+    # What the log is said to be comes before what its noise is.
+    return replace(found, findings=(*recording.findings, *found.findings))
+
+
+def noise_of_file(
+    path: str | os.PathLike[str],
+    *,
+    columns: str,
+    rate_hz: float,
+    accelerometer_unit: str | AccelerationUnit | None = None,
+    gyroscope_unit: str | RateUnit | None = None,
+    accelerometer_lsb: str | None = None,
+    gyroscope_lsb: str | None = None,
+    exclude_s: Sequence[tuple[float, float]] = (),
+    automatic: bool = True,
+    checkpoint: str | os.PathLike[str] | None = None,
+) -> Noise:
+    """Noise of a .npy, Parquet or text log of any size in bounded memory; what its columns are is said, not judged.
+
+    Up to half a gigabyte the log is read whole; beyond, it is read in one pass (:func:`stream_noise`), which leaves
+    nothing out. With ``checkpoint`` that file keeps every half a minute how far the pass is; a run that was stopped
+    goes on from it, to the same bits, and the end removes it.
+
+    Raises
+    ------
+    ValueError
+        When file, columns, stretches to leave out, sizes of counts or ``checkpoint`` do not fit one another.
+    """
+    log = open_chunks(Path(path), columns)
+    factor, names, units = [], [], []
+    for role in log.roles:
+        if role[0] == "g":
+            rate_unit = RateUnit(gyroscope_unit or "counts")
+            scale = rate_to_si(rate_unit) if gyroscope_lsb is None else rate_lsb_to_si(gyroscope_lsb)
+            printed, si = rate_unit.value, "rad/s"
+            refuse_size_of_a_unit("gyro", printed, None if gyroscope_lsb is None else scale)
+        else:
+            force_unit = AccelerationUnit(accelerometer_unit or "counts")
+            scale = (
+                acceleration_to_si(force_unit)
+                if accelerometer_lsb is None
+                else acceleration_lsb_to_si(accelerometer_lsb)
+            )
+            printed, si = force_unit.value, "m/s^2"
+            refuse_size_of_a_unit("accel", printed, None if accelerometer_lsb is None else scale)
+        names.append(f"{'gyro' if role[0] == 'g' else 'accel'} {role[1]}")
+        units.append(printed if scale is None else si)
+        factor.append(1.0 if scale is None else scale)
+    scales = np.array(factor)
+    is_scaled = bool(np.any(scales != 1.0))
+
+    def scaled(part: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        return part * scales if is_scaled else part
+
+    if 8 * log.n_rows * len(log.roles) <= IN_MEMORY_BYTES:
+        return identify_noise(
+            scaled(log.whole()),
+            rate_hz,
+            names=names,
+            units=units,
+            exclude_s=exclude_s,
+            automatic=automatic,
+            source=str(path),
+        )
+    if exclude_s:
+        raise RefusedError(
+            f"{path}: nothing can be excluded from a log that is read in one pass; cut the file instead."
+        )
+
+    kept = None
+    if checkpoint is not None:
+        kept = Checkpoint(Path(checkpoint), made_of(log.path, "allan", rate_hz, log.roles, factor))
+    done, state = kept.load() if kept else (0, {})
+
+    def parts() -> Iterator[npt.NDArray[np.float64]]:
+        for part in log.chunks(first=done):
+            yield scaled(part)
+
+    found = stream_noise(
+        parts(), rate_hz, n_samples=log.n_rows, names=names, units=units, source=str(path), state=state,
+        keep=kept.keep if kept else None,
+    )  # fmt: skip
+    if kept:
+        kept.remove()
+    return found
+
+
+def noise_of_curve(
+    path: str | os.PathLike[str],
+    *,
+    rate_hz: float | None = None,
+    n_samples: int | None = None,
+    accelerometer_unit: str | AccelerationUnit | None = None,
+    gyroscope_unit: str | RateUnit | None = None,
+) -> Noise:
+    """Noise terms of a table of Allan deviations, of which the log is not at hand (docs/noise.md, section 5).
+
+    ``rate_hz`` and ``n_samples`` are those of the log behind the curve, where the table does not state them. Channels
+    whose names begin with ``g`` or ``a`` take the unit said for the gyro or the accelerometer.
+
+    Raises
+    ------
+    ValueError
+        When the table is not recognised, too short, or does not state the log's rate and length.
+    """
+    table = read_allan_table(Path(path))
+    rate, length = rate_hz or table.rate_hz, n_samples or table.n_samples
+    if rate is None or length is None:
+        missing = " and ".join(
+            w for w, v in (("rate (--rate HZ)", rate), ("length (--samples N)", length)) if v is None
+        )
+        raise ReadError(f"{path}: the table does not state the log's {missing}; how certain a point is depends on it.")
+    deviation, units = table.deviation.copy(), list(table.units)
+    for c, name in enumerate(table.names):
+        scale: float | None = None
+        first = name[:1].lower()
+        if first == "g" and (gyroscope_unit or units[c] in {unit.value for unit in RateUnit}):
+            scale, si = rate_to_si(RateUnit(gyroscope_unit or units[c])), "rad/s"
+        elif first == "a" and (accelerometer_unit or units[c] in {unit.value for unit in AccelerationUnit}):
+            scale, si = acceleration_to_si(AccelerationUnit(accelerometer_unit or units[c])), "m/s^2"
+        if scale is not None:
+            deviation[:, c] *= scale
+            units[c] = si
+    return identify_curve(table.tau_s, deviation, rate, length, names=table.names, units=tuple(units), source=str(path))
+
+
+def recording_lengths(noise: Noise, relative: float) -> dict[str, dict[TermName, float | None]]:
+    """Seconds of recording after which each term present in each axis is known to ``relative``; None beyond a month.
+
+    Raises
+    ------
+    ValueError
+        When ``relative`` is no positive share.
+    """
+    return {
+        axis.name: {term: recording_length_s(axis, term, relative) for term in TermName if axis.terms[term].is_present}
+        for axis in noise.axes
+    }

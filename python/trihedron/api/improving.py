@@ -1,0 +1,272 @@
+"""A user's scenario against a recording: driven with its motion, compared, and written again with what was found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import tomllib
+
+from trihedron.api.comparing_moved import AIMED_AT
+from trihedron.api.comparing_noise import Sampled, sampled
+from trihedron.api.comparing_quantisation import white_and_quantisation
+from trihedron.api.comparing_ranges import SENSOR
+from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, flicker_of_poses
+from trihedron.api.results import DiagnosisResult
+from trihedron.diagnose.against import model_of_diagnosis
+from trihedron.estimate.noise import gain_of
+from trihedron.files.scenario import improved_scenario
+from trihedron.records.diagnosis import AcceptedEffect
+from trihedron.records.pose_noise import PoseNoise
+from trihedron.simulate import (
+    NoiseTerms,
+    Scenario,
+    Smoother,
+    diagnosed_sizes,
+    low_pass_like,
+    noise_of_octaves,
+    read_scenario,
+    scenario_from_table,
+)
+
+FEWEST_OCTAVES = 4
+N_FREQUENCIES = 256
+"""At which a filter is compared with what was seen: a sixteenth of an octave in the middle of the band."""
+
+
+@dataclass(frozen=True)
+class Improvement:
+    """The text of an improved scenario, and what could not be put into it, each with the reason.
+
+    ``unlike``: what ``poses`` (lengths of gravity) and ``moves`` (gravity carried through them) of the improved
+    scenario miss, rms, over what the recording's do, where that is outside ``AIMED_AT``.
+    """
+
+    text: str
+    left_out: Mapping[str, str]
+    unlike: Mapping[str, float] = field(default_factory=dict)
+
+
+def improve(
+    scenario: str | Path, found: DiagnosisResult, *, stage: Literal["numbers", "noise", "effects"] = "effects"
+) -> Improvement:
+    """The user's scenario file with numbers, noise, sampling and physics of the recording.
+
+    Only what differs is replaced; comments, order and all else stay. Effects that only the scenario has are taken out.
+    ``stage`` stops after the numbers, or after noise and sampling.
+
+    Raises
+    ------
+    ValueError
+        When the file is no scenario, or the diagnosis was not made against one.
+    """
+    given = read_scenario(scenario)
+    tables: dict[str, dict[str, Any]] = {"accelerometer": {}, "gyroscope": {}, "clock": {}, "environment": {}}
+    _numbers(tables, given, found)
+    _gravity(tables, given, found)
+    if stage == "numbers":
+        return Improvement(improved_scenario(scenario, tables, [], []), {})
+    _noise(tables, given, found)
+    if stage == "noise":
+        return Improvement(improved_scenario(scenario, tables, [], []), {})
+    ranged = _ranges(tables, given, found)
+    physics = [effect for effect in found.effects if effect.side == "recording" and effect.id not in ranged]
+    shared = {p.id for p in found.parameters if p.significant}
+    shared -= ranged
+    sizes, left_out = diagnosed_sizes(
+        [e.to_dict() for e in (*physics, *_shared(found, shared))], float(np.ptp(found.recording.time_s))
+    )
+    surplus = [*(effect.id for effect in found.effects if effect.side == "model"), *ranged]
+    text = improved_scenario(scenario, tables, sizes, surplus)
+    own = found.updated
+    if own is not None and own.gyroscope is not None:
+        beside = MovedAlike(found.recording, found.segments, own)
+        # What octaves called flicker and poses do not show goes first. Then poses: a force that is another in every
+        # pose also turns the gravity that moves are judged by.
+        for sensor, table, key, of in (
+            ("accelerometer", "noise", "B", flicker_of_poses),
+            ("accelerometer", "electronics", "bias_repeatability", bias_of_poses),
+            ("gyroscope", "electronics", "bias_in_moves", bias_in_moves),
+        ):
+            found_value = of(scenario_from_table(tomllib.loads(text)), beside)
+            if found_value is not None:
+                tables[sensor].setdefault(table, {})[key] = list(found_value)
+                text = improved_scenario(scenario, tables, sizes, surplus)
+        return Improvement(text, left_out, _unlike(scenario_from_table(tomllib.loads(text)), beside))
+    return Improvement(text, left_out)
+
+
+def _unlike(better: Scenario, beside: MovedAlike) -> dict[str, float]:
+    """What poses and moves of a scenario miss over what the recording's do, where that is not as good as one."""
+    made = dict(zip(("poses", "moves"), beside.missed(better), strict=True))
+    seen = {"poses": beside.poses, "moves": beside.moves}
+    ratios = {k: math.sqrt(m / s) for k, m in made.items() if m is not None and (s := seen[k]) is not None and s > 0.0}
+    return {key: ratio for key, ratio in ratios.items() if not AIMED_AT[0] <= ratio <= AIMED_AT[1]}
+
+
+def _of_poses(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
+    """Noise inside the recording's poses as terms and a low-pass, sensor by sensor: what its octaves show."""
+    recording = found.recording
+    seen = sampled(recording, found.segments.poses, model_of_diagnosis(found)).noise
+    out = {}
+    for name, axes in seen.items():
+        # The same octaves on all axes; at most those below half the rate.
+        bands = [o for o in axes[0].octaves if o.high_hz <= 0.5 * recording.rate_hz]
+        by_axis = [{o.low_hz: o.density for o in axis.octaves} for axis in axes]
+        bands = [o for o in bands if all(o.low_hz in one for one in by_axis)]
+        if len(bands) < FEWEST_OCTAVES:
+            continue
+        low_pass = _low_pass(axes)
+        rounding = np.array([axis.step**2 / (12.0 * recording.rate_hz) for axis in axes])
+        density = np.array([[one[o.low_hz].value for one in by_axis] for o in bands])
+        relative = np.array([[one[o.low_hz].sigma_log for one in by_axis] for o in bands])
+        out[str(name)] = noise_of_octaves(
+            np.array([(o.low_hz, o.high_hz) for o in bands]),
+            np.maximum(density - rounding, 1e-3 * density),
+            relative,
+            1.0 / recording.rate_hz,
+            low_pass,
+            _white(axes),
+        )
+    return out
+
+
+def white_and_quantisation_of(seen: Sampled, name: str) -> dict[str, list[float]]:
+    """N and Q of all axes of a sensor, as its octaves show them together; empty where some axis tells them not."""
+    axes = [white_and_quantisation(axis) for sensor, each in seen.noise.items() if sensor == name for axis in each]
+    known = [one for one in axes if one is not None]
+    if len(known) < len(axes):
+        return {}
+    return {
+        "N": [math.sqrt(one.white) for one in known],
+        "Q": [math.sqrt(one.quantisation) if one.is_shown else 0.0 for one in known],
+    }
+
+
+def _low_pass(axes: Sequence[PoseNoise]) -> Smoother | float | None:
+    """The low-pass whose gain is that of the filter seen on all axes, none where none was seen.
+
+    Where axes show unlike ones that colour is a hand's or a stand's too: roughly the corner [Hz] of most of them, for
+    the octaves to tell the shape; ``None`` where most show none.
+    """
+    rate = axes[0].rate_hz
+    seen = [(one.corner_hz.value, one.corner_shape) for one in axes if one.corner_hz is not None]
+    if not seen:
+        return Smoother()
+    if len(seen) < len(axes) or len(set(seen)) > 1:
+        mean = math.exp(sum(math.log(corner) for corner, _ in seen) / len(seen))
+        return mean if 2 * len(seen) > len(axes) else None
+    frequency_hz = rate * (np.arange(N_FREQUENCIES) + 0.5) / (2 * N_FREQUENCIES)
+    return low_pass_like(frequency_hz, gain_of(frequency_hz, *seen[0], rate), 1.0 / rate)
+
+
+def _white(axes: Sequence[PoseNoise]) -> list[tuple[float, float] | None]:
+    """N of every axis with its relative error, where all axes show one filter or none.
+
+    What lies below a corner of an axis' own is its motion.
+    """
+    if len({(one.corner_hz, one.corner_shape) for one in axes}) > 1:
+        return [None] * len(axes)
+    return [None if one.white is None else (one.white.value, one.white.sigma_log) for one in axes]
+
+
+def _shared(found: DiagnosisResult, ids: set[str]) -> list[AcceptedEffect]:
+    """Effects of both sides whose parameters differ: with the recording's values."""
+    return [effect for effect in found.own_effects if effect.id in ids]
+
+
+def _numbers(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:
+    moved = {p.id for p in found.parameters if p.significant}
+    fits = (("accelerometer", "accel", found.extended.accelerometer), ("gyroscope", "gyro", found.extended.gyroscope))
+    for name, prefix, fit in fits:
+        groups = {f"{prefix}-bias", f"{prefix}-scale", f"{prefix}-misalignment", "triad-alignment"}
+        # S and b of both sensors are in one frame: where one of them is replaced, both are.
+        scaled = {n.sensor for n in found.noise_compared if n.term in ("range", "unit") and n.significant}
+        if fit is None or not (moved & (groups | {"accel-misalignment", "gravity"}) or scaled):
+            continue
+        tables[name] |= {"S": np.array(fit["S"]), "b": np.array(fit["b"]), "unit": str(fit["raw_unit"])}
+        readings = getattr(found.recording, name)
+        if readings is not None and getattr(given, name).unit.value != fit["raw_unit"]:
+            # Codes of another unit: the ADC is that of the recording.
+            tables[name]["adc"] = {"lsb": found.recording.facts.of(name).common_step}
+
+
+def _gravity(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:
+    # Told apart only beyond what a latitude changes in its last printed digit.
+    if abs(given.environment.gravity - found.gravity_m_s2) > 1e-4:
+        tables["environment"]["gravity_m_s2"] = found.gravity_m_s2
+
+
+def _ranges(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> set[str]:
+    """Ranges of the recording's ADCs, where its readings end at them exactly; the effects that say so already.
+
+    An end that no reading came to is where the other one is. Channels with limits of their own, and limits that noise
+    has blurred, are none of an ADC: those stay an effect.
+    """
+    out = set()
+    for effect, name in SENSOR.items():
+        if getattr(found.recording, name) is None:
+            continue
+        facts = found.recording.facts.of(name)
+        unit = str(tables[name].get("unit", getattr(given, name).unit.value))
+        if not facts.limits or any(limit.sigma > 0.0 for limit in facts.limits):
+            continue
+        if unit != getattr(found.recording, f"{name}_unit").value:
+            continue
+        ends = {is_high: [one.value for one in facts.limits if one.is_high == is_high] for is_high in (False, True)}
+        if any(max(values) - min(values) > float(facts.step.max()) for values in ends.values() if values):
+            continue
+        # A word of bits goes one code further down than up.
+        code = float(facts.step.max()) if any(one.is_word for one in facts.limits) else 0.0
+        low = min(ends[False], default=-max(ends[True], default=0.0) - code)
+        high = max(ends[True], default=-low - code)
+        if not low < high:
+            continue
+        out.add(effect)
+        adc = getattr(given, name).adc
+        if (adc.low, adc.high) != (low, high):
+            tables[name].setdefault("adc", {}).update(low=low, high=high)
+    return out
+
+
+def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:
+    poses = _of_poses(found)
+    for name in ("accelerometer", "gyroscope"):
+        differing = [n for n in found.noise_compared if n.significant and n.sensor == name]
+        terms: dict[str, list[float]] = {}
+        had = getattr(given, name).noise
+        for n in differing:
+            if n.term in ("N", "B", "K", "Q") and n.recording is not None:
+                values = terms.setdefault(n.term, [float(v) for v in getattr(had, n.term)])
+                for axis in range(3) if not n.axis else ["xyz".index(n.axis)]:
+                    values[axis] = n.recording
+            elif n.term == "resolution" and n.recording is not None:
+                tables[name].setdefault("adc", {})["lsb"] = n.recording
+        # A scenario without noise is wrong where the recording shows some, however its poses happen to be found.
+        if name in poses and (not any(had.N) or any(n.term in ("octave", "bandwidth") for n in differing)):
+            noise, low_pass = poses[name]
+            terms["N"] = list(noise.N)
+            if low_pass.corner_hz > 0.0:
+                tables[name]["noise_filter"] = {"corner_hz": low_pass.corner_hz, "order": low_pass.order}
+            elif getattr(given, name).noise_filter.corner_hz > 0.0:
+                tables[name]["noise_filter"] = {"corner_hz": 0.0}
+            if "B" not in terms and any(noise.B):
+                terms["B"] = list(noise.B)
+        if "Q" in terms:
+            # What rises with frequency is in the white noise of neighbours: both from one fit, and no low-pass.
+            seen = sampled(found.recording, found.segments.poses, model_of_diagnosis(found))
+            both = white_and_quantisation_of(seen, name)
+            if both:
+                terms |= both
+                tables[name].pop("noise_filter", None)
+        if terms:
+            tables[name]["noise"] = terms
+    for n in found.noise_compared:
+        if n.significant and n.term == "rate" and n.recording is not None:
+            tables["clock"]["rate_hz"] = n.recording
+        elif n.significant and n.term == "jitter" and n.recording is not None:
+            tables["clock"] |= {"timestamp_jitter_s": n.recording, "jitter_s": 0.0}

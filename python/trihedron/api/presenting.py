@@ -1,0 +1,207 @@
+"""Results shown: which words, tables and figures belong to which record."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from trihedron.api.filtering import KalmanResult
+from trihedron.api.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
+from trihedron.api.sessions import SessionsResult
+from trihedron.errors import RefusedError
+from trihedron.files.calibration import calibration_document, plain
+from trihedron.files.output import OutputError, write_whole
+from trihedron.records import AllanCurve, Calibration, Noise, Recording, Segments, Verification
+from trihedron.records.filter_noise import FilterNoise
+from trihedron.records.plan import ExperimentPlan
+from trihedron.records.ranking import Ranking
+from trihedron.report import document, frames, machine, summaries
+from trihedron.report.calibration import calibration_report
+from trihedron.report.check import check_report
+from trihedron.report.diagnosis import diagnosis_report
+from trihedron.report.filter_noise import filter_noise_columns, filter_noise_record, filter_noise_report
+from trihedron.report.fragment import to_fragment
+from trihedron.report.kalman import kalman_record, kalman_report
+from trihedron.report.noise import noise_picture, noise_report
+from trihedron.report.noise_files import noise_record
+from trihedron.report.page import to_html
+from trihedron.report.plan import plan_record, plan_report
+from trihedron.report.ranking import ranking_record, ranking_report
+from trihedron.report.sessions import sessions_columns, sessions_record, sessions_report
+from trihedron.report.text import to_text
+from trihedron.report.verification import verification_report
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+REPORT_ENDINGS = (".html", ".txt", ".json")
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """How one kind of record is laid out, given to machines, and put into columns."""
+
+    document: Any
+    record: Any
+    columns: Any = None
+
+
+def _calibrated(result: Any) -> Any:
+    return machine.calibration_record(result.calibration, result.segments, result.recording)
+
+
+_KINDS: dict[type, _Shown] = {
+    CalibrationResult: _Shown(
+        lambda r: calibration_report(r.calibration, r.segments, r.recording),
+        _calibrated,
+        lambda r: frames.calibration_columns(r.calibration),
+    ),
+    VerificationResult: _Shown(
+        lambda r: verification_report(r.verification, r.segments, r.recording),
+        lambda r: machine.verification_record(r.verification),
+        lambda r: frames.verification_columns(r.verification),
+    ),
+    CheckResult: _Shown(
+        lambda r: check_report(r.recording, r.segments, r.calibration, r.findings),
+        lambda r: machine.check_record(r.recording, r.segments, r.calibration, r.findings),
+        lambda r: frames.segments_columns(r.segments),
+    ),
+    DiagnosisResult: _Shown(diagnosis_report, lambda r: r.to_dict(), frames.diagnosis_columns),
+    KalmanResult: _Shown(
+        lambda r: kalman_report(r.outcome, r.calibration),
+        lambda r: kalman_record(r.outcome, r.calibration),
+        lambda r: frames.calibration_columns(r.calibration),
+    ),
+    SessionsResult: _Shown(
+        lambda r: sessions_report(r.model), lambda r: sessions_record(r.model), lambda r: sessions_columns(r.model)
+    ),
+    Calibration: _Shown(calibration_report, calibration_document, frames.calibration_columns),
+    Ranking: _Shown(ranking_report, ranking_record),
+    Verification: _Shown(verification_report, machine.verification_record, frames.verification_columns),
+    Noise: _Shown(noise_report, noise_record, frames.noise_columns),
+    FilterNoise: _Shown(filter_noise_report, filter_noise_record, filter_noise_columns),
+    AllanCurve: _Shown(summaries.curve_summary, machine.curve_record, frames.curve_columns),
+    Recording: _Shown(summaries.recording_summary, machine.recording_record, frames.recording_columns),
+    Segments: _Shown(summaries.segments_summary, machine.poses_record, frames.segments_columns),
+    ExperimentPlan: _Shown(plan_report, plan_record),
+}
+
+
+def _kind(result: object) -> _Shown:
+    for known, shown in _KINDS.items():
+        if isinstance(result, known):
+            return shown
+    names = ", ".join(sorted(known.__name__ for known in _KINDS))
+    raise TypeError(f"{type(result).__name__} is no result of trihedron; there are {names}.")
+
+
+def as_dict(result: object) -> dict[str, Any]:
+    """See :meth:`trihedron.records.presented.Presented.to_dict`."""
+    made: dict[str, Any] = plain(_kind(result).record(result))
+    return made
+
+
+def as_frame(result: object, library: str) -> Any:
+    """See :meth:`trihedron.records.presented.Presented.to_dataframe`."""
+    return frames.made_by(library, _kind(result).columns(result))
+
+
+def as_text(result: object) -> str:
+    """The report of a result as plain text."""
+    return to_text(_kind(result).document(result))
+
+
+def as_html(result: object) -> str:
+    """The first screen of the report, as a notebook shows it."""
+    return to_fragment(_kind(result).document(result))
+
+
+def pictures(result: object) -> dict[str, document.Picture]:
+    """The figures of a result's report by name."""
+    found = {"allan": noise_picture(result)} if isinstance(result, Noise) else {}
+    laid_out = _kind(result).document(result)
+    every = [laid_out.lead, *(block for section in laid_out.sections for block in section.blocks)]
+    return found | {b.name: b for b in every if isinstance(b, document.Picture) and b.draw is not None}
+
+
+def plot(result: object, name: str | None = None, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
+    """A figure of a result's report: the first, or the one of that name; a notebook shows it, ``savefig`` writes it.
+
+    Parameters
+    ----------
+    result : a result of trihedron
+        Of any verb but ``demo``.
+    name : str, optional
+        Which figure; a wrong name lists those that there are.
+    ax : matplotlib Axes, or one for each panel
+        Where to draw; a figure of its own when not given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    TypeError
+        When it is no result.
+    ValueError
+        When there is no such figure, it has another number of panels, or matplotlib is not installed.
+    """
+    there = pictures(result)
+    chosen = next(iter(there), None) if name is None else name
+    if chosen is None or chosen not in there:
+        listed = ", ".join(repr(key) for key in there) or "none"
+        raise RefusedError(f"there is no figure {chosen!r} of this {type(result).__name__}; there are: {listed}.")
+    picture = there[chosen]
+    if ax is not None:
+        if picture.chart is None:
+            raise RefusedError(f"the figure {chosen!r} has a layout of its own: leave ax out.")
+        from trihedron.report.chart_figures import draw_onto
+
+        axes = list(ax) if isinstance(ax, Iterable) else [ax]
+        if not all(hasattr(one, "fill_between") for one in axes):
+            raise RefusedError(f"ax is matplotlib Axes, or a list of them, not {type(ax).__name__}.")
+        return draw_onto(picture.chart, axes)
+    assert picture.draw is not None
+    return picture.draw()
+
+
+def report(result: object, path: str | os.PathLike[str] | None = None, *, overwrite: bool = False) -> str:
+    """The whole report of a result as text, and as a file where ``path`` is given: .html with figures, .txt or .json.
+
+    Returns
+    -------
+    str
+        The whole report as text.
+
+    Raises
+    ------
+    TypeError
+        When it is no result.
+    ValueError
+        When the ending of the path names no format, or the file exists and may not be replaced.
+
+    Examples
+    --------
+    >>> trihedron.report(result).splitlines()[0]
+    'Calibration'
+    """
+    laid_out = _kind(result).document(result)
+    text = to_text(laid_out)
+    if path is None:
+        return text
+    ending = Path(path).suffix.lower()
+    if ending == ".html":
+        content = to_html(laid_out)
+    elif ending == ".txt":
+        content = text
+    elif ending == ".json":
+        content = machine.json_text(_kind(result).record(result))
+    else:
+        raise OutputError(f"{path}: the ending tells the format of a report; give {', '.join(REPORT_ENDINGS)}.")
+    write_whole(path, content, overwrite=overwrite)
+    return text

@@ -1,0 +1,189 @@
+"""Log in, audited recording out; recording in, poses out."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy.typing as npt
+
+from trihedron.api.wording import finding_in_python, in_python
+from trihedron.errors import RefusedError
+from trihedron.read import ReadError, read_recording
+from trihedron.records import Recording, Segments
+from trihedron.records.checked import WrongTypeError, number_of
+from trihedron.records.progress import Progress
+from trihedron.units import AccelerationUnit, RateUnit
+
+AnyRecording = object
+"""A recording, a result that holds one, or what :func:`read` takes: a file, arrays, a dictionary, a data frame."""
+
+
+def read(
+    path: Any = None,
+    *,
+    accelerometer_path: str | os.PathLike[str] | None = None,
+    gyroscope_path: str | os.PathLike[str] | None = None,
+    columns: str | None = None,
+    rate_hz: float | None = None,
+    accelerometer_unit: str | AccelerationUnit | None = None,
+    gyroscope_unit: str | RateUnit | None = None,
+    time_unit: str | None = None,
+    device: int | None = None,
+    topic: str | None = None,
+    instance: int | str | None = None,
+    progress: Progress | None = None,
+) -> Recording:
+    """Read and audit a log; the parameters are those of :func:`trihedron.read.read_recording`.
+
+    ``path`` is a file name, or readings in memory: an array (n, columns), also structured or masked; a dictionary of
+    arrays (n,) or (n, 3); a list of dictionaries, one per sample; a data frame of pandas, polars or Arrow. Names of
+    columns are understood as in a file; masked cells are missing readings. A recording comes back as it is.
+
+    Returns
+    -------
+    Recording
+        Raw readings on one time base, in the unit of the log, with findings about both.
+
+    Raises
+    ------
+    ReadError
+        (a ``ValueError``) one sentence naming file, line and remedy.
+
+    Examples
+    --------
+    >>> import numpy as np, trihedron
+    >>> rng = np.random.default_rng(1)
+    >>> a = rng.normal([0, 0, 9.8], 0.02, (500, 3))
+    >>> trihedron.read({"t": np.arange(500) / 100, "acc": a}).rate_hz
+    100.0
+    """
+    inside = getattr(path, "recording", path)
+    if isinstance(inside, Recording):
+        return inside
+    try:
+        recording = read_recording(
+            path,
+            accelerometer_path=accelerometer_path,
+            gyroscope_path=gyroscope_path,
+            columns=columns,
+            rate_hz=rate_hz,
+            accelerometer_unit=accelerometer_unit,
+            gyroscope_unit=gyroscope_unit,
+            time_unit=time_unit,
+            device=device,
+            topic=topic,
+            instance=instance,
+            progress=progress,
+        )
+    except ReadError as error:
+        raise ReadError(in_python(str(error))) from None
+    return recording.with_same_readings(findings=tuple(finding_in_python(finding) for finding in recording.findings))
+
+
+def of_arrays(
+    time_s: npt.ArrayLike | None,
+    accelerometer: npt.ArrayLike | None,
+    gyroscope: npt.ArrayLike | None,
+    *,
+    accelerometer_unit: str | AccelerationUnit,
+    gyroscope_unit: str | RateUnit,
+    rate_hz: float | None,
+    temperature_degc: npt.ArrayLike | None,
+    supply_v: npt.ArrayLike | None,
+) -> Recording:
+    """See :meth:`trihedron.Recording.from_arrays`."""
+    if time_s is None and rate_hz is None:
+        raise ReadError("from_arrays needs time_s (n,) in seconds, or rate_hz where the samples are evenly spaced.")
+    if accelerometer is None and gyroscope is None:
+        raise ReadError("from_arrays needs accelerometer (n, 3) or gyroscope (n, 3).")
+    import numpy as np
+
+    for name, given in (
+        *(("time_s", time_s), ("accelerometer", accelerometer), ("gyroscope", gyroscope)),
+        *(("temperature_degc", temperature_degc), ("supply_v", supply_v)),
+    ):
+        _check_even(name, given)
+    if rate_hz is not None:
+        number_of("rate_hz", rate_hz)
+    if time_s is not None and np.ndim(time_s) != 1:
+        raise ReadError(f"time_s must have shape (n,), got {np.shape(time_s)}.")
+    columns: dict[str, Any] = {} if time_s is None else {"time [s]": time_s}
+    mapping = ["time=time [s]"] if time_s is not None else ["time=none"]
+    for name, letter, readings in (("accelerometer", "a", accelerometer), ("gyroscope", "g", gyroscope)):
+        if readings is None:
+            continue
+        array: Any = np.ma.asanyarray(readings)
+        if array.ndim != 2 or array.shape[1] != 3:
+            raise ReadError(f"{name} must have shape (n, 3), got {array.shape}.")
+        columns |= {f"{name} {axis}": array[:, k] for k, axis in enumerate("xyz")}
+        mapping += [f"{letter}{axis}={name} {axis}" for axis in "xyz"]
+    for name, role, values in (("temperature", "temperature", temperature_degc), ("supply", "supply", supply_v)):
+        if values is not None:
+            columns[name] = values
+            mapping.append(f"{role}={name}")
+    return read(
+        columns,
+        columns=",".join(mapping),
+        rate_hz=rate_hz,
+        accelerometer_unit=None if accelerometer is None else accelerometer_unit,
+        gyroscope_unit=None if gyroscope is None else gyroscope_unit,
+    )
+
+
+def _check_even(name: str, given: Any) -> None:
+    import numpy as np
+
+    try:
+        np.ma.asanyarray(given)
+    except (TypeError, ValueError):
+        raise WrongTypeError(f"{name} is an array of numbers, and its rows have different lengths.") from None
+
+
+def recording_of(given: AnyRecording) -> Recording:
+    """A recording, whether it is one, belongs to a result, or is what :func:`read` takes (a file, arrays, a frame).
+
+    Raises
+    ------
+    ReadError
+        (a ``ValueError``) when it cannot be read, or is nothing of the kind.
+    """
+    if isinstance(given, Recording):
+        return given
+    return read(given)
+
+
+def segments_of(given: Segments | None, recording: Recording, progress: Progress | None = None) -> Segments:
+    """Segments as given, or found in the recording.
+
+    Raises
+    ------
+    ValueError
+        When what was given are no segments.
+    """
+    if given is None:
+        return segment(recording, progress=progress)
+    if not isinstance(given, Segments):
+        raise RefusedError(f"segments are what trihedron.segment(recording) gives, not {type(given).__name__}.")
+    return given
+
+
+def segment(recording: AnyRecording, *, progress: Progress | None = None) -> Segments:
+    """Static poses and the moves between them, separated by the sensor's own noise: nothing to set.
+
+    Returns
+    -------
+    Segments
+        ``poses`` and ``moves``, mean reading of every pose (n, 3) in raw units and its standard error.
+
+    Examples
+    --------
+    >>> poses = trihedron.segment(recording)
+    >>> poses.accelerometer_mean.shape == (poses.n_poses, 3)
+    True
+    """
+    recording = recording_of(recording)
+    # Loaded when it is needed: half of what a command that only reads would wait for.
+    from trihedron.segment import segment_recording
+
+    return segment_recording(recording, progress=progress)

@@ -1,0 +1,90 @@
+"""Several recordings of one unit, each beside known motion: one calibration, and what each reference says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from trihedron.api.choices import settle_gravity
+from trihedron.api.reading import AnyRecording, recording_of
+from trihedron.api.referring import AnyReference, calibration_by, motion_of
+from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
+from trihedron.estimate.reference import fit_references
+from trihedron.records import Calibration, Frame, Recording
+from trihedron.records.reference import AgainstReference, FitToReference
+
+
+@dataclass(frozen=True, eq=False)
+class ReferencesResult:
+    """The unit's ``calibration``; ``references`` hold what is each of the ``recordings``' own: bias, clock, error."""
+
+    calibration: Calibration
+    references: tuple[AgainstReference, ...]
+    recordings: tuple[Recording, ...]
+
+    def __str__(self) -> str:
+        from trihedron.report import to_text
+        from trihedron.report.reference import references_report
+
+        return to_text(references_report(self.calibration, self.references))
+
+
+def calibrate_references(
+    recordings: Sequence[AnyRecording],
+    references: Sequence[AnyReference],
+    *,
+    reference_columns: str | None = None,
+    frame: Frame | None = None,
+    gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
+) -> ReferencesResult:
+    """Calibrate one unit from recordings that each have a reference: S and effects are shared, biases are not.
+
+    The calibration's bias is the mean over the recordings, and how far it repeats counts in its uncertainty.
+
+    Returns
+    -------
+    ReferencesResult
+        The shared calibration, and what each recording says beside its reference.
+
+    Raises
+    ------
+    ValueError
+        When logs and references are not as many, or as :func:`trihedron.diagnose` with a reference.
+    """
+    if len(recordings) != len(references) or not recordings:
+        raise RefusedError(f"{len(recordings)} logs need as many references, not {len(references)}.")
+    gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
+    logs = tuple(recording_of(one) for one in recordings)
+    pairs = [(log, motion_of(one, reference_columns)) for log, one in zip(logs, references, strict=True)]
+    found = fit_references(pairs, gravity)
+    gyro = _with_repeatability([one.gyroscope for one in found])
+    forces = [one.accelerometer for one in found if one.accelerometer is not None]
+    first = replace(found[0], gyroscope=gyro, accelerometer=_averaged(forces) if forces else None)
+    calibration = calibration_by(first, logs[0], gravity, source, frame)
+    findings = (*said, *(finding for one in found for finding in one.findings))
+    return ReferencesResult(replace(calibration, findings=findings), found, logs)
+
+
+def _with_repeatability(fits: Sequence[FitToReference]) -> FitToReference:
+    """Shared S and the mean bias; the next recording's bias scatters as those of these."""
+    b = np.array([fit.b for fit in fits])
+    covariance = np.mean([fit.covariance for fit in fits], axis=0)
+    if len(fits) > 1:
+        covariance[9:, 9:] += np.diag(np.var(b, axis=0, ddof=1) * (1.0 + 1.0 / len(b)))
+    return replace(fits[0], b=b.mean(axis=0), covariance=covariance)
+
+
+def _averaged(fits: Sequence[FitToReference]) -> FitToReference:
+    """Weighted mean of S and b, wider by as much as the recordings disagree."""
+    theta: list[FloatArray] = [np.concatenate([fit.S.ravel(), fit.b]) for fit in fits]
+    weights = [np.linalg.pinv(fit.covariance, hermitian=True) for fit in fits]
+    covariance = np.linalg.pinv(np.sum(weights, axis=0), hermitian=True)
+    mean = covariance @ np.sum([w @ t for w, t in zip(weights, theta, strict=True)], axis=0)
+    chi2 = sum(float((t - mean) @ w @ (t - mean)) for w, t in zip(weights, theta, strict=True))
+    wide = max(1.0, chi2 / max(12 * (len(fits) - 1), 1))
+    return replace(fits[0], S=mean[:9].reshape(3, 3), b=mean[9:], covariance=wide * covariance)

@@ -1,0 +1,280 @@
+"""Known motion beside a log: what it says of both sensors, as a calibration and as a diagnosis."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from trihedron.api.asking import WrongTypeError
+from trihedron.api.reading import read
+from trihedron.diagnose.against import FittedModel, compare_numbers, model_of_calibration
+from trihedron.errors import RefusedError
+from trihedron.estimate.reference import ACCEPTED, fit_reference
+from trihedron.read import ReadError
+from trihedron.read.reference import of_recording, read_reference
+from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, SensorCalibration
+from trihedron.records.diagnosis import (
+    AcceptedEffect,
+    Candidate,
+    Diagnosis,
+    EffectParameter,
+    LinearModel,
+    ParameterDifference,
+    Verdict,
+)
+from trihedron.records.domains import DomainTest
+from trihedron.records.reference import AgainstReference, Estimate, ReferenceMotion
+from trihedron.sensor_model import in_frame
+from trihedron.units import acceleration_to_si
+
+AnyReference = ReferenceMotion | Recording | str | os.PathLike[str]
+
+NOMINAL_SCALE, NOMINAL_BIAS_M_S2 = 0.1, 0.5
+"""How wrong an accelerometer is that nobody calibrated: 10 % where only its reading at rest tells the scale."""
+
+
+def motion_of(reference: AnyReference, columns: str | None = None) -> ReferenceMotion:
+    """A reference from a file of attitude, rate or pose, or from the log of another unit that moved along.
+
+    Raises
+    ------
+    ReadError
+        (a ``ValueError``) one sentence: which file, what to do.
+    """
+    if isinstance(reference, ReferenceMotion):
+        return reference
+    if isinstance(reference, Recording):
+        return of_recording(reference)
+    if not isinstance(reference, str | os.PathLike):
+        raise WrongTypeError(f"a reference is a file, a recording or a motion, not {type(reference).__name__}.")
+    if columns is None:
+        try:
+            log = read(reference)
+        except ReadError:
+            return read_reference(reference)
+        is_named = not any(f.code is FindingCode.COLUMNS_ASSUMED for f in log.findings)
+        if is_named and log.accelerometer is not None and log.gyroscope is not None:
+            return replace(of_recording(log), findings=())
+    return read_reference(reference, columns)
+
+
+def held_against(
+    recording: Recording,
+    reference: AnyReference,
+    gravity: float,
+    *,
+    columns: str | None = None,
+    given: Calibration | None = None,
+) -> AgainstReference:
+    """Hold a log against a reference; ``given`` is a calibration whose replay is shown beside the reference's.
+
+    Raises
+    ------
+    ValueError
+        One sentence: what the two do not share, or what the reference cannot tell.
+    """
+    is_own = not isinstance(reference, ReferenceMotion | Recording) and os.path.abspath(reference) == os.path.abspath(
+        recording.source
+    )
+    motion = read_reference(reference, columns) if is_own else motion_of(reference, columns)  # type: ignore[arg-type]
+    known = None if given is None or given.gyroscope is None else (given.gyroscope.S, given.gyroscope.b)
+    found = fit_reference(recording, motion, gravity, given=known)
+    if is_own or (motion.sha256 and motion.sha256 == recording.sha256):
+        found = replace(found, findings=(*found.findings, _own_file()))
+    return found
+
+
+def _own_file() -> Finding:
+    return Finding.of(FindingCode.REFERENCE_OF_ITSELF)
+
+
+def calibration_by(
+    found: AgainstReference, recording: Recording, gravity: float, source: str, frame: Frame | None
+) -> Calibration:
+    """Both sensors as the reference says, in the lower frame, or (``case``) in the reference's body.
+
+    Raises
+    ------
+    ValueError
+        When the log has no accelerometer: a calibration file holds both.
+    """
+    if recording.accelerometer is None:
+        raise RefusedError(
+            f"{recording.source}: a calibration holds an accelerometer too, and this log has none; "
+            "`trihedron diagnose LOG --reference MOTION --json FILE` writes the gyro's parameters."
+        )
+    gyro = found.gyroscope
+    method = f"reference ({found.kind})"
+    gyroscope = SensorCalibration(gyro.S, gyro.b, gyro.covariance, recording.gyroscope_unit.value, "rad/s", method)
+    findings: tuple[Finding, ...] = (*recording.findings, *found.findings)
+    wanted: Frame = frame or "lower"
+    if found.accelerometer is not None:
+        force = found.accelerometer
+        accelerometer = SensorCalibration(
+            force.S, force.b, force.covariance, recording.accelerometer_unit.value, "m/s^2", method
+        )
+    else:
+        accelerometer, finding = _nominal(recording, gravity)
+        findings, wanted = (*findings, finding), "case"
+    covariance = np.zeros((24, 24))
+    covariance[:12, :12], covariance[12:, 12:] = accelerometer.covariance, gyroscope.covariance
+    calibration = Calibration(
+        accelerometer, gyroscope, covariance, "case", gravity, source, recording.source, recording.sha256, findings
+    )
+    return calibration if wanted == "case" else _without_rounding(in_frame(calibration, wanted))
+
+
+def _without_rounding(calibration: Calibration) -> Calibration:
+    """Entries of S that the lower frame makes zero have no uncertainty: what is left of one is rounding."""
+    if calibration.frame != "lower" or calibration.gyroscope is None:
+        return calibration
+    covariance = np.array(calibration.covariance)
+    fixed = [1, 2, 5]
+    covariance[fixed], covariance[:, fixed] = 0.0, 0.0
+    return replace(
+        calibration,
+        covariance=covariance,
+        accelerometer=replace(calibration.accelerometer, covariance=covariance[:12, :12]),
+    )
+
+
+def _nominal(recording: Recording, gravity: float) -> tuple[SensorCalibration, Finding]:
+    """The accelerometer as nobody calibrated it, with uncertainties that say so."""
+    raw = recording.accelerometer
+    assert raw is not None
+    scale = acceleration_to_si(recording.accelerometer_unit)
+    if scale is None:
+        scale = gravity / float(np.nanmedian(np.linalg.norm(raw, axis=1)))
+    covariance = np.diag([*np.full(9, (NOMINAL_SCALE * scale) ** 2), *np.full(3, NOMINAL_BIAS_M_S2**2)])
+    finding = Finding.of(FindingCode.ACCELEROMETER_NOMINAL, scale=scale)
+    unit = recording.accelerometer_unit.value
+    return SensorCalibration(scale * np.eye(3), np.zeros(3), covariance, unit, "m/s^2", "nominal"), finding
+
+
+def effects_of(found: AgainstReference) -> tuple[AcceptedEffect, ...]:
+    """Effects that the evidence names, the strongest first (the Bayes factor bounds p)."""
+    named = [(one.score or 0.0, ident, one) for ident, one in found.effects.items()]
+    return tuple(_accepted(ident, one) for score, ident, one in sorted(named, reverse=True) if score > ACCEPTED)
+
+
+def _accepted(ident: str, one: Estimate) -> AcceptedEffect:
+    assert one.score is not None
+    units = one.unit.split(", ")
+    per = len(one.names) // len(units)
+    parameters = tuple(
+        EffectParameter(_written(ident, name), float(v), float(s), units[min(k // per, len(units) - 1)])
+        for k, (name, v, s) in enumerate(zip(one.names, one.value, one.std, strict=True))
+    )
+    largest = int(np.argmax(np.abs(one.value / one.std)))
+    what = (
+        "reads a rate that follows specific force"
+        if ident == "gyro-g-sensitivity"
+        else "has a scale that depends on rate"
+    )
+    return AcceptedEffect(
+        ident,
+        f"The gyro {what} ({parameters[largest].name} stands out most).",
+        parameters,
+        float(np.exp(-0.5 * one.score)),
+        -one.score,
+        (),
+        # Stated in the reference's body: another recording of the unit may lie in it otherwise.
+        model=MappingProxyType(
+            {
+                "variant": "both" if ident == "gyro-scale-nonlinearity" else "",
+                "shape": {},
+                "values": [float(v) for v in one.value],
+                "applies_to_other_recordings": False,
+            }
+        ),
+    )
+
+
+def _written(ident: str, name: str) -> str:
+    return f"G_{name}" if ident == "gyro-g-sensitivity" else name.replace(" ", "_")
+
+
+def parameters_of(found: AgainstReference, given: Calibration, alpha: float) -> tuple[ParameterDifference, ...]:
+    """Numbers of a given calibration against those that the reference shows."""
+    model = model_of_calibration(given)
+    fit, force = found.gyroscope, found.accelerometer
+    covariance = np.zeros((24, 24))
+    covariance[12:, 12:] = fit.covariance
+    covariance[:12, :12] = model.covariance[:12, :12] if force is None else force.covariance
+    S, b = (model.accel_S, model.accel_b) if force is None else (force.S, force.b)
+    # Biases wander from one day to the next by what nobody measured here: only the fit's own error is known.
+    seen = FittedModel(
+        S, b, model.accel_unit, fit.S, fit.b, model.gyro_unit or "counts", covariance, np.zeros(3), np.zeros(3)
+    )
+    numbers = compare_numbers(model, seen, alpha=alpha).parameters
+    return tuple(p for p in numbers if force is not None or p.sensor == "gyroscope")
+
+
+def diagnosis_by(
+    found: AgainstReference, recording: Recording, gravity: float, given: Calibration | None, alpha: float
+) -> dict[str, Any]:
+    """A diagnosis of a log that holds no poses to speak of: what its reference alone says, as fields."""
+    effects = effects_of(found)
+    parameters = () if given is None or given.gyroscope is None else parameters_of(found, given, alpha)
+    test = _dynamics(found)
+    left = replace(test, disagrees=False) if effects else test
+    verdict: Verdict = "consistent"
+    if any(p.significant for p in parameters):
+        verdict = "parameters-differ"
+    if effects:
+        verdict = "missing-physics"
+    linear = _linear(found, recording)
+    base = Diagnosis(
+        verdict=verdict,
+        domains=(test,),
+        effects=effects,
+        remaining=(left,),
+        candidates=tuple(
+            Candidate(name, float(np.exp(-0.5 * max(one.score or 0.0, 0.0))), True)
+            for name, one in found.effects.items()
+        ),
+        baseline=linear,
+        extended=linear,
+        noise=MappingProxyType({}),
+        gravity_m_s2=gravity,
+        alpha=alpha,
+        recording_source=recording.source,
+        recording_sha256=recording.sha256,
+        parameters=parameters,
+    )
+    return dict(vars(base))
+
+
+def _dynamics(found: AgainstReference) -> DomainTest:
+    """Rate inside the motion: p is that of the effects tried on it, the search paid for."""
+    score = max([0.0, *(one.score or 0.0 for one in found.effects.values())])
+    return DomainTest(
+        "dynamics", 1.0, float(3 * found.gyroscope.n_rows), float(np.exp(-0.5 * score)), score > ACCEPTED,
+        rms=found.gyroscope.rms, unit="rad/s",
+    )  # fmt: skip
+
+
+def _linear(found: AgainstReference, recording: Recording) -> LinearModel:
+    def sensor(fit: Any, raw: str, si: str) -> MappingProxyType[str, Any]:
+        sigma = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+        return MappingProxyType(
+            {
+                "S": fit.S.tolist(),
+                "b": fit.b.tolist(),
+                "sigma_S": sigma[:9].reshape(3, 3).tolist(),
+                "sigma_b": sigma[9:].tolist(),
+                "raw_unit": raw,
+                "si_unit": si,
+            }
+        )
+
+    gyro = sensor(found.gyroscope, recording.gyroscope_unit.value, "rad/s")
+    if found.accelerometer is None:
+        nothing: dict[str, Any] = {name: np.zeros((3, 3)).tolist() for name in ("S", "sigma_S")}
+        nothing |= {"b": [0.0] * 3, "sigma_b": [0.0] * 3}
+        return LinearModel(MappingProxyType({**nothing, "raw_unit": "none", "si_unit": "m/s^2"}), gyro)
+    return LinearModel(sensor(found.accelerometer, recording.accelerometer_unit.value, "m/s^2"), gyro)

@@ -1,0 +1,113 @@
+"""A log replayed through the guide: what it would have said pose by pose, then the calibration and its check."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.api.guiding import conclude, examine, part_of
+from trihedron.api.reading import AnyRecording, recording_of
+from trihedron.api.results import CalibrationResult, VerificationResult
+from trihedron.capture.guide import Guide
+from trihedron.errors import RefusedError
+from trihedron.records import Recording
+from trihedron.records.guiding import Accuracy, GuideView
+from trihedron.units import STANDARD_GRAVITY_M_S2
+
+STEP_S = 0.25
+"""Of a replayed log: as the blocks of a live one."""
+
+DEFAULT_ACCURACY = "accel 0.1 %, gyro 0.2 %"
+
+Tell = Callable[[GuideView], Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """Where the guide stood at the end, how much of the log it used, and where its check of held-back poses began."""
+
+    view: GuideView
+    recording: Recording
+    cut_s: float | None
+    is_done: bool
+
+
+def guide(
+    recording: AnyRecording,
+    accuracy: str = DEFAULT_ACCURACY,
+    *,
+    gravity_m_s2: float | None = None,
+    on_pose: Tell | None = None,
+) -> tuple[CalibrationResult, VerificationResult | None]:
+    """What a guided session would have made of a log: calibrated when ``accuracy`` is reached, verified on the rest.
+
+    Parameters
+    ----------
+    recording : Recording, or what trihedron.read takes
+        Poses and moves.
+    accuracy : str
+        When to stop: ``"accel 0.05 %, gyro 0.1 %"``.
+    gravity_m_s2 : float, optional
+        |g| where it was recorded.
+    on_pose : callable, optional
+        Is given the guide's view (instruction, next pose, uncertainties) after every pose.
+
+    Returns
+    -------
+    (CalibrationResult, VerificationResult or None)
+        None where the log ends before poses to verify with.
+
+    Raises
+    ------
+    ValueError
+        When there is no accelerometer, the accuracy is not understood, or no calibration can be made.
+    """
+    done = replay(recording_of(recording), Accuracy.parse(accuracy), gravity_m_s2=gravity_m_s2, on_pose=on_pose)
+    return conclude(done.recording, done.cut_s, gravity_m_s2=gravity_m_s2)
+
+
+def replay(
+    recording: Recording, wanted: Accuracy, *, gravity_m_s2: float | None = None, on_pose: Tell | None = None
+) -> Replay:
+    """Lead the guide through a log, block by block, as if it were live.
+
+    Raises
+    ------
+    ValueError
+        When the log has no accelerometer.
+    """
+    readings = readings_of(recording)
+    gravity = gravity_m_s2 or STANDARD_GRAVITY_M_S2
+    now_s = 0.0
+    made = Guide(wanted, lambda: examine(part_of(recording, -math.inf, now_s + 1e-9), wanted, gravity_m_s2=gravity))
+    n_events = 0
+    for first, last in steps(recording.time_s):
+        now_s = float(recording.time_s[last - 1])
+        view = made.advance(recording.time_s[first:last], readings[first:last])
+        if view.n_events > n_events:
+            n_events = view.n_events
+            if on_pose is not None:
+                on_pose(view)
+        if made.is_done:
+            break
+    return Replay(made.view(), part_of(recording, -math.inf, now_s + 1e-9), made.cut_s, made.is_done)
+
+
+def steps(time_s: npt.NDArray[np.float64]) -> Iterable[tuple[int, int]]:
+    """Ranges of samples of about ``STEP_S``."""
+    edges = np.searchsorted(time_s, np.arange(time_s[0], time_s[-1] + STEP_S, STEP_S))
+    edges = np.unique([*edges, len(time_s)])
+    return zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
+
+
+def readings_of(recording: Recording) -> npt.NDArray[np.float64]:
+    """(n, 3) or (n, 6), the accelerometer first."""
+    if recording.accelerometer is None:
+        raise RefusedError(f"{recording.source}: a guide needs the accelerometer; this log has a gyro alone.")
+    parts = [part for part in (recording.accelerometer, recording.gyroscope) if part is not None]
+    return np.hstack(parts)

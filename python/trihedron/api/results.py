@@ -1,0 +1,147 @@
+"""What the verbs hand back: records together, readable as a laboratory report with ``print``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity, Verification
+from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
+from trihedron.records.presented import Presented
+from trihedron.records.published import published_figures
+from trihedron.records.reference import AgainstReference
+from trihedron.sanitise import one_line
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CalibrationResult(Presented):
+    """A calibration with the segments and the recording that it was made from. ``print`` gives the report."""
+
+    calibration: Calibration
+    segments: Segments
+    recording: Recording
+
+    @property
+    def accelerometer(self) -> SensorCalibration:
+        """``f = S a' + b`` with ``.S``, ``.b``, ``.sigma_S``, ``.sigma_b``, ``.covariance``, ``.quality``."""
+        return self.calibration.accelerometer
+
+    @property
+    def gyroscope(self) -> SensorCalibration | None:
+        """``ω = S w' + b``, or ``None`` where there was no gyro or it was not determined."""
+        return self.calibration.gyroscope
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Everything noticed, by every stage."""
+        return self.calibration.findings
+
+    @property
+    def is_trustworthy(self) -> bool:
+        """No serious finding."""
+        return self.calibration.is_trustworthy
+
+    def __repr__(self) -> str:
+        sensors = "accelerometer" if self.gyroscope is None else "accelerometer and gyroscope"
+        return f"<CalibrationResult of {one_line(self.recording.source)}: {sensors}, {self.segments.n_poses} poses>"
+
+    def __str__(self) -> str:
+        from trihedron.report import calibration_report, to_text
+
+        return to_text(calibration_report(self.calibration, self.segments, self.recording))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class VerificationResult(Presented):
+    """A calibration judged on another recording. ``print`` gives the report."""
+
+    verification: Verification
+    calibration: Calibration
+    segments: Segments
+    recording: Recording
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Everything noticed."""
+        return self.verification.findings
+
+    @property
+    def is_passed(self) -> bool:
+        """No serious finding."""
+        return self.verification.is_passed
+
+    def __repr__(self) -> str:
+        return f"<VerificationResult on {one_line(self.recording.source)}: {self.verification.norm_rms:.3g} m/s² rms>"
+
+    def __str__(self) -> str:
+        from trihedron.report import to_text, verification_report
+
+        return to_text(verification_report(self.verification, self.segments, self.recording))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CheckResult(Presented):
+    """Is a log fit for calibration? ``calibration`` holds the uncertainties to expect, ``None`` where it cannot be
+    made."""
+
+    recording: Recording
+    segments: Segments
+    calibration: Calibration | None
+    findings: tuple[Finding, ...]
+
+    @property
+    def is_fit(self) -> bool:
+        """No serious finding."""
+        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
+
+    def __repr__(self) -> str:
+        return (
+            f"<CheckResult of {one_line(self.recording.source)}: {'fit' if self.is_fit else 'not fit'} for calibration>"
+        )
+
+    def __str__(self) -> str:
+        from trihedron.report import check_report, to_text
+
+        return to_text(check_report(self.recording, self.segments, self.calibration, self.findings))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DiagnosisResult(Diagnosis, Presented):
+    """A diagnosis with what it was made from. ``print`` gives a short laboratory report.
+
+    ``calibration`` is the linear model at the start: fitted to this recording, or given (``model_is_given``);
+    ``updated`` the recording's own calibration where one was given and the recording can carry another;
+    ``reference`` what known motion beside the log says;
+    ``own_effects`` every effect that the recording has, those that the given model has too included.
+    """
+
+    recording: Recording = field(kw_only=True)
+    segments: Segments = field(kw_only=True)
+    calibration: Calibration | None = field(kw_only=True)
+    updated: Calibration | None = None
+    reference: AgainstReference | None = None
+    own_effects: tuple[AcceptedEffect, ...] = ()
+    gravity_source: str = ""
+    model_is_given: bool = False
+    findings: tuple[Finding, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types, with the findings about the recording."""
+        return {
+            **super().to_dict(),
+            "gravity_source": self.gravity_source,
+            "model_is_given": self.model_is_given,
+            "figures": None if self.calibration is None or self.model_is_given else published_figures(self.calibration),
+            "reference": None if self.reference is None else self.reference.to_dict(),
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+    def __repr__(self) -> str:
+        named = ", ".join(effect.id for effect in self.effects)
+        return f"<DiagnosisResult of {one_line(self.recording.source)}: {self.verdict}{': ' + named if named else ''}>"
+
+    def __str__(self) -> str:
+        from trihedron.report import diagnosis_report, to_text
+        from trihedron.report.diagnosis import first_screen
+
+        return to_text(diagnosis_report(self), sections=first_screen(self))

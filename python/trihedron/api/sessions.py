@@ -1,0 +1,269 @@
+"""Many recordings of one unit: each calibrated, then what is common, what repeats how far, and what changed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+
+from trihedron.api.calibrating import calibrate
+from trihedron.api.reading import AnyRecording, recording_of
+from trihedron.api.results import CalibrationResult
+from trihedron.api.sessions_combined import ALPHA, combine
+from trihedron.arrays import FloatArray
+from trihedron.errors import REFUSALS, RefusedError
+from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
+from trihedron.records import Calibration, Frame, Recording, SensorCalibration
+from trihedron.records.presented import Presented
+from trihedron.records.progress import Progress
+from trihedron.records.sessions import By, Session, SessionsModel
+from trihedron.records.words import Words, words
+from trihedron.sensor_model import in_frame
+
+BYS: tuple[By, ...] = get_args(By)
+MEDIAN_CHI2 = 0.4549
+"""Median of a squared standard normal number."""
+HEATING_DEGC = 1.0
+"""Change of temperature over a recording from which it was made while heating or cooling: the resolution of the
+thermometers in parts is 0.1 to 0.5 °C."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SessionsResult(Presented):
+    """Many recordings as one model, with each recording's own calibration. ``print`` gives the report."""
+
+    model: SessionsModel
+    results: tuple[CalibrationResult, ...]
+
+    @property
+    def calibration(self) -> Calibration:
+        """What is common, with the covariance of the next session."""
+        return self.model.calibration
+
+    @property
+    def is_trustworthy(self) -> bool:
+        """No serious finding."""
+        return self.model.is_trustworthy
+
+    def __repr__(self) -> str:
+        return f"<SessionsResult of {len(self.model.sessions)} recordings by {self.model.by}>"
+
+    def __str__(self) -> str:
+        from trihedron.report import sessions_report, to_text
+
+        return to_text(sessions_report(self.model))
+
+
+def calibrate_sessions(
+    recordings: Sequence[AnyRecording | CalibrationResult],
+    *,
+    by: By = "session",
+    labels: Sequence[str] | None = None,
+    gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
+    frame: Frame = "lower",
+    alpha: float = ALPHA,
+    progress: Progress | None = None,
+) -> SessionsResult:
+    """Calibrate many recordings of one unit, and say how far each parameter repeats.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording, CalibrationResult, or what trihedron.read takes
+        Two or more, in their order in time; each is calibrated by :func:`calibrate` where it is not yet.
+    by : "session", "date", "device" or "temperature"
+        Groups within which sessions belong together: every recording for itself, those of one day, those of one device;
+        or polynomials of temperature through all of them.
+    labels : sequence of str, optional
+        One word a recording, instead of its date or device.
+    gravity_m_s2 or latitude_deg, height_m : float
+        As for :func:`calibrate`.
+    frame : "lower" or "symmetric"
+        Body frame of the common calibration.
+    alpha : float
+        Chance that any number of a unit that did not change is called changed.
+
+    Returns
+    -------
+    SessionsResult
+        ``calibration`` common to all sessions, and in ``model`` what repeats and what changed.
+
+    Raises
+    ------
+    ValueError
+        When fewer than two recordings can be calibrated, or what they are grouped by is not known.
+    """
+    if by not in BYS:
+        raise RefusedError(f"recordings are not grouped by {by!r}; choose one of {', '.join(BYS)}.")
+    if labels is not None and len(labels) != len(recordings):
+        raise RefusedError(f"{len(labels)} labels were given for {len(recordings)} recordings; give one for each.")
+    tell = progress or (lambda _fraction, _text: None)
+    results: list[CalibrationResult] = []
+    groups: list[str] = []
+    left_out: list[tuple[str, str]] = []
+    for k, given in enumerate(recordings):
+        recording = recording_of(given)
+        label = _label(recording, by) if labels is None else labels[k]
+        tell(k / len(recordings), f"calibrating {Path(recording.source).name}")
+        try:
+            if isinstance(given, CalibrationResult):
+                result = given
+            else:
+                place = {"gravity_m_s2": gravity_m_s2, "latitude_deg": latitude_deg, "height_m": height_m}
+                result = calibrate(recording, **place)  # type: ignore[arg-type]
+        except REFUSALS as error:
+            left_out.append((recording.source, str(error)))
+            continue
+        why = _unfit(result, results)
+        if why:
+            left_out.append((recording.source, why))
+            continue
+        results.append(result)
+        groups.append(label)
+    if len(results) < 2:
+        reasons = "; ".join(f"{Path(name).name}: {reason}" for name, reason in left_out) or "one recording was given"
+        if len(recordings) > 1 and all(recording_of(given).gyroscope is None for given in recordings):
+            reasons = "no log has a gyro: the logs of both sensors of one recording are given with --accel and --gyro"
+        raise RefusedError(f"two recordings at least are needed to see what repeats ({reasons}).")
+    sessions = sessions_of(results, groups)
+    model = combine(sessions, by, results[0].calibration, frame=frame, alpha=alpha, left_out=tuple(left_out))
+    return SessionsResult(model, tuple(results))
+
+
+def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Words | None:
+    """Why a calibration does not go with the others; None where it does."""
+    if not result.is_trustworthy:
+        serious = next(finding for finding in result.findings if finding.severity.value == "serious")
+        return words("not-trusted", seen=serious.seen)
+    if others:
+        first, own = others[0].calibration, result.calibration
+        for name in ("accelerometer", "gyroscope"):
+            a, b = getattr(first, name), getattr(own, name)
+            if (a is None) != (b is None):
+                return words("sensor-not-calibrated" if b is None else "first-lacks-sensor", sensor=name)
+            if a is not None and a.raw_unit != b.raw_unit:
+                return words("another-unit", sensor=name, unit=b.raw_unit, first_unit=a.raw_unit)
+        if not math.isclose(first.gravity_m_s2, own.gravity_m_s2, rel_tol=1e-6):
+            return words("another-gravity")
+        if first.extensions.get("onboard") != own.extensions.get("onboard"):
+            return words("another-correction")
+    return None
+
+
+def _label(recording: Recording, by: By) -> str:
+    if by == "date":
+        if recording.start_epoch_s <= 0.0:
+            raise RefusedError(
+                f"{recording.source}: the log does not say on which day it was recorded; give --labels DAY,DAY,..., "
+                "one word for each recording."
+            )
+        return datetime.fromtimestamp(recording.start_epoch_s, tz=timezone.utc).date().isoformat()
+    if by == "device":
+        # One folder a device is how people keep them; archives of several name the device behind a comma.
+        _name, comma, device = recording.source.rpartition(", ")
+        return device if comma and device.startswith("device ") else Path(recording.source).parent.name
+    return recording.source
+
+
+def sessions_of(results: Sequence[CalibrationResult], groups: Sequence[str]) -> tuple[Session, ...]:
+    """Calibrations as numbers that do not depend on a frame, counted from the first one's axes."""
+    first = in_frame(results[0].calibration, "lower")
+    anchor = anchor_of(first.accelerometer.S, None if first.gyroscope is None else first.gyroscope.S)
+    names = _names([result.recording.source for result in results])
+    return tuple(
+        session_of(result, anchor, name, group) for result, name, group in zip(results, names, groups, strict=True)
+    )
+
+
+def _names(sources: Sequence[str]) -> list[str]:
+    """Names as short as they stay distinct."""
+    short = [Path(source).name or source for source in sources]
+    return [name if short.count(name) == 1 else source for name, source in zip(short, sources, strict=True)]
+
+
+def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str) -> Session:
+    """One calibration as numbers, its error widened where held-out poses and moves miss by more than predicted."""
+    calibration = in_frame(result.calibration, "lower")
+    accel, gyro = calibration.accelerometer, calibration.gyroscope
+    S_g, b_g = (None, None) if gyro is None else (gyro.S, gyro.b)
+    jacobian = numbers_jacobian(accel.S, accel.b, S_g, b_g)
+    widened = np.repeat([_excess(accel), 1.0 if gyro is None else _excess(gyro)], 12)[: jacobian.shape[1]]
+    covariance = jacobian @ (calibration.covariance * np.sqrt(np.outer(widened, widened))) @ jacobian.T
+    recording = result.recording
+    temperature, low, high, branch = _temperature(result)
+    return Session(
+        name,
+        group,
+        numbers_of(accel.S, accel.b, S_g, b_g, anchor),
+        0.5 * (covariance + covariance.T),
+        _wander(result, len(covariance)),
+        recording.start_epoch_s,
+        temperature,
+        (low, high),
+        branch,
+        recording.sha256,
+    )
+
+
+def _excess(sensor: SensorCalibration) -> float:
+    """Held-out variance over predicted, at least 1 (docs/diagnosis-method.md, section 9).
+
+    By the median: a pushed pose or a clipped move was weighted down by the fit, and must not count here.
+    """
+    quality = sensor.quality
+    if quality is None or quality.held_out is None or quality.held_out_sigma is None:
+        return 1.0
+    z = (quality.held_out / quality.held_out_sigma).ravel()
+    z = z[np.isfinite(z)]
+    return max(1.0, float(np.median(z**2)) / MEDIAN_CHI2) if len(z) > 3 else 1.0
+
+
+def _wander(result: CalibrationResult, n: int) -> FloatArray:
+    """Variance (n,) by which zeros of a session like this differ from one to the next (eq. 9.3)."""
+    out = np.zeros(n)
+    accel, gyro, segments = result.accelerometer, result.gyroscope, result.segments
+    quality = accel.quality
+    if quality is not None and segments.accelerometer_mean is not None and len(quality.residual) > 3:
+        up = segments.accelerometer_mean @ accel.S.T + accel.b
+        up = up / np.linalg.norm(up, axis=1, keepdims=True)
+        if len(up) == len(quality.residual):
+            noise = quality.sigma**2 / max(quality.covariance_scale, 1.0)
+            out[:3] = _shared(quality.residual, noise, np.einsum("ij,ij->i", up[1:], up[:-1]))
+    if gyro is not None and segments.gyroscope_mean is not None and segments.gyroscope_sigma_mean is not None:
+        zeros = segments.gyroscope_mean @ gyro.S.T
+        noise = (segments.gyroscope_sigma_mean**2) @ (gyro.S**2).T
+        is_seen = np.all(np.isfinite(zeros) & np.isfinite(noise), axis=1)
+        if is_seen.sum() > 3:
+            zeros, noise = zeros[is_seen] - zeros[is_seen].mean(axis=0), noise[is_seen]
+            each = [_shared(zeros[:, k], noise[:, k], np.ones(len(zeros) - 1)) for k in range(3)]
+            out[9:12] = np.mean(each)
+    return out
+
+
+def _shared(away: FloatArray, noise: FloatArray, alike: FloatArray) -> float:
+    """``2 C₁ + (V - C₁)/n``: V of n poses beyond their noise, C₁ of neighbours; ``alike`` their common direction."""
+    n = len(away)
+    total = max(float(np.sum(away**2)) / (n - 1) - float(np.mean(noise)), 0.0)
+    shared = float(np.sum(away[1:] * away[:-1] * alike) / max(np.sum(alike**2), 1e-12)) + float(np.mean(away**2)) / n
+    shared = min(max(shared, 0.0), total)
+    return 2.0 * shared + (total - shared) / n
+
+
+def _temperature(result: CalibrationResult) -> tuple[float, float, float, int]:
+    """Mean, least and largest temperature of the poses, and whether they rise (+1) or fall (-1)."""
+    T = result.recording.temperature_degc
+    if T is None:
+        return math.nan, math.nan, math.nan, 0
+    means = [
+        float(np.nanmean(T[h.start : h.stop])) for h in result.segments.poses if np.isfinite(T[h.start : h.stop]).any()
+    ]
+    if not means:
+        return math.nan, math.nan, math.nan, 0
+    rise = means[-1] - means[0]
+    return float(np.mean(means)), min(means), max(means), 0 if abs(rise) < HEATING_DEGC else int(np.sign(rise))

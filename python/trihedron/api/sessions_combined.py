@@ -1,0 +1,155 @@
+"""Many sessions of one unit as one model: what is common, what repeats how far, what changed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from trihedron.api.session_findings import findings_about
+from trihedron.estimate.sessions import changes_among, next_session, repeated_parameters, spread_of_next, thermal_model
+from trihedron.invariants import Anchor, anchor_of, model_jacobian, model_vector
+from trihedron.records import Calibration, Frame, SensorCalibration
+from trihedron.records.sessions import PARAMETERS, By, Repeated, Session, SessionsModel, ThermalModel
+from trihedron.sensor_model import in_frame
+
+ALPHA = 0.01
+"""Chance that any number of a unit that did not change is called changed."""
+
+
+def combine(
+    sessions: Sequence[Session],
+    by: By,
+    reference: Calibration,
+    *,
+    frame: Frame = "lower",
+    alpha: float = ALPHA,
+    left_out: tuple[tuple[str, str], ...] = (),
+) -> SessionsModel:
+    """One model of all sessions; ``reference`` is the first one's calibration: units, gravity and axes."""
+    first = in_frame(reference, "lower")
+    anchor = anchor_of(first.accelerometer.S, None if first.gyroscope is None else first.gyroscope.S)
+    plain = [replace(session, group=session.name) for session in sessions]
+    grouped = sessions if by in ("date", "device") else plain
+    repeated = repeated_parameters(grouped)
+    thermal = thermal_model(sessions) if by == "temperature" else None
+    if by == "device":
+        units = [[s for s in sessions if s.group == name] for name in dict.fromkeys(s.group for s in sessions)]
+    else:
+        units = [] if by == "temperature" else [list(sessions)]
+    changes = changes_among(units, alpha=alpha)
+    calibration = _common(grouped, repeated, thermal, first, anchor)
+    model = SessionsModel(by, tuple(sessions), repeated, changes, thermal, calibration, left_out)
+    findings = findings_about(model)
+    calibration = replace(
+        in_frame(calibration, frame),
+        findings=findings,
+        extensions=MappingProxyType(_extensions(model, anchor, reference.extensions)),
+    )
+    return replace(model, calibration=calibration, findings=findings)
+
+
+def _common(
+    sessions: Sequence[Session],
+    repeated: Sequence[Repeated],
+    thermal: ThermalModel | None,
+    first: Calibration,
+    anchor: Anchor,
+) -> Calibration:
+    """The common numbers as S and b, with the covariance of the next session."""
+    value = np.array([one.value for one in repeated])
+    spread, error = next_session(sessions, repeated)
+    if thermal is not None:
+        for term in thermal.terms:
+            picked = [k for k, parameter in enumerate(PARAMETERS) if parameter.id == term.id]
+            value[picked] = term.coefficients[0]
+            error[picked] = np.sqrt(term.covariance[:, 0, 0])
+            spread[picked] = [spread_of_next(one) for one in term.remaining]
+    total = sum(session.covariance for session in sessions) + len(sessions) * np.diag(spread**2)
+    root = np.sqrt(np.maximum(np.diag(total), 1e-300))
+    covariance = total / np.outer(root, root) * np.outer(error, error) + np.diag(spread**2)
+    parameters = model_vector(value, anchor)
+    J = model_jacobian(value, anchor)
+    full = J @ covariance @ J.T
+    full = 0.5 * (full + full.T)
+    # Frame lower fixes three entries of S: their rows are zero, not rounding.
+    for fixed in (1, 2, 5):
+        full[fixed], full[:, fixed] = 0.0, 0.0
+    sensors: list[SensorCalibration | None] = []
+    for k, sensor in enumerate((first.accelerometer, first.gyroscope)):
+        if sensor is None:
+            sensors.append(None)
+            continue
+        own = slice(12 * k, 12 * k + 12)
+        sensors.append(
+            replace(
+                sensor,
+                S=parameters[own][:9].reshape(3, 3),
+                b=parameters[own][9:],
+                covariance=full[own, own],
+                method=f"{len(sessions)} recordings, random effects",
+                quality=None,
+                observability=None,
+            )
+        )
+    assert sensors[0] is not None
+    return replace(
+        first,
+        accelerometer=sensors[0],
+        gyroscope=sensors[1],
+        covariance=full,
+        recording_source=", ".join(session.name for session in sessions),
+        recording_sha256="",
+    )
+
+
+def _extensions(model: SessionsModel, anchor: Anchor, kept: Mapping[str, object]) -> dict[str, Any]:
+    """What the calibration file keeps beside S and b (docs/calibration-file.md)."""
+    out: dict[str, Any] = {
+        **kept,
+        "sessions": [
+            {
+                "name": s.name,
+                "group": s.group,
+                "sha256": s.sha256,
+                "temperature_degc": s.temperature_degc,
+            }
+            for s in model.sessions
+        ],
+        "repeatability": [
+            {
+                "id": one.parameter.id,
+                "name": one.parameter.name,
+                "unit": one.parameter.unit,
+                "value": one.value,
+                "std": one.std,
+                "within": None if one.within is None else vars(one.within),
+                "between": None if one.between is None else vars(one.between),
+            }
+            for one in model.repeated
+        ],
+    }
+    ranges = [session.temperature_range_degc for session in model.sessions]
+    if all(math.isfinite(low) for low, _ in ranges):
+        out["valid_range"] = {"temperature_degc": [min(low for low, _ in ranges), max(high for _, high in ranges)]}
+    if model.thermal is not None:
+        out["thermal"] = {
+            "reference_degc": model.thermal.reference_degc,
+            "axis_signs": anchor.signs,
+            "triad": anchor.triad,
+            "terms": [
+                {
+                    "id": term.id,
+                    "order": term.order,
+                    "coefficients": term.coefficients,
+                    "hysteresis": term.hysteresis,
+                    "remaining": [one.sd for one in term.remaining],
+                }
+                for term in model.thermal.terms
+            ],
+        }
+    return out

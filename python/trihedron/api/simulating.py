@@ -1,0 +1,86 @@
+"""Simulations on request: a scenario by file or name, or the digital twin of a recording."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from trihedron.api.applying import AnyCalibration, calibration_of
+from trihedron.api.asking import WrongTypeError
+from trihedron.api.reading import AnyRecording, recording_of
+from trihedron.records import Recording, Truth
+from trihedron.segment import segment_recording
+from trihedron.simulate import Scenario, read_scenario, scenario_by_name, twin_scenario, with_diagnosed_effects
+from trihedron.simulate import simulate as run
+
+
+def simulate(scenario: str | os.PathLike[str] | Scenario, seed: int = 0) -> tuple[Recording, Truth]:
+    """Simulate a scenario: a record, the name of a ready-made one, or a TOML file (docs/simulation.md).
+
+    Returns
+    -------
+    (Recording, Truth)
+        The log as an instrument would write it, and what it was really exposed to and made of.
+
+    Raises
+    ------
+    ValueError
+        When there is no such scenario, or it asks for what cannot be.
+
+    Examples
+    --------
+    >>> recording, truth = trihedron.simulate("hand-session", 3)
+    >>> truth.accelerometer_S.shape
+    (3, 3)
+    """
+    return run(scenario_of(scenario), seed)
+
+
+def scenario_of(scenario: str | os.PathLike[str] | Scenario) -> Scenario:
+    """A scenario as a record, whether it is one, a TOML file or the name of a ready-made one.
+
+    Raises
+    ------
+    ValueError
+        When there is no such scenario.
+    """
+    if isinstance(scenario, Scenario):
+        return scenario
+    if not isinstance(scenario, str | os.PathLike):
+        raise WrongTypeError(f"a scenario is its name or its .toml file, not {type(scenario).__name__}.")
+    path = Path(scenario)
+    return read_scenario(path) if path.suffix.lower() == ".toml" else scenario_by_name(str(scenario))
+
+
+@dataclass(frozen=True)
+class WithEffects:
+    """A scenario with the accepted effects of a diagnosis: ids switched on, ids left out with the reason."""
+
+    scenario: Scenario
+    applied: tuple[str, ...]
+    left_out: Mapping[str, str]
+
+
+def with_effects(scenario: str | os.PathLike[str] | Scenario, effects: Sequence[Mapping[str, Any]]) -> WithEffects:
+    """Switch on in a scenario what a diagnosis accepted (``effects`` of ``Diagnosis.to_dict`` or of its JSON)."""
+    return WithEffects(*with_diagnosed_effects(scenario_of(scenario), effects))
+
+
+def twin(recording: AnyRecording, calibration: AnyCalibration, seed: int = 0) -> tuple[Recording, Truth]:
+    """Repeat a recording as a simulation: its poses, moves, timing, noise and resolution.
+
+    Returns
+    -------
+    (Recording, Truth)
+        As :func:`simulate` gives them, moved as the recording was.
+
+    Raises
+    ------
+    ValueError
+        When the recording has no poses, or lacks a sensor.
+    """
+    recording, known = recording_of(recording), calibration_of(calibration)
+    return run(twin_scenario(recording, segment_recording(recording), known), seed)

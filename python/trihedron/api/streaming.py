@@ -1,0 +1,326 @@
+"""Logs larger than memory: poses, calibration and corrected readings, a piece of the log at a time.
+
+What stays in memory are the statistics of blocks of a tenth of a second (:func:`segment_file`), the rows of moves and
+of the ends of poses (:func:`calibrate_file`), or one piece (:func:`apply_file`). See docs/larger-than-memory.md.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from trihedron.api.applying import AnyCalibration, calibration_of, check_units
+from trihedron.api.calibrating import calibrate
+from trihedron.api.results import CalibrationResult
+from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
+from trihedron.files.calibration import calibration_text
+from trihedron.files.checkpoint import Checkpoint, made_of
+from trihedron.read import ChunkedLog, open_chunks
+from trihedron.records import Move, Pose, Recording, Segments
+from trihedron.records.progress import Progress
+from trihedron.segment import BlockSums, segment_blocks
+from trihedron.sensor_model import correct
+from trihedron.units import AccelerationUnit, RateUnit
+
+PIECE_ROWS = 1 << 18
+KEPT_S = 60.0
+"""Of a pose longer than twice this, a minute at either end goes into the fit: the mean and its error are those of the
+whole pose, and the bias next to a move is read off the readings next to it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Triad:
+    """Three columns of a log on disk, read when rows are asked for: stands for an array (n, 3)."""
+
+    log: ChunkedLog
+    first: int
+
+    def __len__(self) -> int:
+        return self.log.n_rows
+
+    def __getitem__(self, rows: Any) -> FloatArray:
+        if isinstance(rows, slice):
+            start, stop, step = rows.indices(self.log.n_rows)
+            part = self.log.rows(start, stop)[::step]
+        else:
+            index = np.asarray(rows)
+            part = self.log.rows(int(index[0]), int(index[-1]) + 1)[index - index[0]]
+        # Row by row, as a recording holds them: sums come out the same to the last bit.
+        return np.ascontiguousarray(part[:, self.first : self.first + 3])
+
+
+@dataclass(frozen=True)
+class EvenTime:
+    """Timestamps of an even clock, made when they are asked for: stands for an array (n,)."""
+
+    n: int
+    rate_hz: float
+
+    def __len__(self) -> int:
+        return self.n
+
+    def __getitem__(self, rows: Any) -> Any:
+        if isinstance(rows, slice):
+            return np.arange(*rows.indices(self.n)) / self.rate_hz
+        return np.asarray(rows) / self.rate_hz if np.ndim(rows) else float(rows) / self.rate_hz
+
+
+@dataclass(frozen=True, eq=False)
+class LogOnDisk:
+    """A log as the segmentation needs it: the attributes of a recording, without its arrays in memory."""
+
+    time_s: EvenTime
+    accelerometer: Triad | None
+    gyroscope: Triad | None
+    rate_hz: float
+    accelerometer_unit: AccelerationUnit
+    gyroscope_unit: RateUnit
+    source: str
+    log: ChunkedLog
+
+    @property
+    def n_samples(self) -> int:
+        """Rows of the log."""
+        return self.log.n_rows
+
+    @property
+    def duration_s(self) -> float:
+        """As of a recording: from the first to the last row, and one step."""
+        return (self.n_samples - 1) / self.rate_hz + 1.0 / self.rate_hz
+
+
+def log_on_disk(
+    path: str | os.PathLike[str],
+    *,
+    columns: str,
+    rate_hz: float,
+    accelerometer_unit: str | AccelerationUnit | None = None,
+    gyroscope_unit: str | RateUnit | None = None,
+) -> LogOnDisk:
+    """A .npy, Parquet or text log whose columns, rate and units are said, not judged.
+
+    Raises
+    ------
+    ValueError
+        When the file is neither, columns do not fit, or a sensor has not all its axes in the order x y z.
+    """
+    if not (np.isfinite(rate_hz) and rate_hz > 0.0):
+        raise RefusedError(f"--rate is a positive number of samples per second, not {rate_hz}.")
+    log = open_chunks(Path(path), columns)
+    triads: dict[str, Triad | None] = {"a": None, "g": None}
+    for sensor in triads:
+        if any(role[0] == sensor for role in log.roles):
+            wanted = (f"{sensor}x", f"{sensor}y", f"{sensor}z")
+            first = log.roles.index(wanted[0]) if wanted[0] in log.roles else 0
+            if log.roles[first : first + 3] != wanted:
+                raise RefusedError(f"{path}: --columns must name {' '.join(wanted)}, one after the other.")
+            triads[sensor] = Triad(log, first)
+    return LogOnDisk(
+        EvenTime(log.n_rows, rate_hz),
+        triads["a"],
+        triads["g"],
+        rate_hz,
+        AccelerationUnit(accelerometer_unit or "counts"),
+        RateUnit(gyroscope_unit or "counts"),
+        str(path),
+        log,
+    )
+
+
+def segment_file(
+    log: LogOnDisk, *, checkpoint: str | os.PathLike[str] | None = None, progress: Progress | None = None
+) -> Segments:
+    """Poses and moves of a log on disk: the same as :func:`trihedron.segment` finds in the whole of it.
+
+    With ``checkpoint`` a file keeps every half a minute how far the pass is; a run that was stopped goes on from it, to
+    the same bits, and the end removes it.
+
+    Raises
+    ------
+    ValueError
+        When ``checkpoint`` is a file of something else.
+    """
+    tell = progress or (lambda _fraction, _text: None)
+    # Types that only read rows: the segmentation asks for no more of a recording.
+    view = cast("Recording", log)
+    sums = BlockSums(view)
+    width = sums.length * max(1, PIECE_ROWS // sums.length)
+    kept = None
+    if checkpoint is not None:
+        kept = Checkpoint(Path(checkpoint), made_of(log.log.path, "blocks", log.rate_hz, log.log.roles))
+    done, state = kept.load() if kept else (0, {})
+    if done:
+        sums.restore(done, state)
+    for part in log.log.chunks(width, done):
+        triads = [part[:, t.first : t.first + 3] for t in (log.accelerometer, log.gyroscope) if t is not None]
+        sums.add([np.ascontiguousarray(t, dtype=np.float64) for t in triads])
+        done += len(part)
+        tell(0.8 * done / log.n_samples, f"{done} of {log.n_samples} rows")
+        if kept:
+            kept.keep(done, sums.state)
+    segments = segment_blocks(view, sums.channels(), progress=lambda f, text: tell(0.8 + 0.2 * f, text))
+    if kept:
+        kept.remove()
+    return segments
+
+
+def calibrate_file(
+    log: LogOnDisk,
+    *,
+    checkpoint: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> CalibrationResult:
+    """Calibrate a log on disk from the statistics of its poses and the rows of its moves; options as for ``calibrate``.
+
+    ``checkpoint`` as in :func:`segment_file`, whose pass over the log is what takes long. The same as
+    :func:`trihedron.calibrate` of the whole, where no hold is longer than two minutes.
+    """
+    tell = progress or (lambda _fraction, _text: None)
+    segments = segment_file(log, checkpoint=checkpoint, progress=lambda f, text: tell(0.7 * f, text))
+    recording, shown = condensed(log, segments)
+    tell(0.8, f"fitting {recording.n_samples} of {log.n_samples} rows")
+    return calibrate(recording, segments=shown, **options)
+
+
+def condensed(log: LogOnDisk, segments: Segments) -> tuple[Recording, Segments]:
+    """The rows of moves and of the ends of poses, at their own times, and the segments counted in them.
+
+    Means, errors and durations remain those of whole poses.
+    """
+    kept = max(round(KEPT_S * log.rate_hz), 1)
+    ranges: list[tuple[int, int]] = []
+    for pose in segments.poses:
+        if pose.stop - pose.start <= 2 * kept:
+            ranges.append((pose.outer_start, pose.outer_stop))
+        else:
+            ranges += [(pose.outer_start, pose.start + kept), (pose.stop - kept, pose.outer_stop)]
+    ranges += [(move.start, move.stop) for move in segments.moves]
+    edges = [0, log.n_samples] if not ranges else None
+    joined = _joined([(edges[0], edges[1])] if edges else ranges)
+    starts = np.array([a for a, _ in joined])
+    offsets = np.concatenate([[0], np.cumsum([b - a for a, b in joined])])
+
+    def place(row: int) -> int:
+        k = int(np.searchsorted(starts, row, side="right")) - 1
+        return int(offsets[k] + min(row - joined[k][0], joined[k][1] - joined[k][0]))
+
+    def stack(triad: Triad | None) -> FloatArray | None:
+        return None if triad is None else np.concatenate([triad[a:b] for a, b in joined])
+
+    recording = Recording(
+        np.concatenate([log.time_s[a:b] for a, b in joined]),
+        stack(log.accelerometer),
+        stack(log.gyroscope),
+        log.rate_hz,
+        log.accelerometer_unit,
+        log.gyroscope_unit,
+        source=log.source,
+    )
+    poses = tuple(_moved_pose(pose, place, kept) for pose in segments.poses)
+    moves = tuple(Move(m.index, m.pose_before, m.pose_after, place(m.start), place(m.stop)) for m in segments.moves)
+    return recording, replace(segments, poses=poses, moves=moves)
+
+
+def _moved_pose(pose: Pose, place: Any, kept: int) -> Pose:
+    disturbed = tuple(
+        (place(a), place(b))
+        for a, b in pose.disturbed
+        if pose.stop - pose.start <= 2 * kept or b <= pose.start + kept or a >= pose.stop - kept
+    )
+    stop = place(pose.stop - 1) + 1
+    return Pose(
+        pose.index,
+        place(pose.start),
+        stop,
+        place(pose.outer_start),
+        max(place(pose.outer_stop - 1) + 1, stop),
+        disturbed,
+        pose.is_unsteady,
+    )
+
+
+def _joined(ranges: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    out: list[tuple[int, int]] = []
+    for a, b in sorted(ranges):
+        if out and a <= out[-1][1]:
+            out[-1] = (out[-1][0], max(out[-1][1], b))
+        else:
+            out.append((a, b))
+    return out
+
+
+def apply_file(
+    calibration: AnyCalibration,
+    log: LogOnDisk,
+    output: str | os.PathLike[str],
+    *,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> int:
+    """Correct a log on disk piece by piece into a .npy file (n, 4 or 7): time [s], specific force, angular rate.
+
+    A run that was stopped goes on where it was: ``OUTPUT.part`` grows, ``OUTPUT.part.json`` says how far it is and of
+    what it is made. Returns the rows that were written in this run.
+
+    Raises
+    ------
+    ValueError
+        When the calibration needs a temperature or effects taken off, which this does not; when units differ; when the
+        output exists.
+    """
+    target = Path(output)
+    known = calibration_of(calibration)
+    if target.suffix.lower() != ".npy":
+        raise RefusedError(f"{target}: a log that is corrected in pieces is written as .npy; give this ending.")
+    if target.exists() and not overwrite:
+        raise RefusedError(f"{target}: this exists and was left alone; choose another name or add --force.")
+    if known.extensions.get("effects") or known.extensions.get("thermal"):
+        raise RefusedError(
+            "this calibration follows temperature or compensates effects: apply it to the log as a whole."
+        )
+    check_units(known, cast("Recording", log))
+    sensors = [(log.accelerometer, known.accelerometer), (log.gyroscope, known.gyroscope)]
+    used = [(triad, sensor) for triad, sensor in sensors if triad is not None and sensor is not None]
+    if not used:
+        raise RefusedError(f"{log.source}: the calibration holds none of its sensors.")
+    shape = (log.n_samples, 1 + 3 * len(used))
+    part, note, next_note = (Path(f"{target}{ending}") for ending in (".part", ".part.json", ".part.json.new"))
+    of = made_of(log.log.path, log.rate_hz, log.log.roles, shape, calibration_text(known))
+    done = _rows_done(part, note, of)
+    if done == 0:
+        np.lib.format.open_memmap(part, mode="w+", dtype=np.float64, shape=shape).flush()
+    header = part.stat().st_size - 8 * shape[0] * shape[1]
+    written = 0
+    with part.open("r+b") as stream:
+        for start in range(done, log.n_samples, PIECE_ROWS):
+            rows = slice(start, min(start + PIECE_ROWS, log.n_samples))
+            columns = [log.time_s[rows][:, None], *(correct(t[rows], s.S, s.b) for t, s in used)]
+            stream.seek(header + 8 * start * shape[1])
+            stream.write(np.hstack(columns).tobytes())
+            stream.flush()
+            written += rows.stop - start
+            # In one step: a run that is killed here leaves the note before.
+            next_note.write_text(json.dumps({"made_of": of, "rows": rows.stop}))
+            next_note.replace(note)
+            if progress is not None:
+                progress(rows.stop / log.n_samples, f"{rows.stop} of {log.n_samples} rows")
+        os.fsync(stream.fileno())
+    part.replace(target)
+    note.unlink(missing_ok=True)
+    next_note.unlink(missing_ok=True)
+    return written
+
+
+def _rows_done(part: Path, note: Path, of: str) -> int:
+    try:
+        said = json.loads(note.read_text())
+    except (OSError, ValueError):
+        return 0
+    return int(said["rows"]) if said.get("made_of") == of and part.exists() else 0

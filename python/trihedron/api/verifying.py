@@ -1,0 +1,100 @@
+"""Verify: a calibration against a recording that it was not made from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from trihedron.api.applying import AnyCalibration, calibration_of, check_units, doubted, without_effects
+from trihedron.api.calibrating import calibrate
+from trihedron.api.choices import settle_gravity
+from trihedron.api.reading import AnyRecording, recording_of, segments_of
+from trihedron.api.results import VerificationResult
+from trihedron.errors import REFUSALS
+from trihedron.estimate.verification import verify_calibration
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, Severity, Verification
+from trihedron.records.progress import Progress
+from trihedron.units import mg_from_m_s2
+
+
+def verify(
+    calibration: AnyCalibration,
+    recording: AnyRecording,
+    *,
+    segments: Segments | None = None,
+    gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
+    limit_mg: float | None = None,
+    limit_deg: float | None = None,
+    progress: Progress | None = None,
+) -> VerificationResult:
+    """Gravity error in static poses and tilt error after rotations, in a recording that the calibration has not seen.
+
+    Without ``gravity_m_s2`` or a place, gravity is that of the calibration. ``limit_mg`` and ``limit_deg`` are what the
+    user can accept (rms): beyond them a serious finding says so. Where no limit is said, a miss of more than ten times
+    what noise and the stated errors allow is serious; where one is said and kept, it is a warning.
+
+    Returns
+    -------
+    VerificationResult
+        ``is_passed``, errors beside those to be expected, and ``findings``.
+
+    Raises
+    ------
+    ValueError
+        When units differ, or the recording has no accelerometer or no pose.
+
+    Examples
+    --------
+    >>> trihedron.verify(result, recording).is_passed
+    True
+    """
+    known = calibration_of(calibration)
+    recording = recording_of(recording)
+    check_units(known, recording)
+    recording, more = without_effects(known, recording)
+    if known.extensions.get("effects"):
+        segments = None
+    segments = segments_of(segments, recording, progress)
+    if gravity_m_s2 is None and latitude_deg is None and height_m is None:
+        gravity, source = known.gravity_m_s2, "that of the calibration"
+    else:
+        gravity, source, _ = settle_gravity(gravity_m_s2, latitude_deg, height_m)
+    own = own_calibration(recording, segments, gravity)
+    judged = verify_calibration(known, recording, segments, gravity, source, own)
+    accepted = {
+        FindingCode.RESIDUAL_ABOVE_NOISE: limit_mg is not None,
+        FindingCode.HELD_OUT_WORSE: limit_deg is not None,
+    }
+    missed = tuple(
+        replace(found, severity=Severity.WARNING) if accepted.get(found.code, False) else found
+        for found in judged.findings
+    )
+    findings = (*recording.findings, *segments.findings, *missed, *more, *_limits(judged, limit_mg, limit_deg))
+    findings = (*doubted(known), *findings)
+    findings += _same_recording(known.recording_sha256, recording.sha256)
+    return VerificationResult(replace(judged, findings=findings), known, segments, recording)
+
+
+def own_calibration(recording: Recording, segments: Segments, gravity_m_s2: float) -> Calibration | None:
+    """What the recording says of the sensor itself; ``None`` where it cannot carry a calibration."""
+    try:
+        return calibrate(recording, segments=segments, gravity_m_s2=gravity_m_s2).calibration
+    except REFUSALS:
+        return None
+
+
+def _limits(judged: Verification, limit_mg: float | None, limit_deg: float | None) -> tuple[Finding, ...]:
+    found = []
+    rms_mg, rms_deg = mg_from_m_s2(judged.norm_rms), judged.angle_rms_deg
+    if limit_mg is not None and not rms_mg <= limit_mg:
+        found.append(Finding.of(FindingCode.LIMIT_EXCEEDED, "rest", rms_mg=rms_mg, limit_mg=limit_mg))
+    if limit_deg is not None and not rms_deg <= limit_deg:
+        found.append(Finding.of(FindingCode.LIMIT_EXCEEDED, "moves", rms_deg=rms_deg, limit_deg=limit_deg))
+    return tuple(found)
+
+
+def _same_recording(made_from: str, tested_on: str) -> tuple[Finding, ...]:
+    if not made_from or made_from != tested_on:
+        return ()
+    return (Finding.of(FindingCode.SAME_RECORDING),)

@@ -1,0 +1,189 @@
+"""Calibration as people use it from Python, and whether its uncertainties are honest end to end."""
+
+import importlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import trihedron
+from trihedron.api.calibrating import calibrate
+from trihedron.api.demonstrating import compare_with_truth, truth_of_the_day
+from trihedron.errors import RefusedError
+from trihedron.simulate import hand_session, scenario_by_name, simulate
+from trihedron.units import STANDARD_GRAVITY_M_S2
+
+SHORT = hand_session(n_poses=18, pose_s=3.0, move_s=1.5, first_pose_s=5.0)
+
+
+@pytest.fixture(scope="module")
+def scenario():
+    return replace(scenario_by_name("hand-session"), motion=SHORT)
+
+
+@pytest.fixture(scope="module")
+def recording(scenario):
+    return simulate(scenario, 11)[0]
+
+
+@pytest.fixture(scope="module")
+def result(recording):
+    return trihedron.calibrate(recording, gravity_m_s2=STANDARD_GRAVITY_M_S2)
+
+
+def test_errors_over_their_error_bars_are_standard_normal(scenario):
+    """12 sessions of 21 parameters each, every stage included: segmentation, both sensors, the joint fit.
+
+    χ² of one session in the metric of its covariance has 21 degrees of freedom; their sum is tested at 1e-4 each side.
+    The estimated noise behind the weights (some 10 % per pose) makes χ² about 5 % wider, hence the factor 1.1.
+    """
+    totals = []
+    for seed in range(12):
+        recording, _ = simulate(scenario, seed)
+        truth = truth_of_the_day(scenario, seed)
+        done = trihedron.calibrate(recording, gravity_m_s2=truth.gravity_m_s2)
+        totals.append(compare_with_truth(done.calibration, truth).chi2)
+    low, high = stats.chi2.ppf([1e-4, 1.0 - 1e-4], 21 * len(totals))
+    assert low / 1.1 < sum(totals) < high * 1.1
+
+
+def test_a_wrong_gravity_goes_into_the_scale_and_nowhere_else(recording, result):
+    other = trihedron.calibrate(recording, segments=result.segments, gravity_m_s2=STANDARD_GRAVITY_M_S2 * 1.002)
+    np.testing.assert_allclose(other.accelerometer.S, 1.002 * result.accelerometer.S, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(other.accelerometer.b, 1.002 * result.accelerometer.b, rtol=1e-5)
+    np.testing.assert_allclose(other.gyroscope.S, result.gyroscope.S, rtol=1e-6, atol=1e-11)
+
+
+def test_the_result_has_what_a_user_looks_for_and_prints_as_a_report(result):
+    assert result.accelerometer.S.shape == (3, 3)
+    assert result.accelerometer.b.shape == (3,)
+    assert result.accelerometer.covariance.shape == (12, 12)
+    assert result.gyroscope.covariance.shape == (12, 12)
+    assert isinstance(result.findings, tuple)
+    text = str(result)
+    for heading in ("Result", "Findings", "Axes", "Uncertainty", "Residuals"):
+        assert f"\n{heading}\n" in text
+    assert max(map(len, text.splitlines())) < 140
+    assert " at 0x" not in repr(result)
+
+
+def test_held_out_residuals_stand_beside_those_in_sample(result):
+    for sensor in (result.accelerometer, result.gyroscope):
+        assert sensor.quality.held_out is not None
+        assert sensor.quality.held_out.shape == sensor.quality.residual.shape
+        assert sensor.quality.held_out_rms > 0.0
+
+
+def test_both_methods_agree_within_their_error_bars(recording, result):
+    apart = trihedron.calibrate(
+        recording, segments=result.segments, gravity_m_s2=STANDARD_GRAVITY_M_S2, method="separate"
+    )
+    for name in ("accelerometer", "gyroscope"):
+        one, other = getattr(result, name), getattr(apart, name)
+        sigma = np.where(other.sigma_S > 0, other.sigma_S, 1.0)
+        # Same data: they differ by less than either's uncertainty.
+        assert np.all(np.abs(one.S - other.S) < 2.0 * sigma)
+
+
+def test_a_frame_is_a_choice_of_axes_and_changes_no_norm(recording, result):
+    symmetric = trihedron.calibrate(
+        recording, segments=result.segments, gravity_m_s2=STANDARD_GRAVITY_M_S2, frame="symmetric"
+    )
+    S = symmetric.accelerometer.S
+    np.testing.assert_allclose(S, S.T, atol=1e-15)
+    readings = result.segments.accelerometer_mean
+    norms = [np.linalg.norm(readings @ r.accelerometer.S.T + r.accelerometer.b, axis=1) for r in (result, symmetric)]
+    # Two fits of the same minimum, each stopped by its own inequality.
+    np.testing.assert_allclose(norms[0], norms[1], atol=1e-5)
+
+
+def test_applying_gives_si_and_keeps_rows_that_were_lost(recording, result):
+    readings = recording.accelerometer.copy()
+    readings[5] = np.nan
+    corrected = trihedron.apply(result, replace(recording, accelerometer=readings))
+    assert corrected.accelerometer_unit.value == "m/s^2"
+    assert np.isnan(corrected.accelerometer[5]).all()
+    assert np.isfinite(corrected.accelerometer[6]).all()
+
+
+def test_a_recording_without_gyro_is_calibrated_alone_and_without_accelerometer_refused(recording):
+    alone = trihedron.calibrate(replace(recording, gyroscope=None), gravity_m_s2=9.80665)
+    assert alone.gyroscope is None
+    assert "Gyroscope" not in str(alone)
+    with pytest.raises(ValueError, match="gyro alone"):
+        trihedron.calibrate(replace(recording, accelerometer=None), gravity_m_s2=9.80665)
+
+
+def test_verification_expects_what_it_sees_on_another_session(scenario, result):
+    other, _ = simulate(replace(scenario, motion=hand_session(n_poses=16, pose_s=3.0, move_s=1.5, layout=3)), 12)
+    judged = trihedron.verify(result, other).verification
+    z = judged.norm_error / judged.norm_sigma
+    # 16 poses: χ² within its 1e-4 limits.
+    assert stats.chi2.ppf(1e-4, len(z)) < np.sum(z**2) < stats.chi2.ppf(1.0 - 1e-4, len(z))
+    ratio = 2.0 * np.sum((judged.angle_deg / judged.angle_sigma_deg) ** 2)
+    n = 2 * len(judged.angle_deg)
+    assert stats.chi2.ppf(1e-4, n) < ratio < stats.chi2.ppf(1.0 - 1e-4, n)
+
+
+def test_a_move_beyond_the_gyros_range_is_left_out_of_what_verification_says_of_moves(scenario, result):
+    other, truth = simulate(replace(scenario, motion=hand_session(n_poses=16, pose_s=3.0, move_s=1.5, layout=3)), 12)
+    move = [part for part in truth.segments if part.kind == "move"][4]
+    beyond = np.array(other.gyroscope)
+    beyond[move.start + 40 : move.stop - 40] = [32767.0, -32768.0, 32767.0]
+    judged = trihedron.verify(result, replace(other, gyroscope=beyond)).verification
+    as_it_was = trihedron.verify(result, other).verification
+    assert judged.moves_left_out == (4,)
+    np.testing.assert_array_equal(judged.moves, np.delete(as_it_was.moves, 4))
+    assert judged.angle_rms_deg < 1.5 * as_it_was.angle_rms_deg
+    assert "without move 5" in str(trihedron.verify(result, replace(other, gyroscope=beyond)))
+
+
+def test_verification_notices_a_sensor_that_has_changed(scenario, result):
+    changed = replace(scenario, accelerometer=replace(scenario.accelerometer, b=(0.33, -0.3834, 0.1025)))
+    other, _ = simulate(changed, 13)
+    codes = {finding.code.value for finding in trihedron.verify(result, other).findings}
+    assert "residual-above-noise" in codes
+
+
+def test_a_miss_far_beyond_what_was_expected_is_not_to_be_trusted_unless_a_limit_accepts_it(scenario, result):
+    changed = replace(scenario, accelerometer=replace(scenario.accelerometer, b=(1.2, -0.3834, 0.1025)))
+    other, _ = simulate(changed, 13)
+    verified = trihedron.verify(result, other)
+    finding = next(f for f in verified.findings if f.code.value == "residual-above-noise")
+    assert finding.numbers["times_expected"] > 10.0
+    assert finding.severity.value == "serious"
+    # 0.9 m/s² more of one zero is missed by 50 mg rms; whoever can live with 200 mg is told, not stopped.
+    wide = trihedron.verify(result, other, limit_mg=200.0)
+    assert {f.severity.value for f in wide.findings if f.code.value == "residual-above-noise"} == {"warning"}
+    # A change of a few times the uncertainties is a warning.
+    slightly = replace(scenario, accelerometer=replace(scenario.accelerometer, b=(0.303, -0.3834, 0.1025)))
+    near, _ = simulate(slightly, 13)
+    assert all(f.severity.value != "serious" for f in trihedron.verify(result, near).findings)
+
+
+def test_a_check_predicts_the_error_bars_that_the_calibration_has(recording, result):
+    checked = trihedron.check(recording)
+    assert checked.is_fit
+    np.testing.assert_allclose(checked.calibration.accelerometer.sigma_b, result.accelerometer.sigma_b, rtol=0.05)
+    assert "Expected standard uncertainty" in str(checked)
+
+
+@pytest.mark.parametrize("fit", ["calibrate_joint", "calibrate_moves"])
+def test_a_defect_inside_a_fit_is_an_error_and_a_refusal_leaves_the_gyro_out(fit, recording, monkeypatch):
+    calibrating = importlib.import_module("trihedron.api.calibrating")
+    method = "joint" if fit == "calibrate_joint" else "separate"
+
+    def ends(error):
+        def raising(*_, **__):
+            raise error
+
+        monkeypatch.setattr(calibrating, fit, raising)
+        return calibrate(recording, method=method, gravity_m_s2=9.81)
+
+    with pytest.raises(ValueError, match="broadcast"):
+        ends(ValueError("operands could not be broadcast together with shapes (3,) (4,)"))
+    for refusal in (RefusedError("the moves do not tell."), np.linalg.LinAlgError("Singular matrix")):
+        result = ends(refusal)
+        assert result.calibration.gyroscope is None
+        assert any(str(refusal).rstrip(".") in finding.seen for finding in result.findings)
