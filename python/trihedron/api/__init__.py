@@ -1,4 +1,4 @@
-"""PIPELINE: the stages composed. Everything that a person asks for is one function here."""
+"""API: the stages composed. Everything that a person asks for is one function here."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from trihedron.api.converting import convert
     from trihedron.api.demonstrating import demo
     from trihedron.api.diagnosing import diagnose
+    from trihedron.api.diagnosing_sessions import diagnose_sessions
     from trihedron.api.driving import driven
     from trihedron.api.exporting import export
     from trihedron.api.extending import extend
@@ -52,6 +53,7 @@ __all__ = [
     "convert",
     "demo",
     "diagnose",
+    "diagnose_sessions",
     "driven",
     "export",
     "extend",
@@ -98,6 +100,7 @@ _HOME = {
     "convert": "trihedron.api.converting",
     "settle_gravity": "trihedron.api.choices",
     "diagnose": "trihedron.api.diagnosing",
+    "diagnose_sessions": "trihedron.api.diagnosing_sessions",
     "extend": "trihedron.api.extending",
     "export": "trihedron.api.exporting",
     "filter_noise": "trihedron.api.filter_noising",

@@ -18,6 +18,7 @@ from trihedron.records import AllanCurve, Calibration, Noise, Recording, Segment
 from trihedron.records.filter_noise import FilterNoise
 from trihedron.records.plan import ExperimentPlan
 from trihedron.records.ranking import Ranking
+from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.report import document, frames, machine, summaries
 from trihedron.report.calibration import calibration_report
 from trihedron.report.check import check_report
@@ -31,6 +32,7 @@ from trihedron.report.page import to_html
 from trihedron.report.plan import plan_record, plan_report
 from trihedron.report.ranking import ranking_record, ranking_report
 from trihedron.report.sessions import sessions_columns, sessions_record, sessions_report
+from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
 from trihedron.report.text import to_text
 from trihedron.report.verification import verification_report
 
@@ -79,6 +81,7 @@ _KINDS: dict[type, _Shown] = {
     SessionsResult: _Shown(
         lambda r: sessions_report(r.model), lambda r: sessions_record(r.model), lambda r: sessions_columns(r.model)
     ),
+    SharedDiagnosis: _Shown(shared_diagnosis_report, shared_diagnosis_record),
     Calibration: _Shown(calibration_report, calibration_document, frames.calibration_columns),
     Ranking: _Shown(ranking_report, ranking_record),
     Verification: _Shown(verification_report, machine.verification_record, frames.verification_columns),

@@ -11,7 +11,7 @@ from trihedron.cli.options import (
     Force,
     GravitySource,
     Json,
-    LogSource,
+    LogsSource,
     ReferenceColumns,
     Report,
     progress,
@@ -52,9 +52,9 @@ Alpha = Annotated[float, typer.Option(metavar="P", help="Chance that a healthy l
 Full = Annotated[bool, typer.Option("--full", help="Print the whole report, with every candidate.")]
 
 
-@with_options(source=LogSource, place=GravitySource)
+@with_options(sources=LogsSource, place=GravitySource)
 def diagnose(
-    source: LogSource,
+    sources: LogsSource,
     place: GravitySource,
     calibration: Calibration = None,
     against: Against = None,
@@ -68,7 +68,11 @@ def diagnose(
     full: Full = False,
     force: Force = False,
 ) -> None:
-    """Where a log and its model differ, which effects are missing, and does adding it help. Status 0 if it ran."""
+    """Where a log and its model differ, which effects are missing, and does adding it help. Status 0 if it ran.
+
+    With several logs of one unit: which effects all of them share.
+    """
+    check_outputs(json, updated, improved, force=force, report=report, inputs=(*sources.files, calibration, against))
     if calibration is not None and against is not None:
         raise typer.BadParameter("give either --calibration or --against: each is the model")
     if not 0.0 < alpha < 0.5:
@@ -79,11 +83,15 @@ def diagnose(
         raise typer.BadParameter("--improved goes with --against SCENARIO.toml: that file is what is improved")
     if improved is not None and against is not None and improved.resolve() == against.resolve():
         raise typer.BadParameter("--improved would overwrite the scenario that it improves; give it another name")
-    check_outputs(json, updated, improved, force=force, report=report, inputs=(*source.files, calibration, against))
+    if sources.are_many(None):
+        if any(one is not None for one in (calibration, against, reference, improved, updated)):
+            raise typer.BadParameter("several logs are diagnosed without a model: each by itself, and what all share")
+        _diagnose_many(sources, place, alpha, json, report, force=force)
+        return
     from trihedron.files.calibration import read_calibration, write_calibration
 
     known = None if calibration is None else read_calibration(calibration)
-    recording = source.read()
+    recording = sources.one().read()
     from trihedron import api
     from trihedron.files.diagnosis import diagnosis_document
     from trihedron.report import diagnosis_report
@@ -124,6 +132,29 @@ def diagnose(
 
         # What a model that nobody should trust differs by says nothing of the physics.
         leave(doubted(known))
+
+
+def _diagnose_many(
+    sources: LogsSource, place: GravitySource, alpha: float, json: Path | None, report: Path | None, *, force: bool
+) -> None:
+    """Every log by itself, and what all of one unit share."""
+    from trihedron import api
+    from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
+
+    recordings = [source.read() for source in sources.each()]
+    with progress("diagnosing") as tell:
+        found = api.diagnose_sessions(
+            recordings,
+            gravity_m_s2=place.gravity,
+            latitude_deg=place.latitude,
+            height_m=place.height,
+            alpha=alpha,
+            progress=tell,
+        )
+    document, machine = shared_diagnosis_report(found), shared_diagnosis_record(found)
+    show(document, json, sections=None)
+    write_json(machine, json, force=force)
+    write_report(document, machine, report, force=force)
 
 
 def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -> None:

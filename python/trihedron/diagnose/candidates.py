@@ -43,7 +43,7 @@ class Tried:
 
 def all_beside(model: Hypothesis) -> tuple[list[Tried], dict[str, str]]:
     """The whole catalogue beside a hypothesis, its noise as strong as it is there; and why others do not apply."""
-    terms, missing = _terms(model, ())
+    terms, missing = terms_beside(model, ())
     looks = model.looked_at(terms, PRIOR_SCALES) if terms else []
     asked = [
         Asked(model.log_evidence + float(look.gain[:, 0].max()), model.strengths, look.value, look.covariance)
@@ -54,7 +54,7 @@ def all_beside(model: Hypothesis) -> tuple[list[Tried], dict[str, str]]:
 
 def candidates_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Tried], dict[str, str]]:
     """Candidates beside a hypothesis, best first, one an effect; and why others do not apply."""
-    terms, missing = _terms(model, exclude)
+    terms, missing = terms_beside(model, exclude)
     if not terms:
         return [], missing
     leading = _leaders(model, terms)
@@ -87,7 +87,7 @@ def _best_of_each(terms: Sequence[Term], asked: Sequence[Asked], plain: float) -
     return sorted(best.values(), key=lambda one: -one.score)
 
 
-def _terms(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term], dict[str, str]]:
+def terms_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term], dict[str, str]]:
     """Every shape of every effect that applies and is not there yet."""
     context = model.context
     held = {t.effect.id for t in model.terms if not t.effect.repeatable} | set(exclude)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 
@@ -29,14 +29,17 @@ from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_twin
 from trihedron.diagnose.session.twin import NO_DISTORTION, Prior, Twin
+from trihedron.diagnose.shared import shared_effects
 from trihedron.diagnose.verdict import accounted_for, verdict_of
 from trihedron.errors import RefusedError
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Candidate, Diagnosis
 from trihedron.records.domains import DomainTest
 from trihedron.records.progress import Progress
+from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.session.noise import Strengths
 
+FEWEST_RECORDINGS = 2
 LARGEST_ALPHA = 0.5
 """A false-alarm rate of a half or more is a coin, not a test."""
 
@@ -69,6 +72,53 @@ def diagnose_recording(
     ValueError
         When there is nothing to hold a model against: no accelerometer, fewer than two poses.
     """
+    return diagnosed(
+        recording, segments, calibration, calibration_is_given=calibration_is_given, alpha=alpha, progress=progress
+    )[0]
+
+
+def diagnose_recordings(
+    given: Sequence[tuple[Recording, Segments, Calibration]], *, alpha: float = 0.01, progress: Progress | None = None
+) -> SharedDiagnosis:
+    """Every recording of one unit by itself, and the effects that all demand together with one size (eq. 11.20).
+
+    Parameters
+    ----------
+    given : sequence of (Recording, Segments, Calibration)
+        Two or more, each as for :func:`diagnose_recording`.
+    alpha : float
+        Chance that a healthy recording is called anything but consistent.
+    progress : callable (fraction, text), optional
+        Called as the work goes on.
+
+    Raises
+    ------
+    ValueError
+        When there are fewer than two, or there is nothing to hold a model against.
+    """
+    if len(given) < FEWEST_RECORDINGS:
+        raise RefusedError(f"what recordings share needs two or more, got {len(given)}.")
+    tell = progress or (lambda _fraction, _text: None)
+    each = []
+    for k, one in enumerate(given):
+        tell(0.8 * k / len(given), f"diagnosing {one[0].source}")
+        each.append(diagnosed(*one, alpha=alpha))
+    tell(0.8, "asking what all recordings share")
+    effects, candidates_together = shared_effects([model for _, model in each], alpha)
+    tell(1.0, "done")
+    return SharedDiagnosis(tuple(one for one, _ in each), effects, candidates_together)
+
+
+def diagnosed(
+    recording: Recording,
+    segments: Segments,
+    calibration: Calibration,
+    *,
+    calibration_is_given: bool = False,
+    alpha: float = 0.01,
+    progress: Progress | None = None,
+) -> tuple[Diagnosis, Hypothesis]:
+    """The same as :func:`diagnose_recording`, with the hypothesis that the search ended at."""
     tell = progress or (lambda _fraction, _text: None)
     if not 0.0 < alpha < LARGEST_ALPHA:
         raise RefusedError(f"alpha is a small probability such as 0.01, got {alpha}")
@@ -104,7 +154,7 @@ def diagnose_recording(
         stages=held_out_stages(run.bare, answer),
     )
     tell(1.0, "done")
-    return result
+    return result, model
 
 
 def _noise(model: Hypothesis) -> MappingProxyType[str, object]:

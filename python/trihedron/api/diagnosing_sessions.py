@@ -1,0 +1,61 @@
+"""Diagnose several recordings of one unit: each by itself, and what all of them share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from trihedron.api.calibrating import calibrate
+from trihedron.api.reading import AnyRecording, recording_of
+from trihedron.diagnose import diagnose_recordings
+from trihedron.errors import REFUSALS, RefusedError
+from trihedron.records.progress import Progress
+from trihedron.records.shared_effects import SharedDiagnosis
+from trihedron.segment import resegment
+
+
+def diagnose_sessions(
+    recordings: Sequence[AnyRecording],
+    *,
+    gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
+    alpha: float = 0.01,
+    progress: Progress | None = None,
+) -> SharedDiagnosis:
+    """Which physics several recordings of one unit lack together, and which one of them lacks alone.
+
+    An effect of the instrument has one size in all recordings: their evidence for it adds (docs/diagnosis-method.md).
+
+    Parameters
+    ----------
+    recordings : sequence of Recording, or what trihedron.read takes
+        Two or more of the same unit.
+    gravity_m_s2 or latitude_deg, height_m : float
+        |g| at the place, as for :func:`calibrate`.
+    alpha : float
+        Chance that healthy recordings are said to share an effect.
+
+    Returns
+    -------
+    SharedDiagnosis
+        ``effects`` that are shared, with common parameters and those of every recording; ``diagnoses`` of each.
+
+    Raises
+    ------
+    ValueError
+        When there are fewer than two recordings, or one of them cannot be calibrated.
+
+    Examples
+    --------
+    >>> import trihedron
+    >>> together = trihedron.diagnose_sessions(["monday.csv", "friday.csv"], latitude_deg=50.1)  # doctest: +SKIP
+    """
+    given = []
+    for one in recordings:
+        recording = recording_of(one)
+        try:
+            result = calibrate(recording, gravity_m_s2=gravity_m_s2, latitude_deg=latitude_deg, height_m=height_m)
+        except REFUSALS as error:
+            raise RefusedError(f"{recording.source}: {error}") from None
+        given.append((recording, resegment(recording, result.segments), result.calibration))
+    return diagnose_recordings(given, alpha=alpha, progress=progress)

@@ -1,0 +1,230 @@
+"""Several recordings of one unit in one evidence: an effect of the instrument has the same size in all (eq. 11.20).
+
+What one recording says of an effect's parameters, everything else integrated out, is Gaussian: a constant, a slope and
+a precision. Those of several recordings add. Bias, S and strengths of noise are each recording's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import chdtrc
+
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.candidates import PRIOR_SCALES, terms_beside
+from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects.bias_process import BiasProcess
+from trihedron.diagnose.effects.contract import Effect
+from trihedron.diagnose.effects.direct import DirectEffect
+from trihedron.diagnose.hypothesis import Asked, Hypothesis, Term, again
+from trihedron.diagnose.search import MOST_EFFECTS, threshold
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.shared_effects import SharedCandidate, SharedEffect
+
+N_LEADERS = 4
+"""Candidates, best at fixed strengths, whose strengths are found anew."""
+KNOWN = 1e-6
+"""Share of the best-known direction's precision below which a recording knows nothing of a direction."""
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """What one recording says of parameters ``q``, in units of their expected size: a log-likelihood
+    ``constant + slope·q - q·precision·q/2``, over that without the effect."""
+
+    constant: float
+    slope: FloatArray
+    precision: FloatArray
+
+    @classmethod
+    def of(cls, asked: Asked, term: Term, unit: FloatArray, plain: float) -> Information:
+        """From the answer under a prior of standard deviations ``term.sizes``, ``unit`` the sizes of ``q``."""
+        posterior = np.linalg.inv(asked.covariance / np.outer(unit, unit))
+        prior = np.diag((unit / term.sizes) ** 2)
+        slope = posterior @ (asked.value / unit)
+        # Rounding makes a direction that the data say nothing of seem less known than beforehand.
+        values, vectors = np.linalg.eigh(posterior - prior)
+        precision = (vectors * np.maximum(values, 0.0)) @ vectors.T
+        gain = asked.log_evidence - plain
+        odds = 0.5 * (np.linalg.slogdet(posterior)[1] - np.linalg.slogdet(prior)[1])
+        return cls(gain - 0.5 * float(slope @ np.linalg.solve(posterior, slope)) + float(odds), slope, precision)
+
+    @property
+    def known(self) -> tuple[FloatArray, FloatArray]:
+        """Eigenvalues and vectors of what this recording knows."""
+        values, vectors = np.linalg.eigh(self.precision)
+        keeps = values > KNOWN * max(float(values[-1]), 1e-300)
+        return values[keeps], vectors[:, keeps]
+
+    @property
+    def peak(self) -> float:
+        """``slope·precision⁻¹·slope`` over the directions that are known."""
+        values, vectors = self.known
+        return float(((vectors.T @ self.slope) ** 2 / values).sum())
+
+
+def together(parts: Sequence[Information], scale: float) -> tuple[float, FloatArray, FloatArray]:
+    """Log-evidence gained by one common ``q``, ``scale`` its standard deviation beforehand; ``q``, its covariance."""
+    precision = sum((one.precision for one in parts), np.eye(len(parts[0].slope)) / scale**2)
+    slope = np.sum([one.slope for one in parts], axis=0)
+    covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
+    odds = 0.5 * np.linalg.slogdet(covariance / scale**2)[1]
+    value: FloatArray = covariance @ slope
+    return sum(one.constant for one in parts) + 0.5 * float(slope @ value) + float(odds), value, covariance
+
+
+def agreement(parts: Sequence[Information]) -> float:
+    """Chance that values of one size differ between recordings as much as these do (χ², no prior)."""
+    whole = Information(0.0, np.sum([p.slope for p in parts], axis=0), np.sum([p.precision for p in parts], axis=0))
+    dof = sum(len(one.known[0]) for one in parts) - len(whole.known[0])
+    return float(chdtrc(dof, max(sum(one.peak for one in parts) - whole.peak, 0.0))) if dof > 0 else 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """One candidate in all recordings: its terms, what each says, and the score of a common size."""
+
+    terms: tuple[Term, ...]
+    parts: tuple[Information, ...]
+    scale: float
+    score: float
+    value: FloatArray
+    covariance: FloatArray
+
+    @property
+    def effect(self) -> Effect:
+        return self.terms[0].effect
+
+
+def may_be_shared(effect: Effect) -> bool:
+    """Whether an effect belongs to the instrument and has columns, so that several recordings can share its size."""
+    is_own = effect.is_of_session or effect.is_of_motion or effect.is_local or effect.is_spread
+    return not (is_own or isinstance(effect, BiasProcess | DirectEffect))
+
+
+def shared_effects(
+    models: Sequence[Hypothesis], alpha: float
+) -> tuple[tuple[SharedEffect, ...], tuple[SharedCandidate, ...]]:
+    """The effects that all recordings of one unit demand together, by the score of one common size; and what was tried.
+
+    ``models`` are what each recording demands by itself; what may be the instrument's is asked anew.
+    """
+    bare = [again(m, [t for t in m.terms if not may_be_shared(t.effect)]) for m in models]
+    held, tried = _added(list(bare), threshold(alpha))
+    judged = [_judged(held, k, alpha) for k in range(held.n_added)]
+    while any(score <= threshold(alpha) for score, _ in judged):
+        held = held.without(int(np.argmin([score for score, _ in judged])))
+        judged = [_judged(held, k, alpha) for k in range(held.n_added)]
+    effects = sorted((one for _, one in judged), key=lambda one: -one.score)
+    named = {one.id for one in effects}
+    candidates = tuple(SharedCandidate(j.effect.id, j.score) for j in tried if j.effect.id not in named)
+    return tuple(effects), candidates
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """Every recording with the effects that are shared, behind those of its own."""
+
+    models: tuple[Hypothesis, ...]
+    n_added: int
+    paid: tuple[float, ...]
+
+    def without(self, k: int) -> _Held:
+        """Without the shared effect ``k``."""
+        fewer = tuple(again(m, [t for j, t in enumerate(m.terms) if j != self._at(m, k)]) for m in self.models)
+        return _Held(fewer, self.n_added - 1, tuple(p for j, p in enumerate(self.paid) if j != k))
+
+    def _at(self, model: Hypothesis, k: int) -> int:
+        return len(model.terms) - self.n_added + k
+
+    def terms(self, k: int) -> tuple[Term, ...]:
+        """Shared effect ``k`` in every recording."""
+        return tuple(m.terms[self._at(m, k)] for m in self.models)
+
+
+def _added(models: list[Hypothesis], limit: float) -> tuple[_Held, list[_Joint]]:
+    held = _Held(tuple(models), 0, ())
+    names: set[str] = set()
+    while True:
+        tried = _tried(held.models, names)
+        if not tried or tried[0].score <= limit or held.n_added >= MOST_EFFECTS:
+            return held, tried
+        best = tried[0]
+        names.add(best.effect.id)
+        larger = tuple(
+            again(m, [*m.terms, replace(t, sizes=t.sizes * best.scale)])
+            for m, t in zip(held.models, best.terms, strict=True)
+        )
+        held = _Held(larger, held.n_added + 1, (*held.paid, best.terms[0].paid))
+
+
+def _judged(held: _Held, k: int, alpha: float) -> tuple[float, SharedEffect]:
+    """The score of a shared effect beside all others, and its record."""
+    fewer = held.without(k)
+    joint = _full(fewer.models, held.terms(k))
+    term = joint.terms[0]
+    unit = term.sizes
+
+    def parameters(value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
+        return term.effect.parameters(term.variant, value * unit, covariance * np.outer(unit, unit))
+
+    alone = [together([part], joint.scale) for part in joint.parts]
+    return joint.score, SharedEffect(
+        id=term.effect.id,
+        score=joint.score,
+        parameters=parameters(joint.value, joint.covariance),
+        scores=tuple(2.0 * gain - term.paid for gain, *_ in alone),
+        each=tuple(parameters(value, covariance) for _, value, covariance in alone),
+        p_agree=(p_agree := agreement(joint.parts)),
+        is_of_instrument=p_agree > alpha,
+    )
+
+
+def _tried(models: Sequence[Hypothesis], exclude: Collection[str]) -> list[_Joint]:
+    """Effects beside the hypotheses of all recordings, best first, one shape each."""
+    ids = {one.id for one in catalogue() if not may_be_shared(one)} | set(exclude)
+    found = [{_key(t): t for t in terms_beside(m, ids)[0]} for m in models]
+    common = [key for key in found[0] if all(key in one for one in found)]
+    if not common:
+        return []
+    terms = {key: tuple(one[key] for one in found) for key in common}
+    looks = [m.looked_at([terms[key][i] for key in common], (1.0,)) for i, m in enumerate(models)]
+    glanced = []
+    for j, key in enumerate(common):
+        asked = [
+            Asked(m.log_evidence + float(look[j].gain[0, 0]), m.strengths, look[j].value, look[j].covariance)
+            for m, look in zip(models, looks, strict=True)
+        ]
+        glanced.append(_joint(terms[key], asked, [m.log_evidence for m in models]))
+    first = _best_of_each(glanced)
+    full = [_full(models, one.terms) for one in first[:N_LEADERS]]
+    return sorted([*full, *first[N_LEADERS:]], key=lambda one: -one.score)
+
+
+def _key(term: Term) -> tuple[object, ...]:
+    return term.effect.id, term.variant.label, term.variant.names, tuple(sorted(term.variant.shape.items()))
+
+
+def _best_of_each(all_of: Sequence[_Joint]) -> list[_Joint]:
+    best: dict[str, _Joint] = {}
+    for one in sorted(all_of, key=lambda one: -one.score):
+        best.setdefault(one.effect.id, one)
+    return list(best.values())
+
+
+def _full(models: Sequence[Hypothesis], terms: tuple[Term, ...]) -> _Joint:
+    """A candidate with the strengths of every recording found anew beside it."""
+    asked = [m.asked([t])[0] for m, t in zip(models, terms, strict=True)]
+    return _joint(terms, asked, [m.plain([a.strengths]) for m, a in zip(models, asked, strict=True)])
+
+
+def _joint(terms: tuple[Term, ...], asked: Sequence[Asked], plain: Sequence[float]) -> _Joint:
+    unit = terms[0].sizes
+    # One of a column may stand for another number of the reported unit.
+    units = [unit * terms[0].variant.scale / t.variant.scale for t in terms]
+    parts = tuple(Information.of(a, t, u, p) for a, t, u, p in zip(asked, terms, units, plain, strict=True))
+    made = [(scale, *together(parts, scale)) for scale in PRIOR_SCALES]
+    scale, gain, value, covariance = max(made, key=lambda one: one[1])
+    return _Joint(terms, parts, scale, 2.0 * gain - max(t.paid for t in terms), value, covariance)
