@@ -30,7 +30,8 @@ __all__ = ["recording", "session"]
         (["calibrate", "x.csv", "--axis-signs", "++"], "three signs"),
         (["calibrate", "x.csv", "--report", "r.docx"], ".html, .txt or .json"),
         (["export", "x.json"], "--to"),
-        (["diagnose", "a.csv", "b.csv"], "--accel F --gyro F"),
+        (["segment", "a.csv", "b.csv"], "--accel F --gyro F"),
+        (["diagnose", "a.csv", "b.csv", "--calibration", "c.json"], "without a model"),
         (["check", "a.csv", "b.csv"], "once for each log"),
     ],
 )

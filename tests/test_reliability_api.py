@@ -46,6 +46,7 @@ def right(folder, recording, result, tmp_path_factory):
         "calibrate_references": {"recordings": [recording], "references": [recording]},
         "calibrate_sessions": {"recordings": [recording, recording]},
         "capture": {"port": "none", "output": place / "x.csv"},
+        "diagnose_sessions": {"recordings": [recording, recording]},
         "convert": {"log": recording, "output": place / "x.csv"},
         "demo": {"folder": place / "demo"},
         "export": {"calibration": result, "target": "c"},

@@ -95,7 +95,9 @@ def test_values_that_differ_are_not_called_the_instruments():
 @pytest.mark.skipif(not MASSIF.is_dir(), reason="the recordings are not here")
 def test_the_g_sensitivity_of_a_real_unit_is_in_all_three_of_its_sessions():
     recordings = [
-        trihedron.read(accelerometer_path=MASSIF / f"session{k}_acc.txt", gyroscope_path=MASSIF / f"session{k}_gyro.txt")
+        trihedron.read(
+            accelerometer_path=MASSIF / f"session{k}_acc.txt", gyroscope_path=MASSIF / f"session{k}_gyro.txt"
+        )
         for k in (2, 3, 4)
     ]
     found = trihedron.diagnose_sessions(recordings, gravity_m_s2=9.803)

@@ -77,6 +77,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "diagnose": (
         ("What the linear model leaves out:", "trihedron diagnose log.csv --latitude 50.1 --report diagnosis.html"),
+        ("Which effects are the unit's own?", "trihedron diagnose mon.csv tue.csv wed.csv --latitude 50.1"),
         ("Is this still the sensor of last year?", "trihedron diagnose log.csv --calibration cal.json"),
         ("Why does my simulation not fit?", "trihedron diagnose log.csv --against sim.toml --improved better.toml"),
     ),

@@ -80,7 +80,7 @@ def diagnose_recording(
 def diagnose_recordings(
     given: Sequence[tuple[Recording, Segments, Calibration]], *, alpha: float = 0.01, progress: Progress | None = None
 ) -> SharedDiagnosis:
-    """Every recording of one unit by itself, and the effects that all demand together with one size (eq. 11.20).
+    """Every recording of one unit by itself, and the effects that all demand together with one size (eq. 11.21).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Several recordings of one unit in one evidence: an effect of the instrument has the same size in all (eq. 11.20).
+"""Several recordings of one unit in one evidence: an effect of the instrument has the same size in all (eq. 11.21).
 
 What one recording says of an effect's parameters, everything else integrated out, is Gaussian: a constant, a slope and
 a precision. Those of several recordings add. Bias, S and strengths of noise are each recording's own.

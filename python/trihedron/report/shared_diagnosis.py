@@ -75,7 +75,7 @@ def _cell(one: EffectParameter, scale: float) -> str:
 
 def _each(found: SharedDiagnosis, names: list[str]) -> Table:
     rows = tuple(
-        (name, verdict_in_words(one), listed(list(alone)) if alone else "–")
+        (name, verdict_in_words(one).split(":")[0].lower(), listed(list(alone)) if alone else "–")
         for name, one, alone in zip(names, found.diagnoses, found.of_single_recordings, strict=True)
     )
     return Table(("recording", "verdict", "named here alone"), rows)
