@@ -12,7 +12,7 @@ PACKAGE = ROOT / "python" / "trihedron"
 STAGES = ("read", "segment", "estimate", "diagnose", "simulate", "report", "capture")
 # What any stage may import: the nouns, the model, units. `_core` only where numbers are made.
 # A fleet is `api` over many logs.
-COMPOSERS = {"api", "cli", "fleet", "__init__", "__main__"}
+COMPOSERS = {"api", "comparison", "cli", "fleet", "__init__", "__main__"}
 # Records ask for how they are shown (to_dict, plot, a page) and for the reader of plain arrays only when asked.
 LOOKS_UP = {"records/presented.py", "records/recording.py"}
 # A finding asks the catalogue for its sentence.

@@ -9,9 +9,9 @@ from scipy.stats import binom
 
 import trihedron
 from trihedron.api import improving
-from trihedron.api.comparing_noise import Sampled
-from trihedron.api.comparing_noise import sampled as sampled_of
-from trihedron.api.comparing_quantisation import quantisation_noise, white_and_quantisation
+from trihedron.comparison.noise import Sampled
+from trihedron.comparison.noise import sampled as sampled_of
+from trihedron.comparison.quantisation import quantisation_noise, white_and_quantisation
 from trihedron.diagnose.against.fitted import model_of_calibration
 from trihedron.estimate.noise import noise_of_poses
 from trihedron.simulate import NoiseTerms, Scenario, hand_session, make_noise, simulate

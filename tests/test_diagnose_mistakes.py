@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trihedron
-from trihedron.api.comparing_frames import sign_of_gravity
+from trihedron.comparison.frames import sign_of_gravity
 from trihedron.diagnose.against import FittedModel, compare_numbers
 from trihedron.estimate.gyroscope.world_rates import carried_gravity
 from trihedron.estimate.noise.of_biases import PoseBiases, compare_slow
@@ -149,7 +149,7 @@ def test_slow_noise_is_not_compared_with_few_poses():
 
 
 def test_stamps_that_reading_made_even_still_count_as_scattered():
-    from trihedron.api.comparing_noise import compare_noise, sampled
+    from trihedron.comparison.noise import compare_noise, sampled
 
     rng = np.random.default_rng(4)
     body, _, _ = session_with_world_rates(3)

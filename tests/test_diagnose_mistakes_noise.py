@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from trihedron.api.comparing_correlation import correlation_times
-from trihedron.api.comparing_noise import compare_noise, sampled
+from trihedron.comparison.correlation import correlation_times
+from trihedron.comparison.noise import compare_noise, sampled
 from trihedron.diagnose.against import FittedModel, compare_numbers
 from trihedron.records import Pose, Recording
 from trihedron.records.channel_facts import LowPass

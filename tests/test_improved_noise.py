@@ -8,9 +8,9 @@ import pytest
 
 import trihedron
 from trihedron.api import driving
-from trihedron.api.comparing_noise import _are_even
 from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, driven, flicker_of_poses
 from trihedron.api.improving import _unlike
+from trihedron.comparison.noise import _are_even
 from trihedron.estimate.noise import gain_of, noise_of_poses
 from trihedron.records.pose_noise import Measured
 from trihedron.simulate import (

@@ -9,7 +9,7 @@ import tomllib
 
 import trihedron
 from trihedron.api import driving, improve
-from trihedron.api.comparing_ranges import stated_ranges
+from trihedron.comparison.ranges import stated_ranges
 from trihedron.records.channel_facts import ChannelFacts, Limit
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.simulate import Scenario, hand_session, read_scenario, simulate

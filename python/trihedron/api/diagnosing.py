@@ -13,20 +13,20 @@ from trihedron.api.asking import WrongTypeError
 from trihedron.api.beside import beside, shared_log
 from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import settle_gravity
-from trihedron.api.comparing import compared
-from trihedron.api.comparing_correlation import correlation_times
-from trihedron.api.comparing_frames import rates_of_world, sign_of_gravity
-from trihedron.api.comparing_moved import judged_by_motion
-from trihedron.api.comparing_noise import Sampled, compare_noise, sampled
-from trihedron.api.comparing_quantisation import quantisation_noise
-from trihedron.api.comparing_ranges import stated_ranges
-from trihedron.api.comparing_slow import slow_noise
-from trihedron.api.comparing_stages import with_noise_stage
 from trihedron.api.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
-from trihedron.api.driving import driven
+from trihedron.api.driving import MovedAlike, driven
 from trihedron.api.reading import AnyRecording, read, recording_of, segment, segments_of
 from trihedron.api.referring import AnyReference
 from trihedron.api.results import DiagnosisResult
+from trihedron.comparison.correlation import correlation_times
+from trihedron.comparison.frames import rates_of_world, sign_of_gravity
+from trihedron.comparison.model import compared
+from trihedron.comparison.moved import judged_by_motion
+from trihedron.comparison.noise import Sampled, compare_noise, sampled
+from trihedron.comparison.quantisation import quantisation_noise
+from trihedron.comparison.ranges import stated_ranges
+from trihedron.comparison.slow import slow_noise
+from trihedron.comparison.stages import with_noise_stage
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.against import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open
@@ -166,8 +166,10 @@ def _of_poses(
         found = compared(found, given, free_simulation, noise, recording_used, segments_used, alpha)
         if simulated is not None:
             stages = with_noise_stage(found.stages, simulated.sampled, recording_used, segments_used, fit, noise)
-            moved = (simulated.scenario, recording_used, segments_used, used)
-            found = judged_by_motion(replace(found, stages=stages), *moved, alpha)
+            found = replace(found, stages=stages)
+            if simulated.scenario is not None and recording_used.gyroscope is not None and used.gyroscope is not None:
+                beside = MovedAlike(recording_used, segments_used, used)
+                found = judged_by_motion(found, simulated.scenario, beside, alpha)
         updated, used = used, given
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
     return DiagnosisResult(

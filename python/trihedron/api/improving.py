@@ -11,12 +11,12 @@ from typing import Any, Literal
 import numpy as np
 import tomllib
 
-from trihedron.api.comparing_moved import AIMED_AT
-from trihedron.api.comparing_noise import Sampled, sampled
-from trihedron.api.comparing_quantisation import white_and_quantisation
-from trihedron.api.comparing_ranges import SENSOR
 from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, flicker_of_poses
 from trihedron.api.results import DiagnosisResult
+from trihedron.comparison.moved import AIMED_AT
+from trihedron.comparison.noise import Sampled, sampled
+from trihedron.comparison.quantisation import white_and_quantisation
+from trihedron.comparison.ranges import SENSOR
 from trihedron.diagnose.against import model_of_diagnosis
 from trihedron.estimate.noise import gain_of
 from trihedron.files.scenario import improved_scenario

@@ -72,7 +72,6 @@ def diagnose(
 
     With several logs of one unit: which effects all of them share.
     """
-    check_outputs(json, updated, improved, force=force, report=report, inputs=(*sources.files, calibration, against))
     if calibration is not None and against is not None:
         raise typer.BadParameter("give either --calibration or --against: each is the model")
     if not 0.0 < alpha < 0.5:
@@ -83,6 +82,7 @@ def diagnose(
         raise typer.BadParameter("--improved goes with --against SCENARIO.toml: that file is what is improved")
     if improved is not None and against is not None and improved.resolve() == against.resolve():
         raise typer.BadParameter("--improved would overwrite the scenario that it improves; give it another name")
+    check_outputs(json, updated, improved, force=force, report=report, inputs=(*sources.files, calibration, against))
     if sources.are_many(None):
         if any(one is not None for one in (calibration, against, reference, improved, updated)):
             raise typer.BadParameter("several logs are diagnosed without a model: each by itself, and what all share")

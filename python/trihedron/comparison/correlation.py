@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from trihedron.api.comparing_noise import Sampled, Sensor
+from trihedron.comparison.noise import Sampled, Sensor
 from trihedron.estimate.noise import ratio_of
 from trihedron.estimate.noise.correlation_time import correlation_time
 from trihedron.records.diagnosis import NoiseDifference

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
-from trihedron.api.driving import MovedAlike
 from trihedron.probability import fdtrc, stdtrit
-from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.simulate import Scenario
 
@@ -26,29 +24,32 @@ OPEN_P = 0.1
 What = Literal["poses", "moves"]
 
 
-def judged_by_motion(
-    found: Diagnosis,
-    scenario: Scenario | None,
-    recording: Recording,
-    segments: Segments,
-    own: Calibration,
-    alpha: float,
-) -> Diagnosis:
+class Moved(Protocol):
+    """What poses [(m/s²)²] and moves [rad²] of a recording miss, and of a scenario that is moved as it was."""
+
+    poses: float | None
+    moves: float | None
+
+    def missed_by(self, scenario: Scenario, seed: int) -> tuple[float | None, float | None]:
+        """The same of one simulation with its own calibration."""
+
+
+def judged_by_motion(found: Diagnosis, scenario: Scenario, beside: Moved, alpha: float) -> Diagnosis:
     """A ``consistent`` diagnosis of a scenario, held against simulations of its instrument moved as the recording was.
 
     Noise inside poses says nothing of what happens between them. A ratio that chance does not explain makes it
     ``parameters-differ``; other verdicts stand, and are not held up by simulations.
     """
-    if scenario is None or found.verdict != "consistent" or recording.gyroscope is None or own.gyroscope is None:
+    if found.verdict != "consistent":
         return found
-    rows = missed_alike(scenario, MovedAlike(recording, segments, own), alpha)
+    rows = missed_alike(scenario, beside, alpha)
     if not rows:
         return found
     verdict = "parameters-differ" if any(row.significant for row in rows) else found.verdict
     return replace(found, verdict=verdict, noise_compared=(*found.noise_compared, *rows))
 
 
-def missed_alike(scenario: Scenario, beside: MovedAlike, alpha: float) -> tuple[NoiseDifference, ...]:
+def missed_alike(scenario: Scenario, beside: Moved, alpha: float) -> tuple[NoiseDifference, ...]:
     """What poses and moves of a scenario miss over what the recording's do, each with its interval.
 
     The recording is one draw more of the same kind where both are alike: the logarithm of its root mean square then
@@ -64,9 +65,7 @@ def missed_alike(scenario: Scenario, beside: MovedAlike, alpha: float) -> tuple[
     return rows
 
 
-def _rows(
-    made: list[tuple[float | None, float | None]], beside: MovedAlike, alpha: float
-) -> tuple[NoiseDifference, ...]:
+def _rows(made: list[tuple[float | None, float | None]], beside: Moved, alpha: float) -> tuple[NoiseDifference, ...]:
     poses = _row("poses", [one for one, _ in made], beside.poses, alpha)
     moves = _row("moves", [one for _, one in made], beside.moves, alpha)
     return tuple(row for row in (poses, moves) if row is not None)

@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 from scipy.stats import chi2
 
-from trihedron.api.comparing_draws import one_draw_for_all, uniform_for_normal
 from trihedron.arrays import FloatArray
+from trihedron.comparison.draws import one_draw_for_all, uniform_for_normal
 from trihedron.diagnose.against import FittedModel
 from trihedron.errors import REFUSALS
 from trihedron.estimate.noise import noise_of_poses, ratio_of

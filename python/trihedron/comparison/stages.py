@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from trihedron.api.comparing_noise import Sampled, Sensor, sampled
+from trihedron.comparison.noise import Sampled, Sensor, sampled
 from trihedron.diagnose.against import FittedModel
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import NoiseDifference, Stage, StageDomain

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.api.comparing_noise import Sampled, Sensor
+from trihedron.comparison.noise import Sampled, Sensor
 from trihedron.estimate.noise import ratio_of
 from trihedron.records.diagnosis import NoiseDifference
 from trihedron.records.pose_noise import Measured, PoseNoise

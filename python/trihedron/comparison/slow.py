@@ -9,8 +9,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from trihedron.api.comparing_noise import Sensor
 from trihedron.arrays import FloatArray
+from trihedron.comparison.noise import Sensor
 from trihedron.diagnose.against import FREE_CURVES
 from trihedron.estimate.noise.of_biases import PoseBiases, SlowDifference, compare_slow
 from trihedron.estimate.noise.of_norms import PoseNorms, compare_slow_norms
