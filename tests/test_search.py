@@ -1,13 +1,19 @@
 """The one search by one evidence: what joins, what is swapped, what every candidate's row says."""
 
+import sys
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
+import polars
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 import trihedron
 from diagnosed_session import diagnosed, simulated
+from nuisance_trial.draw import G, draw
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.hypothesis import Term, hypothesis
 from trihedron.diagnose.search import search, threshold
@@ -151,3 +157,14 @@ def test_a_flaw_of_moves_is_not_swallowed_by_zeros_that_scatter(seed):
     # The scatter may stray between poses as far as moves show: without its cost it explained the moves alone.
     assert names[0] == "gyro-scale-nonlinearity"
     assert "gyro-bias-repeatability" in names
+
+
+@pytest.mark.parametrize("seed", [9700200004, 9700200104])
+def test_a_drift_that_temperature_explains_as_well_names_both(seed, tmp_path):
+    columns, _ = draw("gyro-thermal-bias", seed, 0.5, True, False, ())
+    polars.DataFrame(columns).write_csv(tmp_path / "log.csv")
+    effects = {one.id: one for one in trihedron.diagnose(tmp_path / "log.csv", gravity_m_s2=G).effects}
+    # At half its size a bias that follows 9 °C is known to three sigma: a walk of the bias does as well.
+    drift = effects["gyro-bias-drift"]
+    assert drift.confounded_with == ("gyro-thermal-bias",)
+    assert "temperature" in drift.separating_experiment

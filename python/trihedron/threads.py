@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+Given = TypeVar("Given")
+Made = TypeVar("Made")
 
 _MOST_PER_PROCESSOR = 4
 
@@ -14,3 +20,14 @@ def cap_threads() -> None:
         asked = os.environ.get(name, "").strip()
         if asked.isdecimal() and (len(asked) > 6 or int(asked) > _MOST_PER_PROCESSOR * processors):
             os.environ[name] = str(processors)
+
+
+def side_by_side(make: Callable[[Given], Made], given: Iterable[Given]) -> list[Made]:
+    """``make`` of each, as many at a time as the core may start threads: fits that do not need one another."""
+    work = list(given)
+    allowed = os.environ.get("RAYON_NUM_THREADS", "").strip()
+    n = min(int(allowed) if allowed.isdecimal() and int(allowed) else os.cpu_count() or 1, len(work))
+    if n <= 1:
+        return [make(one) for one in work]
+    with ThreadPoolExecutor(n) as pool:
+        return list(pool.map(make, work))

@@ -72,7 +72,7 @@ pub enum Stop {
     /// GN4 holds.
     SmallGradient,
     /// The residuals vanish to rounding.
-    BiasResidual,
+    NoResidual,
     /// No step along the descent direction lowers the cost: it is flat to rounding, or the model is not smooth there.
     NoDescent,
     /// `max_iterations` linearisations were made.
@@ -85,7 +85,7 @@ impl Stop {
     pub fn is_converged(self) -> bool {
         matches!(
             self,
-            Self::SmallStep | Self::SmallGradient | Self::BiasResidual
+            Self::SmallStep | Self::SmallGradient | Self::NoResidual
         )
     }
 
@@ -95,7 +95,7 @@ impl Stop {
         match self {
             Self::SmallStep => "small-step",
             Self::SmallGradient => "small-gradient",
-            Self::BiasResidual => "zero-residual",
+            Self::NoResidual => "zero-residual",
             Self::NoDescent => "no-descent",
             Self::TooManyIterations => "too-many-iterations",
         }
@@ -193,7 +193,7 @@ pub fn descend<D: Descent>(
         let step = local.length(&undamped);
         // Whitened residuals are of order one; a root mean square of 1e-13 is rounding whatever the unit.
         let mut stop = if local.cost() <= 1e-26 * local.n_residuals() as f64 {
-            Some(Stop::BiasResidual)
+            Some(Stop::NoResidual)
         } else if step <= options.step_tolerance {
             Some(Stop::SmallStep)
         } else if gradient <= options.gradient_tolerance {

@@ -122,16 +122,18 @@ pub fn fit(
     strengths: Strengths,
     distortion: &Distortion,
 ) -> Result<Fit> {
-    fit_from(session, start, None, strengths, distortion)
+    fit_from(session, start, None, strengths, distortion, false)
 }
 
-/// [`fit`], with the moves as they were carried at the start where that is known.
+/// [`fit`], with the moves as they were carried at the start where that is known; a rough one ends with the first descent,
+/// near enough for the strengths of noise to be sought there.
 pub(super) fn fit_from(
     session: &Session,
     start: State,
     known: Option<Vec<Passed>>,
     strengths: Strengths,
     distortion: &Distortion,
+    ends_rough: bool,
 ) -> Result<Fit> {
     let mut options = Options {
         step_tolerance: STEP_TOLERANCE,
@@ -175,7 +177,7 @@ pub(super) fn fit_from(
         // Where rows miss by far more than their noise a descent ends late, and renewed weights would begin it again.
         let is_endless = !is_rough && ended.stop == Stop::TooManyIterations;
         spread = shown;
-        if is_settled || is_endless || renewal >= RENEWALS {
+        if is_settled || is_endless || ends_rough || renewal >= RENEWALS {
             let factor = match local.factor.into_inner() {
                 Some(factor) => factor,
                 None => local.chain.factor(RIDGE, None)?,

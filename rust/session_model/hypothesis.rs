@@ -217,7 +217,8 @@ impl Hypothesis {
         strengths.iter().map(one).collect()
     }
 
-    /// The strengths that make the rows likeliest, sought from the best of some, near it or anywhere.
+    /// The strengths that make the rows likeliest, sought from the best of some, near it or anywhere, and what they gain in
+    /// log-evidence over that one.
     ///
     /// # Errors
     /// When there are none.
@@ -226,7 +227,7 @@ impl Hypothesis {
         starts: &[Strengths],
         within: &Within,
         is_near: bool,
-    ) -> Result<Strengths> {
+    ) -> Result<(Strengths, f64)> {
         let values = self.at_each(starts);
         let best = starts
             .iter()
@@ -234,8 +235,9 @@ impl Hypothesis {
             .max_by(|a, b| a.1.total_cmp(&b.1))
             .ok_or_else(|| Error::bad_input("strengths to begin from are missing"))?;
         let mut search = Search::new(self, best.0, within);
+        let before = search.value();
         search.run(is_near);
-        Ok(search.strengths())
+        Ok((search.strengths(), search.value() - before))
     }
 
     /// Normal equations and `Jᵀr` at some strengths.
@@ -259,7 +261,7 @@ impl Hypothesis {
     /// # Errors
     /// When there are none, or nothing determines the session there.
     pub fn tuned(&self, starts: &[Strengths], within: &Within) -> Result<Found> {
-        let strengths = self.likeliest(starts, within, true)?;
+        let (strengths, _) = self.likeliest(starts, within, true)?;
         let log_evidence = self.at_each(&[strengths])[0];
         let (chain, side) = self.system(&strengths)?;
         let factor = chain.factor(RIDGE, None)?;

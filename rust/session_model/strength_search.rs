@@ -130,6 +130,10 @@ impl<'a> Search<'a> {
         strengths_of(&self.x)
     }
 
+    pub(super) fn value(&self) -> f64 {
+        self.value
+    }
+
     fn at(&mut self, x: &Point) -> f64 {
         let strengths = strengths_of(x);
         let key = std::array::from_fn(|i| x[SCATTER_AT + i].to_bits());

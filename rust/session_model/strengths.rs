@@ -1,6 +1,6 @@
 //! A session at the strengths of its noise that make it likeliest (docs/model-session.md, 11.18).
 
-use super::fit::{Fit, fit, fit_from};
+use super::fit::{Fit, fit_from};
 use super::hypothesis::Hypothesis;
 use super::strength_search::Within;
 use super::{Distortion, Session, State, Strengths};
@@ -8,8 +8,10 @@ use crate::error::Result;
 
 /// Rounds of fit and strengths: each finds the other almost where it left it.
 const MOST_ROUNDS: usize = 4;
-/// Change of the logarithm of every strength below which another round changes no number by a tenth of its error.
+/// Change of the logarithm of every strength below which another round changes no number by a tenth of its error, and gain
+/// in log-evidence below which other strengths are not worth another fit.
 const SETTLED: f64 = 0.25;
+const WORTH_A_FIT: f64 = 0.1;
 
 /// Fits a session and the strengths of its noise in turns, all unknowns integrated out where the strengths are judged.
 ///
@@ -22,16 +24,17 @@ pub fn tune(
     distortion: &Distortion,
     within: &Within,
 ) -> Result<Fit> {
-    let mut found = fit(session, start, strengths, distortion)?;
+    let mut found = fit_from(session, start, None, strengths, distortion, true)?;
     for round in 0..MOST_ROUNDS {
-        let best =
+        let (best, gain) =
             Hypothesis::of(&found, &[], &[])?.likeliest(&[found.strengths], within, round > 0)?;
         let moved = best.changed_from(&found.strengths);
-        if moved == 0.0 {
+        if round > 0 && gain < WORTH_A_FIT {
             break;
         }
-        found = fit_from(session, found.state, Some(found.passed), best, distortion)?;
-        if moved < SETTLED {
+        let passed = Some(found.passed);
+        found = fit_from(session, found.state, passed, best, distortion, false)?;
+        if round > 0 && moved < SETTLED {
             break;
         }
     }

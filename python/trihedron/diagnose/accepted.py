@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc
 
-from trihedron.diagnose.bias_strengths import BiasStrength
+from trihedron.diagnose.bias_strengths import BiasStrength, explain_as_much
 from trihedron.diagnose.candidates import Tried
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
@@ -138,7 +138,8 @@ def _of_biases(answer: Answer) -> list[dict[str, Any]]:
         # Half of a chi-square with one degree of freedom: the strength lies at its boundary without it.
         p = float(np.exp(-0.5 * max(one.gain, 0.0)))
         held = held_out_records(one.without, model)
-        out.append(_record(one.effect, one.parameters, one.statement, p, one.score, (), held, **extra))
+        rivals = explain_as_much(one, model, answer.found.tried.values())
+        out.append(_record(one.effect, one.parameters, one.statement, p, one.score, rivals, held, **extra))
     return out
 
 

@@ -6,17 +6,20 @@ with that strength no larger than the part's own noise makes it.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.diagnose.candidates import NEAR, Tried
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.hypothesis import Hypothesis, again
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, Bounds, scatter_unit
+from trihedron.threads import side_by_side
 
 LEAST_WALK = 1.5
 """Rms of a bias over the error of a pose's mean from which its walk is called drift: of 120 healthy sessions, half of
@@ -47,10 +50,9 @@ def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength],
     held = {term.effect.id for term in model.terms}
     # Twice the logarithm of odds of (1 - α)/α: a strength is there or is not, and nothing else was searched for.
     limit = 2.0 * float(np.log((1.0 - alpha) / alpha))
-    asked = {}
-    for effect in catalogue():
-        if isinstance(effect, BiasProcess) and effect.id not in held and effect.unavailable(model.context) is None:
-            asked[effect.id] = _asked(model, effect)
+    processes = [one for one in catalogue() if isinstance(one, BiasProcess) and one.id not in held]
+    applying = [one for one in processes if one.unavailable(model.context) is None]
+    asked = {one.effect.id: one for one in side_by_side(lambda effect: _asked(model, effect), applying)}
     named = [one for one in asked.values() if one.score > limit and one.is_large]
     for sensor in range(2):
         both = [one for one in asked.values() if one.effect.sensor == sensor and one.is_large]
@@ -136,3 +138,22 @@ def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArra
     assert sigma is not None
     error = np.median(sigma, axis=0) * model.context.si_per_raw(sensor)
     return np.ptp(path, axis=0), np.asarray(np.sqrt(2.0) * error)
+
+
+def explain_as_much(one: BiasStrength, model: Hypothesis, tried: Iterable[Tried]) -> tuple[str, ...]:
+    """Effects of the same sensor that leave the process no stronger than the part's noise, and cost little more.
+
+    The strengths of noise are in every hypothesis, an effect in its place pays for its choice: within odds of twenty to
+    one the session does not tell which of the two it is.
+    """
+    s = one.effect.sensor
+    corner, scatter, _ = noise_bounds(model)
+    out = []
+    for other in tried:
+        columns = (other.term.distortion.force, other.term.distortion.rate)[s]
+        corners, scatters, _, _ = other.asked.strengths
+        own = scatters[1:] if s else scatters[:1]
+        is_noise = corners[s] >= corner[s] if one.effect.walks else max(own) <= scatter[s]
+        if columns is not None and is_noise and other.score > -NEAR and other.term.effect.id != one.effect.id:
+            out.append(other.term.effect.id)
+    return tuple(out)

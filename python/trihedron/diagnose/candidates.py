@@ -21,7 +21,9 @@ SHAPES_KEPT = 2
 """Shapes of one effect that go along."""
 N_RESIZED = 3
 """Candidates whose expected size is asked anew."""
-FAMILY = 6.0
+NEAR = 6.0
+"""Difference of scores below which two explanations are named together: odds of twenty to one."""
+FAMILY = NEAR
 """What a shape that stands for a family (a filter of any order) pays besides: odds of twenty to one."""
 
 

@@ -25,6 +25,7 @@ from trihedron.diagnose.session.twin import (
     twin_of,
 )
 from trihedron.session.noise import ANYTHING, NO_SCATTER, START_STRENGTHS, Bounds, Strengths
+from trihedron.threads import side_by_side
 
 NOTHING: tuple[None, None, list[float]] = (None, None, [])
 ELSEWHERE: tuple[Strengths, ...] = (
@@ -169,3 +170,9 @@ def again(known: Hypothesis, terms: Sequence[Term], within: Bounds | None = None
     twin = replace(known.fitted.twin, effect=np.zeros(0))
     within = known.within if within is None else within
     return hypothesis(known.obs, twin, known.prior, terms, within, known.strengths)
+
+
+def without_each(known: Hypothesis) -> tuple[Hypothesis, ...]:
+    """The hypothesis without each of its terms."""
+    terms = known.terms
+    return tuple(side_by_side(lambda k: again(known, [*terms[:k], *terms[k + 1 :]]), range(len(terms))))

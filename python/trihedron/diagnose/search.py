@@ -12,11 +12,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.candidates import Tried, all_beside, candidates_beside
+from trihedron.diagnose.candidates import NEAR, Tried, all_beside, candidates_beside
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.hypothesis import Hypothesis, Term, again, hypothesis
+from trihedron.diagnose.hypothesis import Hypothesis, Term, again, hypothesis, without_each
 from trihedron.diagnose.relations.search import Related, related
 from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
 from trihedron.diagnose.session.twin import (
@@ -26,10 +26,8 @@ from trihedron.diagnose.session.twin import (
     STATIC_GYRO,
     Distortion,
 )
-from trihedron.session.noise import Strengths
+from trihedron.threads import side_by_side
 
-NEAR = 6.0
-"""Difference of scores below which two explanations are named together: odds of twenty to one."""
 WORTH_FITTING = 20.0
 """Difference of scores, one linear step from the fit, within which rivals are fitted in full."""
 N_RIVALS = 3
@@ -109,6 +107,8 @@ def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
         state.rivals[chosen.effect.id] = others[:N_RIVALS]
         state.against.update({one.term.effect.id: chosen.effect.id for one in standing})
         tried, missing = candidates_beside(judged.model, exclude)
+    if judged is not state.judged:
+        state.tried.clear()  # what was tried before was tried beside another hypothesis
     state.tried.update({one.term.effect.id: one for one in reversed(tried)})
     state.missing.update(missing)
     return replace(state, judged=judged)
@@ -125,9 +125,11 @@ def _concluded(state: _State, alpha: float) -> Found:
     judged, beside = _beside_relations(judged, threshold(alpha))
     model = judged.model
     tried, missing = all_beside(model)
+    # What was asked with the noise found anew is worth more than a look in the noise of the answer.
+    beside_it = {one.term.effect.id: one for one in tried} | (state.tried if model is state.judged.model else {})
     held = {term.effect.id for term in model.terms}
     return Found(
-        model, beside, {one.term.effect.id: one for one in reversed(tried)},
+        model, beside, beside_it,
         {key: other for key, other in state.against.items() if other in held and key not in held}, missing,
         tuple(2.0 * (model.log_evidence - one.log_evidence) for one in judged.without), judged.without,
         tuple(tuple(named.get(term.effect.id, ())) for term in model.terms),
@@ -139,18 +141,15 @@ def _beside_relations(judged: _Judged, limit: float) -> tuple[_Judged, Related]:
     best = related(judged.model, limit)
     if not best.relations:
         return judged, best
-    k = 0
-    while k < len(judged.model.terms):
+    for k, fewer in enumerate(judged.without):
         # What stands beside the relations is not theirs.
         without = again(best.model, [t for j, t in enumerate(best.model.terms) if j != k])
         gained = 2.0 * (best.model.log_evidence - without.log_evidence) - judged.model.terms[k].paid
-        if gained <= limit:
-            fewer = again(judged.model, [t for j, t in enumerate(judged.model.terms) if j != k])
-            other = related(fewer, limit)
-            if other.relations and other.score > best.score + NEAR:
-                judged, best, k = _pruned(fewer, limit), other, 0
-                continue
-        k += 1
+        if gained > limit:
+            continue
+        other = related(fewer, limit)
+        if other.relations and other.score > best.score + NEAR:
+            return _beside_relations(_pruned(fewer, limit), limit)
     return judged, best
 
 
@@ -178,9 +177,7 @@ def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Te
     """The hypothesis with the best of the candidates that come near the first, each fitted in full."""
     near = [one for one in standing if one.score > standing[0].score - WORTH_FITTING][:N_RIVALS]
     best: tuple[float, Hypothesis, Term] | None = None
-    for one in near:
-        term = _fitting(model, one)
-        larger = _beside(model, term, one.asked.strengths)
+    for term, larger in side_by_side(lambda one: _fitted_beside(model, one), near):
         value, covariance = larger.value(len(larger.terms) - 1)
         if not term.effect.is_plausible_variant(term.variant, value, covariance):
             continue
@@ -190,11 +187,12 @@ def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Te
     return (model, None) if best is None else best[1:]
 
 
-def _beside(model: Hypothesis, term: Term, strengths: Strengths) -> Hypothesis:
-    terms = (*model.terms, term)
+def _fitted_beside(model: Hypothesis, tried: Tried) -> tuple[Term, Hypothesis]:
+    term = _fitting(model, tried)
     twin = model.fitted.twin
     start = replace(twin, effect=np.concatenate([twin.effect, np.zeros(term.distortion.n_parameters)]))
-    return hypothesis(model.obs, start, model.prior, terms, model.within, strengths)
+    strengths = tried.asked.strengths
+    return term, hypothesis(model.obs, start, model.prior, (*model.terms, term), model.within, strengths)
 
 
 def _fitting(model: Hypothesis, tried: Tried) -> Term:
@@ -238,8 +236,7 @@ def _reshaped(model: Hypothesis, term: Term) -> Term:
 def _pruned(model: Hypothesis, limit: float) -> _Judged:
     """The hypothesis without terms that the others have made needless, the one with least to show first."""
     while True:
-        n = len(model.terms)
-        without = tuple(again(model, [t for j, t in enumerate(model.terms) if j != k]) for k in range(n))
+        without = without_each(model)
         scores = [
             2.0 * (model.log_evidence - one.log_evidence) - term.paid if _is_shown(model, one, k) else -np.inf
             for k, (term, one) in enumerate(zip(model.terms, without, strict=True))
