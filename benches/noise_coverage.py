@@ -52,8 +52,8 @@ def flicker_bank(rng, n, ratio=2.0):
     tau = 0.5 * ratio ** np.arange(count)
     sigma = np.sqrt(np.log(ratio) / np.pi)
     out = np.zeros(n)
-    for time in tau:
-        decay = np.exp(-1.0 / time)
+    for constant in tau:
+        decay = np.exp(-1.0 / constant)
         drive = rng.standard_normal(n) * (sigma * np.sqrt(1.0 - decay**2))
         start = sigma * rng.standard_normal()
         out += lfilter([1.0], [1.0, -decay], drive, zi=[decay * start])[0]
