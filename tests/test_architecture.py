@@ -13,10 +13,8 @@ STAGES = ("read", "segment", "estimate", "diagnose", "simulate", "report", "capt
 # What any stage may import: the nouns, the model, units. `_core` only where numbers are made.
 # A fleet is `api` over many logs.
 COMPOSERS = {"api", "comparison", "cli", "fleet", "__init__", "__main__"}
-# Records ask for how they are shown (to_dict, plot, a page) and for the reader of plain arrays only when asked.
-LOOKS_UP = {"records/presented.py", "records/recording.py"}
-# A finding asks the catalogue for its sentence.
-ASKS_FOR_WORDS = {"records/finding.py", "records/words.py"}
+# What a record is built on: names of arrays, units and errors, and the place where it asks what others make.
+BELOW_RECORDS = {"answers", "arrays", "errors", "sanitise", "units"}
 # Where numbers are made.
 MAY_USE_CORE = {"read", "segment", "estimate", "diagnose", "simulate", "session", "channel_facts"} | {
     "arrays.py",
@@ -52,6 +50,13 @@ def test_a_stage_imports_no_other_stage(path):
     assert not foreign, f"{path.name} belongs to {own} and imports {sorted(foreign)}"
 
 
+def test_records_import_nobody():
+    for path in (PACKAGE / "records").rglob("*.py"):
+        rooms = {m.split(".")[1] for m in imported_modules(path) if m.startswith("trihedron.")} - {"records"}
+        assert rooms <= BELOW_RECORDS, f"{path.name} imports {sorted(rooms - BELOW_RECORDS)}"
+        assert "import_module" not in path.read_text(), path
+
+
 def circles(arrows: dict[str, set[str]]) -> list[list[str]]:
     """Sets of files that reach one another."""
     reached = {name: set() for name in arrows}
@@ -79,8 +84,7 @@ def test_no_module_imports_itself_by_way_of_others():
             if isinstance(node, ast.ImportFrom) and node.module:
                 whole = {f"{node.module}.{alias.name}" for alias in node.names}
                 found |= {one if one in names else node.module for one in whole}
-        looks_up = str(path.relative_to(PACKAGE)) in LOOKS_UP | ASKS_FOR_WORDS
-        arrows[name] = {one for one in found if not looks_up or one.startswith("trihedron.records")} - {name}
+        arrows[name] = found - {name}
     assert circles(arrows) == []
 
 
@@ -147,7 +151,7 @@ def test_nothing_below_the_verbs_knows_who_composes_it():
         above = {m for m in imported_modules(path) if m.split(".")[:2] in (["trihedron", c] for c in COMPOSERS)}
         if above:
             lookups.add(str(name))
-    assert lookups == LOOKS_UP
+    assert lookups == set()
 
 
 def test_only_the_rooms_that_make_numbers_use_the_core():
