@@ -2,7 +2,6 @@
 
     python benches/blind.py --each 6 --seed 7             # every effect six times: confusion matrix
     python benches/blind.py --each 4 --size 0.5           # at half size
-    python benches/blind.py --pairs 30                    # two effects at once
     python benches/blind.py --foreign 30                  # mechanisms that the catalogue does not hold
     python benches/blind.py --healthy 600                 # false alarms, three noise grades in turn
     python benches/blind.py --effect accel-cubic --each 40 --grade mpu
@@ -26,7 +25,7 @@ import numpy as np
 from blind_trial.draw import GRADES, Job
 from blind_trial.foreign import FOREIGN
 from blind_trial.score import Result, confusion, summary, trial
-from blind_trial.sizes import SIZES, may_be_paired
+from blind_trial.sizes import SIZES
 
 
 def drawn(options: argparse.Namespace) -> list[Job]:
@@ -44,10 +43,7 @@ def drawn(options: argparse.Namespace) -> list[Job]:
     for k in range(options.each):
         for effect in effects:
             add((effect,), grades[k % len(grades)])
-    pairs = [pair for pair in itertools.combinations(effects, 2) if may_be_paired(*pair)]
-    for k in range(options.pairs):
-        add(pairs[int(rng.integers(len(pairs)))], grades[k % len(grades)])
-    for k, name in zip(range(options.foreign), itertools.cycle(options.mechanism or FOREIGN), strict=False):
+    for k, name in zip(range(options.foreign), itertools.cycle(FOREIGN), strict=False):
         add((), grades[k // len(FOREIGN) % len(grades)], 1.0, name)
     return jobs
 
@@ -75,13 +71,13 @@ def line(result: Result) -> str:
 
 def tried(options: argparse.Namespace) -> list[Result]:
     """Run the trials, print what went wrong as it comes, store every result."""
-    if not (options.each or options.pairs or options.foreign or options.healthy):
+    if not (options.each or options.foreign or options.healthy):
         options.each = 2
     jobs = [job for job in drawn(options) if options.only_seed in (None, job.seed)]
     results: list[Result] = []
     for result in run(jobs, options.jobs):
         results.append(result)
-        if options.verbose or result["score"] not in ("right", "confounded", "both", "hidden"):
+        if options.verbose or result["score"] not in ("right", "confounded"):
             print(line(result), flush=True)
         if options.json:
             options.json.write_text(json.dumps(results))
@@ -91,26 +87,20 @@ def tried(options: argparse.Namespace) -> list[Result]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--each", type=int, default=0, help="recordings of every effect, grades in turn")
-    parser.add_argument("--pairs", type=int, default=0, help="recordings with two effects")
     parser.add_argument("--foreign", type=int, default=0, help="recordings with a mechanism outside the catalogue")
     parser.add_argument("--healthy", type=int, default=0, help="healthy recordings")
     parser.add_argument("--effect", action="append", choices=SIZES, help="only this effect (repeatable)")
-    parser.add_argument("--mechanism", action="append", choices=FOREIGN, help="only this foreign one (repeatable)")
     parser.add_argument("--grade", action="append", choices=GRADES, help="only this noise grade (repeatable)")
     parser.add_argument("--size", type=float, default=1.0, help="size as a fraction of the typical one")
     parser.add_argument("--seed", type=int, default=1, help="of the draw")
     parser.add_argument("--only-seed", type=int, help="repeat only the recording of this seed")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--json", type=Path, help="write every result here")
-    parser.add_argument("--show", type=Path, action="append", help="print the tables of stored results instead")
     parser.add_argument("--verbose", action="store_true", help="print every trial")
     options = parser.parse_args()
-    if options.show:
-        results = [result for path in options.show for result in json.loads(path.read_text())]
-    else:
-        results = tried(options)
+    results = tried(options)
     print()
-    print(confusion([r for r in results if len(r["effects"]) < 2 and r["label"] != "healthy"]))
+    print(confusion([r for r in results if r["label"] != "healthy"]))
     print()
     print(summary(results))
 

@@ -2,8 +2,6 @@
 
     python benches/blind_pairs.py --pairs 60 --seed 1             # every kind in turn
     python benches/blind_pairs.py --kind surplus --pairs 20
-    python benches/blind_pairs.py --pairs 60 --nuisances          # the recording has the small faults of real logs
-    python benches/blind_pairs.py --pairs 60 --settling           # and is set down on a support that gives way
 
 Kinds: the same unit on another day's session; a nominal simulation of the part; another unit; one number moved (zero,
 scale, misalignment, the gyro triad turned, gravity); an effect that only the recording has, or only the simulation, or
@@ -13,13 +11,11 @@ false; a group of numbers whose true difference exceeds five of its own stated e
 
 Each pair goes through a folder: the generator writes ``simulation.csv``, ``recording.csv`` and ``sealed.json``; the
 question is asked of the two logs alone and its answer written to ``found.json``; only then the seal is opened.
-``--keep DIR`` keeps the folders.
 """
 
 from __future__ import annotations
 
 import argparse
-import itertools
 import json
 import sys
 import tempfile
@@ -27,7 +23,6 @@ import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -50,10 +45,6 @@ NOT_PAIRED = {
     *ON_A_TABLE, "disturbed-pose", "dropped-samples", "timing-jitter", "axis-handedness", "earth-rate", "lever-arm",
     "accel-saturation", "gyro-saturation", "quantisation", "supply-sensitivity",
 }  # fmt: skip
-NAMED_NUISANCES = {"gyro-bias-repeatability", "accel-bias-repeatability", "periodic-interference"}
-"""What the nuisances of this bench are: named, they are no false name, and missing physics is said rightly."""
-FAINT = 0.09
-"""Share of the samples' variance below which a line of the recording is a footnote, no missing physics."""
 IS_TOO = {"accel-size-effect": ("lever-arm",)}
 """Three accelerometers drawn at three places lie, in their mean, away from the centre of rotation."""
 GROUPS = (
@@ -66,9 +57,7 @@ GROUPS = (
 class Pair:
     kind: str
     seed: int
-    nuisances: bool = False
     by_file: bool = False
-    settling: bool = False
 
 
 def matrix(S: np.ndarray) -> Any:
@@ -127,50 +116,6 @@ def session(rng: np.random.Generator) -> Any:
     )  # fmt: skip
 
 
-def with_nuisances(recording: Recording, rng: np.random.Generator) -> Recording:
-    """Biases that differ from pose to pose and a faint line, as public recordings show them."""
-    segments = trihedron.segment(recording)
-    accel, gyro = np.array(recording.accelerometer), np.array(recording.gyroscope)
-    unit_a = 9.81 / float(np.median(np.linalg.norm(accel[segments.poses[0].samples()], axis=1)))
-    unit_g = np.radians(1 / 65.5)
-    step_a, step_g = rng.uniform(5e-4, 3e-3) / unit_a, np.radians(rng.uniform(0.005, 0.03)) / unit_g
-    t = recording.time_s
-    edges = [0, *[(a.stop + b.start) // 2 for a, b in itertools.pairwise(segments.poses)], len(t)]
-    for first, last in itertools.pairwise(edges):
-        accel[first:last] += step_a * rng.standard_normal(3)
-        gyro[first:last] += step_g * rng.standard_normal(3)
-    line = np.radians(rng.uniform(0.005, 0.02)) / unit_g * np.sin(2 * np.pi * rng.uniform(3, 30) * t)
-    gyro[:, int(rng.integers(3))] += line
-    # Every second recording has passed its ADC after all that; the other was brought to other units since.
-    again = np.random.default_rng(int(rng.integers(1 << 30)))
-    if again.random() < 0.5:
-        # Whole codes moved by a part of one would be moved by none or a whole one: zeros a step apart, in two values.
-        accel, gyro = (np.round(x + again.uniform(-0.5, 0.5, x.shape)) for x in (accel, gyro))
-    return replace(recording, accelerometer=accel, gyroscope=gyro)
-
-
-def with_settling(recording: Recording, rng: np.random.Generator) -> Recording:
-    """A knock as the sensor is set down in three poses of ten, and a support that gives way slowly in every pose."""
-    segments = trihedron.segment(recording)
-    accel, gyro = np.array(recording.accelerometer), np.array(recording.gyroscope)
-    unit_a = 9.81 / float(np.median(np.linalg.norm(accel[segments.poses[0].samples()], axis=1)))
-    unit_g = np.radians(1 / 65.5)
-    tau, reach = rng.uniform(0.4, 2.0), np.radians(rng.uniform(0.01, 0.05))
-    for pose in segments.poses[1:]:
-        t = recording.time_s[pose.start : pose.stop] - recording.time_s[pose.start]
-        force = accel[pose.start : pose.stop].mean(axis=0)
-        lean = np.cross(force / np.linalg.norm(force), reach * rng.standard_normal(3))
-        decay = np.exp(-t / tau)[:, None]
-        # The body still turns by v: gravity is seen turned back by it, the gyro reads its change.
-        accel[pose.start : pose.stop] -= np.cross(lean * decay, force)
-        gyro[pose.start : pose.stop] += -lean * decay / tau / unit_g
-        if rng.random() < 0.3:
-            ring = np.exp(-t / 0.08) * np.cos(2 * np.pi * rng.uniform(12, 40) * t)
-            accel[pose.start : pose.stop] += np.outer(ring, rng.uniform(0.05, 0.5) * rng.standard_normal(3)) / unit_a
-            gyro[pose.start : pose.stop] += np.outer(ring, np.radians(2.0) * rng.standard_normal(3)) / unit_g
-    return replace(recording, accelerometer=accel, gyroscope=gyro)
-
-
 def make(pair: Pair) -> tuple[Recording, Recording, float, dict[str, Any]]:
     """Simulated log, recording, gravity, sealed answer."""
     rng = np.random.default_rng([pair.seed, 77])
@@ -206,10 +151,6 @@ def make(pair: Pair) -> tuple[Recording, Recording, float, dict[str, Any]]:
     if pair.kind == "gravity":
         sim = replace(sim, environment=replace(sim.environment, gravity_m_s2=gravity * (1.0 + 3e-3)))
         simulated, truth_s = simulate(sim, pair.seed + 1)
-    if pair.nuisances:
-        recording = with_nuisances(recording, rng)
-    if pair.settling:
-        recording = with_settling(recording, rng)
     answer = {"kind": pair.kind, "effect": effect, "numbers": true_differences(truth_s, truth, pair.kind)}
     return simulated, recording, gravity, answer
 
@@ -264,12 +205,11 @@ def ask(folder: Path) -> None:
     (folder / "found.json").write_text(json.dumps(found.to_dict()))
 
 
-def trial(pair: Pair, keep: Path | None = None) -> dict[str, Any]:
+def trial(pair: Pair) -> dict[str, Any]:
     warnings.simplefilter("ignore")
     result: dict[str, Any] = {"kind": pair.kind, "seed": pair.seed, "by_file": pair.by_file, "crash": ""}
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch) if keep is None else keep / f"{pair.kind}-{pair.seed}"
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = Path(scratch)
         seal(pair, folder)
         try:
             ask(folder)
@@ -284,18 +224,6 @@ def left_open(effects: list[tuple[str, str, list[str]]]) -> set[str]:
     """Groups whose level is a convention once one of these effects stands (the temperature that a zero is of)."""
     by_id = {effect.id: effect.leaves_open for effect in catalogue()}
     return {group for _, name, _ in effects for group in by_id.get(name, ())}
-
-
-def is_footnote(effect: dict[str, Any]) -> bool:
-    """A pushed pose, or a faint line of the recording: true, named, and no physics that the simulation lacks."""
-    is_faint = effect["id"] == "periodic-interference" and effect["share"] < FAINT
-    return effect["in"] == "recording" and (effect["id"] == "disturbed-pose" or is_faint)
-
-
-def nuisances_of(pair: Pair, effect: str) -> set[str]:
-    """What a pair's recording has besides ``effect``, which was drawn; a knock is a disturbed pose."""
-    named = (NAMED_NUISANCES if pair.nuisances else set()) | ({"disturbed-pose"} if pair.settling else set())
-    return named - {effect}
 
 
 def scored(pair: Pair, document: dict[str, Any], answer: dict[str, Any]) -> dict[str, Any]:
@@ -330,7 +258,6 @@ def scored(pair: Pair, document: dict[str, Any], answer: dict[str, Any]) -> dict
     false += [
         f"{where}:{e}" for where, e, c in effects
         if not (where == side and (e in rightly or answer["effect"] in c))
-        and not (where == "recording" and e in nuisances_of(pair, answer["effect"]))
     ]  # fmt: skip
     noise = sorted({f"{n['sensor']} {n['term']}" for n in document["noise"] if n["significant"]})
     if answer["kind"] == "noise":
@@ -338,8 +265,7 @@ def scored(pair: Pair, document: dict[str, Any], answer: dict[str, Any]) -> dict
     elif answer["kind"] == "resolution":
         false += [n for n in noise if not n.startswith("accelerometer")]
     else:
-        # The faint line of the nuisances stands in an octave of the recording's gyro, and nowhere in the simulation's.
-        false += [n for n in noise if not (pair.nuisances and n == "gyroscope octave")]
+        false += noise
     expected = "consistent"
     if must or (answer["kind"] in ("noise", "resolution") and not pair.by_file):
         expected = "parameters-differ"
@@ -347,13 +273,6 @@ def scored(pair: Pair, document: dict[str, Any], answer: dict[str, Any]) -> dict
         expected = "parameters-differ"
     if side:
         expected = "missing-physics"
-    if pair.nuisances:
-        counted = [e for e in document["effects"] if not is_footnote(e)]
-        is_only_nuisance = bool(counted) and all(
-            e["in"] == "recording" and e["id"] in nuisances_of(pair, answer["effect"]) for e in counted
-        )
-        expected = "missing-physics" if is_only_nuisance and not side else expected
-        effects = [e for e in effects if not (e[0] == "recording" and e[1] in nuisances_of(pair, answer["effect"]))]
     first = (
         bool(effects)
         and effects[0][0] == side
@@ -373,27 +292,18 @@ def main() -> None:
     parser.add_argument("--pairs", type=int, default=32)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kind", action="append", choices=KINDS)
-    parser.add_argument("--nuisances", action="store_true")
-    parser.add_argument("--settling", action="store_true", help="knocks and supports that give way, besides")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--keep", type=Path, help="a folder for the logs, seals and answers of all pairs")
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
     kinds = options.kind or list(KINDS)
     pairs = [
-        Pair(
-            kinds[k % len(kinds)],
-            int(rng.integers(1 << 30)),
-            options.nuisances or options.settling,
-            (k // len(kinds)) % 3 == 2,
-            options.settling,
-        )
+        Pair(kinds[k % len(kinds)], int(rng.integers(1 << 30)), (k // len(kinds)) % 3 == 2)
         for k in range(options.pairs)
     ]
     results = []
     with ProcessPoolExecutor(options.jobs) as pool:
-        for r in pool.map(partial(trial, keep=options.keep), pairs):
+        for r in pool.map(trial, pairs):
             results.append(r)
             if not r["right"] or r["false"] or r.get("missed") or r["crash"] or r.get("first") is False:
                 print({k: v for k, v in r.items() if k != "z"}, flush=True)

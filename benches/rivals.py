@@ -5,8 +5,7 @@ python benches/rivals.py [--rounds 3] [--rows 1e7] [--only norm] [--write]
 Each method runs in a process of its own, in turn, `--rounds` times; a round is the fastest of some calls after a first.
 Numbers are CPU time on one core (`two cores` and reading: wall time), so that a busy machine shifts them little; quote
 ratios. `--write` puts the tables into docs/evidence.md.
-A rival that is not installed is excluded: `pip install numba python-ins bottleneck pandas pyarrow
-filterpy colorednoise`.
+A rival that is not installed is excluded: `pip install numba python-ins bottleneck pandas pyarrow`.
 """
 
 from __future__ import annotations
@@ -23,9 +22,6 @@ from pathlib import Path
 from typing import Any
 
 import rival_paths  # noqa: F401
-
-# numba looks for a package `coverage` and would find our bench of that name.
-sys.path.remove(str(Path(__file__).parent))
 
 ROOT = Path(__file__).parents[1]
 FACTORIES = ("ours", "numba_chain", "sensitivities", "parser")
@@ -49,9 +45,6 @@ class Subject:
 # Methods that would take minutes are timed on fewer.
 SLOW = {
     "SciPy steps, loop of products": 20_000,
-    "numba, sixteen Gauss-Markov processes": 100_000,
-    "SciPy RotationSpline, a knot in five samples": 100_000,
-    "pyins generate_imu": 20_000,
 }
 
 
@@ -60,8 +53,6 @@ def subjects(rows: int) -> list[Subject]:
     step = ("ns/step", 1e-9)
     sample = ("ns/sample", 1e-9)
     with_sensitivities = "Rotation with 12 sensitivities and covariance, 10⁶ uneven steps in moves of 2000"
-    motion = "Motion of a hand session, 10⁶ samples: attitude, rate, its change, force"
-    noise = "Noise of a triad, 10⁶ samples: white, flicker, walk"
     text = f"Reading {rows:_} × 7 numbers of CSV, two cores".replace("10_000_000", "10⁷")
     return [
         Subject("last", "Rotation over 10⁶ steps, the last attitude", "attitude", "LAST", million, *step),
@@ -71,12 +62,6 @@ def subjects(rows: int) -> list[Subject]:
         Subject("norm500", "Accelerometer from 500 poses", "norm", "FIT", 500, "µs", 1e-6),
         Subject("norm1e6", "Accelerometer from 10⁶ raw samples", "norm", "FIT", million, "ms", 1e-3),
         Subject("still", "Still detection, 10⁷ × 3", "still", "DETECT", 10 * million, *sample),
-        Subject("kalman", "Kalman filter of one axis, 20 000 poses", "kalman", "TRACK", 20_000, "ns/pose", 1e-9),
-        Subject("noise", noise, "simulation", "NOISE", million, *sample),
-        Subject(
-            "response", "Second-order response of a triad, 10⁶ samples", "simulation", "RESPONSE", million, *sample
-        ),
-        Subject("motion", motion, "simulation", "MOTION", million, *sample),
         Subject("read", text, "reading", "READ", rows, "s", 1.0, True),
     ]
 

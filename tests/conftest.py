@@ -1,10 +1,14 @@
 """Shared fixtures: the folder of real recordings, where it is present."""
 
 import os
+import tempfile
 from pathlib import Path
 
 # Two test processes on two cores: linear algebra that starts threads of its own only waits for itself.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Commands that tests start run on compiled Python, as an installation leaves it, and leave none in the sources.
+if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
+    os.environ.setdefault("PYTHONPYCACHEPREFIX", str(Path(tempfile.gettempdir()) / "trihedron-compiled"))
 
 import pytest
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import trihedron
+from following_hand import FollowingHand
 from trihedron.api import simulate
 from trihedron.api.guiding import conclude, examine, part_of
 from trihedron.api.planning_poses import move_rows, shortest_path
@@ -23,7 +24,6 @@ from trihedron.cli.page import Page
 from trihedron.cli.screen import as_text
 from trihedron.records.guiding import Accuracy, Phase
 from trihedron.simulate import scenario_by_name
-from trihedron.simulate.following import FollowingHand
 
 ACCURACY = Accuracy.parse("accel 0.1 %, gyro 0.2 %")
 

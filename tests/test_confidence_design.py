@@ -1,4 +1,4 @@
-"""Sessions of the thirteen-factor design (benches/confidence/design.py), one weakness a test."""
+"""Sessions of the thirteen-factor design (thirteen_factors.py), one weakness a test."""
 
 import sys
 from pathlib import Path
@@ -8,10 +8,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
-from confidence.design import session
 from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import table
+from thirteen_factors import session
 from trihedron import calibrate
 from trihedron.records import Recording
 from trihedron.session.averaging import Averaging, averaging_of, broadening

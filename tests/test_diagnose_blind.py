@@ -13,7 +13,6 @@ import trihedron
 from blind_trial.draw import GRADES, Job, make
 from blind_trial.foreign import FOREIGN
 from blind_trial.score import scored, trial
-from blind_trial.visibility import ideal_sigma, is_visible
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
 
 
@@ -62,19 +61,9 @@ def test_a_foreign_mechanism_changes_its_own_sensor_only(name):
     assert answer["expected_domains"]
 
 
-def test_the_earth_is_hidden_from_an_industrial_gyro_and_plain_to_a_tactical_one():
-    visible = {}
-    for grade in ("adis", "tactical"):
-        profile = profile_by_name(grade)
-        healthy = Scenario(hand_session(24), "healthy", *profile.unit(1), profile.clock)
-        sigma = ideal_sigma("earth-rate", healthy, {"latitude_deg": 55.0, "heading_deg": 10.0}, 1)
-        visible[grade] = is_visible("earth-rate", sigma)
-    assert visible == {"adis": False, "tactical": True}
-
-
 def test_an_answer_behind_a_saturation_that_is_true_is_right_and_behind_another_it_is_not():
     result = {
-        "effects": ["accel-cubic"], "foreign": "", "ideal": {"accel-cubic": 40.0}, "verdict": "missing-physics",
+        "effects": ["accel-cubic"], "foreign": "", "verdict": "missing-physics",
         "found": ["gyro-saturation", "accel-cubic"], "confounded": [[], []], "also": ["gyro-saturation"],
     }  # fmt: skip
     assert scored(result) == "right"
@@ -82,4 +71,3 @@ def test_an_answer_behind_a_saturation_that_is_true_is_right_and_behind_another_
     assert scored(result | {"found": ["accel-quadratic"], "confounded": [["accel-cubic"]]}) == "confounded"
     assert scored(result | {"found": ["accel-quadratic"], "confounded": [[]]}) == "wrong"
     assert scored(result | {"found": [], "confounded": []}) == "missed"
-    assert scored(result | {"found": [], "confounded": [], "ideal": {"accel-cubic": 3.0}}) == "hidden"

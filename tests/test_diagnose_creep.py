@@ -49,7 +49,7 @@ def session(seed, lean_rad, scatter_rad_s):
     return Context(obs, tune_noise(obs, start_twin(obs, calibration), NO_DISTORTION, None))
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.slow) for s in (2, 3))])
 def test_supports_that_give_are_told_from_zeros_that_scatter(seed):
     for lean_rad in (0.006, 0.001):
         assert settling(session(seed, lean_rad, 0.0)).is_motion
@@ -58,7 +58,7 @@ def test_supports_that_give_are_told_from_zeros_that_scatter(seed):
         assert not settling(session(seed, lean_rad, 1e-3)).is_motion
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_scatter_under_supports_that_give_is_still_found_and_creep_alone_is_none(seed):
     gives = settling(session(seed, 0.001, 0.0))
     # The accelerometer hardly sees so little; the shape in time and what it does see say the same.
@@ -68,7 +68,7 @@ def test_scatter_under_supports_that_give_is_still_found_and_creep_alone_is_none
     assert not settling(session(seed, 0.006, 1e-3)).is_motion
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_moves_allow_for_poses_that_settle_and_rates_at_rest_still_disagree(seed):
     context = session(seed, 0.006, 0.0)
     found = settling(context)

@@ -33,7 +33,7 @@ def chamber(seed, hysteresis=0.0):
     return recording(t, accelerometer, gyroscope, temperature_degc=np.round(heat, 1)), own
 
 
-@pytest.mark.parametrize("seed", [41, 42])
+@pytest.mark.parametrize("seed", [41, pytest.param(42, marks=pytest.mark.slow)])
 def test_a_static_log_of_a_healthy_sensor_is_not_testable_and_nothing_is_named(seed):
     d = trihedron.diagnose(recording(*still(60000, 100.0, seed)), gravity_m_s2=9.8)
     assert d.verdict == "not-testable"
@@ -43,7 +43,7 @@ def test_a_static_log_of_a_healthy_sensor_is_not_testable_and_nothing_is_named(s
     assert "poses" in str(d)
 
 
-@pytest.mark.parametrize("seed", [43, 44])
+@pytest.mark.parametrize("seed", [43, pytest.param(44, marks=pytest.mark.slow)])
 def test_a_chamber_log_of_one_pose_tells_zeros_against_temperature(seed):
     log, own = chamber(seed)
     d = trihedron.diagnose(log, gravity_m_s2=9.8)

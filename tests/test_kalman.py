@@ -12,7 +12,6 @@ from trihedron.estimate.kalman import (
     Prior,
     ShapingOptions,
     calibrate_with_references,
-    normalised_error_squared,
 )
 from trihedron.estimate.kalman.shaping import shaping_model
 from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode, PoseTable
@@ -22,6 +21,7 @@ from twins_kalman import (
     covariance_of_pose_means,
     generalised_least_squares,
     naive_covariance_form,
+    normalised_error_squared,
     recursive_least_squares_in_fractions,
 )
 

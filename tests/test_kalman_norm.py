@@ -12,10 +12,10 @@ from trihedron.estimate.kalman import (
     NormStart,
     ShapingOptions,
     calibrate_without_references,
-    normalised_error_squared,
 )
 from trihedron.estimate.kalman.shaping import shaping_model
 from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode
+from twins_kalman import normalised_error_squared
 
 GRAVITY = 9.80665
 S_TRUE = np.array([[0.0393, 0, 0], [0.0001, 0.0390, 0], [0.0001, 0.0002, 0.0385]])

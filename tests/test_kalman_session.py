@@ -13,7 +13,6 @@ from trihedron.estimate.kalman import (
     calibrate_without_references,
     noise_from_identified,
     noise_from_poses,
-    normalised_error_squared,
     pose_readings,
 )
 from trihedron.read import ReadError, read_pose_table
@@ -21,6 +20,7 @@ from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode, 
 from trihedron.segment import segment_recording
 from trihedron.simulate import Accelerometer, Adc, NoiseTerms, Scenario, dividing_head, hand_session, simulate
 from trihedron.units import AccelerationUnit
+from twins_kalman import normalised_error_squared
 
 GRAVITY = 9.80665
 S_TRUE = np.array([[0.98, 0.01, -0.02], [0.005, 1.03, 0.008], [-0.01, 0.012, 0.99]])

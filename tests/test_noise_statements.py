@@ -9,8 +9,8 @@ from scipy.optimize import brentq, minimize
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
+from noise_coverage import in_time
 from noise_series import series
-from noise_trial.generator import in_time
 from trihedron import _core
 from trihedron.estimate.noise import identify_noise
 from trihedron.records.finding import FindingCode

@@ -185,7 +185,7 @@ def test_a_reference_clock_that_jumps_is_refused_with_the_place():
         fit_reference(trial.log, replace(trial.motion, time_s=late), G)
 
 
-@pytest.mark.parametrize("seed", [61, 62, 63])
+@pytest.mark.parametrize("seed", [61, *(pytest.param(s, marks=pytest.mark.slow) for s in (62, 63))])
 @pytest.mark.parametrize("by_s", [0.4, -0.25])
 def test_a_clock_that_jumps_late_is_refused_with_the_place(seed, by_s):
     # Ten seconds before the end: too little for two stretches of eight seconds, and the fit calls it outliers.
@@ -205,7 +205,7 @@ def test_no_part_of_a_sound_reference_is_called_elsewhere_however_noisy():
         assert fit_reference(trial.log, trial.motion, G).overlap_s > 40.0
 
 
-@pytest.mark.parametrize("seed", [52, 53])
+@pytest.mark.parametrize("seed", [52, pytest.param(53, marks=pytest.mark.slow)])
 def test_a_clock_that_jumps_early_is_refused_with_the_place(seed):
     # One stretch of eight seconds before the jump, the other spoilt by it.
     trial = tracked(seed, seconds=60)
@@ -232,7 +232,7 @@ def test_a_reference_of_another_motion_is_refused(posed):
         fit_reference(posed.log, tracked(999, seconds=30).motion, G)
 
 
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("seed", [4, pytest.param(5, marks=pytest.mark.slow)])
 def test_a_log_that_mostly_rests_is_held_against_its_reference_and_against_no_other(seed):
     # Four fifths at rest, as a session of poses: there the tracker's noise, as a rate, is all that either shows.
     trial = tracked(seed, 90, sigma_deg=0.2, rest_s=36.0)

@@ -13,21 +13,20 @@ from small_session import G, copied, leftovers, run, started
 from trihedron.documents import DocumentError, parse_json
 from trihedron.read import read_recording
 
-ENVIRONMENTS = {
-    "C without UTF-8": {"LC_ALL": "C", "LANG": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
-    "unknown locale, no home, dumb terminal": {"LC_ALL": "xx_YY.foo", "HOME": "", "TERM": "dumb", "COLUMNS": "0"},
-}
+# C without UTF-8; an unknown locale, no home and a dumb terminal.
+ENVIRONMENTS = (
+    {"LC_ALL": "C", "LANG": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+    {"LC_ALL": "xx_YY.foo", "HOME": "", "TERM": "dumb", "COLUMNS": "0"},
+)
 
 
-@pytest.mark.parametrize("name", ENVIRONMENTS)
-def test_the_answer_does_not_depend_on_locale_home_or_terminal(tmp_path, name):
+def test_the_answer_does_not_depend_on_locale_home_or_terminal(tmp_path):
     folder = copied(tmp_path)
-    plain = run("check", "log.csv", "--json", "-", cwd=folder)
-    odd = run("check", "log.csv", "--json", "-", cwd=folder, env=ENVIRONMENTS[name])
-    made = [re.sub(r'"(made_at|created)": "[^"]*"', "", out) for _, out, _ in (plain, odd)]
-    assert plain[0] == odd[0] == 0
-    assert json.loads(plain[1])
-    assert made[0] == made[1]
+    said = [run("check", "log.csv", "--json", "-", cwd=folder, env=env) for env in ({}, *ENVIRONMENTS)]
+    plain, *odd = (re.sub(r'"(made_at|created)": "[^"]*"', "", out) for _, out, _ in said)
+    assert [status for status, _, _ in said] == [0, 0, 0]
+    assert json.loads(plain)
+    assert odd == [plain, plain]
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a shell closes the streams")

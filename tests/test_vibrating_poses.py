@@ -94,14 +94,14 @@ def session(seed, shaken_share, gain, rate_line):
     return trihedron.diagnose(log, gravity_m_s2=truth.gravity_m_s2).to_dict()
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.slow) for s in (2, 3))])
 def test_a_few_mm_s2_that_go_with_the_shaking_are_rectification_alone(seed):
     # 0.005 of a mean square of 1.1²/2 m²/s⁴ is 3 mm/s², of 0.8²/2 half of that.
     named = [effect["id"] for effect in session(seed, 0.35, 0.005, 0.0)["effects"]]
     assert named == ["vibration-rectification"]
 
 
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("seed", [4, pytest.param(5, marks=pytest.mark.slow)])
 def test_a_line_in_every_pose_is_interference(seed):
     named = [effect["id"] for effect in session(seed, 0.0, 0.0, 3e-3)["effects"]]
     assert named == ["periodic-interference"]

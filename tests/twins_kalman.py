@@ -71,3 +71,10 @@ def naive_covariance_form(rows, variance, prior_variance):
         ph = p @ h
         p = p - np.outer(ph, ph) / (h @ ph + variance)
     return np.diag(p)
+
+
+def normalised_error_squared(error, covariance):
+    """NEES ``eᵀ P⁻¹ e`` of an estimate whose truth is known: chi-square with ``len(e)`` degrees of freedom."""
+    scale = np.sqrt(np.diag(covariance))
+    whitened = np.linalg.solve(covariance / np.outer(scale, scale), error / scale)
+    return float((error / scale) @ whitened)

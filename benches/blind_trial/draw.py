@@ -11,7 +11,6 @@ import numpy as np
 from blind_trial.foreign import FOREIGN
 from blind_trial.sealed import sealed_parameters
 from blind_trial.sizes import ON_A_TABLE, SIZES, Session
-from blind_trial.visibility import ideal_sigma
 from trihedron.records import Recording
 from trihedron.simulate import Scenario, hand_session, simulate
 from trihedron.simulate.effects import with_effect
@@ -85,9 +84,8 @@ def make(job: Job) -> tuple[Recording, float, dict[str, Any]]:
         # Only a brisk hand takes an accelerometer beyond 1 g.
         travel = 0.6 if "accel-saturation" in job.effects else 0.1
         motion = hand_session(n, pose_s=pose, layout=layout, move_s=float(rng.uniform(1.6, 2.6)), travel_m=travel)
-    healthy = Scenario(motion, "blind", accelerometer, gyroscope, profile.clock)
+    scenario, sizes = Scenario(motion, "blind", accelerometer, gyroscope, profile.clock), {}
     session = Session(profile, accelerometer, moves_of(motion))
-    scenario, sizes = healthy, {}
     for effect in job.effects:
         sizes[effect] = SIZES[effect](rng, job.scale, session)
         scenario = with_effect(scenario, effect, **sizes[effect])
@@ -102,7 +100,6 @@ def make(job: Job) -> tuple[Recording, float, dict[str, Any]]:
         "seed": job.seed, "scale": job.scale, "sizes": sizes, "expected_domains": expected,
         "also": true_saturations(recording, scenario, job.effects),
         "parameters": {e: sealed_parameters(e, sizes[e], scenario, recording, truth) for e in job.effects},
-        "ideal": {e: ideal_sigma(e, healthy, sizes[e], job.seed) for e in job.effects} if job.effects else {},
     }  # fmt: skip
     return recording, truth.gravity_m_s2, answer
 

@@ -10,16 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
 
 import trihedron
 from blind_trial.draw import Job, make
-from blind_trial.visibility import is_visible
 
 Result = dict[str, Any]
 HELD_OUT = 1.3
 """Chi-square per degree of freedom on unseen poses and moves that an explained recording should stay below."""
-COLUMNS = ("right", "confounded", "second", "missed", "wrong", "hidden")
+COLUMNS = ("right", "confounded", "second", "missed", "wrong")
 
 
 def trial(job: Job) -> Result:
@@ -41,8 +39,6 @@ def trial(job: Job) -> Result:
         **sealed, "verdict": said["verdict"], "crash": crash, "seconds": seconds,
         "found": [e["id"] for e in effects], "confounded": [e["confounded_with"] for e in effects],
         "disagrees": [d["domain"] for d in said["domains"] if d["disagrees"]],
-        "dof": {d["domain"]: d["dof"] for d in said["domains"]},
-        "remaining": [d["domain"] for d in said["remaining"] if d["disagrees"]],
         "answers": [
             {
                 "id": e["id"], "heldout": e["heldout"],
@@ -65,26 +61,18 @@ def _first(result: Result) -> int | None:
 
 
 def scored(result: Result) -> str:
-    """What a result is: right, confounded, second, missed, wrong, hidden (the noise hides the effect, and it is not
-    claimed); for pairs both, one, none; for healthy and foreign ones right or wrong.
-    """
+    """What a result is: right, confounded, second, missed, wrong; for healthy and foreign ones right or wrong."""
     found, first = result["found"], _first(result)
     if result["foreign"]:
         located = set(result["expected_domains"]) & set(result["disagrees"])
         return "right" if result["verdict"] == "unexplained" and located else "wrong" if found else "missed"
-    effects = result["effects"]
-    if not effects:
+    if not result["effects"]:
         extra = [e for e in found if e not in result["also"]]
         is_clean = result["verdict"] == "consistent" or (result["also"] and not extra)
         return "right" if is_clean else "wrong"
-    if len(effects) == 2:
-        named = set(found).union(*map(set, result["confounded"])) if found else set()
-        if any(e not in named and not is_visible(e, result["ideal"][e]) for e in effects):
-            return "hidden"
-        return ("none", "one", "both")[sum(e in named for e in effects)]
-    (effect,) = effects
+    (effect,) = result["effects"]
     if first is None:
-        return "missed" if is_visible(effect, result["ideal"][effect]) else "hidden"
+        return "missed"
     if found[first] == effect:
         return "right"
     if effect in result["confounded"][first]:
@@ -135,14 +123,6 @@ def _held_after(result: Result) -> float | None:
     return None if held is None else held["chi2_per_dof_after"]
 
 
-def _chance_to_pass(result: Result) -> float:
-    """How often a model without any fault has a chi-square per degree of freedom below the bound, by noise alone."""
-    first = _first(result)
-    domain = "" if first is None else result["answers"][first]["heldout"]["domain"]
-    dof = result.get("dof", {}).get(domain, np.nan)
-    return float(chi2.cdf(HELD_OUT * dof, dof))
-
-
 def confusion(results: list[Result]) -> str:
     """Effect by effect: how the answers fell, shares of parameters within two sigma, held-out fit afterwards."""
     by_effect: dict[str, list[Result]] = defaultdict(list)
@@ -174,41 +154,25 @@ def _percent(flags: Any) -> str:
 
 def summary(results: list[Result]) -> str:
     """The figures that the targets are about."""
-    single = [r for r in results if len(r["effects"]) == 1]
-    pairs = [r for r in results if len(r["effects"]) == 2]
-    foreign = [r for r in results if r["foreign"]]
-    healthy = [r for r in results if not r["effects"] and not r["foreign"]]
     out = []
-    if single:
-        visible = [r for r in single if r["score"] != "hidden"]
-        count = Counter(r["score"] for r in visible)
-        n = len(visible)
-        z = np.abs([v for r in visible if r["score"] == "right" for _, v in r["z"]])
-        answered = [r for r in visible if r["score"] in ("right", "confounded")]
-        held = np.array([h for r in answered if (h := _held_after(r)) is not None])
+    if single := [r for r in results if r["effects"]]:
+        count, n = Counter(r["score"] for r in single), len(single)
+        z = np.abs([v for r in single if r["score"] == "right" for _, v in r["z"]])
+        held = np.array([h for r in single if r["score"] in ("right", "confounded") and (h := _held_after(r))])
         named = count["right"] + count["confounded"]
-        perfect = [_chance_to_pass(r) for r in answered if _held_after(r) is not None]
         out += [
             f"right {share(count['right'], n)}; right or named as confounded {share(named, n)}",
             f"first answer wrong and the truth not named beside it {share(count['wrong'] + count['second'], n)}",
-            f"missed {share(count['missed'], n)}; hidden by the noise and not claimed: {len(single) - n}",
+            f"missed {share(count['missed'], n)}",
             f"parameters within two sigma {share(int((z <= 2).sum()), len(z))}",
-            f"held out afterwards at most {HELD_OUT} {share(int((held <= HELD_OUT).sum()), len(held))}; "
-            f"noise alone leaves that to {100 * float(np.mean(perfect or [np.nan])):.0f} % of perfect models",
+            f"held out afterwards at most {HELD_OUT} {share(int((held <= HELD_OUT).sum()), len(held))}",
         ]
-    if pairs:
-        count = Counter(r["score"] for r in pairs)
-        n = len(pairs) - count["hidden"]
-        out.append(
-            f"pairs: both found {share(count['both'], n)}; one {count['one']}, none {count['none']}; "
-            f"with one that the noise hides {count['hidden']}"
-        )
-    if foreign:
-        count = Counter(r["score"] for r in foreign)
-        out.append(f"outside the catalogue: unexplained, in the right domain {share(count['right'], len(foreign))}")
+    if foreign := [r["score"] == "right" for r in results if r["foreign"]]:
+        out.append(f"outside the catalogue: unexplained, in the right domain {share(sum(foreign), len(foreign))}")
+    healthy = [r for r in results if r["label"] == "healthy"]
     for grade in dict.fromkeys(r["grade"] for r in healthy):
-        rows = [r for r in healthy if r["grade"] == grade]
-        out.append(f"healthy, {grade}: consistent {share(sum(r['score'] == 'right' for r in rows), len(rows))}")
+        right = [r["score"] == "right" for r in healthy if r["grade"] == grade]
+        out.append(f"healthy, {grade}: consistent {share(sum(right), len(right))}")
     if healthy:
         out.append(f"healthy, all: {share(sum(r['score'] == 'right' for r in healthy), len(healthy))}")
     crashes = sum(bool(r["crash"]) for r in results)

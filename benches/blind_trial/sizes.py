@@ -128,32 +128,3 @@ SIZES: dict[str, Draw] = {
 
 ON_A_TABLE = ("turn-angle-error", "table-tilt")
 """Effects of a session with turns on a table against a wall."""
-
-SAME_SIGNATURE: tuple[frozenset[str], ...] = tuple(
-    frozenset(group)
-    for group in (
-        ("accel-quadratic", "accel-scale-asymmetry"),
-        ("accel-cubic", "accel-saturation"),
-        ("accel-gyro-time-offset", "sensor-lag"),
-        # One warm-up, one sag: everything here follows the same exponential of time.
-        ("accel-thermal-bias", "accel-thermal-scale", "accel-bias-drift", "supply-sensitivity"),
-        ("gyro-thermal-bias", "gyro-thermal-scale", "gyro-bias-drift"),
-        # Both move the proof masses: the simulator has one place for each.
-        ("lever-arm", "accel-size-effect"),
-        # Clipped moves are excluded from the fit, and the fast ones are what shows a scale that depends on the rate.
-        ("gyro-saturation", "gyro-scale-nonlinearity"),
-        ("disturbed-pose", "vibration-rectification"),
-        ("turn-angle-error", "table-tilt"),
-    )
-)
-HIDDEN_BY_COARSE_STEPS = ("accel-", "lever-arm", "periodic-interference", "supply-", "vibration-", "disturbed-pose")
-"""What an accelerometer cannot show when its steps are four times its noise or more."""
-
-
-def may_be_paired(one: str, other: str) -> bool:
-    """Whether two effects are physically apart: neither the same signature nor one that hides the other."""
-    if one == other or any({one, other} <= group for group in SAME_SIGNATURE):
-        return False
-    return not any(
-        a == "quantisation" and b.startswith(HIDDEN_BY_COARSE_STEPS) for a, b in ((one, other), (other, one))
-    )

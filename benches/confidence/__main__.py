@@ -1,30 +1,32 @@
-"""``python benches/confidence [--sessions N] [--asked] [NAME ...]``: do 95 % intervals hold, whatever the session?
+"""``python benches/confidence [NAME ...] [--sessions N] [--first SEED ...] [--asked]``: do 95 % intervals hold?
 
-One line per setting: sessions answered and trusted (no serious finding), those refused or marked; over the trusted ones
-the share of parameters within 1.96 σ (accelerometer 9, gyro scale 9, gyro bias 3), rms z, the median and the largest
-error of the gyro's scale in per cent of it, and the largest of them in σ.
+One line per setting: sessions answered and trusted (no serious finding), marked, refused; over the trusted ones the
+share within 1.96 σ and rms z of S and b of both sensors, and the largest of all in σ. A share is outside where it
+misses 93 to 97 % by more than two of its standard errors, from session to session, for a session's elements share its
+readings. ``scattered biases`` takes ``--gyro`` [°/s] and ``--accel`` [mm/s²], drawn anew for every pose.
 """
 
 import argparse
-import json
+import itertools
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from confidence import design
-from confidence.judge import judge
 from confidence.machine import robot
 from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import hand, manual, table
+from trihedron import calibrate
+from trihedron.records import Recording
 
 STRONG = {"gyro_flicker": np.radians(20.0 / 3600.0), "accel_flicker": 0.3e-3 * G}
 WEAK = {"gyro_flicker": np.radians(0.2 / 3600.0), "accel_flicker": 2e-5}
 THERE_AND_BACK = {90.0: (90.0, -90.0), 180.0: (180.0, -180.0), 360.0: (360.0, -360.0)}
+NORMAL_95 = 1.96
+QUANTITIES = ("S_f", "b_f", "S_w", "b_w")
 
 SETTINGS = {
     **{f"moves of {s:g} s": (hand, {"move_s": s}) for s in (0.25, 2.0, 30.0, 60.0)},
@@ -57,6 +59,7 @@ SETTINGS = {
     "robot, 12 bit, lost 0.3 %, remade": (robot, {"gyro_bits": 12, "lost": 0.003, "is_remade": True}),
     "manual's session, moves": (manual, {}),
     "manual's session, stated turns": (manual, {"is_stated": True}),
+    "scattered biases": (hand, {"n_poses": 24, "scatter": (0.05, 3.0)}),
 }
 
 # One factor of a session at a time: length of moves, bits, rate, poses, slow noise, losses. 16 bits, 100 Hz, 18 poses
@@ -69,120 +72,88 @@ ASKED = (
 )
 
 
-def answer(make, options, seed):
-    """Calibration of one session through the public front, its truth in the same frame, CPU seconds."""
-    from trihedron import api
-    from trihedron.records import Recording
+def scattered(values, S, time_s, rests, sigma, rng):
+    """Readings (n, 3) with a bias of each pose's own, of ``sigma`` in SI, that leaps somewhere in every move."""
+    own = sigma * rng.standard_normal((len(rests), 3))
+    leaps = [rng.uniform(before[1], after[0]) for before, after in itertools.pairwise(rests)]
+    return values + np.linalg.solve(S, own[np.searchsorted(leaps, time_s)].T).T
 
+
+def answer(make, options, seed):
+    """Calibration of one session through the public front, its truth in the same frame, the motion."""
     options = dict(options)
     method, is_stated = options.pop("method", "joint"), options.pop("is_stated", False)
     lost, is_remade = options.pop("lost", 0.0), options.pop("is_remade", False)
+    scatter = options.pop("scatter", None)
     f, w, rate, truth, motion = make(seed, **options)
     t = getattr(motion, "time_s", np.arange(len(f)) / rate)
+    if scatter:
+        rng = np.random.default_rng([15, seed])
+        w = scattered(w, truth.S_w, t, motion.rests, np.radians(scatter[0]), rng)
+        f = scattered(f, truth.S_f, t, motion.rests, 1e-3 * scatter[1], rng)
     if lost:
         kept = np.random.default_rng([14, seed]).random(len(t)) >= lost
         f, w, t = f[kept], w[kept], t[kept]
         if is_remade:
             t = np.arange(len(f)) / rate
     recording = Recording(t, f, w, rate, accelerometer_unit="counts", gyroscope_unit="counts")
-    more = {}
-    if is_stated:
-        more["turns_deg"] = [angle for _, _, angle in motion.turns]
-    began = time.process_time()
-    result = api.calibrate(recording, gravity_m_s2=G, method=method, **more)
-    return result, (truth if method == "faces" else lower(truth)), motion, time.process_time() - began
+    more = {"turns_deg": [angle for _, _, angle in motion.turns]} if is_stated else {}
+    result = calibrate(recording, gravity_m_s2=G, method=method, **more)
+    return result, truth if method == "faces" else lower(truth)
+
+
+def session(make, options, seed):
+    """What was answered, and every error in standard errors: of S_f, b_f, S_w, b_w."""
+    try:
+        result, truth = answer(make, options, seed)
+    except ValueError:
+        return "refused", None
+    a, g = result.accelerometer, result.gyroscope
+    if g is None:
+        return "refused", None
+    free = np.nonzero(np.tril(np.ones((3, 3))) if options.get("method") != "faces" else np.ones((3, 3)))
+    z = {"S_f": ((a.S - truth.S_f) / np.where(a.sigma_S > 0.0, a.sigma_S, np.inf))[free]}
+    z |= {"b_f": (a.b - truth.b_f) / a.sigma_b}
+    z |= {"S_w": ((g.S - truth.S_w) / g.sigma_S).ravel(), "b_w": (g.b - truth.b_w) / g.sigma_b}
+    return ("trusted" if result.is_trustworthy else "marked"), z
+
+
+def line(name, rows):
+    """One row of the table."""
+    counts = ", ".join(str(sum(said == kind for said, _ in rows)) for kind in ("trusted", "marked", "refused"))
+    trusted = [z for said, z in rows if said == "trusted"]
+    cells, outside, worst = [], [], 0.0
+    for quantity in QUANTITIES if trusted else ():
+        z = np.array([row[quantity] for row in trusted])
+        each = 100.0 * np.mean(np.abs(z) < NORMAL_95, axis=1)
+        error = max(each.std() / np.sqrt(len(each)), 100.0 * np.sqrt(0.05 * 0.95 / z.size))
+        cells.append(f"{each.mean():.1f} %, {np.sqrt(np.mean(z**2)):.2f}")
+        worst = max(worst, float(np.abs(z).max()))
+        if not 93.0 - 2.0 * error <= each.mean() <= 97.0 + 2.0 * error:
+            outside.append(f"{quantity} too {'small' if each.mean() < 95.0 else 'wide'}")
+    return f"| {name} | {counts} | {' | '.join(cells or ['–'] * 4)} | {worst:.1f} σ | {' '.join(outside)} |"
 
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--sessions", type=int, default=20)
-    parser.add_argument("--first", type=int, default=0, help="seed of the first session")
-    parser.add_argument("--rows", type=Path, help="file to which every session is written, a line of JSON each")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sessions", type=int, default=20, help="from every first seed")
+    parser.add_argument("--first", type=int, nargs="+", default=[0], help="seeds of first sessions")
     parser.add_argument("--asked", action="store_true", help="the settings of the table of coverage, no others")
-    parser.add_argument("--judge", type=Path, help="print coverage from such a file; run nothing")
+    parser.add_argument("--gyro", type=float, help="°/s")
+    parser.add_argument("--accel", type=float, help="mm/s²")
     parser.add_argument("names", nargs="*")
-    parser.add_argument("--design", type=int, help="so many sessions of the thirteen-factor design, nothing else")
     given = parser.parse_args()
-    if given.design:
-        by_level(range(given.first, given.first + given.design))
-        return
-    if given.judge:
-        judge(given.judge)
-        return
-    print("setting                        trusted marked none holds  acc in  S_w in  b_w in  rms z   error of S_w, %")
+    print("| setting | trusted, marked, refused | S_f | b_f | S_ω | b_ω | worst | outside |\n" + "|---" * 8 + "|")
     for name, (make, options) in SETTINGS.items():
         if given.names and not any(word in name for word in given.names):
             continue
         if given.asked and name not in ASKED:
             continue
-        rows = [session(name, make, options, given.first + k) for k in range(given.sessions)]
-        if given.rows:
-            with given.rows.open("a") as file:
-                file.writelines(json.dumps(row) + "\n" for row in rows)
-        print(line(name, rows), flush=True)
-
-
-def by_level(seeds):
-    """Answers and shares within 1.96 σ of S and b of both sensors, at every level of every factor of the design."""
-    settings = {}
-    for seed in seeds:
-        levels = design.drawn(seed)
-        row = session("design", _designed(levels), {}, seed)
-        for name, level in levels.items():
-            settings.setdefault(f"{name} {level}", []).append(row)
-    for name, rows in settings.items():
-        print(line(name, rows), flush=True)
-
-
-def _designed(levels):
-    """A maker of sessions at these levels, in the shape of the others."""
-
-    def make(seed):
-        made = design.session(seed, **levels)
-        return made.force, made.rate, made.rate_hz, made.truth, made
-
-    return make
-
-
-def session(name, make, options, seed):
-    """One session: what was answered and how far from the truth, in standard errors and in the unit of the scale."""
-    row = {"setting": name, "seed": seed, "answer": "none", "codes": [], "cpu_s": 0.0}
-    try:
-        result, truth, motion, row["cpu_s"] = answer(make, options, seed)
-    except ValueError as error:
-        row["codes"] = [str(error)[:60]]
-        return row
-    row["holds"] = result.segments.n_poses == len(motion.rests)
-    row["codes"] = sorted({f.code.value for f in result.findings if f.severity.value != "note"})
-    if result.gyroscope is None:
-        return row
-    row["answer"] = "trusted" if result.is_trustworthy else "marked"
-    low = np.nonzero(np.tril(np.ones((3, 3))) if options.get("method") != "faces" else np.ones((3, 3)))
-    a, g = result.accelerometer, result.gyroscope
-    row["a"] = [*((a.S - truth.S_f)[low] / a.sigma_S[low]), *((a.b - truth.b_f) / a.sigma_b)]
-    row["S"] = [*((g.S - truth.S_w) / g.sigma_S).ravel()]
-    row["b"] = [*((g.b - truth.b_w) / g.sigma_b)]
-    row["error"] = 100.0 * np.abs(g.S - truth.S_w).max() / np.abs(np.diag(truth.S_w)).mean()
-    return row
-
-
-def line(name, rows):
-    """One row of the table."""
-    counts = {kind: sum(row["answer"] == kind for row in rows) for kind in ("trusted", "marked", "none")}
-    why = {}
-    for code in (code for row in rows for code in row["codes"]):
-        why[code] = why.get(code, 0) + 1
-    right = sum(row.get("holds", False) for row in rows)
-    text = f"{name:30s} {counts['trusted']:7d} {counts['marked']:6d} {counts['none']:4d} {right:5d}"
-    trusted = [row for row in rows if row["answer"] == "trusted"]
-    if trusted:
-        share = {key: 100.0 * np.mean([np.abs(row[key]) < 1.96 for row in trusted]) for key in ("a", "S", "b")}
-        every, errors = np.array([row["S"] for row in trusted]), [row["error"] for row in trusted]
-        text += f" {share['a']:6.1f} {share['S']:7.1f} {share['b']:7.1f} {np.sqrt(np.mean(every**2)):6.2f}"
-        text += f"   {np.median(errors):.4f} median, {max(errors):.3f} worst, {np.abs(every).max():.1f} σ"
-    seconds = sum(row["cpu_s"] for row in rows) / len(rows)
-    return text + f"   {seconds:.2f} s of CPU a session   {why}"
+        if "scatter" in options and given.gyro is not None:
+            options = options | {"scatter": (given.gyro, given.accel or 0.0)}
+        seeds = [first + k for first in given.first for k in range(given.sessions)]
+        print(line(name, [session(make, options, seed) for seed in seeds]), flush=True)
 
 
 if __name__ == "__main__":

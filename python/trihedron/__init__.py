@@ -45,6 +45,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from trihedron.answers import answered_by
 from trihedron.threads import cap_threads
 
 if TYPE_CHECKING:
@@ -204,6 +205,15 @@ def _installed_version() -> str:
         return "0+unknown"
 
 
+# Records name these; here it is said who makes them.
+answered_by(
+    dict.fromkeys(("as_dict", "as_frame", "as_html", "as_screen", "as_text", "plot"), "trihedron.report.presenting")
+)
+answered_by({"words_of": "trihedron.report.findings.catalogue", "phrase": "trihedron.report.findings.phrases"})
+answered_by(dict.fromkeys(("effect_words", "experiment", "why_not"), "trihedron.report.effects.catalogue"))
+answered_by({"family_words": "trihedron.report.effects.relations", "of_arrays": "trihedron.api.reading"})
+answered_by({"facts_of": "trihedron.channel_facts", "find_low_passes": "trihedron.channel_facts.filters"})
+answered_by({"find_possible_limits": "trihedron.channel_facts.possible_limits"})
 # Before anything starts threads.
 cap_threads()
 # Names are fetched when first asked for: `trihedron --help` must not wait for what it does not use.

@@ -19,20 +19,27 @@ if TYPE_CHECKING:
     from trihedron.api.exporting import export
     from trihedron.api.extending import extend
     from trihedron.api.filter_noising import filter_noise
-    from trihedron.api.filtering import KalmanResult, kalman
+    from trihedron.api.filtering import kalman
     from trihedron.api.identifying import noise, noise_of_curve, noise_of_file, recording_lengths
     from trihedron.api.improving import improve
     from trihedron.api.planning import plan
-    from trihedron.api.presenting import plot, report
     from trihedron.api.ranking import rank
     from trihedron.api.reading import read, segment
     from trihedron.api.references import ReferencesResult, calibrate_references
     from trihedron.api.replaying import guide
-    from trihedron.api.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
-    from trihedron.api.sessions import SessionsResult, calibrate_sessions
+    from trihedron.api.sessions import calibrate_sessions
     from trihedron.api.simulating import simulate, twin, with_effects
     from trihedron.api.verifying import verify
     from trihedron.estimate.noise.allan import allan_deviation
+    from trihedron.records.results import (
+        CalibrationResult,
+        CheckResult,
+        DiagnosisResult,
+        KalmanResult,
+        SessionsResult,
+        VerificationResult,
+    )
+    from trihedron.report.presenting import plot, report
 
 __all__ = [
     "METHODS",
@@ -85,8 +92,8 @@ _HOME = {
     "apply": "trihedron.api.applying",
     "write_calibration": "trihedron.api.applying",
     "guide": "trihedron.api.replaying",
-    "report": "trihedron.api.presenting",
-    "plot": "trihedron.api.presenting",
+    "report": "trihedron.report.presenting",
+    "plot": "trihedron.report.presenting",
     "plan": "trihedron.api.planning",
     "demo": "trihedron.api.demonstrating",
     "allan_deviation": "trihedron.estimate.noise.allan",
@@ -104,7 +111,7 @@ _HOME = {
     "extend": "trihedron.api.extending",
     "export": "trihedron.api.exporting",
     "filter_noise": "trihedron.api.filter_noising",
-    "KalmanResult": "trihedron.api.filtering",
+    "KalmanResult": "trihedron.records.results",
     "kalman": "trihedron.api.filtering",
     "noise": "trihedron.api.identifying",
     "noise_of_curve": "trihedron.api.identifying",
@@ -115,11 +122,11 @@ _HOME = {
     "rank": "trihedron.api.ranking",
     "read": "trihedron.api.reading",
     "segment": "trihedron.api.reading",
-    "CalibrationResult": "trihedron.api.results",
-    "CheckResult": "trihedron.api.results",
-    "DiagnosisResult": "trihedron.api.results",
-    "VerificationResult": "trihedron.api.results",
-    "SessionsResult": "trihedron.api.sessions",
+    "CalibrationResult": "trihedron.records.results",
+    "CheckResult": "trihedron.records.results",
+    "DiagnosisResult": "trihedron.records.results",
+    "VerificationResult": "trihedron.records.results",
+    "SessionsResult": "trihedron.records.results",
     "calibrate_sessions": "trihedron.api.sessions",
     "simulate": "trihedron.api.simulating",
     "twin": "trihedron.api.simulating",

@@ -9,7 +9,6 @@ from typing import Protocol
 
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import AnyRecording, recording_of
-from trihedron.api.results import CheckResult
 from trihedron.api.temperature import check_range, thermally_corrected
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
@@ -17,6 +16,7 @@ from trihedron.files.calibration import read_calibration
 from trihedron.files.calibration import write_calibration as write_file
 from trihedron.files.plausible import require_plausible
 from trihedron.records import Calibration, Finding, FindingCode, Recording, SensorCalibration, Severity
+from trihedron.records.results import CheckResult
 from trihedron.records.words import words
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit

@@ -9,8 +9,8 @@ from importlib import import_module
 from typing import Any, TypeVar
 
 from trihedron.api.arguments import settled
-from trihedron.api.wording import in_python, result_in_python
 from trihedron.records.checked import WrongTypeError
+from trihedron.report.in_python import in_python, result_in_python
 
 __all__ = ["WrongTypeError", "asked_in_python"]
 

@@ -18,12 +18,12 @@ from trihedron.api.referring import (
     effects_of,
     held_against,
 )
-from trihedron.api.results import DiagnosisResult
 from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.reference import moves_along
 from trihedron.read.reference import of_recording
 from trihedron.records import Calibration, Finding, FindingCode, Recording
 from trihedron.records.reference import AgainstReference
+from trihedron.records.results import DiagnosisResult
 from trihedron.records.words import words
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit, rate_to_si

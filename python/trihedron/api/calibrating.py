@@ -11,7 +11,6 @@ import numpy as np
 
 from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
-from trihedron.api.results import CalibrationResult
 from trihedron.api.turns_on_faces import opposite_on_faces, resting_spans, turns_on_faces
 from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm, shared_rounding
@@ -36,6 +35,7 @@ from trihedron.quantiles import median
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.plain import as_plain
 from trihedron.records.progress import Progress
+from trihedron.records.results import CalibrationResult
 from trihedron.records.words import words
 from trihedron.sensor_model import in_frame
 from trihedron.units import rate_to_si

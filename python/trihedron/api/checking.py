@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of, segment
-from trihedron.api.results import CheckResult
 from trihedron.errors import REFUSALS
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress
+from trihedron.records.results import CheckResult
 from trihedron.records.words import Words, words
 from trihedron.units import STANDARD_GRAVITY_M_S2
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import read, segment
-from trihedron.api.results import CalibrationResult, VerificationResult
 from trihedron.api.verifying import verify
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
@@ -21,6 +20,7 @@ from trihedron.files.calibration import plain, write_calibration
 from trihedron.files.output import write_whole
 from trihedron.gravity import normal_gravity
 from trihedron.records import PARAMETER_NAMES, Calibration, Comparison, Recording, Segments, Truth
+from trihedron.records.results import CalibrationResult, VerificationResult
 from trihedron.report import calibration_report, demonstration_report, verification_report
 from trihedron.report.document import Document
 from trihedron.report.page import to_html

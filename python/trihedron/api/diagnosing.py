@@ -17,7 +17,6 @@ from trihedron.api.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
 from trihedron.api.driving import MovedAlike, driven
 from trihedron.api.reading import AnyRecording, read, recording_of, segment, segments_of
 from trihedron.api.referring import AnyReference
-from trihedron.api.results import DiagnosisResult
 from trihedron.comparison.correlation import correlation_times
 from trihedron.comparison.frames import rates_of_world, sign_of_gravity
 from trihedron.comparison.model import compared
@@ -34,6 +33,7 @@ from trihedron.errors import REFUSALS, RefusedError
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.records.progress import Progress
+from trihedron.records.results import DiagnosisResult
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, read_scenario
 

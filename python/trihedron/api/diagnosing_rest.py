@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.api.results import DiagnosisResult
 from trihedron.diagnose.rest.answer import diagnose_rest
 from trihedron.diagnose.session.starting_point import (
     TYPICAL_ANGLE,
@@ -21,6 +20,7 @@ from trihedron.diagnose.session.starting_point import (
 from trihedron.errors import REFUSALS
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, LinearModel
+from trihedron.records.results import DiagnosisResult
 from trihedron.units import acceleration_to_si, rate_to_si
 
 Calibrated = Callable[[], Calibration]

@@ -13,12 +13,12 @@ import numpy as np
 from trihedron.api.diagnosing import diagnose
 from trihedron.api.improving import improve
 from trihedron.api.reading import read
-from trihedron.api.results import DiagnosisResult
 from trihedron.files.calibration import plain
 from trihedron.files.log import write_recording
 from trihedron.files.output import write_whole
 from trihedron.files.scenario import write_scenario
 from trihedron.gravity import normal_gravity
+from trihedron.records.results import DiagnosisResult
 from trihedron.report import diagnosis_report, disagreement_report
 from trihedron.report.document import Document
 from trihedron.report.page import to_html

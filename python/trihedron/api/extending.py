@@ -11,12 +11,12 @@ import numpy as np
 
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.diagnosing import diagnose
-from trihedron.api.results import CalibrationResult
 from trihedron.errors import RefusedError
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import Domain
 from trihedron.records.progress import Progress
+from trihedron.records.results import CalibrationResult
 from trihedron.records.words import words
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.choices import settle_gravity
@@ -33,39 +33,10 @@ from trihedron.records import (
     Severity,
 )
 from trihedron.records.noise import Noise
-from trihedron.records.presented import Presented
 from trihedron.records.progress import Progress
-from trihedron.sanitise import one_line
+from trihedron.records.results import KalmanResult
 
 NoiseSource = AxisNoise | Sequence[AxisNoise] | Noise | str | os.PathLike[str]
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class KalmanResult(Presented):
-    """What the filter found, with the segments and the recording that it was made from. ``print`` gives the report."""
-
-    outcome: KalmanCalibration | NormKalmanCalibration
-    calibration: Calibration
-    segments: Segments
-    recording: Recording
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """Everything noticed, by every stage."""
-        return self.calibration.findings
-
-    @property
-    def is_trustworthy(self) -> bool:
-        """No serious finding."""
-        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
-
-    def __repr__(self) -> str:
-        return f"<KalmanResult of {one_line(self.recording.source)}: {self.calibration.accelerometer.method}>"
-
-    def __str__(self) -> str:
-        from trihedron.report import kalman_report, to_text
-
-        return to_text(kalman_report(self.outcome, self.calibration))
 
 
 def kalman(

@@ -20,13 +20,13 @@ from trihedron.api.planning_poses import (
     sigma_of,
 )
 from trihedron.api.reading import segment
-from trihedron.api.results import CalibrationResult, VerificationResult
 from trihedron.api.verifying import verify
 from trihedron.arrays import FloatArray
 from trihedron.errors import REFUSALS
 from trihedron.estimate.accelerometer.poses import ENTRIES, design_rows, parameter_names, pose_in_words
 from trihedron.records import Calibration, FindingCode, Recording, Segments, Severity
 from trihedron.records.guiding import LEAST_POSES, Accuracy, Examination, Uncertain
+from trihedron.records.results import CalibrationResult, VerificationResult
 from trihedron.sensor_model import in_frame
 from trihedron.units import (
     STANDARD_GRAVITY_M_S2,

@@ -12,7 +12,6 @@ import numpy as np
 import tomllib
 
 from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, flicker_of_poses
-from trihedron.api.results import DiagnosisResult
 from trihedron.comparison.moved import AIMED_AT
 from trihedron.comparison.noise import Sampled, sampled
 from trihedron.comparison.quantisation import white_and_quantisation
@@ -22,6 +21,7 @@ from trihedron.estimate.noise import gain_of
 from trihedron.files.scenario import improved_scenario
 from trihedron.records.diagnosis import AcceptedEffect
 from trihedron.records.pose_noise import PoseNoise
+from trihedron.records.results import DiagnosisResult
 from trihedron.simulate import (
     NoiseTerms,
     Scenario,

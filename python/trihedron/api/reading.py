@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy.typing as npt
 
-from trihedron.api.wording import finding_in_python, in_python
 from trihedron.errors import RefusedError
 from trihedron.read import ReadError, read_recording
 from trihedron.records import Recording, Segments
 from trihedron.records.checked import WrongTypeError, number_of
 from trihedron.records.progress import Progress
+from trihedron.report.in_python import finding_in_python, in_python
 from trihedron.units import AccelerationUnit, RateUnit
 
 AnyRecording = object

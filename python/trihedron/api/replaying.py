@@ -12,11 +12,11 @@ import numpy.typing as npt
 
 from trihedron.api.guiding import conclude, examine, part_of
 from trihedron.api.reading import AnyRecording, recording_of
-from trihedron.api.results import CalibrationResult, VerificationResult
 from trihedron.capture.guide import Guide
 from trihedron.errors import RefusedError
 from trihedron.records import Recording
 from trihedron.records.guiding import Accuracy, GuideView
+from trihedron.records.results import CalibrationResult, VerificationResult
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 STEP_S = 0.25

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import get_args
@@ -13,15 +12,14 @@ import numpy as np
 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
-from trihedron.api.results import CalibrationResult
 from trihedron.api.sessions_combined import ALPHA, combine
 from trihedron.arrays import FloatArray
 from trihedron.errors import REFUSALS, RefusedError
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
-from trihedron.records import Calibration, Frame, Recording, SensorCalibration
-from trihedron.records.presented import Presented
+from trihedron.records import Frame, Recording, SensorCalibration
 from trihedron.records.progress import Progress
-from trihedron.records.sessions import By, Session, SessionsModel
+from trihedron.records.results import CalibrationResult, SessionsResult
+from trihedron.records.sessions import By, Session
 from trihedron.records.words import Words, words
 from trihedron.sensor_model import in_frame
 
@@ -31,32 +29,6 @@ MEDIAN_CHI2 = 0.4549
 HEATING_DEGC = 1.0
 """Change of temperature over a recording from which it was made while heating or cooling: the resolution of the
 thermometers in parts is 0.1 to 0.5 °C."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class SessionsResult(Presented):
-    """Many recordings as one model, with each recording's own calibration. ``print`` gives the report."""
-
-    model: SessionsModel
-    results: tuple[CalibrationResult, ...]
-
-    @property
-    def calibration(self) -> Calibration:
-        """What is common, with the covariance of the next session."""
-        return self.model.calibration
-
-    @property
-    def is_trustworthy(self) -> bool:
-        """No serious finding."""
-        return self.model.is_trustworthy
-
-    def __repr__(self) -> str:
-        return f"<SessionsResult of {len(self.model.sessions)} recordings by {self.model.by}>"
-
-    def __str__(self) -> str:
-        from trihedron.report import sessions_report, to_text
-
-        return to_text(sessions_report(self.model))
 
 
 def calibrate_sessions(

@@ -16,7 +16,6 @@ import numpy as np
 
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units
 from trihedron.api.calibrating import calibrate
-from trihedron.api.results import CalibrationResult
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.files.calibration import calibration_text
@@ -24,6 +23,7 @@ from trihedron.files.checkpoint import Checkpoint, made_of
 from trihedron.read import ChunkedLog, open_chunks
 from trihedron.records import Move, Pose, Recording, Segments
 from trihedron.records.progress import Progress
+from trihedron.records.results import CalibrationResult
 from trihedron.segment import BlockSums, segment_blocks
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit

@@ -8,11 +8,11 @@ from trihedron.api.applying import AnyCalibration, calibration_of, check_units, 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
-from trihedron.api.results import VerificationResult
 from trihedron.errors import REFUSALS
 from trihedron.estimate.verification import verify_calibration
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, Severity, Verification
 from trihedron.records.progress import Progress
+from trihedron.records.results import VerificationResult
 from trihedron.units import mg_from_m_s2
 
 

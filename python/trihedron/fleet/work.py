@@ -43,7 +43,7 @@ def work(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
 def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
     # Imported by the worker: the process that only hands out logs needs none of it.
     from trihedron import api
-    from trihedron.api.results import CalibrationResult
+    from trihedron.records.results import CalibrationResult
 
     reading: dict[str, Any] = {
         key: options[key] for key in ("columns", "rate_hz", "accelerometer_unit", "gyroscope_unit") if options.get(key)

@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from importlib import import_module
 from numbers import Real
 from types import MappingProxyType
 from typing import Any
 
+from trihedron.answers import ask
 from trihedron.records.checked import kind_of, word_of
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.plain import Plain
@@ -198,8 +198,7 @@ class Finding(Frozen, Plain):
         KeyError
             When the catalogue does not know the case, or a place of its sentences has no value.
         """
-        catalogue = import_module("trihedron.report.findings.catalogue")
-        severity, seen, cause, action = catalogue.words_of(code, case, severity, values)
+        severity, seen, cause, action = ask("words_of", code, case, severity, values)
         told = {name: float(v) for name, v in values.items() if isinstance(v, Real) and not isinstance(v, bool)}
         # What could not be estimated is infinite or none: no figure, and no file could hold it.
         figures = {name: v for name, v in (told | dict(numbers or {})).items() if math.isfinite(v)}

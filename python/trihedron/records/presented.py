@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
+from trihedron.answers import ask
 from trihedron.records.frozen import Frozen
 
 if TYPE_CHECKING:
@@ -21,15 +22,12 @@ class Presented(Frozen):
 
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types, as ``--json`` of the command gives it; what is not a finite number is None."""
-        from trihedron.api.presenting import as_dict
-
-        return as_dict(self)
+        record: dict[str, Any] = ask("as_dict", self)
+        return record
 
     def as_text(self) -> str:
         """The report as plain text, as ``print`` gives it."""
-        from trihedron.api.presenting import as_text
-
-        return as_text(self)
+        return str(ask("as_text", self))
 
     def to_dataframe(self, library: Library = "polars") -> Any:
         """One row per parameter, pose, axis and term, or sample; units in the names.
@@ -39,9 +37,7 @@ class Presented(Frozen):
         ValueError
             When the library is neither polars nor pandas, or is not installed.
         """
-        from trihedron.api.presenting import as_frame
-
-        return as_frame(self, library)
+        return ask("as_frame", self, library)
 
     def plot(self, name: str | None = None, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
         """A matplotlib figure of the report: the first, or the one of that name. A notebook shows it.
@@ -58,14 +54,11 @@ class Presented(Frozen):
         ValueError
             When there is no figure of that name, it has another number of panels, or matplotlib is not installed.
         """
-        from trihedron.api.presenting import plot
-
-        return plot(self, name, ax=ax)
+        figure: Figure = ask("plot", self, name, ax=ax)
+        return figure
 
     def _repr_html_(self) -> str:
-        from trihedron.api.presenting import as_html
-
-        return as_html(self)
+        return str(ask("as_html", self))
 
 
 def _read_only(mapping: Mapping[Any, Any]) -> MappingProxyType[Any, Any]:

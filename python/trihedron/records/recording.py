@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.answers import ask
 from trihedron.arrays import CORE_MEMORY, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.records.channel_facts import Limit, LowPass, RecordingFacts
@@ -198,9 +199,8 @@ class Recording(Presented):
             When shapes disagree, or neither ``time_s`` nor ``rate_hz`` is given.
         """
         # The audit belongs to the reader; people look for the constructor here.
-        from trihedron.api.reading import of_arrays
-
-        return of_arrays(
+        audited: Recording = ask(
+            "of_arrays",
             time_s,
             accelerometer,
             gyroscope,
@@ -210,32 +210,33 @@ class Recording(Presented):
             temperature_degc=temperature_degc,
             supply_v=supply_v,
         )
+        return audited
 
     @cached_property
     def facts(self) -> RecordingFacts:
         """What the readings say of the ADCs behind them: found when first asked for, which the reader does."""
         # How facts are found is a room of its own; a record only carries them.
-        from trihedron.channel_facts import facts_of
-
-        return facts_of(self.accelerometer, self.gyroscope, self.rate_hz)
+        found: RecordingFacts = ask("facts_of", self.accelerometer, self.gyroscope, self.rate_hz)
+        return found
 
     @cached_property
     def possible_limits(self) -> dict[str, tuple[Limit, ...]]:
         """Limits by sensor that noise covers, on sides where no code is one (``facts``): found when asked, and
         not more than possible: steady turns share a level too."""
-        from trihedron.channel_facts.possible_limits import find_possible_limits
-
-        named = {"accelerometer": self.accelerometer, "gyroscope": self.gyroscope}
-        return find_possible_limits({name: one for name, one in named.items() if one is not None}, self.facts)
+        found: dict[str, tuple[Limit, ...]] = ask("find_possible_limits", self._readings(), self.facts)
+        return found
 
     @cached_property
     def low_passes(self) -> dict[str, tuple[LowPass, ...]]:
         """The filter ahead of each channel by sensor, as white noise in the quietest stretches shows it: found when
         asked for; none of a sensor that never rests for 32 readings."""
-        from trihedron.channel_facts.filters import find_low_passes
+        found: dict[str, tuple[LowPass, ...]] = ask("find_low_passes", self._readings(), self.rate_hz)
+        return found
 
+    def _readings(self) -> dict[str, FloatArray]:
+        """Readings (n, 3) of the sensors that there are, by name."""
         named = {"accelerometer": self.accelerometer, "gyroscope": self.gyroscope}
-        return find_low_passes({name: one for name, one in named.items() if one is not None}, self.rate_hz)
+        return {name: one for name, one in named.items() if one is not None}
 
     @property
     def n_samples(self) -> int:

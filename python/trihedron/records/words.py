@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
+
+from trihedron.answers import ask
 
 
 class Words(str):
@@ -20,7 +21,7 @@ def words(phrase: str, /, **values: Any) -> Words:
     KeyError
         When the catalogue has no such phrase, or a place of it has no value.
     """
-    return Words(import_module("trihedron.report.findings.phrases").phrase(phrase, values))
+    return Words(ask("phrase", phrase, values))
 
 
 def effect_words(effect_id: str, case: str, /, **values: Any) -> Words:
@@ -31,12 +32,12 @@ def effect_words(effect_id: str, case: str, /, **values: Any) -> Words:
     KeyError
         When the catalogue has no such case, or a place of it has no value.
     """
-    return Words(import_module("trihedron.report.effects.catalogue").effect_words(effect_id, case, values))
+    return Words(ask("effect_words", effect_id, case, values))
 
 
 def experiment_for(effect_id: str, *, at_rest: bool = False) -> Words:
     """What to record so that an effect cannot be mistaken for another; empty where the catalogue has none."""
-    return Words(import_module("trihedron.report.effects.catalogue").experiment(effect_id, at_rest=at_rest))
+    return Words(ask("experiment", effect_id, at_rest=at_rest))
 
 
 def why_not(name: str, /, **values: Any) -> Words:
@@ -47,14 +48,14 @@ def why_not(name: str, /, **values: Any) -> Words:
     KeyError
         When there is no such reason, or a place of it has no value.
     """
-    return Words(import_module("trihedron.report.effects.catalogue").why_not(name, values))
+    return Words(ask("why_not", name, values))
 
 
 def relation_experiment(family: str) -> Words:
     """What would prove a law of a family of variables; empty where the catalogue has none."""
-    return Words(import_module("trihedron.report.effects.relations").family_words(family).experiment)
+    return Words(ask("family_words", family).experiment)
 
 
 def relation_resembles(family: str) -> tuple[Words, ...]:
     """Mechanisms that follow such variables."""
-    return tuple(map(Words, import_module("trihedron.report.effects.relations").family_words(family).resembles))
+    return tuple(map(Words, ask("family_words", family).resembles))

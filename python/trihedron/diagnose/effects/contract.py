@@ -6,7 +6,7 @@ To add one: write a file in this folder with a subclass of :class:`Effect` and n
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -116,19 +116,6 @@ class Effect(ABC):
     def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:  # noqa: ARG002
         """A scaled variant made again for the size it was found to have; ``None`` where columns do not depend on it."""
         return None
-
-    def made_again(self, context: Context, variant: Variant) -> Variant | None:
-        """The same variant on other observations (samples put back or taken out); ``None`` where it does not exist."""
-        same = [v for v in self.variants(context) if v.label == variant.label and v.names == variant.names]
-        if not same:
-            return None
-        if len(variant.shape) == 1:
-            name, (value, unit) = next(iter(variant.shape.items()))
-            again = self.reshaped(context, same[0], value)
-            if again is not None:
-                return replace(again, shape={name: (value, unit)}, shape_sigma=variant.shape_sigma)
-            same = [v for v in same if v.shape == variant.shape]
-        return same[0] if same else None
 
     def is_plausible(self, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
         """Whether the fitted parameters are ones that the mechanism can have."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import trapezoid
 
-from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 
 NEAR_DEG = 12.0
@@ -29,12 +28,11 @@ class TableTurn:
     move: int
     angle_rad: float
     error_rad: float
-    tilt_change: FloatArray
 
 
 def table_turns(context: Context) -> list[TableTurn]:
     """Moves whose axis is the vertical throughout: the vertical ends where it began in the body."""
-    twin, path, h = context.fitted.twin, context.fitted.line.path, context.obs.n_poses
+    twin = context.fitted.twin
     out = []
     for m, where in enumerate(context.moves):
         before, after = context.obs.move_poses[m]
@@ -48,8 +46,7 @@ def table_turns(context: Context) -> list[TableTurn]:
         if abs(angle) < HALF_RIGHT_RAD or np.mean(across) > MOST_ACROSS * np.mean(np.abs(about_up)):
             continue
         error = (angle + HALF_RIGHT_RAD) % (2.0 * HALF_RIGHT_RAD) - HALF_RIGHT_RAD
-        rotated = path.attitude[where.stop - 1 - h] @ up
-        out.append(TableTurn(m, angle, float(error), twin.up[after] - rotated))
+        out.append(TableTurn(m, angle, float(error)))
     return out
 
 

@@ -155,14 +155,14 @@ def hidden_biases(fitted: Fit) -> tuple[HiddenBias, HiddenBias | None]:
     return out[0], out[1]
 
 
-def locate(fitted: Fit, label: int, n_most: int = 5) -> Where:
+def locate(fitted: Fit, label: int) -> Where:
     """The channels and segments that carry a domain's misfit."""
     system, obs = fitted.system, fitted.line.obs
     rows = np.flatnonzero((system.domain == label) & (system.walk == 0))
     squared = system.residual[rows] ** 2
     segments = system.segment[rows]
     per_segment = {int(s): float(squared[segments == s].sum()) for s in np.unique(segments)}
-    heavy = [s for s, v in sorted(per_segment.items(), key=lambda item: -item[1]) if v > HEAVY][:n_most]
+    heavy = [s for s, v in sorted(per_segment.items(), key=lambda item: -item[1]) if v > HEAVY][:5]
     per_channel = np.array([squared[system.channel[rows] == c].sum() for c in range(3)])
     names = _CHANNELS[label]
     channels = tuple(names[c] for c in np.argsort(-per_channel) if per_channel[c] > CARRIES * per_channel.sum())

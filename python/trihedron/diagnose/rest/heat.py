@@ -26,7 +26,7 @@ ALL = (SCATTER, WALK, DRIFT)
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One sensor's zeros as a function of temperature, raw units per power of kelvin about ``mean_degc``.
+    """One sensor's zeros as a function of temperature, raw units per power of kelvin.
 
     ``names`` (k,) of the terms, ``value``, ``std`` (3, k); ``swing`` (3,) through which the curve runs, ``rest`` (n, 3)
     what it leaves, ``raw`` (n, 3) the readings without it, about the mean of their orientation; ``gain`` twice the
@@ -36,7 +36,6 @@ class Curve:
     names: tuple[str, ...]
     value: FloatArray
     std: FloatArray
-    mean_degc: float
     range_degc: tuple[float, float]
     swing: FloatArray
     raw: FloatArray
@@ -133,7 +132,7 @@ def _curve(
         return None
     heat = pieces.temperature
     return Curve(
-        tuple(names), np.array(theta), np.array(std), float(heat.mean()), (float(heat.min()), float(heat.max())),
+        tuple(names), np.array(theta), np.array(std), (float(heat.min()), float(heat.max())),
         np.array(swing), raw, rest, before, after, gain, cost, float(chdtrc(3.0 * len(names), max(gain, 0.0))),
     )  # fmt: skip
 

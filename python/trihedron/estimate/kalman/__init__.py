@@ -1,6 +1,6 @@
 """Calibration by Kalman filter with the identified noise in its state (docs/kalman.md)."""
 
-from trihedron.estimate.kalman.consistency import check_innovations, normalised_error_squared
+from trihedron.estimate.kalman.consistency import check_innovations
 from trihedron.estimate.kalman.guide import Goal
 from trihedron.estimate.kalman.identified import check_same_converter, check_same_gravity, noise_from_identified
 from trihedron.estimate.kalman.live import LiveCalibration
@@ -32,6 +32,5 @@ __all__ = [
     "check_same_gravity",
     "noise_from_identified",
     "noise_from_poses",
-    "normalised_error_squared",
     "pose_readings",
 ]

@@ -85,10 +85,3 @@ def consistency_findings(axis: int | None, seen: Consistency) -> list[Finding]:
             )
         )
     return out
-
-
-def normalised_error_squared(error: FloatArray, covariance: FloatArray) -> float:
-    """NEES ``eᵀ P⁻¹ e`` of an estimate whose truth is known: chi-square with ``len(e)`` degrees of freedom."""
-    scale = np.sqrt(np.diag(covariance))
-    whitened = np.linalg.solve(covariance / np.outer(scale, scale), error / scale)
-    return float((error / scale) @ whitened)

@@ -18,15 +18,17 @@ from trihedron.records.noise import AllanCurve, AllanKind
 
 _LONGEST = {"overlapping": 2, "non-overlapping": 2, "modified": 3, "hadamard": 3, "total": 2}
 
+CLUSTERS_AN_OCTAVE = 4
+
 STREAM_BUDGET_BYTES = 384 << 20
 """Memory for running sums of a streamed log, all channels together."""
 
 
-def default_clusters(n: int, kind: AllanKind = "overlapping", per_octave: int = 4) -> list[int]:
-    """Cluster sizes from 1 reading to the longest that still has terms, ``per_octave`` to the octave."""
+def default_clusters(n: int, kind: AllanKind = "overlapping") -> list[int]:
+    """Cluster sizes from 1 reading to the longest that still has terms, four to the octave."""
     longest = max(1, n // _LONGEST[kind])
-    steps = np.arange(int(per_octave * math.log2(longest)) + 1)
-    return [int(m) for m in np.unique(np.round(2.0 ** (steps / per_octave)).astype(np.int64))]
+    steps = np.arange(int(CLUSTERS_AN_OCTAVE * math.log2(longest)) + 1)
+    return [int(m) for m in np.unique(np.round(2.0 ** (steps / CLUSTERS_AN_OCTAVE)).astype(np.int64))]
 
 
 def allan_deviation(

@@ -30,8 +30,8 @@ class SessionSolution:
 
     ``S_a``, ``b_a``, ``S_w``, ``b_w`` with their ``covariance`` (24, 24); the zeros are those of one for the session.
     ``moves_chi2`` over ``moves_dof`` degrees of freedom of gravity after the moves, in the noise of the samples.
-    ``inflation`` of the moves' standard errors; ``accel_bias_rms``, ``gyro_bias_rms`` what the zeros of the holds
-    differ from the session's by, m/s² and rad/s: as far as S, b alone must miss.
+    ``inflation`` of the moves' standard errors; ``accel_bias_rms`` what the zeros of the holds differ from
+    the session's by, m/s²: as far as S, b alone must miss.
     """
 
     S_a: FloatArray
@@ -43,7 +43,6 @@ class SessionSolution:
     moves_dof: float
     inflation: tuple[float, float]
     accel_bias_rms: float
-    gyro_bias_rms: float
     is_converged: bool
     stopped_because: str
     iterations: int
@@ -99,7 +98,7 @@ def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
     chi2, dof = (float(of_domains[MOVES]) for of_domains in _misfits(core))
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
-    away = core.pose_force_bias @ S_a.T, (core.pose_rate_bias - core.pose_rate_bias.mean(axis=0)) @ S_w.T
+    away = core.pose_force_bias @ S_a.T
     return SessionSolution(
         S_a=S_a,
         b_a=np.asarray(core.session_force_bias) - S_a @ observed.force_origin,
@@ -109,8 +108,7 @@ def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
         moves_chi2=chi2 * inflation[0] ** 2,
         moves_dof=dof,
         inflation=inflation,
-        accel_bias_rms=float(np.sqrt(np.mean(away[0] ** 2))),
-        gyro_bias_rms=float(np.sqrt(np.mean(away[1] ** 2))),
+        accel_bias_rms=float(np.sqrt(np.mean(away**2))),
         is_converged=core.is_converged,
         stopped_because=words(core.stopped_because),
         iterations=core.iterations,

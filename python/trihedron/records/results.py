@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from trihedron.answers import ask
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity, Verification
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
+from trihedron.records.kalman import KalmanCalibration, NormKalmanCalibration
 from trihedron.records.presented import Presented
 from trihedron.records.published import published_figures
 from trihedron.records.reference import AgainstReference
+from trihedron.records.sessions import SessionsModel
 from trihedron.sanitise import one_line
 
 
@@ -46,9 +49,7 @@ class CalibrationResult(Presented):
         return f"<CalibrationResult of {one_line(self.recording.source)}: {sensors}, {self.segments.n_poses} poses>"
 
     def __str__(self) -> str:
-        from trihedron.report import calibration_report, to_text
-
-        return to_text(calibration_report(self.calibration, self.segments, self.recording))
+        return self.as_text()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,9 +75,7 @@ class VerificationResult(Presented):
         return f"<VerificationResult on {one_line(self.recording.source)}: {self.verification.norm_rms:.3g} m/s² rms>"
 
     def __str__(self) -> str:
-        from trihedron.report import to_text, verification_report
-
-        return to_text(verification_report(self.verification, self.segments, self.recording))
+        return self.as_text()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,9 +99,7 @@ class CheckResult(Presented):
         )
 
     def __str__(self) -> str:
-        from trihedron.report import check_report, to_text
-
-        return to_text(check_report(self.recording, self.segments, self.calibration, self.findings))
+        return self.as_text()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,7 +138,54 @@ class DiagnosisResult(Diagnosis, Presented):
         return f"<DiagnosisResult of {one_line(self.recording.source)}: {self.verdict}{': ' + named if named else ''}>"
 
     def __str__(self) -> str:
-        from trihedron.report import diagnosis_report, to_text
-        from trihedron.report.diagnosis import first_screen
+        return str(ask("as_screen", self))
 
-        return to_text(diagnosis_report(self), sections=first_screen(self))
+
+@dataclass(frozen=True, eq=False, repr=False)
+class KalmanResult(Presented):
+    """What the filter found, with the segments and the recording that it was made from. ``print`` gives the report."""
+
+    outcome: KalmanCalibration | NormKalmanCalibration
+    calibration: Calibration
+    segments: Segments
+    recording: Recording
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Everything noticed, by every stage."""
+        return self.calibration.findings
+
+    @property
+    def is_trustworthy(self) -> bool:
+        """No serious finding."""
+        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
+
+    def __repr__(self) -> str:
+        return f"<KalmanResult of {one_line(self.recording.source)}: {self.calibration.accelerometer.method}>"
+
+    def __str__(self) -> str:
+        return self.as_text()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SessionsResult(Presented):
+    """Many recordings as one model, with each recording's own calibration. ``print`` gives the report."""
+
+    model: SessionsModel
+    results: tuple[CalibrationResult, ...]
+
+    @property
+    def calibration(self) -> Calibration:
+        """What is common, with the covariance of the next session."""
+        return self.model.calibration
+
+    @property
+    def is_trustworthy(self) -> bool:
+        """No serious finding."""
+        return self.model.is_trustworthy
+
+    def __repr__(self) -> str:
+        return f"<SessionsResult of {len(self.model.sessions)} recordings by {self.model.by}>"
+
+    def __str__(self) -> str:
+        return self.as_text()

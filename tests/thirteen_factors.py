@@ -1,4 +1,4 @@
-"""``python benches/confidence --design N``: thirteen factors of a session at once, coverage at each of their levels.
+"""Sessions with thirteen factors, each at a level of its own: for tests of one weakness.
 
 A session is poses of a body that is moved by a hand, seen by two sensors; nothing here is taken from ``trihedron``.
 The bias that a session can know is the mean over its poses.
@@ -12,22 +12,6 @@ from confidence.motion import G, attitude, exponential, matrix, multiply, runnin
 from confidence.sensor import DEG, Truth, one_over_f
 from confidence.sessions import directions
 
-FACTORS = {
-    "rate_hz": (25.0, 100.0, 400.0),
-    "bits": (10, 12, 14, 16),
-    "grade": ("industrial", "consumer", "poor"),
-    "poses": (12, 18, 30),
-    "pose_s": (2.0, 4.0, 8.0),
-    "move_s": (0.6, 2.0, 8.0, 25.0),
-    "path": ("free", "axis by axis"),
-    "tremor_deg_s": (0.0, 2.0),
-    "sampling": ("points", "averages"),
-    "timestamps": ("exact", "late", "milliseconds", "lost rows"),
-    "drift": ("none", "accelerometer", "gyro"),
-    "support": ("rigid", "settling"),
-    "outlier": ("none", "bumped pose"),
-}
-"""Levels of every factor, the healthy ones of a consumer's session among them."""
 DENSITY = {
     "industrial": (0.0015 * DEG, 3e-4, 2.0 * DEG / 3600.0, 1e-4),
     "consumer": (0.005 * DEG, 1.2e-3, 8.0 * DEG / 3600.0, 4e-4),
@@ -48,12 +32,6 @@ class Session:
     rate_hz: float
     truth: Truth
     rests: tuple[float, ...]
-
-
-def drawn(seed):
-    """Levels of all factors for one session."""
-    rng = np.random.default_rng([36, 13, seed])
-    return {name: levels[rng.integers(len(levels))] for name, levels in FACTORS.items()}
 
 
 def session(seed, **levels):

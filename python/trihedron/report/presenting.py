@@ -8,9 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from trihedron.api.filtering import KalmanResult
-from trihedron.api.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
-from trihedron.api.sessions import SessionsResult
 from trihedron.errors import RefusedError
 from trihedron.files.calibration import calibration_document, plain
 from trihedron.files.output import OutputError, write_whole
@@ -18,11 +15,19 @@ from trihedron.records import AllanCurve, Calibration, Noise, Recording, Segment
 from trihedron.records.filter_noise import FilterNoise
 from trihedron.records.plan import ExperimentPlan
 from trihedron.records.ranking import Ranking
+from trihedron.records.results import (
+    CalibrationResult,
+    CheckResult,
+    DiagnosisResult,
+    KalmanResult,
+    SessionsResult,
+    VerificationResult,
+)
 from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.report import document, frames, machine, summaries
 from trihedron.report.calibration import calibration_report
 from trihedron.report.check import check_report
-from trihedron.report.diagnosis import diagnosis_report
+from trihedron.report.diagnosis import diagnosis_report, first_screen
 from trihedron.report.filter_noise import filter_noise_columns, filter_noise_record, filter_noise_report
 from trihedron.report.fragment import to_fragment
 from trihedron.report.kalman import kalman_record, kalman_report
@@ -116,6 +121,11 @@ def as_frame(result: object, library: str) -> Any:
 def as_text(result: object) -> str:
     """The report of a result as plain text."""
     return to_text(_kind(result).document(result))
+
+
+def as_screen(result: DiagnosisResult) -> str:
+    """The first screen of a diagnosis as plain text, as ``print`` gives it."""
+    return to_text(diagnosis_report(result), sections=first_screen(result))
 
 
 def as_html(result: object) -> str:
