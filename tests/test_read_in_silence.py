@@ -130,6 +130,54 @@ def test_a_unit_that_nobody_knows_is_asked_for_by_name(tmp_path, name):
     assert read_recording(log, accelerometer_unit="m/s^2").accelerometer_unit is AccelerationUnit.M_S2
 
 
+@pytest.mark.parametrize("form", ["gx [{u}],gy [{u}],gz [{u}]", "gx_{u},gy_{u},gz_{u}"])
+@pytest.mark.parametrize("name", ["rad/min", "deg/min", "rev/s", "rad/h"])
+def test_a_gyro_unit_of_another_time_is_asked_for_and_not_taken_by_its_beginning(tmp_path, name, form):
+    t, force, rate = motion(n_poses=3)
+    log = written(tmp_path / "log.csv", *table(t, force, rate), header="t_s,ax,ay,az," + form.format(u=name))
+    with pytest.raises(ReadError, match=rf"'{name}'.*--gyro-unit"):
+        read_recording(log)
+
+
+@pytest.mark.parametrize(
+    ("units", "unknown"), [("s,mm/s2,mm/s2,mm/s2,dps,dps,dps", "mm/s2"), ("s,g,g,g,rev/s,rev/s,rev/s", "rev/s")]
+)
+def test_a_row_of_units_below_the_names_is_one_though_some_are_unknown(tmp_path, units, unknown):
+    t, force, rate = motion(n_poses=3)
+    log = written(tmp_path / "log.csv", *table(t, force, rate), header=f"{HEADER}\n{units}")
+    with pytest.raises(ReadError, match=rf"'{unknown}' is not"):
+        read_recording(log)
+
+
+@pytest.mark.parametrize(
+    "remark",
+    [
+        "# acceleration in cm/s^2, angular rate in deg/h\n",
+        "# accelerometer unit: cm/s2, gyroscope unit: deg/h\n",
+        "# Accel [cm/s²]\n# Gyro [°/h]\n",
+        "# accelerometer: Gal; gyro: dph\n",
+    ],
+)
+def test_units_that_a_remark_states_are_obeyed(tmp_path, remark):
+    t, force, rate = motion(n_poses=3)
+    columns = table(t, 100.0 * force, np.degrees(rate) * 3600.0)
+    recording = read_recording(written(tmp_path / "log.csv", *columns, header=f"t_s,{HEADER[2:]}", remark=remark))
+    assert recording.accelerometer_unit is AccelerationUnit.CM_S2
+    assert recording.gyroscope_unit is RateUnit.DEG_H
+    assert not serious(recording)
+
+
+@pytest.mark.parametrize(
+    "remark",
+    ["# the accelerometer was mounted in the lab\n", "# accelerometer range: 4 g, gyro range: 500 dps\n"],
+)
+def test_remarks_that_state_no_unit_of_the_readings_change_nothing(tmp_path, remark):
+    t, force, rate = motion(n_poses=3)
+    recording = read_recording(written(tmp_path / "log.csv", *table(t, force, rate), remark=remark))
+    assert recording.accelerometer_unit is AccelerationUnit.M_S2
+    assert recording.gyroscope_unit is RateUnit.RAD_S
+
+
 @pytest.mark.parametrize("same_timestamps", [True, False])
 @pytest.mark.parametrize("name", ["ch", "port", "whose"])
 def test_two_devices_row_by_row_are_asked_for_whatever_the_column_is_called(tmp_path, same_timestamps, name):
