@@ -249,6 +249,31 @@ def test_labelled_lines_in_changing_order_are_all_read(tmp_path):
     np.testing.assert_allclose(recording.gyroscope, rate, atol=1e-5)
 
 
+@pytest.mark.parametrize("separator", [" ", ","])
+@pytest.mark.parametrize("labels", [("A", "G"), ("a", "w"), ("ACCEL", "ROT")])
+def test_labels_of_a_letter_name_the_sensor_where_all_labels_do(tmp_path, labels, separator):
+    t, force, rate = motion(n_poses=3)
+    lines = []
+    for k in range(len(t)):
+        pair = [
+            separator.join([f"{t[k]:.3f}", label, *(f"{x:.5f}" for x in values[k])])
+            for label, values in zip(labels, (force, rate), strict=True)
+        ]
+        lines += pair if k % 3 else pair[::-1]
+    (tmp_path / "log.txt").write_text("\n".join(lines) + "\n")
+    recording = read_recording(tmp_path / "log.txt")
+    np.testing.assert_allclose(recording.accelerometer, force, atol=1e-5)
+    np.testing.assert_allclose(recording.gyroscope, rate, atol=1e-5)
+
+
+def test_devices_called_by_letters_are_devices(tmp_path):
+    t, force, rate = motion(n_poses=3)
+    columns = table(np.repeat(t, 3), np.repeat(force, 3, axis=0), np.repeat(rate, 3, axis=0))
+    log = written(tmp_path / "log.csv", *columns, list("ABG") * len(t), header=f"{HEADER},id")
+    with pytest.raises(ReadError, match="'id' identifies 3 devices"):
+        read_recording(log)
+
+
 def test_json_lines_lists_and_columns_are_read_alike(tmp_path):
     import json
 
