@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from trihedron.read import ReadError, read_recording
+from trihedron.read.names import parse_name
 from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
@@ -390,3 +391,41 @@ def test_sensorstream_rawimu_and_kitti_keep_every_reading(tmp_path):
     drive = read_recording(tmp_path / "drive")
     np.testing.assert_allclose(drive.accelerometer, force)
     assert drive.rate_hz == pytest.approx(100.0)
+
+
+def test_names_of_several_words_two_blanks_apart_are_names(tmp_path):
+    columns = table(*motion())
+    names = ["t [s]", *(f"{s} {a} ({u})" for s, u in (("Accel", "m/s^2"), ("Rate", "rad/s")) for a in "XYZ")]
+    log = tmp_path / "log.txt"
+    rows = ["  ".join(f"{x:.6f}" for x in row) for row in zip(*columns, strict=True)]
+    log.write_text("\n".join(["  ".join(names), *rows]) + "\n")
+    recording = read_recording(log)
+    assert recording.accelerometer_unit is AccelerationUnit.M_S2
+    assert recording.gyroscope_unit is RateUnit.RAD_S
+
+
+@pytest.mark.parametrize(("name", "per_s"), [("dt_us", 1e6), ("Delta time [ms]", 1e3), ("dt", 1.0)])
+def test_the_time_since_the_row_before_is_summed(tmp_path, name, per_s):
+    t, force, rate = motion(rate_hz=128.0)
+    steps = np.diff(np.rint(t * 1e6), prepend=-7812.0) * 1e-6
+    steps[400] += 3.0
+    log = written(tmp_path / "log.csv", *table(steps * per_s, force, rate), header=HEADER.replace("t,", f"{name},", 1))
+    recording = read_recording(log)
+    assert FindingCode.RATE_ASSUMED not in {f.code for f in recording.findings}
+    assert recording.rate_hz == pytest.approx(128.0, rel=1e-3)
+    assert recording.time_s[-1] == pytest.approx(t[-1] - t[0] + 3.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("acceleration", "rate"),
+    [
+        ("Versnelling", "Hoeksnelheid"),
+        ("Zrychlení", "Úhlová rychlost"),
+        ("Прискорення", "Кутова швидкість"),
+        ("가속도", "각속도"),
+        ("İvme", "Açısal hız"),
+        ("Beschleunigung", "Dreh"),
+    ],
+)
+def test_sensors_are_known_in_the_languages_of_loggers(acceleration, rate):
+    assert [parse_name(f"{acceleration} X").role, parse_name(f"{rate}_z [°/s]").role] == ["accelerometer", "gyroscope"]

@@ -43,7 +43,8 @@ _DEVICE_NAMES = frozenset(
 )
 _ACCELEROMETER = re.compile(r"(uncal|type|raw|imu|sensor|android)?\W*acc(el\w*)?(\W*(uncal\w*|raw|data|sensor))?", re.I)
 _GYROSCOPE = re.compile(
-    r"(uncal|type|raw|imu|sensor|android)?\W*(gyr\w*|rot(ation)?|angular\W*(velocity|rate))(\W*(uncal\w*|raw|data))?", re.I
+    r"(uncal|type|raw|imu|sensor|android)?\W*(gyr\w*|rot(ation)?|angular\W*(velocity|rate))(\W*(uncal\w*|raw|data))?",
+    re.I,
 )
 _LETTERS = {"a": "accelerometer", "g": "gyroscope", "w": "gyroscope", "m": "magnetometer", "t": "temperature"}
 """Records named by a letter, where all are: among devices A, B, ... no letter names a sensor."""

@@ -63,6 +63,8 @@ _TIME_WORDS = {
 _TICK_WORDS = {"ticks", "tick", "clk", "sensortime"}
 """What counts, and does not say how fast."""
 _TIME_WORDS |= _TICK_WORDS | {"millis", "micros", "seconds", "secs", "unix"}
+_STEP_WORDS = {"dt", "deltat", "deltatime", "timedelta"}
+"""The time since the row before."""
 _COUNTER_WORDS = {"index", "counter", "seq", "packet", "frame", "idx", "no", "number", "row", "samplenumber", "nr"}
 _TEMPERATURE = re.compile(r"temp|temperature|tempc|temperature\w*|temp_?\w{0,4}")
 _SUPPLY = {"supply", "vdd", "vcc", "voltage", "vbat", "battery", "vin", "avdd"}
@@ -102,7 +104,7 @@ _UNIT_OF = {
 @dataclass(frozen=True)
 class ColumnName:
     """``unit`` as stated, known or not; ``role`` is accelerometer, gyroscope, translation, bare, time,
-    temperature, supply, counter, or empty."""
+    step, temperature, supply, counter, or empty."""
 
     role: str = ""
     axis: str = ""
@@ -278,6 +280,9 @@ def _single_role(words: list[str], unit_words: list[str]) -> ColumnName | None:
         return ColumnName("supply", words=tuple(words))
     if joined == "sampletimefine":
         return ColumnName("time", time_unit="100us", rank=3)
+    if "".join(w for w in words if w not in _TIME_UNIT_OF) in _STEP_WORDS:
+        units = [_TIME_UNIT_OF[w] for w in [*words, *unit_words] if w in _TIME_UNIT_OF]
+        return ColumnName("step", time_unit=units[-1] if units else "")
     if words[0] == "utc" or "relative" in words:
         return ColumnName()
     if joined in {"nsamples", "sample", "samples", "samplecounter", "packetcounter", "n", "i"} or (

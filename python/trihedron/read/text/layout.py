@@ -275,8 +275,9 @@ def _share(fields: list[str], test: re.Pattern[str] | frozenset[str]) -> float:
 
 
 def _header_fields(line: str, separator: str, n_fields: int) -> list[str] | None:
-    for sep in (separator, ",", "\t", ";", " "):
-        fields = split(line, sep)
+    # Names of several words stand two blanks apart or more.
+    aligned = re.split(r"\s{2,}", line.strip())
+    for fields in (*(split(line, sep) for sep in (separator, ",", "\t", ";", " ")), aligned):
         while len(fields) > n_fields and not fields[-1]:
             fields.pop()
         if len(fields) == n_fields:
