@@ -14,7 +14,7 @@ from confidence.sessions import table
 from thirteen_factors import session
 from trihedron import calibrate
 from trihedron.records import Recording
-from trihedron.session.averaging import Averaging, averaging_of, broadening
+from trihedron.session.averaging import Averaging, averaging_of, sharpened
 from trihedron.simulate import scenario_by_name, simulate
 
 
@@ -75,7 +75,7 @@ def test_the_averaging_of_a_sensor_is_told_by_its_fit_and_else_by_its_prior():
     assert averaging_of((3.0, 3.0, 3.0)) == Averaging(0.5, 0.5)
     t = np.arange(200) * 0.01
     value, mean = np.sin(9.0 * t), np.sin(9.0 * t) * np.sin(0.045) / 0.045
-    back = mean[:, None] + broadening(np.repeat(mean[:, None], 3, axis=1), t)
+    back = sharpened(np.repeat(mean[:, None], 3, axis=1), t, 1.0)
     # Ninth of a radian a sample: the second difference leaves h⁴/1920 of the value.
     assert np.abs(back[1:-1, 0] - value[1:-1]).max() < 1e-2 * np.abs(mean - value).max()
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from trihedron.read import ReadError, read_recording
+from trihedron.read.names import parse_name
 from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
@@ -130,6 +131,54 @@ def test_a_unit_that_nobody_knows_is_asked_for_by_name(tmp_path, name):
     assert read_recording(log, accelerometer_unit="m/s^2").accelerometer_unit is AccelerationUnit.M_S2
 
 
+@pytest.mark.parametrize("form", ["gx [{u}],gy [{u}],gz [{u}]", "gx_{u},gy_{u},gz_{u}"])
+@pytest.mark.parametrize("name", ["rad/min", "deg/min", "rev/s", "rad/h"])
+def test_a_gyro_unit_of_another_time_is_asked_for_and_not_taken_by_its_beginning(tmp_path, name, form):
+    t, force, rate = motion(n_poses=3)
+    log = written(tmp_path / "log.csv", *table(t, force, rate), header="t_s,ax,ay,az," + form.format(u=name))
+    with pytest.raises(ReadError, match=rf"'{name}'.*--gyro-unit"):
+        read_recording(log)
+
+
+@pytest.mark.parametrize(
+    ("units", "unknown"), [("s,mm/s2,mm/s2,mm/s2,dps,dps,dps", "mm/s2"), ("s,g,g,g,rev/s,rev/s,rev/s", "rev/s")]
+)
+def test_a_row_of_units_below_the_names_is_one_though_some_are_unknown(tmp_path, units, unknown):
+    t, force, rate = motion(n_poses=3)
+    log = written(tmp_path / "log.csv", *table(t, force, rate), header=f"{HEADER}\n{units}")
+    with pytest.raises(ReadError, match=rf"'{unknown}' is not"):
+        read_recording(log)
+
+
+@pytest.mark.parametrize(
+    "remark",
+    [
+        "# acceleration in cm/s^2, angular rate in deg/h\n",
+        "# accelerometer unit: cm/s2, gyroscope unit: deg/h\n",
+        "# Accel [cm/s²]\n# Gyro [°/h]\n",
+        "# accelerometer: Gal; gyro: dph\n",
+    ],
+)
+def test_units_that_a_remark_states_are_obeyed(tmp_path, remark):
+    t, force, rate = motion(n_poses=3)
+    columns = table(t, 100.0 * force, np.degrees(rate) * 3600.0)
+    recording = read_recording(written(tmp_path / "log.csv", *columns, header=f"t_s,{HEADER[2:]}", remark=remark))
+    assert recording.accelerometer_unit is AccelerationUnit.CM_S2
+    assert recording.gyroscope_unit is RateUnit.DEG_H
+    assert not serious(recording)
+
+
+@pytest.mark.parametrize(
+    "remark",
+    ["# the accelerometer was mounted in the lab\n", "# accelerometer range: 4 g, gyro range: 500 dps\n"],
+)
+def test_remarks_that_state_no_unit_of_the_readings_change_nothing(tmp_path, remark):
+    t, force, rate = motion(n_poses=3)
+    recording = read_recording(written(tmp_path / "log.csv", *table(t, force, rate), remark=remark))
+    assert recording.accelerometer_unit is AccelerationUnit.M_S2
+    assert recording.gyroscope_unit is RateUnit.RAD_S
+
+
 @pytest.mark.parametrize("same_timestamps", [True, False])
 @pytest.mark.parametrize("name", ["ch", "port", "whose"])
 def test_two_devices_row_by_row_are_asked_for_whatever_the_column_is_called(tmp_path, same_timestamps, name):
@@ -199,6 +248,31 @@ def test_labelled_lines_in_changing_order_are_all_read(tmp_path):
     assert recording.rows_in_file == recording.rows_read == len(t)
     np.testing.assert_allclose(recording.accelerometer, force, atol=1e-5)
     np.testing.assert_allclose(recording.gyroscope, rate, atol=1e-5)
+
+
+@pytest.mark.parametrize("separator", [" ", ","])
+@pytest.mark.parametrize("labels", [("A", "G"), ("a", "w"), ("ACCEL", "ROT")])
+def test_labels_of_a_letter_name_the_sensor_where_all_labels_do(tmp_path, labels, separator):
+    t, force, rate = motion(n_poses=3)
+    lines = []
+    for k in range(len(t)):
+        pair = [
+            separator.join([f"{t[k]:.3f}", label, *(f"{x:.5f}" for x in values[k])])
+            for label, values in zip(labels, (force, rate), strict=True)
+        ]
+        lines += pair if k % 3 else pair[::-1]
+    (tmp_path / "log.txt").write_text("\n".join(lines) + "\n")
+    recording = read_recording(tmp_path / "log.txt")
+    np.testing.assert_allclose(recording.accelerometer, force, atol=1e-5)
+    np.testing.assert_allclose(recording.gyroscope, rate, atol=1e-5)
+
+
+def test_devices_called_by_letters_are_devices(tmp_path):
+    t, force, rate = motion(n_poses=3)
+    columns = table(np.repeat(t, 3), np.repeat(force, 3, axis=0), np.repeat(rate, 3, axis=0))
+    log = written(tmp_path / "log.csv", *columns, list("ABG") * len(t), header=f"{HEADER},id")
+    with pytest.raises(ReadError, match="'id' identifies 3 devices"):
+        read_recording(log)
 
 
 def test_json_lines_lists_and_columns_are_read_alike(tmp_path):
@@ -317,3 +391,41 @@ def test_sensorstream_rawimu_and_kitti_keep_every_reading(tmp_path):
     drive = read_recording(tmp_path / "drive")
     np.testing.assert_allclose(drive.accelerometer, force)
     assert drive.rate_hz == pytest.approx(100.0)
+
+
+def test_names_of_several_words_two_blanks_apart_are_names(tmp_path):
+    columns = table(*motion())
+    names = ["t [s]", *(f"{s} {a} ({u})" for s, u in (("Accel", "m/s^2"), ("Rate", "rad/s")) for a in "XYZ")]
+    log = tmp_path / "log.txt"
+    rows = ["  ".join(f"{x:.6f}" for x in row) for row in zip(*columns, strict=True)]
+    log.write_text("\n".join(["  ".join(names), *rows]) + "\n")
+    recording = read_recording(log)
+    assert recording.accelerometer_unit is AccelerationUnit.M_S2
+    assert recording.gyroscope_unit is RateUnit.RAD_S
+
+
+@pytest.mark.parametrize(("name", "per_s"), [("dt_us", 1e6), ("Delta time [ms]", 1e3), ("dt", 1.0)])
+def test_the_time_since_the_row_before_is_summed(tmp_path, name, per_s):
+    t, force, rate = motion(rate_hz=128.0)
+    steps = np.diff(np.rint(t * 1e6), prepend=-7812.0) * 1e-6
+    steps[400] += 3.0
+    log = written(tmp_path / "log.csv", *table(steps * per_s, force, rate), header=HEADER.replace("t,", f"{name},", 1))
+    recording = read_recording(log)
+    assert FindingCode.RATE_ASSUMED not in {f.code for f in recording.findings}
+    assert recording.rate_hz == pytest.approx(128.0, rel=1e-3)
+    assert recording.time_s[-1] == pytest.approx(t[-1] - t[0] + 3.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("acceleration", "rate"),
+    [
+        ("Versnelling", "Hoeksnelheid"),
+        ("Zrychlení", "Úhlová rychlost"),
+        ("Прискорення", "Кутова швидкість"),
+        ("가속도", "각속도"),
+        ("İvme", "Açısal hız"),
+        ("Beschleunigung", "Dreh"),
+    ],
+)
+def test_sensors_are_known_in_the_languages_of_loggers(acceleration, rate):
+    assert [parse_name(f"{acceleration} X").role, parse_name(f"{rate}_z [°/s]").role] == ["accelerometer", "gyroscope"]

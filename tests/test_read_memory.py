@@ -26,6 +26,13 @@ def pandas_frame():
     return pytest.importorskip("pandas").DataFrame(NAMED)
 
 
+def two_levels(frame):
+    frame.columns = pytest.importorskip("pandas").MultiIndex.from_tuples(
+        [("t", ""), *((sensor, axis) for sensor in ("acc", "gyr") for axis in "xyz")]
+    )
+    return frame
+
+
 CARRIERS = {
     "array": lambda: TABLE,
     "list": lambda: TABLE.tolist(),
@@ -36,6 +43,8 @@ CARRIERS = {
     "polars": lambda: pl.DataFrame(NAMED),
     "pandas": pandas_frame,
     "pandas-with-time-index": lambda: pandas_frame().set_index("t"),
+    "pandas-with-index-of-two-levels": lambda: pandas_frame().set_index(["t", "ax"]),
+    "pandas-with-names-of-two-levels": lambda: two_levels(pandas_frame()),
     "pandas-nullable": lambda: pandas_frame().convert_dtypes(),
     "arrow": lambda: pytest.importorskip("pyarrow").table({k: v.tolist() for k, v in NAMED.items()}),
 }

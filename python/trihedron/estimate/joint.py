@@ -33,7 +33,7 @@ from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.records.words import words
 from trihedron.sensor_model import in_frame, reframing
-from trihedron.session.averaging import broadening
+from trihedron.session.averaging import sharpened
 
 
 def calibrate_joint(
@@ -171,7 +171,7 @@ def _by_averaging(
     found = measured.averaging
     more = replace(
         measured,
-        rate=measured.rate + found.sigma * broadening(measured.rate, recording.time_s),
+        rate=sharpened(measured.rate, recording.time_s, found.sigma),
         averaging=replace(found, share=found.share + found.sigma),
     )
     observed = arranged(recording, segments, more, gravity_m_s2, aligned.used)

@@ -24,7 +24,7 @@ from trihedron.records import (
     Severity,
     Verification,
 )
-from trihedron.session.averaging import broadening
+from trihedron.session.averaging import sharpened
 
 FALSE_ALARM = 1e-3
 """Chance that a calibration that holds is said to be exceeded."""
@@ -191,7 +191,7 @@ def _carried(
 
     def seen_in(measured: MoveMeasurements) -> Carried:
         if calibration.averaging:
-            rate = measured.rate + calibration.averaging * broadening(measured.rate, recording.time_s)
+            rate = sharpened(measured.rate, recording.time_s, calibration.averaging)
             measured = measured.of_rate(recording, segments, rate, measured.reading_variance, 3)
         return carried(
             recording.time_s, measured, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b,

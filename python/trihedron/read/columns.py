@@ -93,8 +93,14 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
 
 
 def _stated(table: Table, chosen: Columns, explicit: Columns | None) -> Columns:
-    """Clock columns as the format states them, where the user did not name another."""
+    """Units of readings as the lines above state them, where names do not; clock columns as the format states them,
+    where the user did not name another."""
     said = table.clock
+    chosen = replace(
+        chosen,
+        accelerometer_unit=chosen.accelerometer_unit or table.metadata.get("accelerometer unit", ""),
+        gyroscope_unit=chosen.gyroscope_unit or table.metadata.get("gyroscope unit", ""),
+    )
     if said.counter is not None:
         chosen = replace(chosen, counter=said.counter)
     if explicit is not None and explicit.time is not None and explicit.time != said.time:

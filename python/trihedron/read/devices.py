@@ -43,8 +43,11 @@ _DEVICE_NAMES = frozenset(
 )
 _ACCELEROMETER = re.compile(r"(uncal|type|raw|imu|sensor|android)?\W*acc(el\w*)?(\W*(uncal\w*|raw|data|sensor))?", re.I)
 _GYROSCOPE = re.compile(
-    r"(uncal|type|raw|imu|sensor|android)?\W*(gyr\w*|angular\W*(velocity|rate))(\W*(uncal\w*|raw|data))?", re.I
+    r"(uncal|type|raw|imu|sensor|android)?\W*(gyr\w*|rot(ation)?|angular\W*(velocity|rate))(\W*(uncal\w*|raw|data))?",
+    re.I,
 )
+_LETTERS = {"a": "accelerometer", "g": "gyroscope", "w": "gyroscope", "m": "magnetometer", "t": "temperature"}
+"""Records named by a letter, where all are: among devices A, B, ... no letter names a sensor."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,9 @@ def kind_of(word: str) -> str:
 def pick_kind(words: list[str], kind: str) -> str | None:
     """The record name to take for a sensor: uncorrected readings before corrected ones."""
     fitting = [word for word in words if kind_of(word) == kind]
+    letters = [word.strip("$:").lower() for word in words]
+    if not fitting and set(letters) <= _LETTERS.keys():
+        fitting = [word for word, letter in zip(words, letters, strict=True) if _LETTERS[letter] == kind]
     return max(fitting, key=lambda w: ("uncal" in w.lower(), -words.index(w)), default=None)
 
 

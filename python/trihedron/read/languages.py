@@ -1,5 +1,6 @@
-"""Words that loggers translate, in English: German, French, Spanish, Portuguese, Italian, Polish, Russian, Chinese,
-Japanese, and the Greek letters of equations. A word not known here stays as it is, and its column unrecognised."""
+"""Words that loggers translate, in English: Czech, Dutch, Finnish, French, German, Hungarian, Italian, Polish,
+Portuguese, Russian, Scandinavian, Spanish, Turkish, Ukrainian, Chinese, Japanese, Korean, and the Greek letters of
+equations. A word not known here stays as it is, and its column unrecognised."""
 
 from __future__ import annotations
 
@@ -11,15 +12,17 @@ _MEANINGS = {
     "linear acceleration": "线加速度 线性加速度 線形加速度 線加速度",
     "gravity": "schwerkraft gravitat\\w* gravite gravedad gravidade гравит\\w* 重力 重力加速度",
     "magnetometer": "magnetfeld магн\\w* маг 磁场 磁場 磁力计 磁力計 地磁",
-    "acceleration": "beschl\\w* acel\\w* przysp\\w* уск\\w* акс\\w* 加速度 加速度计 加速度計 加速度センサー?",
-    "gyro": "drehrate\\w* drehgeschw\\w* winkelgeschw\\w* kreisel\\w* giro\\w* zyro\\w* гир\\w* ω "
-    "角速度 陀螺[仪儀]? ジャイロ",
-    "angular": "angulaire\\w* angolar\\w* katow\\w* угл\\w*",
-    "velocity": "geschwindigkeit\\w* vitesse velocidad\\w* velocita predkosc скор\\w*",
+    "acceleration": "beschl\\w* acel\\w* przysp\\w* versnelling\\w* zrychl\\w* akselerasjon akceler\\w* ivme kiihtyvyys gyorsulas "
+    "уск\\w* акс\\w* прискор\\w* 加速度 加速度计 加速度計 加速度センサー? 가속도",
+    "gyro": "dreh dreh(rate|geschw)\\w* winkelgeschw\\w* kreisel\\w* giro\\w* zyro\\w* (hoek|draai)snelheid\\w* "
+    "vinkelhastighe[dt] kulmanopeus szogsebesseg гир\\w* ω "
+    "角速度 陀螺[仪儀]? ジャイロ 각속도 자이로",
+    "angular": "angulaire\\w* angolar\\w* katow\\w* uhlov\\w* ac[iı]sal угл\\w* кутов\\w*",
+    "velocity": "geschwindigkeit\\w* vitesse velocidad\\w* velocita predkosc rychlost h[iı]z скор\\w* швидк\\w*",
     "linear": "linear[ei]\\w* lineal\\w* lineaire\\w* liniow\\w* линейн\\w*",
-    "time": "uhrzeit heure hora czas врем\\w* \\w*[时時][间間刻]\\w*",
+    "time": "uhrzeit heure hora czas tijd\\w* cas zaman aika врем\\w* 시간 \\w*[时時][间間刻]\\w*",
     "temperature": "темп\\w* [温溫]度",
-    "axis": "achse axe eje eixo asse ось оси [轴軸]",
+    "axis": "achse axe eje eixo asse axel osa ось оси [轴軸] 축",
     **{"s": "с сек sek 秒", "ms": "мс 毫秒", "us": "мкс 微秒", "m": "м", "rad": "рад", "deg": "град"},
     "x": "х",
     "y": "у",

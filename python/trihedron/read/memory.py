@@ -87,13 +87,14 @@ def _is_frame(data: object) -> bool:
 
 
 def frame_columns(frame: Any) -> list[tuple[str, Any]]:
-    """Names and columns; an index of pandas that holds times is a column too."""
+    """Names and columns; a level of a pandas index that holds times, or has a name, is a column too."""
     columns: list[tuple[str, Any]] = []
     index = getattr(frame, "index", None)
-    if index is not None and hasattr(index, "to_numpy"):
-        values = index.to_numpy()
-        if values.dtype.kind in "Mm" or (index.name is not None and values.dtype.kind in "iuf"):
-            columns.append((str(index.name or "time"), values))
+    levels = range(getattr(index, "nlevels", 1)) if hasattr(index, "get_level_values") else ()
+    for level in (index.get_level_values(k) for k in levels):
+        values = level.to_numpy()
+        if values.dtype.kind in "Mm" or (level.name is not None and values.dtype.kind in "iuf"):
+            columns.append((str(level.name or "time"), values))
     if hasattr(frame, "columns") and hasattr(frame, "__getitem__") and hasattr(frame, "dtypes"):
         return columns + [(_name(name), _series(frame[name])) for name in frame.columns]
     import polars

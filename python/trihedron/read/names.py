@@ -30,6 +30,11 @@ _NUMBERED = re.compile(r"^(acc|accel|gyr|gyro|omega)([0123])$")
 _DEVICE_WORD = re.compile(r"(imu|dev|device|sensor|node|unit|port|ch|mpu|bmi|icm|lsm)\d*$")
 _LOOKS_LIKE_A_UNIT = re.compile(r"[/^²°]|\bper\b|^(ft|hz|rev|gon|grad|ips|rps|kdps|ug|µg)$")
 """A unit that a bracket states, known or not: one that is not known is asked for."""
+_UNIT_BEHIND = re.compile(r"[xyz][ _]([a-zµ°]+/[a-z]+[0-9²]?)$")
+"""The same behind the axis: gyro_x_rev/s."""
+_OTHER_TIMES = frozenset({"min", "minute", "h", "hr", "hour"})
+"""Behind what would be a unit of the second: rad/min begins as rad does."""
+_OF_READINGS = frozenset({"unit", "units", "raw", "data", "reading", "readings", "value", "values"})
 _RATES = {"p": "x", "q": "y", "r": "z"}
 """An aircraft's names of its angular rates."""
 _TIME_WORDS = {
@@ -58,6 +63,8 @@ _TIME_WORDS = {
 _TICK_WORDS = {"ticks", "tick", "clk", "sensortime"}
 """What counts, and does not say how fast."""
 _TIME_WORDS |= _TICK_WORDS | {"millis", "micros", "seconds", "secs", "unix"}
+_STEP_WORDS = {"dt", "deltat", "deltatime", "timedelta"}
+"""The time since the row before."""
 _COUNTER_WORDS = {"index", "counter", "seq", "packet", "frame", "idx", "no", "number", "row", "samplenumber", "nr"}
 _TEMPERATURE = re.compile(r"temp|temperature|tempc|temperature\w*|temp_?\w{0,4}")
 _SUPPLY = {"supply", "vdd", "vcc", "voltage", "vbat", "battery", "vin", "avdd"}
@@ -97,7 +104,7 @@ _UNIT_OF = {
 @dataclass(frozen=True)
 class ColumnName:
     """``unit`` as stated, known or not; ``role`` is accelerometer, gyroscope, translation, bare, time,
-    temperature, supply, counter, or empty."""
+    step, temperature, supply, counter, or empty."""
 
     role: str = ""
     axis: str = ""
@@ -118,9 +125,24 @@ def _unit(sensor: str, words: list[str]) -> str:
     for length in (4, 3, 2, 1):
         for start in range(len(words) - length + 1):
             joined = "".join(words[start : start + length])
-            if joined in table:
+            if joined in table and not set(words[start + length : start + length + 1]) & _OTHER_TIMES:
                 return table[joined]
     return ""
+
+
+def sensor_said(text: str) -> str:
+    """The sensor whose readings a remark speaks of, and of nothing else of it; "" where it does not."""
+    words = [w for w in english(_WORD.findall(plain(text).lower())) if w not in _OF_READINGS]
+    sensor = _sensor(words)
+    is_alone = all(_SENSOR_WORDS[sensor].fullmatch(w) or w == "rate" for w in words) if sensor in _UNIT_OF else False
+    return sensor if is_alone else ""
+
+
+def unit_said(sensor: str, text: str) -> str:
+    """The unit that is all a remark says, known or not; "" where it says anything else."""
+    words = _WORD.findall(plain(text).lower().replace("²", "2").replace("^", "").replace("-", ""))
+    known = _UNIT_OF[sensor].get("".join(words), "")
+    return known or (text if _LOOKS_LIKE_A_UNIT.search(text) and not any(w.isdecimal() for w in words[:1]) else "")
 
 
 @lru_cache(maxsize=4096)
@@ -153,8 +175,10 @@ def parse_name(name: str) -> ColumnName:
     words = english(_WORD.findall(re.sub(r"([a-z])([A-Z])", r"\1 \2", text).lower()))
     unit_words = english(_WORD.findall(bracket.replace("²", "2").replace("-1", "").replace("-2", "2")))
     said = _classify(words, unit_words, index)
-    if said.role in _SENSOR_WORDS and not said.unit and _LOOKS_LIKE_A_UNIT.search(bracket):
-        return replace(said, unit=bracket)
+    behind = _UNIT_BEHIND.search(text.lower())
+    unknown = bracket if _LOOKS_LIKE_A_UNIT.search(bracket) else behind[1] if behind else ""
+    if said.role in _SENSOR_WORDS and not said.unit and unknown:
+        return replace(said, unit=unknown)
     return said
 
 
@@ -256,6 +280,9 @@ def _single_role(words: list[str], unit_words: list[str]) -> ColumnName | None:
         return ColumnName("supply", words=tuple(words))
     if joined == "sampletimefine":
         return ColumnName("time", time_unit="100us", rank=3)
+    if "".join(w for w in words if w not in _TIME_UNIT_OF) in _STEP_WORDS:
+        units = [_TIME_UNIT_OF[w] for w in [*words, *unit_words] if w in _TIME_UNIT_OF]
+        return ColumnName("step", time_unit=units[-1] if units else "")
     if words[0] == "utc" or "relative" in words:
         return ColumnName()
     if joined in {"nsamples", "sample", "samples", "samplecounter", "packetcounter", "n", "i"} or (

@@ -21,6 +21,7 @@ from trihedron.read.errors import ReadError
 from trihedron.read.sensing import order_of_triads
 from trihedron.read.table import Table
 from trihedron.read.text.store import side_by_side
+from trihedron.read.time_steps import summed_steps
 from trihedron.read.unread_time import refuse_unread_time
 from trihedron.records import Finding, FindingCode, Sampling
 from trihedron.records.progress import Progress
@@ -130,6 +131,8 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
     )
     if table.n_rows < 2:
         raise ReadError(f"{path}: the file holds one row of numbers only ({table.place(0)}); a recording needs many.")
+    if chosen.time is None and options.columns is None and options.rate_hz is None:
+        table, chosen = summed_steps(table, chosen)
     findings = [*table.findings, *chosen.findings, *_words_left_out(table)]
     if chosen.time is None:
         refuse_unread_time(table, chosen, options.columns, options.rate_hz or _stated_rate(table))

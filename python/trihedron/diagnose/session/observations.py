@@ -13,7 +13,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.records import Recording, Segments
-from trihedron.session.averaging import broadening
+from trihedron.session.averaging import sharpened
 from trihedron.session.lines_at_rest import means_beside_lines
 from trihedron.session.noise import Along, along_gradient, measure_noise
 
@@ -138,8 +138,7 @@ class Observations:
 
     def _sharpened(self, readings: FloatArray) -> FloatArray:
         """Readings (n, 3) in the middle of the intervals over which they were averaged."""
-        more = self.averaging * broadening(readings, self.time_s) if self.averaging else 0.0
-        return np.ascontiguousarray(readings + more)
+        return np.ascontiguousarray(sharpened(readings, self.time_s, self.averaging))
 
     @cached_property
     def core_moves(self) -> _core.SessionMoves:

@@ -24,7 +24,7 @@ from trihedron.estimate.gyroscope.verification import is_astray, missed_deg, pre
 from trihedron.quantiles import medians
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-from trihedron.session.averaging import TRIED, averaging_of, broadening
+from trihedron.session.averaging import TRIED, averaging_of, sharpened
 from trihedron.units import rate_to_si
 
 DENIED = 0.1
@@ -74,14 +74,10 @@ class _Session:
 
     def averaged(self, measured: MoveMeasurements, aligned: Aligned) -> tuple[MoveMeasurements, Aligned]:
         """Moves of a sensor that averages over its interval as far as they show it, and what they leave open of it."""
-        rate, lost, variance = (
-            measured.rate,
-            broadening(measured.rate, self.recording.time_s),
-            measured.reading_variance,
-        )
 
         def at(share: float) -> tuple[MoveMeasurements, Aligned]:
-            return self._again(self._read_as(measured, rate + share * lost, variance), aligned)
+            rate = sharpened(measured.rate, self.recording.time_s, share)
+            return self._again(self._read_as(measured, rate, measured.reading_variance), aligned)
 
         points, half, means = (at(share)[1] for share in TRIED)
         excess = max(aligned.inflation, 1.0)

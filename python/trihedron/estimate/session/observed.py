@@ -12,7 +12,7 @@ from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-from trihedron.session.averaging import broadening
+from trihedron.session.averaging import sharpened
 from trihedron.session.noise import Along, measure_noise, scatter_unit
 
 
@@ -83,7 +83,7 @@ def arranged(
         ranges.append((a, b))
         before.append(hold)
     noise = measure_noise(recording, segments, ranges)
-    force = recording.accelerometer + measured.averaging.share * broadening(recording.accelerometer, recording.time_s)
+    force = sharpened(recording.accelerometer, recording.time_s, measured.averaging.share)
     assert noise.rate_sigma is not None
     assert noise.rate_density is not None
     unresolved = noise.unresolved
@@ -106,10 +106,10 @@ def arranged(
         rate_density=noise.rate_density,
         moves=_core.SessionMoves(
             pose_time_s=pose_time_s,
-            time_s=np.ascontiguousarray(recording.time_s),
-            force=np.ascontiguousarray(force - force_origin),
-            rate=np.ascontiguousarray(measured.rate - rate_origin),
-            ranges=np.array(ranges, dtype=np.int64).reshape(-1, 2),
+            time_s=_samples_of(ranges, recording.time_s),
+            force=_samples_of(ranges, force) - force_origin,
+            rate=_samples_of(ranges, measured.rate) - rate_origin,
+            ranges=_in_turn(ranges),
             before=np.array(before, dtype=np.int64),
             unresolved=unresolved,
         ),
@@ -119,3 +119,15 @@ def arranged(
         force_up=noise.force_up,
         force_scatter=noise.force_scatter,
     )
+
+
+def _samples_of(ranges: list[tuple[int, int]], samples: FloatArray) -> FloatArray:
+    """Samples (n,) or (n, 3) of the moves alone, move after move: nothing else of a long log is asked for."""
+    return np.concatenate([samples[a:b] for a, b in ranges]) if ranges else samples[:0]
+
+
+def _in_turn(ranges: list[tuple[int, int]]) -> npt.NDArray[np.int64]:
+    """Where each move lies in what :func:`_samples_of` makes of these ``ranges``, (m, 2)."""
+    ends = np.cumsum([b - a for a, b in ranges], dtype=np.int64)
+    starts = np.concatenate([[0], ends[:-1]]) if ranges else ends
+    return np.ascontiguousarray(np.column_stack([starts, ends]), dtype=np.int64).reshape(-1, 2)

@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
+from trihedron.read.names import parse_name
+from trihedron.read.text.remarks import stated_units
+
 COMMENT_STARTS = ("#", "%", "//")
 MISSING = frozenset({"", "na", "n/a", "null", "none", "nan", "-", "--", "?", "#n/a", "missing"})
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
@@ -235,14 +238,15 @@ def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
         elif not is_comment(line):
             ignored = line
     if not matching:
-        return _Header(None, metadata, ignored, ())
+        return _Header(None, metadata | stated_units(lines), ignored, ())
     units: list[str] = []
     qualifiers: list[str] = []
     used = [matching[-1][0]]
     # Names, then CAL or RAW, then units, as Shimmer writes them; or names and units.
     while len(matching) > 1:
         row = matching[-1][1]
-        if not units and _share(row, _UNIT_WORD) >= 0.6:
+        is_below_names = _names_sensors(matching[-2][1]) and not _names_sensors(row)
+        if not units and (_share(row, _UNIT_WORD) >= 0.6 or is_below_names):
             units = row
         elif not qualifiers and _share(row, _QUALIFIERS) == 1.0:
             qualifiers = row
@@ -256,7 +260,12 @@ def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
     if units:
         bare = [unit[1:-1] if unit[:1] + unit[-1:] in ("[]", "()") else unit for unit in units]
         names = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, bare, strict=True)]
+    metadata |= stated_units(line for i, line in enumerate(lines) if i not in used)
     return _Header(tuple(names), metadata, "", tuple(used))
+
+
+def _names_sensors(fields: list[str]) -> bool:
+    return any(parse_name(f).role in ("accelerometer", "gyroscope") for f in fields)
 
 
 def _share(fields: list[str], test: re.Pattern[str] | frozenset[str]) -> float:
@@ -266,8 +275,9 @@ def _share(fields: list[str], test: re.Pattern[str] | frozenset[str]) -> float:
 
 
 def _header_fields(line: str, separator: str, n_fields: int) -> list[str] | None:
-    for sep in (separator, ",", "\t", ";", " "):
-        fields = split(line, sep)
+    # Names of several words stand two blanks apart or more.
+    aligned = re.split(r"\s{2,}", line.strip())
+    for fields in (*(split(line, sep) for sep in (separator, ",", "\t", ";", " ")), aligned):
         while len(fields) > n_fields and not fields[-1]:
             fields.pop()
         if len(fields) == n_fields:

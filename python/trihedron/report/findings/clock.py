@@ -104,6 +104,13 @@ _TIMESTAMPS = (
     ),
     Entry(
         Code.TIME_UNIT_DETECTED,
+        "sum-of-steps",
+        NOTE,
+        "Column {column} holds the time since the row before; the time is their sum.",
+        action="If it is something else, read with --columns time=none and --rate.",
+    ),
+    Entry(
+        Code.TIME_UNIT_DETECTED,
         "sample-time-100us",
         NOTE,
         "SampleTimeFine steps by {step:.6g}, so it counts 100 µs, as Xsens MTi does.",
