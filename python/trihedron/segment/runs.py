@@ -37,8 +37,8 @@ SAME_POSE = 1e-3
 SWAY_RAD = 0.02
 """About one degree, the tremor and sway of a hand that tries to hold still: an unsteady pose keeps within it."""
 ONE_WAY = 0.5
-"""Share of a hand's mean square rate above which its mean makes it a turn: all of it in a slow move, next to nothing in
-a tremor of several swings."""
+"""Share of a hand's mean square rate above which its straight line makes it a turn: over half of it in a slow move and
+in its pauses, next to nothing in a tremor of several swings."""
 
 
 @dataclass(frozen=True)
@@ -239,13 +239,18 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
 
 
 def _turns_on(channels: Channels, first: int, last: int, zero: FloatArray) -> bool:
-    """The gyro turns one way throughout: a slow move, where a hand that tries to hold still goes to and fro."""
+    """The gyro's reading follows a straight line: a slow move, or its pause, turning back or on about another axis.
+
+    A hand that tries to hold still goes to and fro.
+    """
     gyro = channels.is_gyroscope
-    if not gyro.any():
+    is_valid = channels.is_valid[first:last]
+    if not gyro.any() or np.count_nonzero(is_valid) < 2:
         return False
-    rate = channels.mean[first:last][:, gyro] - zero[gyro]
-    rate = rate[channels.is_valid[first:last]]
-    return len(rate) > 0 and float(np.sum(rate.mean(axis=0) ** 2)) > ONE_WAY * float(np.mean(np.sum(rate**2, axis=1)))
+    rate = channels.mean[first:last][is_valid][:, gyro] - zero[gyro]
+    t = np.flatnonzero(is_valid) - np.mean(np.flatnonzero(is_valid))
+    along = np.sum(rate.mean(axis=0) ** 2) + np.sum((t @ rate) ** 2) / (np.sum(t**2) * len(t))
+    return float(along) > ONE_WAY * float(np.mean(np.sum(rate**2, axis=1)))
 
 
 def _sway(attitude: FloatArray, runs: list[Run]) -> float:

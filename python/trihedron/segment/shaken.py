@@ -174,6 +174,9 @@ def _is_no_hand(readings: FloatArray, white_variance: FloatArray, hand: float, i
     peak, above = int(power.argmax()), float((power - noise).sum())
     if float((power[int(hand) + 1 :] - noise).sum()) > LINE_SHARE * above:
         return True
+    if peak <= (LOBE_BINS if is_short else LINE_BINS):
+        # So near to frequency zero it is no line but the pause of a slow move, which a straight line does not hold.
+        return False
     if is_short:
         lobe = amplitude[max(peak - LOBE_BINS, 0) : peak + LOBE_BINS + 1]
         return float(np.linalg.norm(lobe, 2) ** 2) - noise > LOBE_SHARE * above

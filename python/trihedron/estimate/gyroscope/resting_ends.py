@@ -8,10 +8,11 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.gyroscope.rounding import CHATTER
 
-HIDDEN = (0.50, 0.68, 1.0), (0.91, 0.68, 0.50)
-"""Of a body that settles as exp(-t/τ), one that starts as t² and one that starts as t: time for the second step beside
-its bias's in that for the first, and how long its place inside the step would have to act, as a rate, to turn what is
-hidden there (first order in the place), in units of the first: τ of τ ln 3; √½/2 of √(3/2) - √½; ½ of 1."""
+HIDDEN = (0.465, 0.567, 0.689, 1.0), (1.156, 0.957, 0.782, 0.500)
+"""Of a body that settles as exp(-t/τ), then of those that start as t⁴, t² and t do: time for the second step beside its
+bias's in that for the first, and how long its place inside the step acts, as a rate, before it leaves, in units of the
+first. At a rate r, reached at t(r), codes tell Σ t'(k - ½) of the time in which the place acts (to first order in the
+place, on the mean of both ways), that is τ(2 ln 2 + γ + ln k), or √k + ζ(½, ½)/2 of √k; what is left is still."""
 STEPS = 0.75, 1.75, 2.75
 """Distance from the reading at rest, in steps, up to which a reading is at rest, one step beside, two."""
 
@@ -19,11 +20,12 @@ STEPS = 0.75, 1.75, 2.75
 def resting_ends(
     readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray, edges: IntArray
 ) -> BoolArray:
-    """Readings (n, 3) of ``axes`` (3,) at the ends of moves ``edges`` (m, 2) at which the body does not turn yet, or no
-    more: the same for all, until the first leaves the step ``quantum`` (3,) of its reading at ``rest`` (3,).
+    """Readings (n, 3) of ``axes`` (3,) at the ends of moves ``edges`` (m, 2) at which an axis does not turn yet, or no
+    more, until it leaves the step ``quantum`` (3,) of its reading at ``rest`` (3,).
 
     Before it leaves, it turns unseen, by more against its place inside the step than with it: on the mean of both ways
-    as if that place, read as a rate, had acted for a while, and for so long it is not still.
+    as if that place, read as a rate, had acted for a while, and for so long it is not still. Each axis by what it shows
+    itself, for one that leaves later was slower; one that never leaves is as still as the body.
     """
     out = np.zeros(readings.shape, dtype=np.bool_)
     for first, last in edges.tolist():
@@ -34,8 +36,10 @@ def resting_ends(
             [np.abs(_core.running_median(np.ascontiguousarray(part[:, k]), CHATTER) - rest[k]) for k in range(3)]
         )
         for ends, inside in ((out[first:last], away), (out[first:last][::-1], away[::-1])):
-            seen = [_still(inside[:, k] / quantum[k]) for k in range(3) if axes[k]]
-            ends[: min((n for n in seen if n is not None), default=0), axes] = True
+            own = {k: _still(inside[:, k] / quantum[k]) for k in np.flatnonzero(axes).tolist()}
+            body = min((n for n in own.values() if n is not None), default=0)
+            for k, n in own.items():
+                ends[: body if n is None else n, k] = True
     return out
 
 
