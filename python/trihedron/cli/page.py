@@ -145,7 +145,8 @@ class Page:
 
     def _send_page(self, request: BaseHTTPRequestHandler) -> None:
         nonce = secrets.token_urlsafe(16)
-        body = files("trihedron.cli").joinpath("page.html").read_text("utf-8").replace("{{nonce}}", nonce).encode()
+        text = files("trihedron.cli").joinpath("page.html").read_text("utf-8").replace("{{nonce}}", nonce)
+        body = text.replace("{{body}}", files("trihedron.report").joinpath("body.js").read_text("utf-8")).encode()
         request.send_response(200)
         request.send_header("Content-Type", "text/html; charset=utf-8")
         request.send_header("Content-Length", str(len(body)))

@@ -109,6 +109,7 @@ class DiagnosisResult(Diagnosis, Presented):
     ``calibration`` is the linear model at the start: fitted to this recording, or given (``model_is_given``);
     ``updated`` the recording's own calibration where one was given and the recording can carry another;
     ``reference`` what known motion beside the log says;
+    ``simulated`` what a given scenario reads, moved as the recording was;
     ``own_effects`` every effect that the recording has, those that the given model has too included.
     """
 
@@ -118,6 +119,7 @@ class DiagnosisResult(Diagnosis, Presented):
     updated: Calibration | None = None
     reference: AgainstReference | None = None
     own_effects: tuple[AcceptedEffect, ...] = ()
+    simulated: Recording | None = None
     gravity_source: str = ""
     model_is_given: bool = False
     findings: tuple[Finding, ...] = ()

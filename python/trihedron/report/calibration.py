@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
 from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
@@ -11,15 +9,12 @@ from trihedron.records.published import AFTER_MOVES, AT_REST, counted_moves
 from trihedron.report.axes import Axes, axes_of
 from trihedron.report.calibration_charts import (
     correlation_table,
-    move_chart,
     move_noise_deg,
-    residual_chart,
-    sphere_chart,
     strong_correlations,
 )
+from trihedron.report.calibration_pictures import correlation_picture, figure_blocks, lead_picture
 from trihedron.report.calibration_residuals import residual_tables
-from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
-from trihedron.report.drawing import later
+from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import (
     duration,
@@ -31,7 +26,6 @@ from trihedron.report.numbers import (
     unit_in_print,
     with_sigma,
 )
-from trihedron.report.segments import signals_picture
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
@@ -49,7 +43,7 @@ def calibration_report(
         Section("Result", _result(calibration, segments, recording)),
         Section("Findings", (findings_block(calibration.findings),)),
     ]
-    figures = tuple(_figures(calibration, segments, recording))
+    figures = tuple(figure_blocks(calibration, segments, recording))
     if figures:
         sections.append(Section("Figures", figures))
     sections += [
@@ -66,7 +60,7 @@ def calibration_report(
         is_trustworthy=calibration.is_trustworthy,
         sections=tuple(sections),
         headlines=tuple(_headlines(calibration)),
-        lead=_residual_picture(calibration),
+        lead=lead_picture(calibration, segments),
     )
 
 
@@ -296,49 +290,11 @@ def _certainty(calibration: Calibration) -> list[Block]:
             per_dof = sensor.quality.chi2 / sensor.quality.dof
             rows.append(("χ² per dof", f"{plain_number(per_dof)} over {sensor.quality.dof} degrees of freedom"))
         blocks.append(Facts(tuple(rows)))
+    picture = correlation_picture(calibration)
+    if picture is not None:
+        blocks.append(picture)
     found = correlation_table(calibration)
     if found is not None:
         caption = "Correlations of all free parameters (a: accelerometer, w: gyroscope)"
         blocks.append(Table(*found, caption))
     return blocks
-
-
-def _figures(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> list[Block]:
-    blocks: list[Block] = []
-    if segments is not None and segments.accelerometer_mean is not None:
-        blocks.append(
-            Picture(
-                "poses",
-                "Directions of 'up' in the body frame, upper and lower hemisphere. Empty regions are poses that were "
-                "not recorded; triangles are the most useful next poses, in that order.",
-                later("figures", "draw_poses", calibration.accelerometer, segments.accelerometer_mean),
-                partial(sphere_chart, calibration.accelerometer, segments.accelerometer_mean),
-            )
-        )
-    gyroscope = calibration.gyroscope
-    if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:
-        blocks.append(
-            Picture(
-                "moves",
-                "Tilt error after every rotation, in sample and cross-validated (held out).",
-                later("figures", "draw_moves", gyroscope.quality),
-                partial(move_chart, gyroscope.quality, segments),
-            )
-        )
-    if segments is not None and recording is not None:
-        blocks.append(signals_picture(recording, segments))
-    return blocks
-
-
-def _residual_picture(calibration: Calibration) -> Picture | None:
-    quality = calibration.accelerometer.quality
-    if quality is None:
-        return None
-
-    return Picture(
-        "residuals",
-        "Norm of gravity minus its true value in every pose, against 3 σ of noise alone; circles: cross-validated, "
-        "predicted by a fit that did not see that pose.",
-        later("figures", "draw_residuals", quality),
-        partial(residual_chart, quality),
-    )

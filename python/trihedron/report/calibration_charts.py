@@ -131,12 +131,12 @@ def direction_in_words(words: str) -> FloatArray | None:
 
 def strong_correlations(calibration: Calibration) -> list[tuple[str, str, float]]:
     """Pairs of free parameters whose correlation is above :data:`STRONG`, the strongest first."""
-    names, r = _correlations(calibration)
+    names, r = correlations(calibration)
     pairs = [(names[i], names[j], float(r[i, j])) for i in range(len(names)) for j in range(i + 1, len(names))]
     return sorted((pair for pair in pairs if abs(pair[2]) > STRONG), key=lambda pair: -abs(pair[2]))
 
 
-def _correlations(calibration: Calibration) -> tuple[list[str], FloatArray]:
+def correlations(calibration: Calibration) -> tuple[list[str], FloatArray]:
     """Names (k,) and correlations (k, k) of all free parameters of both sensors."""
     both = (("accel", calibration.accelerometer), ("gyro", calibration.gyroscope))
     names = [f"{prefix} {name}" for prefix, sensor in both if sensor is not None for name in PARAMETER_NAMES]
@@ -148,7 +148,7 @@ def _correlations(calibration: Calibration) -> tuple[list[str], FloatArray]:
 
 def correlation_table(calibration: Calibration) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]] | None:
     """Head and rows of the correlations of all free parameters, two decimals."""
-    kept, r = _correlations(calibration)
+    kept, r = correlations(calibration)
     if not kept:
         return None
     rows = tuple(

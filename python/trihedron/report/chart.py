@@ -19,7 +19,8 @@ AXIS_COLOURS: tuple[Colour, Colour, Colour] = ("c1", "c2", "c3")
 class Scale:
     """An axis of a panel: ``limits`` in data units (found from the marks where None), ``unit`` for values shown.
 
-    ``names`` are of the places 1, 2, ...; a drawing that has room for them writes them there.
+    ``names`` are of the places 1, 2, ...; along x a drawing that has room for them writes them there. Along y they
+    are of the places −1, −2, ..., the first at the top.
     """
 
     label: str
@@ -45,7 +46,10 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Dots with ``sigma`` as uncertainties; ``said`` is what a reader who points at one is told."""
+    """Dots with ``sigma`` as uncertainties; ``said`` is what a reader who points at one is told.
+
+    ``is_across``: the uncertainties lie along x, as in a forest plot.
+    """
 
     x: FloatArray
     y: FloatArray
@@ -54,11 +58,12 @@ class Points:
     name: str = ""
     colour: Colour = "c1"
     is_hollow: bool = False
+    is_across: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """Bars from zero (or from ``base``), ``width`` in data units."""
+    """Bars at ``x`` from zero (or ``base``) to ``y``, ``width`` in data units; ``is_across``: at ``y``, to ``x``."""
 
     x: FloatArray
     y: FloatArray
@@ -67,6 +72,7 @@ class Bars:
     name: str = ""
     colour: Colour = "c1"
     base: FloatArray | None = None
+    is_across: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,11 +143,35 @@ class Disc:
     points: tuple[tuple[float, float, str, str, Literal["taken", "wanted"]], ...]
 
 
+@dataclass(frozen=True, eq=False)
+class Sphere:
+    """Values by direction, on a sphere about the body that a reader turns; ``limit`` is the value of a full-sized dot.
+
+    ``directions`` (n, 3) unit vectors in the body frame, ``values`` (n,); negative ones have the colour c1, positive
+    ones the accent.
+    """
+
+    title: str
+    directions: FloatArray
+    values: FloatArray
+    limit: float
+    said: Sequence[str]
+
+
+@dataclass(frozen=True, eq=False)
+class Matrix:
+    """Correlations ``values`` (n, n) of what ``names`` say, as cells whose depth is their size."""
+
+    title: str
+    names: tuple[str, ...]
+    values: FloatArray
+
+
 @dataclass(frozen=True)
 class Chart:
     """Panels under one legend. ``columns`` side by side on a wide page; linked panels zoom along x together."""
 
-    panels: tuple[Panel | Disc, ...]
+    panels: tuple[Panel | Disc | Sphere | Matrix, ...]
     columns: int = 1
     is_linked: bool = False
     legend: bool = True
@@ -152,32 +182,40 @@ def limits_of(panel: Panel) -> tuple[tuple[float, float], tuple[float, float]]:
     """Data limits (x, y) of a panel: those stated, or what its marks need and a margin."""
     x = panel.x.limits or _reach([v for m in panel.marks for v in _xs(m)], panel.x)
     y = panel.y.limits or _reach([v for m in panel.marks for v in _ys(m)], panel.y)
-    return x, y
+    return x, (-len(panel.y.names) - 0.6, -0.4) if panel.y.names else y
 
 
 def _xs(mark: Mark) -> list[FloatArray]:
-    if isinstance(mark, Line | Points | Band):
+    if isinstance(mark, Line | Band):
         return [mark.x]
+    if isinstance(mark, Points):
+        return _with_bars(mark.x, mark.sigma if mark.is_across else None)
     if isinstance(mark, Bars):
-        return [mark.x - mark.width / 2, mark.x + mark.width / 2]
-    if isinstance(mark, Span):
-        return []
-    return [np.array([mark.x])] if mark.x is not None and isinstance(mark, Note) else []
+        return _from_base(mark.x, mark) if mark.is_across else [mark.x - mark.width / 2, mark.x + mark.width / 2]
+    return [np.array([mark.x])] if isinstance(mark, Note | Level) and mark.x is not None else []
 
 
 def _ys(mark: Mark) -> list[FloatArray]:
     if isinstance(mark, Points):
-        if mark.sigma is None:
-            return [mark.y]
-        bar = np.where(np.isfinite(mark.sigma), mark.sigma, 0.0)
-        return [mark.y - bar, mark.y + bar]
+        return _with_bars(mark.y, None if mark.is_across else mark.sigma)
     if isinstance(mark, Line):
         return [mark.y]
     if isinstance(mark, Bars):
-        return [mark.y, np.zeros(1) if mark.base is None else mark.base]
+        return [mark.y] if mark.is_across else _from_base(mark.y, mark)
     if isinstance(mark, Band):
         return [mark.lower, mark.upper]
     return [np.array([mark.y])] if isinstance(mark, Level) and mark.y is not None else []
+
+
+def _with_bars(values: FloatArray, sigma: FloatArray | None) -> list[FloatArray]:
+    if sigma is None:
+        return [values]
+    bar = np.where(np.isfinite(sigma), sigma, 0.0)
+    return [values - bar, values + bar]
+
+
+def _from_base(ends: FloatArray, mark: Bars) -> list[FloatArray]:
+    return [ends, np.zeros(1) if mark.base is None else mark.base]
 
 
 def _reach(values: list[FloatArray], scale: Scale) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from trihedron.errors import RefusedError
-from trihedron.report.chart import Band, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
+from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Line, Mark, Note, Panel, Points, Scale, Span
 from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, panels
 
 COLOURS: dict[Colour, str] = {
@@ -78,6 +78,10 @@ def _draw_panel(axis: Axes, panel: Panel) -> None:
     if panel.title:
         axis.set_title(panel.title, fontsize=8.5, loc="left")
     axis.set_ylabel(panel.y.label.replace("  [", "\n["), fontsize=8)
+    if panel.y.names:
+        places = [-k for k in range(1, len(panel.y.names) + 1)]
+        axis.set_yticks(places, [_short(n) for n in panel.y.names], fontsize=7)
+        axis.set_ylim(places[-1] - 0.6, -0.4)
     if panel.x.limits is not None:
         axis.set_xlim(*panel.x.limits)
     if panel.y.limits is not None:
@@ -121,11 +125,21 @@ def _draw(axis: Axes, mark: Mark) -> None:
     elif isinstance(mark, Band):
         axis.fill_between(mark.x, mark.lower, mark.upper, color=colour, alpha=0.5, linewidth=0)
     elif isinstance(mark, Points):
+        along = (mark.sigma, None) if mark.is_across else (None, mark.sigma)
         axis.errorbar(
-            mark.x, mark.y, mark.sigma, fmt="o", markersize=3.0, elinewidth=0.7, color=colour, label=mark.name or None
-        )
-    else:
-        raise TypeError(f"{type(mark).__name__} has no drawing here yet")
+            mark.x, mark.y, along[1], along[0], fmt="o", markersize=3.0, elinewidth=0.7, color=colour,
+            fillstyle="none" if mark.is_hollow else "full", label=mark.name or None,
+        )  # fmt: skip
+    elif isinstance(mark, Bars):
+        base = 0.0 if mark.base is None else mark.base
+        if mark.is_across:
+            axis.barh(mark.y, mark.x - base, mark.width, left=base, color=colour, label=mark.name or None)
+        else:
+            axis.bar(mark.x, mark.y - base, mark.width, bottom=base, color=colour, label=mark.name or None)
+    elif isinstance(mark, Span):
+        axis.axvspan(mark.first, mark.last, color=colour, linewidth=0, zorder=0, label=mark.name or None)
+    elif isinstance(mark, Note):
+        axis.annotate(mark.text, (mark.x, mark.y), xytext=(3, 3), textcoords="offset points", fontsize=7, color=colour)
 
 
 def _short(name: str) -> str:

@@ -20,6 +20,12 @@ from trihedron.report.diagnosis_numbers import (
     numbers_blocks,
     stages_blocks,
 )
+from trihedron.report.diagnosis_overview_charts import (
+    forest_pictures,
+    ratio_pictures,
+    strengths_picture,
+    traces_picture,
+)
 from trihedron.report.diagnosis_relations import relations_blocks
 from trihedron.report.diagnosis_words import (
     MEANING,
@@ -72,27 +78,27 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
     if diagnosis.parameters:
         numbers = [*differing_numbers(diagnosis), *differing_noise(diagnosis)]
         words = tuple(("", word) for word in numbers) or (("", "None of the given parameters differs."),)
-        sections.append(Section("Parameters that differ (recording minus model)", (Facts(words),)))
+        about = (*forest_pictures(diagnosis), *_traces(diagnosis))
+        sections.append(Section("Parameters that differ (recording minus model)", (Facts(words), *about)))
     sections += [
-        Section("Missing effects", effects_blocks(diagnosis)),
+        Section("Missing effects", (*effects_blocks(diagnosis), *_physics(diagnosis))),
         Section("Unexplained", (Paragraph(_remaining(diagnosis)), *relations_blocks(diagnosis))),
         Section("Cross-validation: before and after", _held_out(diagnosis)),
         Section("Candidates", (_candidates(diagnosis),)),
         Section("Calibration and noise", models_blocks(diagnosis)),
     ]
     if diagnosis.parameters:
-        stages = (*stages_blocks(diagnosis, MEANING), *stages_pictures(diagnosis))
+        stages = (*stages_pictures(diagnosis), *stages_blocks(diagnosis, MEANING))
         sections.append(Section("Stage by stage", stages))
         sections.append(Section("All parameters of the model", numbers_blocks(diagnosis)))
     if diagnosis.noise_compared:
-        noise = (*noise_blocks(diagnosis), *noise_pictures(diagnosis))
+        noise = (*ratio_pictures(diagnosis), *noise_blocks(diagnosis), *noise_pictures(diagnosis))
         sections.append(Section("Noise and sampling of the model", noise))
     findings: Iterable[Finding] = getattr(diagnosis, "findings", ())
     if findings:
         sections.append(Section("Findings", (findings_block(findings),)))
-    pictures = _pictures(diagnosis)
-    if pictures[1:]:
-        sections.append(Section("Figures", tuple(pictures[1:])))
+    if diagnosis.residuals:
+        sections.append(Section("Figures", tuple(_picture(diagnosis, one) for one in diagnosis.residuals)))
     found = getattr(diagnosis, "reference", None)
     if found is not None:
         sections.insert(0, Section("Against the reference", reference_blocks(found)))
@@ -103,7 +109,7 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
         headlines=tuple(_headlines(diagnosis)),
-        lead=pictures[0] if pictures else None,
+        lead=strengths_picture(diagnosis),
         stated_level=_LEVELS[diagnosis.verdict],
     )
 
@@ -275,9 +281,13 @@ def _candidates(diagnosis: Diagnosis) -> Block:
     return Table(("effect", "p against the linear model", ""), tuple(rows), "Every effect of the catalogue")
 
 
-def _pictures(diagnosis: Diagnosis) -> list[Picture]:
-    """The effects against what drives them, then each domain before and after."""
-    return [*_physics(diagnosis), *(_picture(diagnosis, r) for r in diagnosis.residuals)]
+def _traces(diagnosis: Diagnosis) -> tuple[Picture, ...]:
+    """Simulated over recorded readings, where a simulation was moved as the recording was."""
+    recording, simulated, segments = (getattr(diagnosis, name, None) for name in ("recording", "simulated", "segments"))
+    if recording is None or simulated is None or segments is None:
+        return ()
+    picture = traces_picture(recording, simulated, segments)
+    return () if picture is None else (picture,)
 
 
 def _physics(diagnosis: Diagnosis) -> list[Picture]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
-from trihedron.report.chart import Chart, Line, Mark, Panel, Points, Scale
+from trihedron.report.chart import Chart, Colour, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawing import later
 from trihedron.report.numbers import plain_number
@@ -20,14 +20,17 @@ PRINTED = {
     "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
     "rad/s": (degrees_from_radians(1.0), "°/s"),
     "deg": (1.0, "°"),
+    "m/s": (1.0, "m/s"),
     "dB": (1.0, "dB"),
 }
 WORDS = {
     "static-accel": "gravity error in static poses",
     "static-gyro": "gyro rate in static poses",
     "moves": "tilt error after rotations",
+    "dynamics": "velocity error over a rotation",
     "noise": "noise, octave by octave",
 }
+SLOPES: tuple[Colour, ...] = ("c1", "c2", "c3", "accent", "soft")
 FEWEST_OCTAVES = 2
 PER_OCTAVE = 24
 """Frequencies at which an octave is integrated: sin⁴ has two periods in the highest at the shortest averaging time."""
@@ -40,7 +43,10 @@ def stages_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
     """Misfit of the held-out part after every stage."""
     if len(diagnosis.stages) < len(STAGES) - 1:
         return ()
-    caption = "Cross-validated residual, stage by stage: as given, with its own parameters, noise, effects."
+    caption = (
+        "Cross-validated residual, stage by stage: as given, with its own parameters, noise, effects; each domain "
+    )
+    caption += "against its own first stage."
     return (_picture("stages", caption, partial(stages_chart, diagnosis)),)
 
 
@@ -62,29 +68,24 @@ def _picture(name: str, caption: str, chart: Callable[[], Chart]) -> Picture:
 
 
 def stages_chart(diagnosis: Diagnosis) -> Chart:
-    """A panel per domain: rms after every stage."""
-    panels = []
+    """One slope a domain: rms after every stage over that of its first, since their units differ."""
     names = tuple(STAGES[stage.stage] for stage in diagnosis.stages)
-    for domain, words in WORDS.items():
+    marks: list[Mark] = []
+    least = 1.0
+    for (domain, words), colour in zip(WORDS.items(), SLOPES, strict=True):
         found = [(k, d) for k, stage in enumerate(diagnosis.stages, 1) for d in stage.domains if d.domain == domain]
         found = [(k, d) for k, d in found if d.unit in PRINTED and d.rms > 0.0]
         if len(found) < FEWEST_OCTAVES:
             continue
         factor, unit = PRINTED[found[0][1].unit]
         x = np.array([k for k, _ in found], dtype=np.float64)
-        y = factor * np.array([d.rms for _, d in found])
-        told = [f"{names[k - 1]}: {plain_number(float(v))} {unit}" for (k, _), v in zip(found, y, strict=True)]
-        marks: tuple[Mark, ...] = (Line(x, y, "", "soft", is_thin=True), Points(x, y, told, None, "", "accent"))
-        low, high = float(y.min()), float(y.max())
-        panels.append(
-            Panel(
-                Scale("stage", "", limits=(0.6, len(names) + 0.4), whole=True, names=names),
-                Scale(f"rms [{unit}]", unit, is_log=True, limits=(low / 1.6, high * 1.6)),
-                marks,
-                title=words,
-            )
-        )
-    return Chart(tuple(panels), columns=2)
+        y = 100.0 * np.array([d.rms for _, d in found]) / found[0][1].rms
+        told = [f"{words}, {names[k - 1]}: {plain_number(factor * d.rms)} {unit} rms" for k, d in found]
+        marks += [Line(x, y, "", colour), Points(x, y, told, None, words, colour)]
+        least = min(least, float(y.min()))
+    along = Scale("stage", "", limits=(0.6, len(names) + 0.4), whole=True, names=names)
+    up = Scale("rms left [% of the first stage]", "%", is_log=True, limits=(0.6 * least, 160.0))
+    return Chart((Panel(along, up, tuple(marks), height_px=260),))
 
 
 def spectra_chart(diagnosis: Diagnosis) -> Chart:

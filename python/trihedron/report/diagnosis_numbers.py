@@ -19,7 +19,7 @@ _WORDS = {
     "triad-alignment": "gyro triad turned about {}",
     "gravity": "gravity (or all three accelerometer scales)",
 }
-_GROUPS = {
+GROUPS = {
     "accel-bias": "accelerometer biases",
     "accel-scale": "accelerometer scales",
     "accel-misalignment": "accelerometer angles",
@@ -51,7 +51,7 @@ def differing_numbers(diagnosis: Diagnosis) -> list[str]:
     for members in groups.values():
         size = [_in_sigmas(p) for p in members]
         said += [
-            f"{_named(p)} {_difference(p)}"
+            f"{named(p)} {_difference(p)}"
             for p, s in zip(members, size, strict=True)
             if s > NAMED_SIGMAS or s == max(size)
         ]
@@ -93,7 +93,7 @@ def _groups_in_short(diagnosis: Diagnosis) -> list[str]:
         largest = max(
             (p for p in members if _in_sigmas(p) >= min(NAMED_SIGMAS, clear)), key=lambda p: abs(p.difference)
         )
-        said.append(f"{_GROUPS.get(name, name)} by up to {_size(largest)}")
+        said.append(f"{GROUPS.get(name, name)} by up to {_size(largest)}")
     return said
 
 
@@ -182,8 +182,14 @@ def _si(value: float, unit: str) -> str:
     return f"{plain_number(value)} {'°' if unit == 'deg' else unit_in_print(unit)}"
 
 
-def _named(p: ParameterDifference) -> str:
+def named(p: ParameterDifference) -> str:
+    """The parameter in words."""
     return _WORDS[p.id].format(p.name.upper()) if p.id in _WORDS else f"{p.id} {p.name}"
+
+
+def in_print(p: ParameterDifference) -> tuple[float, str]:
+    """Factor and unit in which people compare differences of this kind."""
+    return _unit(p, is_difference=True)
 
 
 def _difference(p: ParameterDifference) -> str:

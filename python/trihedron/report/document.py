@@ -116,6 +116,17 @@ class Document:
         is_warned = any(f.severity is Severity.WARNING for found in lists for f in found.findings)
         return "usable" if is_warned else "good"
 
+    @property
+    def foremost(self) -> Finding | None:
+        """The first of the gravest findings, where it is more than a note: what a reader should know first."""
+        lists = [b for section in self.sections for b in section.blocks if isinstance(b, FindingList)]
+        found = [f for one in lists for f in one.findings]
+        for severity in (Severity.SERIOUS, Severity.WARNING):
+            for finding in found:
+                if finding.severity is severity:
+                    return finding
+        return None
+
 
 def with_its_making(document: Document) -> Document:
     """The document with how it was made as its last section, for writers that have no foot."""

@@ -9,9 +9,26 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.report.chart import Band, Bars, Chart, Disc, Level, Line, Mark, Note, Panel, Points, Span, limits_of
+from trihedron.report.chart import (
+    Band,
+    Bars,
+    Chart,
+    Disc,
+    Level,
+    Line,
+    Mark,
+    Matrix,
+    Note,
+    Panel,
+    Points,
+    Span,
+    Sphere,
+    limits_of,
+)
 from trihedron.report.disc import drawn_disc
+from trihedron.report.matrix import drawn_matrix
 from trihedron.report.numbers import plain_number
+from trihedron.report.sphere import drawn_sphere
 from trihedron.report.ticks import ticks
 
 UNITS = 10000
@@ -25,15 +42,23 @@ def drawn(chart: Chart, caption: str) -> str:
     link = " data-linked" if chart.is_linked else ""
     parts = [_legend(chart)] if chart.legend else []
     parts.append(f'<div class="panels n{chart.columns}"{link}>')
-    parts += [drawn_disc(p, caption) if isinstance(p, Disc) else _panel(p, caption) for p in chart.panels]
+    parts += [_one(panel, caption) for panel in chart.panels]
     parts.append("</div>")
     return "".join(parts)
+
+
+def _one(panel: Panel | Disc | Sphere | Matrix, caption: str) -> str:
+    if isinstance(panel, Disc):
+        return drawn_disc(panel, caption)
+    if isinstance(panel, Sphere):
+        return drawn_sphere(panel, caption)
+    return drawn_matrix(panel, caption) if isinstance(panel, Matrix) else _panel(panel, caption)
 
 
 def _legend(chart: Chart) -> str:
     seen: dict[str, str] = {}
     for panel in chart.panels:
-        for mark in () if isinstance(panel, Disc) else panel.marks:
+        for mark in panel.marks if isinstance(panel, Panel) else ():
             if not isinstance(mark, Note) and mark.name and mark.name not in seen:
                 seen[mark.name] = _swatch(mark)
     if not seen:
@@ -85,6 +110,8 @@ def _panel(panel: Panel, caption: str) -> str:
     if _has_room_for_names(panel):
         x_ticks = [(float(k), name) for k, name in enumerate(panel.x.names, 1)]
     y_ticks = ticks(y0, y1, is_log=panel.y.is_log, whole=panel.y.whole, most=5)
+    if panel.y.names:
+        y_ticks = [(-float(k), name) for k, name in enumerate(panel.y.names, 1)]
     xs, ys = at.x([t for t, _ in x_ticks]), at.y([t for t, _ in y_ticks])
     grid = "".join(f"M{x:.0f} 0V{UNITS}" for x in xs) + "".join(f"M0 {y:.0f}H{UNITS}" for y in ys)
     x_words = "".join(_word(w, f"left:{x / UNITS:.2%}") for x, (_, w) in zip(xs, x_ticks, strict=True) if w)
@@ -103,6 +130,7 @@ def _panel(panel: Panel, caption: str) -> str:
     spec += " data-xwhole" if panel.x.whole else ""
     if _has_room_for_names(panel):
         spec += f' data-xnames="{escape("|".join(panel.x.names))}"'
+    spec += f' data-ynames="{escape("|".join(panel.y.names))}"' if panel.y.names else ""
     return (
         f'<div class="panel" {spec} style="--room:{room}ch;--high:{panel.height_px}px">{title}'
         f'<div class="ylabel">{escape(panel.y.label)}</div>'
@@ -181,11 +209,17 @@ def _path(x: FloatArray, y: FloatArray) -> str:
 def _points(mark: Points, at: _Places) -> str:
     xs, ys = at.x(mark.x), at.y(mark.y)
     sigma = np.zeros(len(xs)) if mark.sigma is None else np.where(np.isfinite(mark.sigma), mark.sigma, 0.0)
-    low, high = at.y(mark.y - sigma), at.y(mark.y + sigma)
     out = []
     if mark.sigma is not None:
+        ends = (
+            (at.x(mark.x - sigma), at.x(mark.x + sigma))
+            if mark.is_across
+            else (at.y(mark.y - sigma), at.y(mark.y + sigma))
+        )
         bars = "".join(
-            f"M{x:.0f} {a:.0f}V{b:.0f}" for x, a, b in zip(xs, low, high, strict=True) if math.isfinite(x + a + b)
+            f"M{a:.0f} {y:.0f}H{b:.0f}" if mark.is_across else f"M{x:.0f} {a:.0f}V{b:.0f}"
+            for x, y, a, b in zip(xs, ys, *ends, strict=True)
+            if math.isfinite(x + y + a + b)
         )
         out.append(f'<path class="err {mark.colour}" d="{bars}"/>')
     for x, y, said in zip(xs, ys, mark.said, strict=True):
@@ -198,11 +232,15 @@ def _points(mark: Points, at: _Places) -> str:
 
 
 def _bars(mark: Bars, at: _Places) -> str:
-    left, right = at.x(mark.x - mark.width / 2), at.x(mark.x + mark.width / 2)
-    top = at.y(mark.y)
-    foot = at.y(np.zeros(len(top)) if mark.base is None else mark.base)
+    base = np.zeros(len(mark.x)) if mark.base is None else mark.base
+    half = mark.width / 2
+    if mark.is_across:
+        left, right, foot, top = at.x(base), at.x(mark.x), at.y(mark.y - half), at.y(mark.y + half)
+    else:
+        left, right, foot, top = at.x(mark.x - half), at.x(mark.x + half), at.y(base), at.y(mark.y)
+    way = " across" if mark.is_across else ""
     return "".join(
-        f'<path class="area {mark.colour}" data-t="{escape(said)}" d="M{a:.0f} {f:.0f}V{t:.0f}H{b:.0f}V{f:.0f}z"/>'
+        f'<path class="area {mark.colour}{way}" data-t="{escape(said)}" d="M{a:.0f} {f:.0f}V{t:.0f}H{b:.0f}V{f:.0f}z"/>'
         for a, b, t, f, said in zip(left, right, top, foot, mark.said, strict=True)
         if math.isfinite(a + b + t + f)
     )

@@ -1,4 +1,3 @@
-"use strict";
 (() => {
   const UNITS = 10000, MINUS = "\u2212";
   const tip = document.createElement("div");
@@ -42,7 +41,7 @@
       this.full = { x: this.scaled(pair(d.x), "x"), y: this.scaled(pair(d.y), "y") };
       this.now = { x: [...this.full.x], y: [...this.full.y] };
       this.unit = { x: d.ux || "", y: d.uy || "" };
-      this.ready = null; this.tools(); this.listen();
+      this.isTime = d.lx === "time [s]"; this.ready = null; this.tools(); this.listen();
     }
     scaled(pair, way) { return this.log[way] ? pair.map(Math.log10) : pair; }
     value(share, way) { const [a, b] = this.now[way], v = a + share * (b - a); return this.log[way] ? 10 ** v : v; }
@@ -74,12 +73,13 @@
       for (const [way, most, name, edge] of [["x", 6, ".xticks", "left"], ["y", 5, ".yticks", "top"]]) {
         const [low, high] = [this.value(0, way), this.value(1, way)], [a, b] = this.full[way], [u, v] = this.now[way];
         const place = this.node.querySelector(name); place.replaceChildren();
-        const names = way === "x" && this.node.dataset.xnames ? this.node.dataset.xnames.split("|") : null;
-        for (const [at, word] of this.log[way] ? logTicks(low, high) : ticks(low, high, most)) {
+        const said = this.node.dataset[way + "names"], names = said ? said.split("|") : null, sign = way === "x" ? 1 : -1;
+        const places = names ? names.map((name, k) => [sign * (k + 1), name]).filter(([v]) => v >= low && v <= high) : null;
+        for (const [at, word] of places || (this.log[way] ? logTicks(low, high) : ticks(low, high, most))) {
           const s = this.log[way] ? Math.log10(at) : at, whole = (s - a) / (b - a) * UNITS, here = (s - u) / (v - u);
           grid += way === "x" ? `M${whole} 0V${UNITS}` : `M0 ${UNITS - whole}H${UNITS}`;
           const span = document.createElement("span");
-          span.textContent = names ? names[at - 1] ?? "" : word; span.style[edge] = 100 * (way === "x" ? here : 1 - here) + "%"; place.append(span);
+          span.textContent = word; span.style[edge] = 100 * (way === "x" ? here : 1 - here) + "%"; place.append(span);
         }
       }
       this.svg.querySelector(".grid").setAttribute("d", grid);
@@ -94,7 +94,10 @@
       const dots = [], lines = [];
       for (const p of this.svg.querySelectorAll("[data-t]")) {
         const n = p.getAttribute("d").match(/-?[\d.]+/g).map(Number);
-        dots.push(p.classList.contains("area") ? [(n[0] + n[3]) / 2, n[2], p, Math.abs(n[3] - n[0]) / 2] : [n[0], n[1], p, 0]);
+        /* A bar is pointed at anywhere along its length. */
+        if (!p.classList.contains("area")) dots.push([n[0], n[1], p, 0, 0]);
+        else if (p.classList.contains("across")) dots.push([0, (n[1] + n[2]) / 2, p, Infinity, Math.abs(n[2] - n[1]) / 2]);
+        else dots.push([(n[0] + n[3]) / 2, 0, p, Math.abs(n[3] - n[0]) / 2, Infinity]);
       }
       for (const p of this.svg.querySelectorAll("path[data-n]")) {
         const xs = [], ys = [];
@@ -118,7 +121,7 @@
         }
         this.hover(x, y, r, e);
       });
-      plot.addEventListener("pointerleave", () => { hide(); this.mark(null); });
+      plot.addEventListener("pointerleave", () => { hide(); this.mark(null); this.follow(null); });
       plot.addEventListener("pointerdown", (e) => {
         if (e.pointerType !== "mouse" || e.button) return;
         start = at(e); plot.setPointerCapture(e.pointerId); hide();
@@ -139,12 +142,24 @@
       }, { passive: false });
     }
     mark(node) { if (this.marked) this.marked.classList.remove("on"); this.marked = node; if (node && node.classList.contains("dot")) node.classList.add("on"); }
+    /* One cursor over all axes of time. */
+    follow(share) {
+      if (!this.isTime) return;
+      const time = share === null ? null : this.value(share, "x");
+      for (const other of all) if (other.isTime) other.cursor(other === this ? null : time);
+    }
+    cursor(time) {
+      this.line ??= this.plot.appendChild(Object.assign(document.createElement("div"), { className: "cursor" }));
+      const [a, b] = this.now.x, at = (time - a) / (b - a);
+      this.line.hidden = time === null || at < 0 || at > 1; this.line.style.left = 100 * at + "%";
+    }
     hover(x, y, r, e) {
+      this.follow(x);
       const { dots, lines } = this.marks(), view = this.svg.viewBox.baseVal;
       const ux = view.x + x * view.width, uy = view.y + y * view.height, sx = r.width / view.width, sy = r.height / view.height;
       let best = null, least = 26;
-      for (const [px, py, node, half] of dots) {
-        const d = half ? Math.max(0, Math.abs(px - ux) - half) * sx : Math.hypot((px - ux) * sx, (py - uy) * sy);
+      for (const [px, py, node, hx, hy] of dots) {
+        const d = Math.hypot(Math.max(0, Math.abs(px - ux) - hx) * sx, Math.max(0, Math.abs(py - uy) - hy) * sy);
         if (d < least) { least = d; best = node; }
       }
       this.mark(best);
@@ -162,7 +177,46 @@
     }
   }
   const all = [...document.querySelectorAll(".panel")].map((node) => new Panel(node));
-  for (const node of document.querySelectorAll(".pose")) {
+  class Sphere {
+    constructor(canvas) {
+      this.canvas = canvas; this.points = JSON.parse(canvas.dataset.points);
+      this.eye = Body.about([1, 0, 0], 0.38); this.view = Body.times(Body.about([0, 1, 0], -0.5), [[1, 0, 0], [0, 0, 1], [0, -1, 0]]);
+      let last = null;
+      const hold = (e) => { last = [e.clientX, e.clientY]; canvas.setPointerCapture(e.pointerId); hide(); };
+      const move = (e) => {
+        if (!last) return this.point(e);
+        this.turn((e.clientX - last[0]) / 90, (e.clientY - last[1]) / 90); last = [e.clientX, e.clientY];
+      };
+      canvas.addEventListener("pointerdown", hold); canvas.addEventListener("pointermove", move);
+      canvas.addEventListener("pointerup", () => { last = null; }); canvas.addEventListener("pointerleave", hide);
+      canvas.addEventListener("keydown", (e) => {
+        const by = { ArrowLeft: [-0.15, 0], ArrowRight: [0.15, 0], ArrowUp: [0, -0.15], ArrowDown: [0, 0.15] }[e.key];
+        if (by) { e.preventDefault(); this.turn(...by); }
+      });
+      new ResizeObserver(() => this.draw()).observe(canvas);
+      for (const q of ["print", "(prefers-color-scheme: dark)"]) matchMedia(q).addEventListener("change", () => this.draw());
+    }
+    turn(right, down) { this.view = Body.times(Body.times(Body.about([1, 0, 0], down), Body.about([0, 1, 0], right)), this.view); this.draw(); }
+    draw() {
+      const at = Body.begin(this.canvas, 0.44), { pen, ratio, r, cx, cy } = at;
+      const place = (v) => { const p = Body.apply(this.eye, Body.apply(this.view, v)); return [cx + r * p[0], cy - r * p[1], p[2]]; };
+      Body.globe(at, place);
+      this.shown = this.points.map(([x, y, z, share, said]) => ({ p: place([x, y, z]), share, said })).sort((a, b) => a.p[2] - b.p[2]);
+      const mark = ({ p, share }) => {
+        pen.globalAlpha = p[2] < 0 ? 0.3 : 1; pen.fillStyle = Body.colour(share < 0 ? "--c1" : "--accent");
+        pen.beginPath(); pen.arc(p[0], p[1], (2.5 + 10.5 * Math.sqrt(Math.abs(share))) * ratio, 0, 7); pen.fill(); pen.globalAlpha = 1;
+      };
+      this.shown.filter((m) => m.p[2] < 0).forEach(mark); Body.board(at, place); this.shown.filter((m) => m.p[2] >= 0).forEach(mark);
+    }
+    point(e) {
+      const box = this.canvas.getBoundingClientRect(), k = this.canvas.width / box.width;
+      const x = (e.clientX - box.left) * k, y = (e.clientY - box.top) * k;
+      const near = this.shown.filter((m) => Math.hypot(m.p[0] - x, m.p[1] - y) < 16 * k).sort((a, b) => b.p[2] - a.p[2])[0];
+      near ? show(near.said, e) : hide();
+    }
+  }
+  for (const canvas of document.querySelectorAll(".sphere canvas")) new Sphere(canvas);
+  for (const node of document.querySelectorAll(".pose, .cell")) {
     node.addEventListener("pointermove", (e) => show(node.dataset.t, e)); node.addEventListener("pointerleave", hide);
   }
 

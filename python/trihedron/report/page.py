@@ -39,7 +39,7 @@ def to_html(document: Document) -> str:
         for section in document.sections
     ]
     lead = None if document.lead is None else _shown(document.lead)
-    script = _file("page.js")
+    script = _file("body.js") + _file("page.js")
     page = template("page.html.j2").render(
         document=replace(document, title=one_line(document.title), subtitle=one_line(document.subtitle)),
         sections=sections,

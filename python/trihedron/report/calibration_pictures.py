@@ -1,0 +1,220 @@
+"""The pictures of a calibration: before and after, residuals by pose, time and orientation, correlations."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
+from trihedron.report.calibration_charts import (
+    LIMIT_SIGMAS,
+    correlations,
+    mm_s2,
+    move_chart,
+    residual_chart,
+    sphere_chart,
+)
+from trihedron.report.calibration_residuals import direction
+from trihedron.report.chart import AXIS_COLOURS, Chart, Level, Line, Mark, Matrix, Panel, Points, Scale, Sphere
+from trihedron.report.document import Block, Picture
+from trihedron.report.drawing import later
+from trihedron.report.drawn import said
+from trihedron.report.numbers import plain_number
+from trihedron.report.segments import signals_picture
+from trihedron.units import AccelerationUnit, acceleration_to_si
+
+FEWEST_NAMES = 2
+
+
+def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture | None:
+    """Residual of every pose; beside it, with the segments at hand, gravity's error before and after."""
+    quality = calibration.accelerometer.quality
+    if quality is None:
+        return None
+    caption = (
+        "Norm of gravity minus its true value in every pose, against 3 σ of noise alone; circles: cross-validated, "
+        "predicted by a fit that did not see that pose."
+    )
+    means = None if segments is None else segments.accelerometer_mean
+    chart = partial(residual_chart, quality)
+    if means is not None and len(means) == len(quality.residual):
+        chart = partial(lead_chart, calibration, means)
+        caption += f" Beside it the error's size before calibration ({_before_words(calibration)}) and after."
+    return Picture(
+        "residuals",
+        caption,
+        later("figures", "draw_residuals", quality),
+        chart,
+    )
+
+
+def lead_chart(calibration: Calibration, means: FloatArray) -> Chart:
+    """Residuals of every pose, and the size of gravity's error before and after; ``means`` (n, 3) raw readings."""
+    quality = calibration.accelerometer.quality
+    assert quality is not None
+    residual = residual_chart(quality)
+    return Chart((*residual.panels, before_after_panel(calibration, means)), columns=2)
+
+
+def before_after_panel(calibration: Calibration, means: FloatArray) -> Panel:
+    """Size of the gravity error in every pose: of the readings as they are, and calibrated."""
+    quality = calibration.accelerometer.quality
+    assert quality is not None
+    before = mm_s2(uncalibrated_error(calibration, means))
+    after = mm_s2(_unseen(quality))
+    pose = np.arange(1, len(before) + 1, dtype=np.float64)
+    noise = float(np.sqrt(np.mean(mm_s2(quality.sigma) ** 2)))
+    marks: list[Mark] = [Level(y=noise, name="noise alone (rms)", is_dashed=True)] if noise > 0.0 else []
+    for values, name, colour in ((before, "before", "soft"), (after, "after", "c1")):
+        told = [said(f"pose {k}, {name}", "", v, "mm/s²") for k, v in enumerate(values, 1)]
+        size = np.where(values == 0.0, np.nan, np.abs(values))
+        marks.append(Points(pose, size, told, None, f"{name} calibration", colour))  # type: ignore[arg-type]
+    rms = [plain_number(float(np.sqrt(np.nanmean(values**2)))) for values in (before, after)]
+    return Panel(
+        Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True),
+        Scale("size of the gravity error [mm/s²]", "mm/s²", is_log=True),
+        tuple(marks),
+        title=f"{rms[0]} → {rms[1]} mm/s² rms",
+    )
+
+
+def uncalibrated_error(calibration: Calibration, means: FloatArray) -> FloatArray:
+    """(n,) |s a| − |g| [m/s²] of raw means (n, 3): s the log's own unit, or the one scale that fits counts best."""
+    norm = np.linalg.norm(means, axis=1)
+    scale = _as_read(calibration)
+    if scale is None:
+        scale = calibration.gravity_m_s2 * float(norm.sum() / (norm @ norm))
+    return np.asarray(scale * norm - calibration.gravity_m_s2)
+
+
+def _before_words(calibration: Calibration) -> str:
+    return "one scale for all axes, no bias" if _as_read(calibration) is None else "the readings as they are"
+
+
+def _as_read(calibration: Calibration) -> float | None:
+    """m/s² of one raw unit, where the log itself says it."""
+    return acceleration_to_si(AccelerationUnit(calibration.accelerometer.raw_unit))
+
+
+def _unseen(quality: FitQuality) -> FloatArray:
+    """(n,) residuals of fits that did not see the pose, where there are such."""
+    return quality.residual if quality.held_out is None else quality.held_out
+
+
+def figure_blocks(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> list[Block]:
+    """All other pictures that the data at hand allow."""
+    blocks: list[Block] = []
+    quality = calibration.accelerometer.quality
+    means = None if segments is None else segments.accelerometer_mean
+    if segments is not None and recording is not None:
+        chart = time_chart(calibration, segments, recording)
+        if chart is not None:
+            caption = "Residuals of the fit over time, against 3 σ of noise alone: drift would show as a slope."
+            blocks.append(Picture("time", caption, later("chart_figures", "draw_chart", lambda: chart), lambda: chart))
+    if means is not None:
+        if quality is not None and len(means) == len(quality.residual):
+            caption = (
+                "Gravity error by the direction of 'up' in the body frame: dots grow with the error, orange too long, "
+                "blue too short, pale behind. One colour on one side: an effect of orientation that the model lacks. "
+                "Drag to turn."
+            )
+            blocks.append(
+                Picture("orientation", caption, None, partial(orientation_chart, calibration.accelerometer, means))
+            )
+        blocks.append(_poses_picture(calibration.accelerometer, means))
+    gyroscope = calibration.gyroscope
+    if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:
+        blocks.append(
+            Picture(
+                "moves",
+                "Tilt error after every rotation, in sample and cross-validated (held out).",
+                later("figures", "draw_moves", gyroscope.quality),
+                partial(move_chart, gyroscope.quality, segments),
+            )
+        )
+    if segments is not None and recording is not None:
+        blocks.append(signals_picture(recording, segments))
+    return blocks
+
+
+def _poses_picture(sensor: SensorCalibration, means: FloatArray) -> Picture:
+    return Picture(
+        "poses",
+        "Directions of 'up' in the body frame, upper and lower hemisphere. Empty regions are poses that were "
+        "not recorded; triangles are the most useful next poses, in that order.",
+        later("figures", "draw_poses", sensor, means),
+        partial(sphere_chart, sensor, means),
+    )
+
+
+def orientation_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
+    """Residual of every pose at its direction of "up"; ``means`` (n, 3) raw readings."""
+    assert sensor.quality is not None
+    force = means @ sensor.S.T + sensor.b
+    values = mm_s2(_unseen(sensor.quality))
+    limit = float(np.nanmax(np.abs(values), initial=0.0))
+    told = [
+        f"{said(f'pose {k}', '', v, 'mm/s²')}, up {direction(f)}"
+        for k, (v, f) in enumerate(zip(values, force, strict=True), 1)
+    ]
+    title = f"gravity error by orientation, largest {plain_number(limit)} mm/s²"
+    return Chart((Sphere(title, force / np.linalg.norm(force, axis=1)[:, None], values, limit, told),), legend=False)
+
+
+def time_chart(calibration: Calibration, segments: Segments, recording: Recording) -> Chart | None:
+    """Residuals over time: gravity's error of the poses, and what every rotation misses of gravity."""
+    panels = []
+    limits = (float(recording.time_s[0]), float(recording.time_s[-1]) or 1.0)
+    quality = calibration.accelerometer.quality
+    if quality is not None and len(quality.residual) == segments.n_poses:
+        y = Scale("|f| − |g|  [mm/s²]", "mm/s²")
+        panels.append((y, _over_time(segments.time_mid_s, quality.residual[:, None], quality.sigma, "pose", ("",))))
+    moved = None if calibration.gyroscope is None else calibration.gyroscope.quality
+    if moved is not None and moved.residual.ndim > 1 and len(moved.residual) == len(segments.moves):
+        last = recording.n_samples - 1
+        middle = np.array(
+            [0.5 * (recording.time_s[m.start] + recording.time_s[min(m.stop, last)]) for m in segments.moves]
+        )
+        sigma = np.sqrt(np.mean(moved.sigma**2, axis=1))
+        y = Scale("gravity after a rotation, predicted − measured  [mm/s²]", "mm/s²")
+        panels.append((y, _over_time(middle, moved.residual, sigma, "move", ("X", "Y", "Z"))))
+    if not panels:
+        return None
+    x = Scale("time [s]", "s", limits=limits)
+    return Chart(tuple(Panel(x, y, marks, height_px=180) for y, marks in panels), is_linked=True)
+
+
+def _over_time(
+    time_s: FloatArray, residual: FloatArray, sigma: FloatArray, kind: str, names: tuple[str, ...]
+) -> tuple[Mark, ...]:
+    """Dots at ``time_s`` (n,) of ``residual`` (n, k), a stroke of ± 3 ``sigma`` (n,) behind them, SI."""
+    limit, gap = LIMIT_SIGMAS * mm_s2(np.abs(sigma)), np.full(len(time_s), np.nan)
+    x, y = (np.column_stack(columns).ravel() for columns in ((time_s, time_s, gap), (-limit, limit, gap)))
+    marks: list[Mark] = [Level(y=0.0), Line(x, y, "3σ of noise alone", "shade")]
+    for k, name in enumerate(names):
+        values = mm_s2(residual[:, k])
+        told = [
+            said(f"{kind} {n}{', ' + name if name else ''}, {t:.1f} s", "", v, "mm/s²")
+            for n, (t, v) in enumerate(zip(time_s, values, strict=True), 1)
+        ]
+        colour = AXIS_COLOURS[k] if name else "accent"
+        marks.append(Points(time_s, values, told, None, name or "norm in a pose", colour))
+    return tuple(marks)
+
+
+def correlation_picture(calibration: Calibration) -> Picture | None:
+    """How the free parameters of both sensors correlate."""
+    names, _ = correlations(calibration)
+    if len(names) < FEWEST_NAMES:
+        return None
+    caption = "Correlations of the free parameters (a: accelerometer, w: gyroscope), orange positive, blue negative."
+    return Picture("correlations", caption, None, partial(matrix_chart, calibration))
+
+
+def matrix_chart(calibration: Calibration) -> Chart:
+    """A triangle of cells."""
+    names, r = correlations(calibration)
+    short = tuple(name.replace("accel ", "a ").replace("gyro ", "w ") for name in names)
+    return Chart((Matrix("correlations", short, r),), legend=False)

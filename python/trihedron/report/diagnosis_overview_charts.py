@@ -1,0 +1,204 @@
+"""What a page draws of a diagnosis as a whole: disagreement by domain, parameters and noise as forests, traces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.records import Recording, Segments
+from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
+from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
+from trihedron.report.diagnosis_numbers import GROUPS, in_print, named
+from trihedron.report.diagnosis_words import MEANING
+from trihedron.report.document import Block, Picture
+from trihedron.report.drawing import later
+from trihedron.report.drawn import envelope
+from trihedron.report.numbers import plain_number, unit_in_print, with_sigma
+
+ROW_PX = 26
+"""A row of names on a page."""
+LEAST_CHI2 = 0.3
+"""Where bars of χ² per degree of freedom begin: what noise explains is 1."""
+TWO_SIGMA = 2.0
+WINDOW_S = 6.0
+"""Of traces drawn: a move and its poses on both sides."""
+RATIOS = ("N", "B", "K", "Q", "bandwidth", "resolution", "range", "rate", "correlation-time", "poses", "moves")
+"""Terms whose ratio is drawn; octaves are drawn as spectra."""
+
+
+def strengths_picture(diagnosis: Diagnosis) -> Picture | None:
+    """How far each domain disagrees, beside what noise explains."""
+    if not any(d.chi2_per_dof > 0.0 for d in diagnosis.domains):
+        return None
+    caption = "How far the recording and the model disagree, domain by domain: χ² per degree of freedom; 1 is what "
+    caption += "noise alone explains."
+    return _picture("strengths", caption, partial(strengths_chart, diagnosis))
+
+
+def strengths_chart(diagnosis: Diagnosis) -> Chart:
+    """A bar a domain, as modelled and with the effects."""
+    tests = [d for d in diagnosis.domains if d.chi2_per_dof > 0.0]
+    after = {d.domain: d.chi2_per_dof for d in diagnosis.remaining} if diagnosis.effects else {}
+    both = [("as modelled", "accent", [d.chi2_per_dof for d in tests])]
+    if after:
+        both.append(("with the effects", "c1", [after.get(d.domain, math.nan) for d in tests]))
+    marks: list[Mark] = []
+    width = 0.7 / len(both)
+    names = tuple(MEANING.get(d.domain, d.domain) for d in tests)
+    for k, (name, colour, values) in enumerate(both):
+        place = -np.arange(1.0, len(tests) + 1.0) + width * (0.5 * (len(both) - 1) - k)
+        told = [f"{what}, {name}: χ²/dof {plain_number(v)}" for what, v in zip(names, values, strict=True)]
+        base = np.full(len(tests), LEAST_CHI2)
+        shown = np.maximum(values, LEAST_CHI2)
+        marks.append(Bars(shown, place, 0.92 * width, told, name, colour, base, is_across=True))  # type: ignore[arg-type]
+    marks.append(Level(x=1.0, name="noise alone", is_dashed=True))
+    top = max(max(v for v in values if math.isfinite(v)) for _, _, values in both)
+    x = Scale("χ² per degree of freedom", is_log=True, limits=(LEAST_CHI2, max(2.0 * top, 4.0)))
+    return Chart((Panel(x, Scale("", names=names), tuple(marks), height_px=2 * ROW_PX + ROW_PX * len(tests)),))
+
+
+def forest_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """Parameters of the recording about those of the model; noise of the model over the recording's."""
+    out: list[Block] = []
+    if diagnosis.parameters:
+        caption = "Parameters of the recording (dots, 95 % interval) about those of the model (the line at 0); orange: "
+        caption += "the group differs."
+        out.append(_picture("forest", caption, partial(forest_chart, diagnosis.parameters)))
+    return tuple(out)
+
+
+def ratio_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """Noise and sampling of the model over the recording's."""
+    rows = [n for n in diagnosis.noise_compared if n.ratio and n.ratio > 0.0 and n.term in RATIOS]
+    if not rows:
+        return ()
+    caption = "Noise and sampling of the model over the recording's, with the interval where there is one; orange: "
+    caption += "differs; 1: the same."
+    return (_picture("ratios", caption, partial(ratios_chart, rows)),)
+
+
+def forest_chart(parameters: Sequence[ParameterDifference]) -> Chart:
+    """A panel for every group of one unit."""
+    groups: dict[str, list[ParameterDifference]] = {}
+    for p in parameters:
+        groups.setdefault(p.id, []).append(p)
+    # Groups differ in size: the larger ones would squeeze the smaller to a point on one axis.
+    panels = [_forest(GROUPS.get(name, name), members) for name, members in groups.items()]
+    return Chart(tuple(panels), columns=min(3, len(panels)))
+
+
+def _forest(title: str, members: list[ParameterDifference]) -> Panel:
+    scale, unit = in_print(members[0])
+    value = scale * np.array([p.difference for p in members])
+    sigma = scale * np.array([p.std for p in members])
+    place = -np.arange(1.0, len(members) + 1.0)
+    told = [
+        f"{named(p)}: recording − model {with_sigma(v, s)} {unit}".strip()
+        for p, v, s in zip(members, value, sigma, strict=True)
+    ]
+    colour: Colour = "accent" if members[0].significant else "c1"
+    name = "differs" if members[0].significant else "agrees"
+    dots = Points(value, place, told, TWO_SIGMA * sigma, f"recording, {name}", colour, is_across=True)
+    x = Scale(f"recording − model [{unit}]" if unit else "recording − model", unit, includes=(0.0,))
+    names = tuple(p.name.upper() if len(p.name) < 3 else p.name for p in members)
+    height = ROW_PX * len(members) + ROW_PX
+    return Panel(x, Scale("", names=names), (Level(x=0.0, name="model"), dots), title=title, height_px=height)
+
+
+def ratios_chart(rows: Sequence[NoiseDifference]) -> Chart:
+    """A row a term and axis, on one logarithmic axis."""
+    place = -np.arange(1.0, len(rows) + 1.0)
+    ratio = np.array([n.ratio for n in rows], dtype=np.float64)
+    ends = np.array([n.interval or (math.nan, math.nan) for n in rows])
+    x = np.column_stack([ends, np.full(len(rows), math.nan)]).ravel()
+    marks: list[Mark] = [Level(x=1.0, name="the same"), Line(x, np.repeat(place, 3), "", "soft")]
+    names = tuple(_row_name(n) for n in rows)
+    for is_other, name, colour in ((False, "agrees", "c1"), (True, "differs", "accent")):
+        picked = np.array([bool(n.significant) == is_other for n in rows])
+        if np.any(picked):
+            told = [_ratio_words(n, name) for n, is_picked in zip(rows, picked, strict=True) if is_picked]
+            marks.append(Points(ratio[picked], place[picked], told, None, name, colour))  # type: ignore[arg-type]
+    seen = np.concatenate([ratio, ends[np.isfinite(ends) & (ends > 0.0)], [0.5, 2.0]])
+    limits = (float(seen.min()) / 1.15, float(seen.max()) * 1.15)
+    along = Scale("model / recording", is_log=True, limits=limits)
+    return Chart((Panel(along, Scale("", names=names), tuple(marks), height_px=20 * len(rows) + ROW_PX),))
+
+
+def _row_name(n: NoiseDifference) -> str:
+    sensor = {"gyroscope": "gyro", "accelerometer": "accel", "both": "sampling"}[n.sensor]
+    return " ".join(part for part in (sensor, n.axis, n.term) if part)
+
+
+def _ratio_words(n: NoiseDifference, name: str) -> str:
+    both = [f"{plain_number(v)}" for v in (n.model, n.recording) if v is not None]
+    unit = unit_in_print(n.unit)
+    beside = f" (model {both[0]}, recording {both[1]} {unit})" if len(both) > 1 else ""
+    assert n.ratio is not None
+    return f"{_row_name(n)}: {plain_number(n.ratio)}{beside}, {name}"
+
+
+def traces_picture(recording: Recording, simulated: Recording, segments: Segments) -> Picture | None:
+    """Simulated over recorded readings where they lie farthest apart."""
+    chart = traces_chart(recording, simulated, segments)
+    if chart is None:
+        return None
+    caption = "Readings of the recording and of the simulation moved as it was, where the two lie farthest apart."
+    return _picture("traces", caption, lambda: chart)
+
+
+def traces_chart(recording: Recording, simulated: Recording, segments: Segments) -> Chart | None:
+    """A panel a sensor: the axis that differs most, in the move or pose where both sensors differ most together."""
+    sides = _both_sides(recording, simulated, segments)
+    if not sides:
+        return None
+    time_s = recording.time_s
+    parts = [(m.start, m.stop, f"move {k}") for k, m in enumerate(segments.moves, 1)]
+    parts += [(p.start, p.stop, f"pose {k}") for k, p in enumerate(segments.poses, 1)]
+    parts = [(a, b, name) for a, b, name in parts if b > a]
+    if not parts:
+        return None
+    score = [sum(float(np.nanmean(apart[a:b] ** 2)) for _, _, _, apart in sides) for a, b, _ in parts]
+    first, stop, name = parts[int(np.nanargmax(score))]
+    middle = 0.5 * (time_s[first] + time_s[min(stop, recording.n_samples) - 1])
+    window = np.flatnonzero(np.abs(time_s - middle) <= WINDOW_S / 2.0)
+    panels = []
+    for sensor, (mine, unit), theirs, apart in sides:
+        axis = int(np.nanargmax(np.nanmean(apart[first:stop] ** 2, axis=0)))
+        lines = (
+            Line(*envelope(time_s[window], mine[window, axis]), "recording", "accent"),
+            Line(*envelope(time_s[window], theirs[window, axis]), "simulation", "ink", is_dashed=True),
+        )
+        x = Scale("time [s]", "s", limits=(float(time_s[window[0]]), float(time_s[window[-1]])))
+        title = f"{sensor} {'XYZ'[axis]}, about {name}"
+        panels.append(Panel(x, Scale(f"reading [{unit}]", unit), lines, title=title, height_px=190))
+    return Chart(tuple(panels), columns=len(panels), is_linked=True)
+
+
+Side = tuple[str, tuple[FloatArray, str], FloatArray, FloatArray]
+"""Sensor; readings (n, 3) of the recording and their unit; the simulation's at the same times; their difference over
+the recording's noise."""
+
+
+def _both_sides(recording: Recording, simulated: Recording, segments: Segments) -> list[Side]:
+    """Sensors that both have in one unit."""
+    out: list[Side] = []
+    mine_s, theirs_s = (log.time_s - log.time_s[0] for log in (recording, simulated))
+    for name, sigma in (("accelerometer", segments.accelerometer_sigma), ("gyroscope", segments.gyroscope_sigma)):
+        mine, theirs = getattr(recording, name), getattr(simulated, name)
+        unit = getattr(recording, f"{name}_unit")
+        if mine is None or theirs is None or sigma is None or unit is not getattr(simulated, f"{name}_unit"):
+            continue
+        at = np.column_stack([np.interp(mine_s, theirs_s, theirs[:, k]) for k in range(3)])
+        at[mine_s > theirs_s[-1]] = math.nan
+        noise = np.where(np.asarray(sigma) > 0.0, sigma, 1.0)
+        said = "gyro" if name == "gyroscope" else name
+        out.append((said, (mine, unit_in_print(unit.value)), at, (mine - at) / noise))
+    return out
+
+
+def _picture(name: str, caption: str, chart: partial[Chart] | object) -> Picture:
+    return Picture(name, caption, later("chart_figures", "draw_chart", chart), chart)  # type: ignore[arg-type]

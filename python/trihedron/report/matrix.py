@@ -1,0 +1,40 @@
+"""Correlations as a triangle of cells."""
+
+from __future__ import annotations
+
+from html import escape
+
+from trihedron.report.chart import Matrix
+
+CELL = 10
+NAMES = 62
+"""Room for the names, in units of which a cell has ten."""
+SEEN = 0.05
+"""A correlation below it leaves its cell empty."""
+
+
+def drawn_matrix(matrix: Matrix, caption: str) -> str:
+    """Rows and columns in one order, a cell a pair, names beside the rows and at the end of the columns."""
+    n = len(matrix.names)
+    cells, words = [], []
+    for i, name in enumerate(matrix.names):
+        words.append(f'<text class="row" x="-3" y="{CELL * i + 7.5}">{escape(name)}</text>')
+        words.append(
+            f'<text class="col" transform="translate({CELL * i + 3} {CELL * i - 2})rotate(-45)">{escape(name)}</text>'
+        )
+        for j in range(i):
+            r = float(matrix.values[i, j])
+            if abs(r) >= SEEN:
+                told = f"{name} and {matrix.names[j]}: {r:+.2f}".replace("-", "−")
+                side = "pos" if r > 0.0 else "neg"
+                cells.append(
+                    f'<path class="cell {side}" data-t="{escape(told)}" fill-opacity="{abs(r):.2f}" '
+                    f'd="M{CELL * j} {CELL * i}h9v9h-9z"/>'
+                )
+    frame = "".join(f"M0 {CELL * i + 9.5}H{CELL * i + 9}" for i in range(n))
+    box = f"{-NAMES} -34 {CELL * n + NAMES + 30} {CELL * n + 38}"
+    return (
+        f'<div class="matrix"><div class="ptitle">{escape(matrix.title)}</div>'
+        f'<svg role="img" aria-label="{escape(f"{matrix.title}: {caption}")}" viewBox="{box}">'
+        f'<path class="rim" d="{frame}"/>{"".join(cells)}{"".join(words)}</svg></div>'
+    )
