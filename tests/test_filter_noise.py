@@ -30,10 +30,10 @@ def still(m=60):
     """A stretch of a body that does not turn: means over blocks of a second, nothing constant but the start."""
     time, eye = np.arange(m) + 0.5, np.eye(3)
     steps = bias_steps(time[:, None, None] * eye)
-    noise = np.kron(accumulated(np.ones(m)) - np.eye(m) / 6.0, eye)
+    noise = accumulated(np.ones(m)) - np.eye(m) / 6.0
     return Stretch(
         time, np.zeros(3 * m), np.tile(0.1 * eye, (m, 1)), np.zeros(3),
-        (noise, 0 * noise, walked(steps), np.eye(3 * m)), steps, None, eye, None, np.zeros(m),
+        (noise, 0 * noise, np.eye(m)), walked(steps), steps, None, eye, None, np.zeros(m),
     )  # fmt: skip
 
 
@@ -49,11 +49,11 @@ def drawn(seed, m=60):
 
 def test_covariances_are_those_of_the_processes():
     # Written out: a walk's block mean has a variance of t_start + h/3, a later one t_mid in common with it.
-    noise = still(4).walks[0][::3, ::3]
+    noise = still(4).alike[0]
     assert noise[2, 2] == pytest.approx(2.0 + 1.0 / 3.0)
     assert noise[1, 3] == pytest.approx(1.5)
     # A bias that steps by one at each of three blocks' starts (the first begins at its middle): 2 s, 1.5 s, 0.5 s.
-    assert still(3).walks[2][::3, ::3][2, 2] == pytest.approx(2.0**2 + 1.5**2 + 0.5**2)
+    assert still(3).bias_walk[::3, ::3][2, 2] == pytest.approx(2.0**2 + 1.5**2 + 0.5**2)
     assert matern(np.array([0.0, 1e-9, 50.0]), 1.0) == pytest.approx([1.0, 1.0, 0.0], abs=1e-9)
 
 

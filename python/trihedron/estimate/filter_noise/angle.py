@@ -77,21 +77,20 @@ def _stretch(table: dict[str, FloatArray], at: slice, h: float, centre: FloatArr
     start = np.tile(START_RAD * np.eye(3), (m, 1))
     columns = np.hstack([table["columns"][at].reshape(3 * m, -1), start])
     steps = bias_steps(table["bias"][at])
-    eye = np.eye(3)
     quiet, shaken = np.full(m, h), h * table["power"][at]
     # A mean over a block of a walk has a third of the block's variance, and not half.
-    noise, vibration = (np.kron(accumulated(q) - np.diag(q) / 6.0, eye) for q in (quiet, shaken))
-    C = table["attitude"][at]
+    noise, vibration = (accumulated(q) - np.diag(q) / 6.0 for q in (quiet, shaken))
     return Stretch(
         time_s=time,
         observed=table["angle"][at].ravel(),
         columns=columns,
         centre=np.concatenate([centre, np.zeros(3)]),
-        walks=(noise, vibration, h * walked(steps), np.diag(np.repeat(table["white"][at], 3))),
+        alike=(noise, vibration, np.diag(table["white"][at])),
+        bias_walk=h * walked(steps),
         bias_steps=steps,
         slow=None,
-        plane=eye,
-        turned=np.einsum("kij,lmj->kilm", C, C).reshape(3 * m, 3 * m),
+        plane=np.eye(3),
+        attitude=table["attitude"][at],
         power=table["power"][at],
     )
 

@@ -170,7 +170,7 @@ def consistency(
         plain = np.zeros(len(NAMES))
         plain[[0, 2]] = static.N.filter_value, static.K.filter_value
         # Of a path only means are compared: its white error cannot be none, and is what it is.
-        plain[3] = 0.0 if held[0][0].turned is not None else taught.mode[3]
+        plain[3] = 0.0 if held[0][0].attitude is not None else taught.mode[3]
         beside = errors_over(held, plain[None], horizon_s)
     return Consistency(
         horizon_s,

@@ -7,6 +7,7 @@ matrices, each with one strength; those of slow errors change with a time consta
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,30 +19,40 @@ AnyFloats = np.ndarray[Any, np.dtype[Any]]
 
 NAMES = ("noise", "vibration", "bias_walk", "white", "world", "world_s", "body", "body_s")
 """Strengths of a stretch, in this order."""
+ALIKE = ("noise", "vibration", "white")
+"""Those whose errors have the same size along every axis."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
     """Observations ``observed`` (3 m,) at ``time_s`` (m,), columns (3 m, p) in units of their prior, p standard normal.
 
-    ``centre`` (p,) is where that prior stands; ``walks`` the covariances (3 m, 3 m) of noise, vibration, bias walk and
-    white error of the reference for strength one; ``slow`` (m, m) integrates a slow error of the world, which ``plane``
-    (3, 3) turns into the observation; ``turned`` (3 m, 3 m) holds the bodies' attitudes to one another, or None;
-    ``bias_steps`` (3 m, 3 m) is what a bias of each block does to the observations.
+    ``centre`` (p,) is where that prior stands; ``alike`` the covariances (m, m), the same along every axis, of noise,
+    vibration and white error of the reference for strength one, ``bias_walk`` (3 m, 3 m) that of a bias that walks;
+    ``slow`` (m, m) integrates a slow error of the world, which ``plane`` (3, 3) turns into the observation;
+    ``attitude`` (m, 3, 3) is the body's, None where the reference's body has no error of its own; ``bias_steps``
+    (3 m, 3 m) is what a bias of each block does to the observations; ``power`` (m,) the vibration's, mean one.
     """
 
     time_s: FloatArray
     observed: FloatArray
     columns: FloatArray
     centre: FloatArray
-    walks: tuple[AnyFloats, ...]
+    alike: tuple[AnyFloats, ...]
+    bias_walk: AnyFloats
     bias_steps: FloatArray
     slow: FloatArray | None
     plane: FloatArray
-    turned: FloatArray | None
+    attitude: FloatArray | None
     power: FloatArray
 
-    @property
+    @cached_property
+    def turned(self) -> FloatArray:
+        """(m, 3, m, 3) the bodies' attitudes to one another."""
+        assert self.attitude is not None
+        return np.einsum("kij,lmj->kilm", self.attitude, self.attitude)
+
+    @cached_property
     def lag_s(self) -> FloatArray:
         """(m, m) between the observations."""
         return np.abs(np.subtract.outer(self.time_s, self.time_s))
@@ -49,17 +60,18 @@ class Stretch:
     def covariance(self, strengths: FloatArray) -> FloatArray:
         """(3 m, 3 m) of everything random, under strengths (8,) in SI, a zero being none."""
         s = dict(zip(NAMES, strengths, strict=True))
-        out = np.zeros_like(self.walks[0])
-        for name, basis in zip(NAMES[:4], self.walks, strict=True):
-            if s[name] > 0.0:
-                out += s[name] ** 2 * basis
-        if s["world"] > 0.0:
-            kernel = s["world"] ** 2 * matern(self.lag_s, s["world_s"])
-            if self.slow is not None:
-                kernel = self.slow @ kernel @ self.slow.T
-            out += np.kron(kernel, self.plane)
-        if self.turned is not None and s["body"] > 0.0:
-            out += np.kron(s["body"] ** 2 * matern(self.lag_s, s["body_s"]), np.ones((3, 3))) * self.turned
+        m = len(self.time_s)
+        out = s["bias_walk"] ** 2 * self.bias_walk
+        parted = out.reshape(m, 3, m, 3)
+        if self.attitude is not None and s["body"] > 0.0:
+            kernel = s["body"] ** 2 * matern(self.lag_s, s["body_s"])
+            parted += kernel[:, None, :, None] * self.turned
+        same = sum(s[name] ** 2 * basis for name, basis in zip(ALIKE, self.alike, strict=True))
+        slow = s["world"] ** 2 * matern(self.lag_s, s["world_s"])
+        if self.slow is not None:
+            slow = self.slow @ slow @ self.slow.T
+        for i, j in np.ndindex(3, 3):
+            parted[:, i, :, j] += self.plane[i, j] * slow + (same if i == j else 0.0)
         return out
 
     def evidence(self, strengths: FloatArray) -> float:
@@ -91,10 +103,11 @@ class Stretch:
             time_s=self.time_s[at],
             observed=self.observed[rows],
             columns=self.columns[rows],
-            walks=tuple(walk[rows, rows] for walk in self.walks),
+            alike=tuple(basis[at, at] for basis in self.alike),
+            bias_walk=self.bias_walk[rows, rows],
             bias_steps=self.bias_steps[rows],
             slow=None if self.slow is None else self.slow[at, at],
-            turned=None if self.turned is None else self.turned[rows, rows],
+            attitude=None if self.attitude is None else self.attitude[at],
             power=self.power[at],
         )
 
@@ -104,7 +117,7 @@ class Stretch:
         h = float(np.median(np.diff(self.time_s)))
         lag = np.abs(np.subtract.outer(np.arange(steps), np.arange(steps))) * h
         kernel = np.kron(np.exp(-lag / correlation_time_s), np.eye(3))
-        return replace(self, walks=(*self.walks[:2], self.bias_steps @ kernel @ self.bias_steps.T, self.walks[3]))
+        return replace(self, bias_walk=self.bias_steps @ kernel @ self.bias_steps.T)
 
 
 def matern(lag_s: FloatArray | float, tau_s: FloatArray | float) -> FloatArray:

@@ -65,18 +65,19 @@ def _stretch(
     quiet = np.full(m, h)
     shaken = 0.5 * h * (vibration[1:] + vibration[:-1])
     eye = np.eye(3)
-    noise, shakes = (np.kron(_triangular(q), eye) for q in (quiet, shaken))
+    noise, shakes = (_triangular(q) for q in (quiet, shaken))
     # An attitude wrong by e turns gravity by g e: two axes across the vertical, summed over time.
     return Stretch(
         time_s=time[: m * n].reshape(m, n).mean(axis=1) + 0.5 * h,
         observed=observed.ravel(),
         columns=columns,
         centre=np.zeros(columns.shape[1]),
-        walks=(noise, shakes, h * walked(steps), np.kron(2.0 * np.eye(m) - neighbours(m), eye) / h**2),
+        alike=(noise, shakes, (2.0 * np.eye(m) - neighbours(m)) / h**2),
+        bias_walk=h * walked(steps),
         bias_steps=steps,
         slow=h * np.tril(np.ones((m, m))),
         plane=gravity**2 * (eye - np.outer(up, up)),
-        turned=None,
+        attitude=None,
         power=vibration[1:],
     )
 
