@@ -24,14 +24,14 @@ N = int(RATE * SECONDS)
 TRUTH = {"accelerometer": np.tile([0.0, 0.0, G], (N, 1)), "gyroscope": np.zeros((N, 3))}
 
 
-def walk(rng, step, keep=1.0):
-    """b[k] = keep b[k-1] + N(0, step²), from zero."""
+def walk(rng, n, step, keep=1.0):
+    """(n, 3): b[k] = keep b[k-1] + N(0, step²), from zero."""
     from scipy.signal import lfilter
 
-    return lfilter([1.0], [1.0, -keep], step * rng.standard_normal((N, 3)), axis=0)
+    return lfilter([1.0], [1.0, -keep], step * rng.standard_normal((n, 3)), axis=0)
 
 
-def gazebo(text, rng):
+def gazebo(text, rng, truth):
     root = ElementTree.fromstring(text)
     dt = 1.0 / float(root.find("update_rate").text)
     out = {}
@@ -41,13 +41,13 @@ def gazebo(text, rng):
             p = {one.tag: float(one.text) for one in root.find(f"imu/{element}/{axis}/noise")}
             tau, sigma = p["dynamic_bias_correlation_time"], p["dynamic_bias_stddev"]
             step = np.sqrt(-(sigma**2) * tau / 2 * np.expm1(-2 * dt / tau))
-            slow = walk(rng, step, np.exp(-dt / tau))[:, 0]
-            columns.append(slow + rng.normal(p["mean"], p["stddev"], N))
-        out[name] = TRUTH[name] + np.array(columns).T
+            slow = walk(rng, len(truth[name]), step, np.exp(-dt / tau))[:, 0]
+            columns.append(slow + rng.normal(p["mean"], p["stddev"], len(slow)))
+        out[name] = truth[name] + np.array(columns).T
     return out
 
 
-def gnss_ins_sim(text, rng):
+def gnss_ins_sim(text, rng, truth):
     scope: dict = {}
     exec(text, scope)
     e, dt = scope["imu_err"], 1.0 / scope["FS"]
@@ -58,8 +58,8 @@ def gnss_ins_sim(text, rng):
     }
     out = {}
     for name, (b, drift, white, corr) in sizes.items():
-        slow = walk(rng, dt * drift, 1 - dt / e[corr][0])
-        out[name] = TRUTH[name] + b + slow + white / np.sqrt(dt) * rng.standard_normal((N, 3))
+        slow = walk(rng, len(truth[name]), dt * drift, 1 - dt / e[corr][0])
+        out[name] = truth[name] + b + slow + white / np.sqrt(dt) * rng.standard_normal(truth[name].shape)
     return out
 
 
@@ -69,35 +69,35 @@ def matlab(text, name):
     return {key: np.array([float(v) for v in re.findall(r"[-+\d.e]+", value)]) for key, value in found.items()}
 
 
-def imusensor(text, rng):
+def imusensor(text, rng, truth):
     out = {}
     for attribute, name in (("Accelerometer", "accelerometer"), ("Gyroscope", "gyroscope")):
         p = matlab(text, attribute)
         A = p["AxesMisalignment"].reshape(3, 3) / 100.0
-        white = p["NoiseDensity"] * np.sqrt(RATE) * rng.standard_normal((N, 3))
-        out[name] = TRUTH[name] @ A.T + p["ConstantBias"] + white + walk(rng, p["RandomWalk"] / np.sqrt(RATE))
+        white = p["NoiseDensity"] * np.sqrt(RATE) * rng.standard_normal(truth[name].shape)
+        out[name] = truth[name] @ A.T + p["ConstantBias"] + white + walk(rng, len(truth[name]), p["RandomWalk"] / np.sqrt(RATE))
     return out
 
 
-def airsim(text, rng):
+def airsim(text, rng, truth):
     s, dt = json.loads(text)["Sensors"]["Imu"], 1.0 / RATE
     gyro = np.radians(s["AngularRandomWalk"]) / 60, np.radians(s["GyroBiasStability"]) / 3600, s["GyroBiasStabilityTau"]
     accel = 9.80665e-3 * s["VelocityRandomWalk"], 9.80665e-6 * s["AccelBiasStability"], s["AccelBiasStabilityTau"]
     out = {}
     for name, (white, stability, tau) in (("gyroscope", gyro), ("accelerometer", accel)):
-        slow = walk(rng, stability / np.sqrt(tau) * np.sqrt(dt))
-        out[name] = TRUTH[name] + white / np.sqrt(dt) * rng.standard_normal((N, 3)) + slow
+        slow = walk(rng, len(truth[name]), stability / np.sqrt(tau) * np.sqrt(dt))
+        out[name] = truth[name] + white / np.sqrt(dt) * rng.standard_normal(truth[name].shape) + slow
     return out
 
 
-def mvsim(text, rng):
+def mvsim(text, rng, truth):
     p = {one.tag: float(one.text) for one in ElementTree.fromstring(text)}
     dt = p["sensor_period"]
     words = {"gyroscope": "angular_velocity", "accelerometer": "linear_acceleration"}
     return {
-        name: TRUTH[name]
-        + walk(rng, p[f"{word}_random_walk_std_noise"] * np.sqrt(dt))
-        + p[f"{word}_white_noise_std_noise"] * rng.standard_normal((N, 3))
+        name: truth[name]
+        + walk(rng, len(truth[name]), p[f"{word}_random_walk_std_noise"] * np.sqrt(dt))
+        + p[f"{word}_white_noise_std_noise"] * rng.standard_normal(truth[name].shape)
         for name, word in words.items()
     }
 
@@ -109,7 +109,7 @@ LAWS = {"gazebo": gazebo, "gnss-ins-sim": gnss_ins_sim, "imusensor": imusensor, 
 def test_the_simulators_own_law_gives_the_noise_of_the_unit(target):
     known = calibration("si")
     text = export_files(known, target, OPTIONS)[""]
-    made = LAWS[target](text, np.random.default_rng(7))
+    made = LAWS[target](text, np.random.default_rng(7), TRUTH)
     log = {"t": np.arange(N) / RATE, "acc": made["accelerometer"], "gyr": made["gyroscope"]}
     noise = trihedron.noise(trihedron.read(log, accelerometer_unit="m/s^2", gyroscope_unit="rad/s"))
     for axis in noise.axes:
