@@ -280,11 +280,11 @@ def test_the_scale_does_not_depend_on_how_long_the_moves_last(duration_s):
 def test_biases_that_do_not_walk_leave_no_walk_beyond_the_noise_of_their_means():
     shares = []
     for seed in range(3):
-        recording, truth = simulate(scenario(hand_session(18, pose_s=3.0, layout=seed)), seed=seed)
+        recording, truth = simulate(scenario(hand_session(60, pose_s=2.0, layout=seed)), seed=seed)
         segments = segments_from_truth(recording, truth)
         measured = measure_moves(recording, segments, given_accelerometer(truth), 0)
         var_mean = np.median(segments.gyroscope_sigma_mean**2, axis=0)
         shares.append(measured.var_bias_walk / (2.0 * var_mean))
-    # Of 17 differences a median tells the variance to 0.45 of itself, and half of them are cut at zero: a mean of nine
-    # of 0.18, known to 0.09. Noise taken for walk would be one.
-    assert np.mean(shares) < 0.5
+    # Of 59 differences a median tells their variance to 0.24 of itself: nine shares about zero, cut there, have a mean
+    # of 0.1 to 0.4. Noise taken for walk would be one at least.
+    assert np.mean(shares) < 0.7
