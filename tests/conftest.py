@@ -53,3 +53,9 @@ def stages_write_no_words(monkeypatch):
         return asked(code, case, severity, values)
 
     monkeypatch.setattr(catalogue, "words_of", words_of)
+
+
+@pytest.fixture
+def few_simulations(monkeypatch):
+    """Improved scenarios are aimed by two simulations and not by eight: enough where their files are what is tested."""
+    monkeypatch.setattr("trihedron.api.driving.N_SEEDS", 2)

@@ -220,7 +220,12 @@ CALLED_BY_NAME = re.compile(r"^(__\w+__|do_GET|do_POST|log_message|handle_error|
 
 def test_everything_that_is_named_is_used():
     package = list(PACKAGE.rglob("*.py"))
-    beside = [*(ROOT / "tests").rglob("*.py"), *(ROOT / "benches").rglob("*.py"), *(ROOT / "docs").rglob("*.md")]
+    beside = [
+        *PACKAGE.rglob("*.j2"),
+        *(ROOT / "tests").rglob("*.py"),
+        *(ROOT / "benches").rglob("*.py"),
+        *(ROOT / "docs").rglob("*.md"),
+    ]
     used = Counter(re.findall(r"\w+", "\n".join(path.read_text() for path in [*package, *beside])))
     unused = set()
     for path in package:

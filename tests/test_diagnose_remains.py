@@ -9,7 +9,9 @@ import numpy as np
 import trihedron
 from trihedron.diagnose import verdict
 from trihedron.diagnose.effects.table_tilt import _error_of_mean
+from trihedron.diagnose.residuals import goodness_of_fit
 from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
+from trihedron.diagnose.session.twin import STATIC_ACCEL, STATIC_GYRO
 from trihedron.records import Pose
 from trihedron.records.domains import DomainTest
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
@@ -102,3 +104,16 @@ def test_restless_poses_hide_neither_a_scatter_nor_the_g_sensitivity_beside_it()
     G = next(one for one in found.effects if one.id == "gyro-g-sensitivity")
     xx = next(p for p in G.parameters if p.name == "G_xx")
     assert abs(xx.value - np.radians(0.004)) < 4.0 * xx.std + 0.02 * np.radians(0.004)
+
+
+def test_an_effect_that_changes_one_sensor_inside_poses_leaves_the_other_judged(monkeypatch):
+    found = SimpleNamespace(p_value=(0.2, 0.3), ratio=(1.1, 1.2), holds=((), ()))
+    monkeypatch.setattr(goodness_of_fit, "jumps_in_poses", lambda _obs: found)
+    changed = np.zeros((2, 3))
+    for force, rate, accel, gyro in ((changed, None, 1.0, 0.3), (None, changed, 0.2, 1.0), (None, None, 0.2, 0.3)):
+        line = SimpleNamespace(distortion=SimpleNamespace(force=force, rate=rate), obs=SimpleNamespace(time_s=()))
+        line.obs.segments = SimpleNamespace(poses=())
+        p_values = [
+            goodness_of_fit._inside_poses(SimpleNamespace(line=line), k)[0] for k in (STATIC_ACCEL, STATIC_GYRO)
+        ]
+        assert p_values == [accel, gyro]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from trihedron.estimate.gyroscope import MoveOptions, calibrate_moves
+from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.records import FindingCode, SensorCalibration
 from trihedron.segment import segment_recording
 from trihedron.simulate import Accelerometer, Gyroscope, Motion, MoveTo, NoiseTerms, Scenario, hand_session, simulate
@@ -274,3 +275,16 @@ def test_the_scale_does_not_depend_on_how_long_the_moves_last(duration_s):
     pick[[0, 4, 8]] = 1.0 / 3.0
     assert abs(error.mean()) < 3.0 * np.sqrt(pick @ found.covariance @ pick)
     assert np.sqrt(pick @ found.covariance @ pick) < 1e-3
+
+
+def test_biases_that_do_not_walk_leave_no_walk_beyond_the_noise_of_their_means():
+    shares = []
+    for seed in range(3):
+        recording, truth = simulate(scenario(hand_session(60, pose_s=2.0, layout=seed)), seed=seed)
+        segments = segments_from_truth(recording, truth)
+        measured = measure_moves(recording, segments, given_accelerometer(truth), 0)
+        var_mean = np.median(segments.gyroscope_sigma_mean**2, axis=0)
+        shares.append(measured.var_bias_walk / (2.0 * var_mean))
+    # Of 59 differences a median tells their variance to 0.24 of itself: nine shares about zero, cut there, have a mean
+    # of 0.1 to 0.4. Noise taken for walk would be one at least.
+    assert np.mean(shares) < 0.7

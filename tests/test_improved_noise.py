@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.api import driving
 from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, driven, flicker_of_poses
 from trihedron.api.improving import _unlike
 from trihedron.comparison.noise import _are_even
@@ -29,9 +28,7 @@ from trihedron.simulate.profiles import profile_by_name
 RATE = 100.0
 
 
-@pytest.fixture(autouse=True)
-def few_simulations(monkeypatch):
-    monkeypatch.setattr(driving, "N_SEEDS", 2)
+pytestmark = pytest.mark.usefixtures("few_simulations")
 
 
 @pytest.mark.parametrize(

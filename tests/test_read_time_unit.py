@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from test_read import HEADER, finding, write
-from trihedron.read import read_recording
+from trihedron.read import ReadError, read_recording
+from trihedron.read.clock.unit import parse_time_unit, seconds_of
 from trihedron.records import FindingCode, Severity
 
 
@@ -79,3 +80,16 @@ def test_a_cycle_of_temperature_tells_microseconds_from_nanoseconds(tmp_path):
     table = np.column_stack([log(2.0, 1e-6, n), 25 + 45 * np.sin(2 * np.pi * np.arange(n) / n)])
     recording = read_recording(write(tmp_path / "log.csv", table, HEADER.replace("gz\n", "gz,temperature\n")))
     assert recording.rate_hz == pytest.approx(2.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("word", ["0 us", "0 Hz", "0.0 ms", "-1 ms", "furlong", "inf s"])
+def test_a_tick_without_a_length_is_no_time_unit(word):
+    with pytest.raises(ReadError, match="is not a time unit"):
+        parse_time_unit(word)
+
+
+@pytest.mark.parametrize(
+    ("word", "seconds"), [("32768 Hz", 1.0 / 32768.0), ("2 kHz", 0.5e-3), ("25 us", 25e-6), ("µs", 1e-6), ("2 s", 2.0)]
+)
+def test_a_unit_of_time_lasts_what_it_says(word, seconds):
+    assert seconds_of(parse_time_unit(word)) == pytest.approx(seconds, rel=1e-15)

@@ -198,12 +198,12 @@ def test_a_forked_child_computes_what_its_parent_computes():
 MANY = pytest.mark.slow
 
 
-@pytest.mark.parametrize("count", [300, pytest.param(4000, marks=MANY)])
+@pytest.mark.parametrize("count", [100, pytest.param(4000, marks=MANY)])
 def test_mutated_inputs_are_taken_or_refused_in_a_sentence(count):
     assert _failures("from attacks.inputs import Inputs as Attack", f"range({count})") == "[]"
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(300, marks=MANY)])
+@pytest.mark.parametrize("count", [8, pytest.param(300, marks=MANY)])
 def test_command_lines_end_with_a_status_and_a_sentence(count):
     assert _failures("from attacks.commands import Commands as Attack", f"range({count})") == "[]"
 
