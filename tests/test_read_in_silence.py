@@ -429,3 +429,23 @@ def test_the_time_since_the_row_before_is_summed(tmp_path, name, per_s):
 )
 def test_sensors_are_known_in_the_languages_of_loggers(acceleration, rate):
     assert [parse_name(f"{acceleration} X").role, parse_name(f"{rate}_z [°/s]").role] == ["accelerometer", "gyroscope"]
+
+
+@pytest.mark.parametrize(
+    ("name", "per_s"),
+    [("ticks (1/32768 s)", 32768.0), ("t [25 us]", 4e4), ("time [min]", 1 / 60), ("Zeit (h)", 1 / 3600)],
+)
+def test_the_size_of_a_tick_in_a_name_is_obeyed(tmp_path, name, per_s):
+    t, force, rate = motion(rate_hz=128.0)
+    log = written(tmp_path / "log.csv", *table(t * per_s, force, rate), header=HEADER.replace("t,", f"{name},", 1))
+    assert read_recording(log).rate_hz == pytest.approx(128.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("bracket", ["[0.061 mg/LSB]", "[mg/digit]", "[1/16384 g]", "[+-2 g]"])
+def test_the_size_of_a_count_or_a_range_in_a_name_is_no_unit_of_the_readings(tmp_path, bracket):
+    t, force, rate = motion()
+    columns = (list(t), *(np.rint(c / G * 16384).astype(int).tolist() for c in force.T), *map(list, rate.T))
+    names = ",".join(f"a{a} {bracket}" for a in "xyz")
+    recording = read_recording(written(tmp_path / "log.csv", *columns, header=f"t,{names},gx,gy,gz"))
+    assert recording.accelerometer_unit is AccelerationUnit.COUNTS
+    assert not serious(recording)
