@@ -449,3 +449,19 @@ def test_the_size_of_a_count_or_a_range_in_a_name_is_no_unit_of_the_readings(tmp
     recording = read_recording(written(tmp_path / "log.csv", *columns, header=f"t,{names},gx,gy,gz"))
     assert recording.accelerometer_unit is AccelerationUnit.COUNTS
     assert not serious(recording)
+
+
+@pytest.mark.parametrize("offset_s", [0.0, 0.005])
+@pytest.mark.parametrize("burst", [1, 10])
+def test_devices_that_no_column_tells_apart_are_split_by_their_turn_where_no_row_is_missing(tmp_path, offset_s, burst):
+    t, *first = motion(seed=1)
+    _, *second = motion(seed=2)
+    rows = [np.column_stack([t, *first]), np.column_stack([t + offset_s, *second])]
+    both = np.stack([r.reshape(-1, burst, 7) for r in rows], axis=1).reshape(-1, 7)
+    log = written(tmp_path / "log.csv", *both.T.tolist())
+    assert FindingCode.DEVICES_INTERLEAVED in serious(read_recording(log))
+    recording = read_recording(log, instance=2)
+    np.testing.assert_allclose(recording.accelerometer, second[0], atol=1e-5)
+    assert not serious(recording)
+    with pytest.raises(ReadError, match="some are missing"):
+        read_recording(written(tmp_path / "lost.csv", *np.delete(both, 2000, axis=0).T.tolist()), instance=2)
