@@ -465,3 +465,12 @@ def test_devices_that_no_column_tells_apart_are_split_by_their_turn_where_no_row
     assert not serious(recording)
     with pytest.raises(ReadError, match="some are missing"):
         read_recording(written(tmp_path / "lost.csv", *np.delete(both, 2000, axis=0).T.tolist()), instance=2)
+
+
+def test_a_counter_of_a_byte_says_that_its_loss_is_the_least(tmp_path):
+    t, force, rate = motion()
+    kept = np.r_[0:800, 800 + 4 * 256 + 60 : len(t)]
+    count = [int(k) % 256 for k in kept]
+    log = written(tmp_path / "log.csv", *table(t[kept], force[kept], rate[kept])[1:], count, header=f"{HEADER[2:]},seq")
+    (lost,) = [f for f in read_recording(log, rate_hz=100.0).findings if f.code is FindingCode.SAMPLES_LOST]
+    assert "at least 60 samples" in lost.seen
