@@ -429,3 +429,48 @@ def test_the_time_since_the_row_before_is_summed(tmp_path, name, per_s):
 )
 def test_sensors_are_known_in_the_languages_of_loggers(acceleration, rate):
     assert [parse_name(f"{acceleration} X").role, parse_name(f"{rate}_z [°/s]").role] == ["accelerometer", "gyroscope"]
+
+
+@pytest.mark.parametrize(
+    ("name", "per_s"),
+    [("ticks (1/32768 s)", 32768.0), ("t [25 us]", 4e4), ("time [min]", 1 / 60), ("Zeit (h)", 1 / 3600)],
+)
+def test_the_size_of_a_tick_in_a_name_is_obeyed(tmp_path, name, per_s):
+    t, force, rate = motion(rate_hz=128.0)
+    log = written(tmp_path / "log.csv", *table(t * per_s, force, rate), header=HEADER.replace("t,", f"{name},", 1))
+    assert read_recording(log).rate_hz == pytest.approx(128.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("bracket", ["[0.061 mg/LSB]", "[mg/digit]", "[1/16384 g]", "[+-2 g]"])
+def test_the_size_of_a_count_or_a_range_in_a_name_is_no_unit_of_the_readings(tmp_path, bracket):
+    t, force, rate = motion()
+    columns = (list(t), *(np.rint(c / G * 16384).astype(int).tolist() for c in force.T), *map(list, rate.T))
+    names = ",".join(f"a{a} {bracket}" for a in "xyz")
+    recording = read_recording(written(tmp_path / "log.csv", *columns, header=f"t,{names},gx,gy,gz"))
+    assert recording.accelerometer_unit is AccelerationUnit.COUNTS
+    assert not serious(recording)
+
+
+@pytest.mark.parametrize("offset_s", [0.0, 0.005])
+@pytest.mark.parametrize("burst", [1, 10])
+def test_devices_that_no_column_tells_apart_are_split_by_their_turn_where_no_row_is_missing(tmp_path, offset_s, burst):
+    t, *first = motion(seed=1)
+    _, *second = motion(seed=2)
+    rows = [np.column_stack([t, *first]), np.column_stack([t + offset_s, *second])]
+    both = np.stack([r.reshape(-1, burst, 7) for r in rows], axis=1).reshape(-1, 7)
+    log = written(tmp_path / "log.csv", *both.T.tolist())
+    assert FindingCode.DEVICES_INTERLEAVED in serious(read_recording(log))
+    recording = read_recording(log, instance=2)
+    np.testing.assert_allclose(recording.accelerometer, second[0], atol=1e-5)
+    assert not serious(recording)
+    with pytest.raises(ReadError, match="some are missing"):
+        read_recording(written(tmp_path / "lost.csv", *np.delete(both, 2000, axis=0).T.tolist()), instance=2)
+
+
+def test_a_counter_of_a_byte_says_that_its_loss_is_the_least(tmp_path):
+    t, force, rate = motion()
+    kept = np.r_[0:800, 800 + 4 * 256 + 60 : len(t)]
+    count = [int(k) % 256 for k in kept]
+    log = written(tmp_path / "log.csv", *table(t[kept], force[kept], rate[kept])[1:], count, header=f"{HEADER[2:]},seq")
+    (lost,) = [f for f in read_recording(log, rate_hz=100.0).findings if f.code is FindingCode.SAMPLES_LOST]
+    assert "at least 60 samples" in lost.seen

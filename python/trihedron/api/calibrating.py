@@ -148,9 +148,14 @@ def calibrate(
             )
         wanted = frame or "lower"
         options = MoveOptions(nominal_scale=gyroscope_nominal)
-        calibration = _by_poses(
-            recording, segments, gravity, source, method, wanted, axis_signs, loss, options, turns_deg
-        )
+        try:
+            calibration = _by_poses(
+                recording, segments, gravity, source, method, wanted, axis_signs, loss, options, turns_deg
+            )
+        except RefusedError as error:
+            # What is wrong with the log comes before what its fit ran into.
+            grave = [finding.seen for finding in recording.findings if finding.severity is Severity.SERIOUS]
+            raise RefusedError(" ".join((*grave, str(error)))) from None
     calibration = in_frame(with_bending(calibration, segments), wanted)
     findings = (*said, *recording.findings, *_as_they_weigh(segments), *_of_fit(calibration, recording, segments))
     return _result(calibration, findings, segments, recording)

@@ -18,6 +18,8 @@ from trihedron.records.words import words as phrase
 
 MAX_DEVICES = 16
 MAX_ROWS = 50_000
+LONGEST_BURST = 256
+"""Rows of one device at a stretch that several may write in turn."""
 _DEVICE_NAMES = frozenset(
     {
         "i",
@@ -77,11 +79,17 @@ def pick_kind(words: list[str], kind: str) -> str | None:
 
 
 def one_device(
-    table: Table, choice: Choice, used: set[int], device: int | None = None, readings: tuple[int, ...] = ()
+    table: Table,
+    choice: Choice,
+    used: set[int],
+    device: int | None = None,
+    readings: tuple[int, ...] = (),
+    time: int | None = None,
 ) -> Table:
     """The rows of one device, where a column tells several apart: ``device``, or one of those not ``used``, by
     its name, or because the
-    ``readings`` of its devices take turns. Devices that take turns and no column that says so are a serious finding.
+    ``readings`` of its devices take turns, in the order of ``time`` where there is one. Devices that take turns and no
+    column that says so are a serious finding; ``--instance 1`` then takes the first of each turn.
 
     Raises
     ------
@@ -89,10 +97,15 @@ def one_device(
         When there are several and none was chosen, or the chosen one is not there.
     """
     column, words, codes = _device_column(table, used if device is None else set(), device)
-    if column < 0 and (n := _n_in_turn(table, readings)) > 1:
-        column, words, codes = _device_column(table, used, None, lambda codes: bool(np.mean(np.diff(codes) != 0) > 0.5))
+    order = _in_time(table, time, MAX_ROWS)
+    if column < 0 and (n := _n_in_turn(table, readings, order)) > 1:
+        column, words, codes = _device_column(
+            table, used, None, lambda codes: bool(np.mean(np.diff(codes[order]) != 0) > 0.5)
+        )
         if column < 0 and choice.instance is None:
             return replace(table, findings=(*table.findings, Finding.of(FindingCode.DEVICES_INTERLEAVED, n=n)))
+        if column < 0:
+            return _by_turn(table, choice.instance or "", n, time)
     if column < 0:
         if choice.instance is not None:
             raise ReadError(
@@ -128,9 +141,37 @@ def chosen(where: Words, what: str, listed: Words, rows_left_out: int) -> Findin
     )
 
 
-def _n_in_turn(table: Table, readings: tuple[int, ...]) -> int:
-    columns = [table.columns[i][:MAX_ROWS] for i in readings if len(table.columns[i])]
+def _in_time(table: Table, time: int | None, most: int) -> npt.NDArray[np.int64]:
+    """Numbers of the first rows in the order of their time; in that of the file without one, or where it wraps."""
+    as_they_stand = np.arange(min(table.n_rows, most))
+    if time is None or len(table.columns[time]) != table.n_rows:
+        return as_they_stand
+    order = np.argsort(table.columns[time][:most], kind="stable")
+    return order if np.abs(order - as_they_stand).max(initial=0) <= LONGEST_BURST else as_they_stand
+
+
+def _n_in_turn(table: Table, readings: tuple[int, ...], order: npt.NDArray[np.int64]) -> int:
+    columns = [table.columns[i][order] for i in readings if len(table.columns[i])]
     return n_interleaved(np.stack(columns, axis=1)) if columns else 1
+
+
+def _by_turn(table: Table, instance: str, n: int, time: int | None) -> Table:
+    """Every n-th row, where the timestamps say that no turn was left out."""
+    if instance not in [str(k + 1) for k in range(n)]:
+        raise ReadError(f"{table.path}: there is no instance {instance}; rows take turns between {n}, from 1.")
+    order = _in_time(table, time, table.n_rows)
+    if time is not None:
+        step = np.diff(table.columns[time][order])
+        turn_s = float(np.median(step[: len(step) // n * n].reshape(-1, n).sum(axis=1)))
+        if not np.all(np.abs(step[n:] - step[:-n]) < 0.5 * turn_s / n) or len(order) % n:
+            raise ReadError(
+                f"{table.path}: rows take turns between {n} devices, but some are missing, and no column says whose a "
+                "row is; log it, and read with --columns device=COLUMN --instance N."
+            )
+    rows = order[int(instance) - 1 :: n].astype(np.int64)
+    listed = phrase("devices", devices=[(str(k + 1), len(order[k::n])) for k in range(n)])
+    note = chosen(phrase("turns"), instance, listed, table.n_rows - len(rows))
+    return table.take(rows, table.n_in_file, note)
 
 
 def _device_column(

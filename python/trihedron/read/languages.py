@@ -12,8 +12,8 @@ _MEANINGS = {
     "linear acceleration": "线加速度 线性加速度 線形加速度 線加速度",
     "gravity": "schwerkraft gravitat\\w* gravite gravedad gravidade гравит\\w* 重力 重力加速度",
     "magnetometer": "magnetfeld магн\\w* маг 磁场 磁場 磁力计 磁力計 地磁",
-    "acceleration": "beschl\\w* acel\\w* przysp\\w* versnelling\\w* zrychl\\w* akselerasjon akceler\\w* ivme kiihtyvyys gyorsulas "
-    "уск\\w* акс\\w* прискор\\w* 加速度 加速度计 加速度計 加速度センサー? 가속도",
+    "acceleration": "beschl\\w* acel\\w* przysp\\w* versnelling\\w* zrychl\\w* akselerasjon akceler\\w* "
+    "ivme kiihtyvyys gyorsulas уск\\w* акс\\w* прискор\\w* 加速度 加速度计 加速度計 加速度センサー? 가속도",
     "gyro": "dreh dreh(rate|geschw)\\w* winkelgeschw\\w* kreisel\\w* giro\\w* zyro\\w* (hoek|draai)snelheid\\w* "
     "vinkelhastighe[dt] kulmanopeus szogsebesseg гир\\w* ω "
     "角速度 陀螺[仪儀]? ジャイロ 각속도 자이로",

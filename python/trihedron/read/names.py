@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
+from trihedron.read.clock.unit import seconds_of
 from trihedron.read.languages import english, plain
 
 _WORD = re.compile(r"(?:[^\W_²³¹]|°)+")
@@ -35,6 +36,8 @@ _UNIT_BEHIND = re.compile(r"[xyz][ _]([a-zµ°]+/[a-z]+[0-9²]?)$")
 _OTHER_TIMES = frozenset({"min", "minute", "h", "hr", "hour"})
 """Behind what would be a unit of the second: rad/min begins as rad does."""
 _OF_READINGS = frozenset({"unit", "units", "raw", "data", "reading", "readings", "value", "values"})
+_COUNTS = frozenset({"lsb", "digit", "digits", "count", "counts"})
+"""mg/LSB is the size of a count."""
 _RATES = {"p": "x", "q": "y", "r": "z"}
 """An aircraft's names of its angular rates."""
 _TIME_WORDS = {
@@ -122,6 +125,8 @@ class ColumnName:
 def _unit(sensor: str, words: list[str]) -> str:
     """A unit spelled by the words that are left of a name: joined, or word by word."""
     table = _UNIT_OF[sensor]
+    if not _COUNTS.isdisjoint(words):
+        return "counts"
     for length in (4, 3, 2, 1):
         for start in range(len(words) - length + 1):
             joined = "".join(words[start : start + length])
@@ -173,12 +178,16 @@ def parse_name(name: str) -> ColumnName:
         index, text = inner.group(1).lower(), text[: inner.start()]
     text = text.replace("m/s^2", "m_s2").replace("m/s²", "m_s2")
     words = english(_WORD.findall(re.sub(r"([a-z])([A-Z])", r"\1 \2", text).lower()))
-    unit_words = english(_WORD.findall(bracket.replace("²", "2").replace("-1", "").replace("-2", "2")))
+    # The size of a count, or a range: no unit of the readings.
+    stated = "" if re.match(r"[±+x*×-]*\s*\d[\d.]*(\s*/\s*[\d.]+)?\s*[a-zµ°]", bracket) else bracket
+    unit_words = english(_WORD.findall(stated.replace("²", "2").replace("-1", "").replace("-2", "2")))
     said = _classify(words, unit_words, index)
     behind = _UNIT_BEHIND.search(text.lower())
-    unknown = bracket if _LOOKS_LIKE_A_UNIT.search(bracket) else behind[1] if behind else ""
+    unknown = stated if _LOOKS_LIKE_A_UNIT.search(stated) else behind[1] if behind else ""
     if said.role in _SENSOR_WORDS and not said.unit and unknown:
         return replace(said, unit=unknown)
+    if said.role in ("time", "step") and bracket and seconds_of(bracket) > 0.0:
+        return replace(said, time_unit=bracket)
     return said
 
 

@@ -127,6 +127,7 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
             chosen.used(),
             chosen.device,
             (*(chosen.accelerometer or ()), *(chosen.gyroscope or ())),
+            chosen.time,
         )
     )
     if table.n_rows < 2:

@@ -152,6 +152,7 @@ def audit_counter(counter: FloatArray, label: str, place: Place) -> list[Finding
             column=label,
             count=len(lost),
             lost_samples=missing,
+            wraps=bool(back.any()),
             where=place(int(lost[0]) + 1),
             sample=lost[0] + 1,
         )

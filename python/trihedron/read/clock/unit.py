@@ -56,7 +56,8 @@ _OTHER_TICK = -4.6
 one log in a hundred."""
 TICKS = "tick"
 """Stands for the unit of a column whose name says that it counts, and not what."""
-_TICK = re.compile(r"(\d+(?:\.\d*)?(?:e[+-]?\d+)?)\s*(k?hz|s|ms|us|µs|ns)", re.IGNORECASE)
+_TICK = re.compile(r"(1\s*/\s*)?(\d+(?:\.\d*)?(?:e[+-]?\d+)?)\s*(k?hz|s|ms|us|µs|ns)", re.IGNORECASE)
+_LONG = {"min": 60.0, "minutes": 60.0, "h": 3600.0, "hours": 3600.0}
 _MOST_ROWS = 200_000
 
 
@@ -78,13 +79,16 @@ def parse_time_unit(text: str) -> str:
 
 
 def seconds_of(unit: str) -> float:
-    """Seconds that one of a unit (``ms``), or of a tick (``32768 Hz``, ``25 us``), lasts; NaN where it is neither."""
+    """Seconds of a unit (``ms``) or of a tick (``32768 Hz``, ``1/32768 s``, ``25 us``); NaN where it is neither."""
     tick = _TICK.fullmatch(unit.strip())
     if tick is None:
-        return SECONDS.get(unit, math.nan)
-    size, of = float(tick[1]), tick[2].lower().replace("µ", "u")
+        return SECONDS.get(unit, _LONG.get(unit, math.nan))
+    number, of = float(tick[2]), tick[3].lower().replace("µ", "u")
+    if not number:
+        return math.nan
+    size = 1.0 / number if tick[1] else number
     hertz = {"hz": 1.0, "khz": 1e3}.get(of)
-    return size * SECONDS[of] if hertz is None else 1.0 / (size * hertz) if size else math.nan
+    return size * SECONDS[of] if hertz is None else 1.0 / (size * hertz)
 
 
 def time_unit(

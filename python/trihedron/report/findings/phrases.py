@@ -79,6 +79,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "sample": "sample {sample}, {row}, {time_s:.3f} s",
         "column": "column {column}",
         "devices": "{devices:each}",
+        "turns": "the turn that rows take",
         "counted": "{words:each}",
         "both": "{one} and {other}",
         "streams": "{streams:each}{has_more:? ...|}",

@@ -306,7 +306,8 @@ _ROWS = (
         Code.SAMPLES_LOST,
         "counter",
         WARNING,
-        "The counter {column} skips at {count} places, {lost_samples} samples are missing (first: {where}).",
+        "The counter {column} skips at {count} places, {wraps:?at least |}{lost_samples} samples are missing (first: "
+        "{where}){wraps:?; it starts again from zero, and whole rounds leave no trace|}.",
         "Lost packets.",
         _INTEGRATED,
         numbers=("sample",),

@@ -17,7 +17,8 @@ ENTRIES = (
         SERIOUS,
         "Rows alternate between the readings of {n} devices, and no column identifies them.",
         "Several sensors written into one log, row by row.",
-        "Log whose row it is, and read with --columns device=COLUMN --instance N; or split the log.",
+        "Read with --instance 1 to {n}, in the order of the rows; or log whose row it is, and name the column with "
+        "--columns device=COLUMN.",
     ),
     Entry(
         Code.AXES_CHANGED,
