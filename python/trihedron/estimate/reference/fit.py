@@ -302,5 +302,8 @@ def _estimates(found: MotionFit, k: int, effects: list[Scored]) -> dict[str, Est
             continue
         fit = found if all(name in found.places[k] for name in names) else one.fitted
         value = np.concatenate([fit.value(k, name) for name in names])
-        out[one.ident] = Estimate(LABELS[one.ident], value, fit.covariance(k, names), UNITS[one.ident], one.score)
+        shown = one.shown_from()
+        out[one.ident] = Estimate(
+            LABELS[one.ident], value, fit.covariance(k, names), UNITS[one.ident], one.score, shown
+        )
     return out
