@@ -67,7 +67,7 @@ def robot(rng, t):
 
 def shaken(rng, t):
     """A body that a machine shakes at 5 Hz about every axis."""
-    on, phase = begun(t)[:, None], 2 * np.pi * (5 * t[:, None] + np.array([0, 0.2, 0.6]))
+    on, phase = begun(t)[:, None], 2 * np.pi * (5 * t[:, None] + rng.uniform(size=3))
     angles = 0.3 * on * np.sin(phase)
     return turn(2, angles[:, 0]) @ turn(1, angles[:, 1]) @ turn(0, angles[:, 2]), np.zeros((len(t), 3))
 
