@@ -5,9 +5,9 @@ world or in the body, as trackers filter it; readings are means over a sample. A
 """
 
 import numpy as np
-from reference_rig import FINE_HZ, Trial, forces, jittered, rates_of, times, turn, unit
 from scipy.signal import lfilter
 
+from reference_rig import FINE_HZ, Trial, forces, jittered, rates_of, times, turn, unit
 from trihedron.records import Recording
 from trihedron.records.reference import ReferenceMotion
 
@@ -65,7 +65,14 @@ def robot(rng, t):
     return C, C @ np.array([0.3, 0.1, 0.2])
 
 
-MOTIONS = {"walk": walk, "drone": drone, "robot": robot}
+def shaken(rng, t):
+    """A body that a machine shakes at 5 Hz about every axis."""
+    on, phase = begun(t)[:, None], 2 * np.pi * (5 * t[:, None] + rng.uniform(size=3))
+    angles = 0.3 * on * np.sin(phase)
+    return turn(2, angles[:, 0]) @ turn(1, angles[:, 1]) @ turn(0, angles[:, 2]), np.zeros((len(t), 3))
+
+
+MOTIONS = {"walk": walk, "drone": drone, "robot": robot, "shaken": shaken}
 
 
 def slow(rng, n, size, seconds):
@@ -95,7 +102,9 @@ def readings(rng, u, C, path):
     return gyro, f @ u.N.T + u.d + 0.02 * rng.normal(size=(n, 3)), bias.mean(axis=0)
 
 
-def truth(seed, kind, seconds=120, has_g_sensitivity=False, has_path=False, size_deg=None, lasting_s=None):
+def truth(
+    seed, kind, seconds=120, has_g_sensitivity=False, has_path=False, size_deg=None, lasting_s=None, white_deg=0.05
+):
     """One trial: ``kind`` of motion, its truth off by 0.1 to 2° over 4 to 40 s in world or body, clocks apart."""
     rng = np.random.default_rng(seed)
     u = unit(rng)
@@ -112,7 +121,7 @@ def truth(seed, kind, seconds=120, has_g_sensitivity=False, has_path=False, size
     size = np.radians(size_deg or np.exp(rng.uniform(np.log(0.1), np.log(2))))
     error = small_turn(slow(rng, len(k), size, lasting_s or np.exp(rng.uniform(np.log(4), np.log(40)))))
     seen = error @ C[k] if rng.uniform() < 0.5 else C[k] @ error
-    seen = jittered(seen, rng, np.radians(0.05))
+    seen = jittered(seen, rng, np.radians(white_deg))
     position = path[k] + 3e-4 * rng.normal(size=(len(k), 3)) if has_path else None
     log = Recording.from_arrays(times(len(gyro), STEP), accelerometer, gyro)
     timestamps = t[k] * (1 + 1e-6 * ppm) + lead

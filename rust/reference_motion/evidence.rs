@@ -16,6 +16,8 @@ const WORLD: usize = 12;
 const BODY: usize = 18;
 /// Variance of an attitude that nothing tells yet, rad²: any linearisation is worse.
 const UNKNOWN: f64 = 1.0;
+/// White error of a reference as a part of the largest angle that varies: below it the covariance is rounding.
+const ROUNDING: f64 = 1e-7;
 
 type State = SMatrix<f64, STATE, STATE>;
 type Columns = OMatrix<f64, U24, Dyn>;
@@ -131,6 +133,7 @@ fn filter(
     let step_s = block_length(blocks);
     let most = blocks.iter().map(|b| b.rows[0]).max().unwrap_or(1).max(1) as f64;
     let slow = Slow::both(with, step_s);
+    let rounding = ROUNDING * ROUNDING * (UNKNOWN + with.world[0].powi(2) + with.body[0].powi(2));
     let mut cov = before_all(&slow);
     let mut state = Columns::zeros(p);
     let mut out = Normal {
@@ -161,7 +164,7 @@ fn filter(
             });
             continue;
         }
-        let white = with.white * with.white * most / block.rows[0] as f64;
+        let white = (with.white * with.white + rounding) * most / block.rows[0] as f64;
         let seen_cov = seen_rows(block, &cov);
         let variance = seen_rows(block, &seen_cov.transpose()) + Matrix3::identity() * white;
         let factor = variance

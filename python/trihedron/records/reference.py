@@ -64,7 +64,8 @@ class ReferenceMotion:
 class Estimate(Plain):
     """Named numbers (n,) with their covariance (n, n) in one SI unit.
 
-    ``score`` of an effect: twice its gain in log evidence over its absence, what was tried paid for.
+    ``score`` of an effect: twice its gain in log evidence over its absence, what was tried paid for; ``shown_from``
+    is the size of all its numbers, in those of data sheets, from which it would be named (infinite: from none).
     """
 
     names: tuple[str, ...]
@@ -72,9 +73,10 @@ class Estimate(Plain):
     covariance: FloatArray
     unit: str
     score: float | None = None
+    shown_from: float | None = None
     LAYOUT: ClassVar[Layout] = Layout(
         {},
-        ("names", "value", "std", "unit", "score"),
+        ("names", "value", "std", "unit", "score", "shown_from"),
         lambda estimate, _: {"std": estimate.std.tolist()},
     )
 

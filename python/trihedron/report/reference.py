@@ -19,6 +19,8 @@ from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 SECONDS_PER_HOUR = 3600.0
 _EFFECTS = {"gyro-g-sensitivity": "g-sensitivity", "gyro-scale-nonlinearity": "nonlinearity of the scale"}
+_SHEET = {"gyro-g-sensitivity": (0.1, "°/s/g"), "gyro-scale-nonlinearity": (0.1, "% of ±250 °/s")}
+"""Sizes in data sheets, in their own units."""
 _SIGNS = {
     "quieter-than-gyro": "the difference between the two is quieter than the static gyro",
     "mounted-without-error": "it lies along the gyro's own axes",
@@ -217,7 +219,17 @@ def _effect(ident: str, one: Estimate) -> Table:
         rows.append(
             (", ".join(one.names[k : k + per]), *cells, f"{power_of_ten(exponent)} {unit.replace('^2', '²')}".strip())
         )
-    score = "–" if one.score is None else plain_number(one.score, 3)
-    return Table(
-        ("", "", "", "", ""), tuple(rows), f"{_EFFECTS.get(ident, ident).capitalize()}   score {score} (named from 8)"
-    )
+    title = _EFFECTS.get(ident, ident).capitalize()
+    if one.score is not None:
+        title += f"   score {plain_number(one.score, 3)} (named from 8{_shown_from(ident, one)})"
+    return Table(("", "", "", "", ""), tuple(rows), title)
+
+
+def _shown_from(ident: str, one: Estimate) -> str:
+    """What a reference this good can show."""
+    if one.shown_from is None:
+        return ""
+    if not np.isfinite(one.shown_from):
+        return ": this reference wanders too much to show any"
+    size, unit = _SHEET[ident]
+    return f": beside this reference about {plain_number(size * one.shown_from, 2)} {unit} in every number"

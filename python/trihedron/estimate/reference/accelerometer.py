@@ -13,6 +13,8 @@ from trihedron.estimate.reference.together import Grid, Reference
 from trihedron.estimate.reference.windows import Windows
 from trihedron.sensor_model import other_form, other_form_jacobian
 
+KNOWN = 0.05
+"""σ of S, as a part of the scale, up to which a force is told by the fit: g-sensitivity is then wrong by as much."""
 TURNS = 4
 """Steps of the direction of gravity: it starts within a degree or two, and each squares the error."""
 
@@ -59,6 +61,23 @@ def fit_accelerometer(
     if motion.specific_force is not None:
         return _in_body(grid, reference, windows, time, handedness)
     return None
+
+
+def force_along(grid: Grid, force: ForceFit, gyro: FloatArray, gravity: float) -> FloatArray | None:
+    """(n, 3) [m/s²] specific force in the reference's body, for what the gyro feels of it.
+
+    A multicopter leans into its acceleration, and an attitude alone does not tell its accelerometer's numbers: beside
+    a gyro of scale (3, 3) ``gyro`` it is then taken to share the gyro's axes, and to read gravity on the whole.
+    """
+    if grid.accelerometer is None:
+        return None
+    scale = np.linalg.norm(force.S, axis=0)
+    sigma = np.sqrt(np.diag(force.covariance)[:9]).reshape(3, 3)
+    if np.all(sigma < KNOWN * scale):
+        return np.asarray(grid.accelerometer @ force.S.T + force.b)
+    U, _, Vt = np.linalg.svd(gyro)
+    size = np.median(np.linalg.norm(grid.accelerometer[grid.is_valid], axis=1))
+    return np.asarray(gravity / size * grid.accelerometer @ (U @ Vt).T)
 
 
 def _in_body(grid: Grid, reference: Reference, windows: Windows, time: FloatArray, handedness: float) -> ForceFit:

@@ -29,6 +29,8 @@ FEWEST_BEYOND = 2
 SURE = 0.97
 """Correlation of a lone stretch at either end of the log that, with less than ``LOCKED`` at the lag of the others, is
 beyond a jump: one that found a neighbouring turn instead fits worse there than at its own lag."""
+FASTEST = 0.01
+"""No clock gains a hundredth: stretches of a motion that repeats itself found one period after another."""
 SEARCH_S = 6.0
 ALIKE = 0.01
 """Peaks whose correlation is this near the best are not separated by it: the timestamps then decide."""
@@ -204,4 +206,6 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
                 f"{at[k]:.0f} and {at[k + 1]:.0f} s of the log: cut the reference there and use the parts one by one."
             )
     rate = float(np.median([(found[j] - found[i]) / (at[j] - at[i]) for i in range(len(at)) for j in range(i)]))
+    if abs(rate) > FASTEST:
+        return offset, 0.0
     return offset + float(np.median(found - rate * at)), rate

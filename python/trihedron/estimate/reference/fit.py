@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.reference.accelerometer import ForceFit, fit_accelerometer
+from trihedron.estimate.reference.accelerometer import ForceFit, fit_accelerometer, force_along
 from trihedron.estimate.reference.beside import Beside, Point
 from trihedron.estimate.reference.bias import bias_over_time
 from trihedron.estimate.reference.clocks import Alignment, align
@@ -147,9 +147,7 @@ def _prepared(recording: Recording, motion: ReferenceMotion, gravity_m_s2: float
     handedness = float(np.sign(np.linalg.det(gyro.A)))
     wide = windows_on(seen, grid.step_s, max(windows.spacing, round(FORCE_WINDOW_S / grid.step_s)))
     force = fit_accelerometer(grid, reference, wide, gyro.offset_s, gyro.rate, gravity_m_s2, handedness)
-    felt = None
-    if force is not None and grid.accelerometer is not None:
-        felt = grid.accelerometer @ force.S.T + force.b
+    felt = None if force is None else force_along(grid, force, gyro.A, gravity_m_s2)
     has_truth = grid.is_valid if motion.attitude is not None else seen
     side = Beside(grid, reference, has_truth, Point(gyro.A, gyro.a, gyro.offset_s, gyro.rate), felt)
     return Prepared(recording, side, gyro, force, windows, wide, found, seen, is_turned)
@@ -304,5 +302,8 @@ def _estimates(found: MotionFit, k: int, effects: list[Scored]) -> dict[str, Est
             continue
         fit = found if all(name in found.places[k] for name in names) else one.fitted
         value = np.concatenate([fit.value(k, name) for name in names])
-        out[one.ident] = Estimate(LABELS[one.ident], value, fit.covariance(k, names), UNITS[one.ident], one.score)
+        shown = one.shown_from()
+        out[one.ident] = Estimate(
+            LABELS[one.ident], value, fit.covariance(k, names), UNITS[one.ident], one.score, shown
+        )
     return out

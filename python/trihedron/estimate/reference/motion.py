@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import brentq
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.reference.beside import BLOCK_S, Beside, Point, places
@@ -19,6 +20,10 @@ WIDER = (0.3, 1.0, 3.0, 10.0, 30.0)
 MARGIN = 2.0
 ACCEPTED = 8.0
 """Score from which an effect is named (docs/decisions.md)."""
+PAID = 2.0 * np.log(len(WIDER) * len(EFFECTS))
+"""What a score pays for what was tried."""
+LARGEST = 100.0
+"""Effects beyond this many times the size in data sheets are no effects of a working part."""
 RELINEARISED = 3
 
 
@@ -100,6 +105,25 @@ class Scored:
         """Whether it is named."""
         return self.score > ACCEPTED
 
+    def shown_from(self) -> float:
+        """Size of all its numbers, in those of data sheets, whose expected score is ``ACCEPTED``; infinite if none.
+
+        Beside a reference with information Λ of them, numbers of size s raise twice the log evidence by
+        Σ λs² - ln(1 + λs²) on average.
+        """
+        names = EFFECTS[self.ident]
+        own = next(own for own in self.fitted.places if all(name in own for name in names))
+        at = np.concatenate([own[name] for name in names])
+        prior = np.eye(len(at))
+        told = np.linalg.eigvalsh(np.linalg.inv(self.fitted.fitted.covariance[np.ix_(at, at)]) - prior)
+        told = np.maximum(told, 0.0) / self.wider**2
+
+        def short(size: float) -> float:
+            gain = told * size**2
+            return float(np.sum(gain - np.log1p(gain))) - PAID - ACCEPTED
+
+        return float(brentq(short, 0.0, LARGEST)) if short(LARGEST) > 0.0 else float("inf")
+
 
 def scores(found: MotionFit) -> list[Scored]:
     """Score of every effect beside its absence, strengths tuned in both; best first."""
@@ -117,8 +141,7 @@ def scores(found: MotionFit) -> list[Scored]:
             if len(tried) > 1 and tried[-1].fitted.evidence < tried[-2].fitted.evidence - MARGIN:
                 break
         best = int(np.argmax([one.fitted.evidence for one in tried]))
-        paid = 2.0 * np.log(len(WIDER) * len(EFFECTS))
-        score = float(2.0 * (tried[best].fitted.evidence - without.fitted.evidence) - paid)
+        score = float(2.0 * (tried[best].fitted.evidence - without.fitted.evidence) - PAID)
         out.append(Scored(ident, score, WIDER[best], tried[best], without))
     return sorted(out, key=lambda one: -one.score)
 

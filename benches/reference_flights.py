@@ -1,0 +1,54 @@
+"""A g-sensitivity put into recordings with references: in which is it named, singly and jointly?
+
+    python benches/reference_flights.py LOG TRUTH [LOG TRUTH ...] [--inject full|one|none] [--joint] [--gravity 9.807]
+
+Logs in SI. `full`: nine numbers of about 0.1 °/s/g (seed 5); `one`: 0.1 °/s/g of the gyro's x along the accelerometer's
+y alone. Printed: the scores, from which size the reference would show one, and how far estimates lie from what was put
+in, in σ.
+"""
+
+import argparse
+from dataclasses import replace
+
+import numpy as np
+
+from trihedron import read
+from trihedron.estimate.reference import fit_references
+from trihedron.read.reference import read_reference
+
+SIZE = np.radians(0.1) / 9.807
+
+
+def matrix(kind):
+    """(3, 3) [(rad/s)/(m/s²)] what is put in."""
+    if kind == "full":
+        return SIZE * np.sign(np.random.default_rng(5).normal(size=(3, 3)))
+    return SIZE * np.array([[0.0, kind == "one", 0.0], [0.0] * 3, [0.0] * 3])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("paths", nargs="+")
+    parser.add_argument("--inject", choices=("full", "one", "none"), default="full")
+    parser.add_argument("--joint", action="store_true")
+    parser.add_argument("--gravity", type=float, default=9.807)
+    given = parser.parse_args()
+    injected = matrix(given.inject)
+    pairs = []
+    for path, beside in zip(given.paths[::2], given.paths[1::2], strict=True):
+        log = read(path)
+        pairs.append((replace(log, gyroscope=log.gyroscope + log.accelerometer @ injected.T), read_reference(beside)))
+    for group in [pairs] if given.joint else [[pair] for pair in pairs]:
+        found = fit_references(group, given.gravity)[0]
+        print(" + ".join(str(log.source) for log, _ in group))
+        for ident, one in found.effects.items():
+            print(f"  {ident} score {one.score:.1f}, shown from {one.shown_from:.2f} times a data sheet's")
+        one = found.effects["gyro-g-sensitivity"]
+        z = (one.value - injected.ravel()) / one.std
+        print(
+            f"  estimates {np.abs(z).max():.1f} sigma at most from what was put in (rms {np.sqrt(np.mean(z**2)):.2f})"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""Truths that wander beside walks, flights and robots: nothing sound is refused, and what is said is covered."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import trihedron
+from reference_rig import G, tracked, turn
+from reference_truths import truth
+from trihedron.estimate.reference import ACCEPTED, fit_reference
+from trihedron.records.reference import ReferenceMotion
+
+
+def z_of_bias(found, trial):
+    """(3,) standard scores of the gyro's bias."""
+    b = -np.linalg.solve(trial.unit.M, trial.unit.c)
+    return (found.gyroscope.b - b) / np.sqrt(np.diag(found.gyroscope.covariance)[9:])
+
+
+@pytest.mark.parametrize("kind", ["walk", "drone"])
+def test_a_truth_without_white_error_is_sound(kind):
+    # The strengths' search passes by a white error of nothing beside a slow one of radians: rounding was all that was
+    # left of a variance.
+    trial = truth(3, kind, seconds=60, white_deg=0.0)
+    found = fit_reference(trial.log, trial.motion, G)
+    assert np.abs(z_of_bias(found, trial)).max() < 4.5
+
+
+def test_a_drone_under_a_tracker_of_attitudes_has_the_g_sensitivity_that_it_has():
+    # It leans into its acceleration: its accelerometer's numbers are not told, and what its gyro feels still is.
+    trial = truth(4, "drone", has_g_sensitivity=True)
+    found = fit_reference(trial.log, trial.motion, G)
+    one = found.effects["gyro-g-sensitivity"]
+    assert one.score > ACCEPTED
+    assert np.abs((one.value - trial.unit.g_sensitivity.ravel()) / one.std).max() < 4.5
+    assert np.abs(z_of_bias(found, trial)).max() < 4.5
+
+
+def test_what_a_reference_is_too_poor_to_show_is_said_with_the_size_from_which_it_would():
+    fine, poor = (
+        fit_reference(trial.log, trial.motion, G).effects["gyro-g-sensitivity"]
+        for trial in (truth(2, "robot", seconds=60, size_deg=size, lasting_s=6.0) for size in (0.03, 2.0))
+    )
+    # Λ of the numbers falls with the square of the truth's error, which is seventy times as large.
+    assert 3.0 * fine.shown_from < poor.shown_from
+
+
+def test_the_gyros_own_noise_does_not_pull_the_clock():
+    # Eight units of 0.14°/√s: the offset's mean was 0.05 ms late, half its σ.
+    z = []
+    for seed in range(1000, 1008):
+        trial = tracked(seed)
+        found = fit_reference(trial.log, trial.motion, G)
+        lead = trial.lead_s + 1e-6 * trial.ppm * found.clock_middle_s
+        z.append((found.clock_offset_s[0] - lead) / found.clock_offset_s[1])
+    assert abs(np.mean(z)) < 3.0 / np.sqrt(len(z))
+
+
+def test_two_places_of_the_clock_are_both_said_and_refused():
+    # Shaken at 5 Hz all along under a tracker that lacks both ends: a fifth of a second more or less fits as well.
+    trial = truth(5, "shaken", seconds=40)
+    inside = (trial.motion.time_s > 4.0) & (trial.motion.time_s < 36.0)
+    t = trial.motion.time_s[inside]
+    motion = ReferenceMotion(t - t[0], attitude=trial.motion.attitude[inside], source="tracker.csv")
+    with pytest.raises(ValueError, match=r"fits two offsets of the reference's clock, .* s and .* s"):
+        fit_reference(trial.log, motion, G)
+
+
+def test_a_stretch_in_which_the_truth_is_wrong_is_said_and_the_rest_is_used():
+    trial = truth(8, "robot", seconds=60, size_deg=0.05, lasting_s=6.0)
+    wrong = (trial.motion.time_s > 30.0) & (trial.motion.time_s < 35.0)
+    attitude = trial.motion.attitude.copy()
+    attitude[wrong] = turn(0, np.radians([6.0]))[0] @ attitude[wrong]
+    found = fit_reference(trial.log, replace(trial.motion, attitude=attitude), G)
+    assert any(start < 31.5 and end > 28.5 for start, end in found.error.apart_s)
+    assert np.abs(z_of_bias(found, trial)).max() < 4.5
+
+
+def test_stretches_of_even_flight_are_no_poses(real_data):
+    log, beside = (real_data / "euroc" / f"MH_03_medium.{what}.csv.gz" for what in ("log", "truth"))
+    found = trihedron.diagnose(log, reference=beside, gravity_m_s2=9.807)
+    assert found.verdict == "consistent"
+    assert not found.effects
