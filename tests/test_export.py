@@ -237,6 +237,22 @@ def test_a_loss_below_its_uncertainty_is_not_stated():
     assert "accelerometer's is lost" not in text
 
 
+@pytest.mark.parametrize("target", sorted(set(targets()) - {"c", "rust", "python", "inav"}))
+def test_of_an_instrument_that_is_right_within_its_uncertainty_no_target_loses_anything(target):
+    """0.3 % and 0.03 m/s² with standard errors of 1 % and 0.1 m/s²: nothing is known to be lost."""
+    known = calibration("si")
+    covariance = np.diag(np.r_[np.full(9, 1e-2**2), np.full(3, 0.1**2)])
+    sensors = [
+        replace(s, S=np.eye(3) + 0.003, b=np.full(3, 0.03), covariance=covariance)
+        for s in (known.accelerometer, known.gyroscope)
+    ]
+    known = replace(known, accelerometer=sensors[0], gyroscope=sensors[1])
+    options = replace(NOISE, current_parameters="none")
+    text = " ".join(export_files(known, target, options).values())
+    said = [line for line in text.splitlines() if re.search(r"\d.* (is|are) lost|lost: |are lost, ", line)]
+    assert not [line for line in said if "walk" not in line]
+
+
 @pytest.mark.parametrize("handed", [1.0, -1.0])
 def test_imu_tk_reads_its_numbers_from_the_first_character_on(handed):
     """x = T K (raw - B), in our frame turned by the rotation that the file states; one file a sensor."""
