@@ -356,6 +356,18 @@ def test_the_command_writes_one_file_a_sensor_where_the_target_wants_it(tmp_path
     assert "is lost" in capsys.readouterr().err
 
 
+def test_several_calibrations_that_are_called_alike_take_the_names_of_their_folders(tmp_path, capsys):
+    files = []
+    for unit in ("a", "b"):
+        (tmp_path / unit).mkdir()
+        write_calibration(calibration("si"), tmp_path / unit / "cal.json")
+        files.append(str(tmp_path / unit / "cal.json"))
+    assert main(["export", *files, "--to", "c", "-o", str(tmp_path / "out")]) == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a_cal.c", "b_cal.c"]
+    assert main(["export", files[0], files[0], "--to", "c", "-o", str(tmp_path / "same")]) == 1
+    assert "names that differ" in capsys.readouterr().err
+
+
 def test_noise_of_a_rest_log_goes_from_allan_into_the_export(tmp_path, capsys):
     rng = np.random.default_rng(3)
     t = np.arange(60_000) / 100.0
