@@ -237,6 +237,22 @@ def test_a_loss_below_its_uncertainty_is_not_stated():
     assert "accelerometer's is lost" not in text
 
 
+@pytest.mark.parametrize("target", sorted(set(targets()) - {"c", "rust", "python", "inav"}))
+def test_of_an_instrument_that_is_right_within_its_uncertainty_no_target_loses_anything(target):
+    """0.3 % and 0.03 m/s² with standard errors of 1 % and 0.1 m/s²: nothing is known to be lost."""
+    known = calibration("si")
+    covariance = np.diag(np.r_[np.full(9, 1e-2**2), np.full(3, 0.1**2)])
+    sensors = [
+        replace(s, S=np.eye(3) + 0.003, b=np.full(3, 0.03), covariance=covariance)
+        for s in (known.accelerometer, known.gyroscope)
+    ]
+    known = replace(known, accelerometer=sensors[0], gyroscope=sensors[1])
+    options = replace(NOISE, current_parameters="none")
+    text = " ".join(export_files(known, target, options).values())
+    said = [line for line in text.splitlines() if re.search(r"\d.* (is|are) lost|lost: |are lost, ", line)]
+    assert not [line for line in said if "walk" not in line]
+
+
 @pytest.mark.parametrize("handed", [1.0, -1.0])
 def test_imu_tk_reads_its_numbers_from_the_first_character_on(handed):
     """x = T K (raw - B), in our frame turned by the rotation that the file states; one file a sensor."""
@@ -338,6 +354,18 @@ def test_the_command_writes_one_file_a_sensor_where_the_target_wants_it(tmp_path
     assert "unit_acc.calib" in capsys.readouterr().err
     assert main(["export", str(file), "--to", "px4", "--accel-lsb", "0.1 mg", "--gyro-lsb", "0.01 deg/s"]) == 0
     assert "is lost" in capsys.readouterr().err
+
+
+def test_several_calibrations_that_are_called_alike_take_the_names_of_their_folders(tmp_path, capsys):
+    files = []
+    for unit in ("a", "b"):
+        (tmp_path / unit).mkdir()
+        write_calibration(calibration("si"), tmp_path / unit / "cal.json")
+        files.append(str(tmp_path / unit / "cal.json"))
+    assert main(["export", *files, "--to", "c", "-o", str(tmp_path / "out")]) == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a_cal.c", "b_cal.c"]
+    assert main(["export", files[0], files[0], "--to", "c", "-o", str(tmp_path / "same")]) == 1
+    assert "names that differ" in capsys.readouterr().err
 
 
 def test_noise_of_a_rest_log_goes_from_allan_into_the_export(tmp_path, capsys):

@@ -6,6 +6,7 @@ gnss-ins-sim (pathgen), MathWorks' page of imuSensor, AirSim (ImuSimple), mvsim 
 
 import json
 import re
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -14,6 +15,13 @@ import pytest
 import trihedron
 from test_export import calibration
 from trihedron.files.formats import ExportOptions, NoiseFigure, SensorNoise, export_files
+from trihedron.records import Calibration, SensorCalibration
+from trihedron.simulate import Scenario, hand_session, simulate
+from trihedron.simulate.accelerometer import Accelerometer
+from trihedron.simulate.gyroscope import Gyroscope
+from trihedron.simulate.noise import NoiseTerms
+from trihedron.simulate.scenario import Clock
+from trihedron.units import RateUnit
 
 RATE, SECONDS, G = 100.0, 2000, 9.81
 WHITE, WALK = {"accelerometer": 2e-3, "gyroscope": 1e-4}, {"accelerometer": 4e-4, "gyroscope": 2e-5}
@@ -75,7 +83,9 @@ def imusensor(text, rng, truth):
         p = matlab(text, attribute)
         A = p["AxesMisalignment"].reshape(3, 3) / 100.0
         white = p["NoiseDensity"] * np.sqrt(RATE) * rng.standard_normal(truth[name].shape)
-        out[name] = truth[name] @ A.T + p["ConstantBias"] + white + walk(rng, len(truth[name]), p["RandomWalk"] / np.sqrt(RATE))
+        out[name] = (
+            truth[name] @ A.T + p["ConstantBias"] + white + walk(rng, len(truth[name]), p["RandomWalk"] / np.sqrt(RATE))
+        )
     return out
 
 
@@ -102,7 +112,27 @@ def mvsim(text, rng, truth):
     }
 
 
-LAWS = {"gazebo": gazebo, "gnss-ins-sim": gnss_ins_sim, "imusensor": imusensor, "airsim": airsim, "mvsim": mvsim}
+def isaac(text, rng, truth):
+    """Isaac Lab's gaussian_noise of operation "add", then the scale of the observation."""
+    lines = [line for line in text.splitlines() if "import" not in line]
+    scope = {"torch": SimpleNamespace(tensor=np.array), "GaussianNoiseCfg": SimpleNamespace}
+    exec("\n".join(lines), scope)
+    out = {}
+    for name, term in (("gyroscope", scope["IMU_ANG_VEL"]), ("accelerometer", scope["IMU_LIN_ACC"])):
+        noise = term["noise"]
+        readings = truth[name] + noise.mean + noise.std * rng.standard_normal(truth[name].shape)
+        out[name] = readings * np.array(term["scale"])
+    return out
+
+
+LAWS = {
+    "gazebo": gazebo,
+    "gnss-ins-sim": gnss_ins_sim,
+    "imusensor": imusensor,
+    "isaac": isaac,
+    "airsim": airsim,
+    "mvsim": mvsim,
+}
 
 
 @pytest.mark.parametrize("target", LAWS)
@@ -117,12 +147,17 @@ def test_the_simulators_own_law_gives_the_noise_of_the_unit(target):
         terms = axis.terms
         # 200 000 samples know N to 0.2 %, 2000 s know K to 10 to 20 %.
         assert terms["N"].value == pytest.approx(WHITE[name], rel=0.02), (target, axis)
-        assert terms["K"].value == pytest.approx(WALK[name], rel=0.5), (target, axis)
+        if target == "isaac":
+            assert f"The walk of the {name}'s bias cannot be held" in text
+        else:
+            assert terms["K"].value == pytest.approx(WALK[name], rel=0.5), (target, axis)
     biases = {s: -np.linalg.solve(getattr(known, s).S, getattr(known, s).b) for s in TRUTH}
     for name, b in biases.items():
+        A = np.linalg.inv(getattr(known, name).S)
         reading = made[name][: int(RATE)].mean(axis=0) - TRUTH[name][0]
-        if target == "imusensor":
-            wanted = np.linalg.inv(getattr(known, name).S) @ TRUTH[name][0] + b - TRUTH[name][0]
+        if target in ("imusensor", "isaac"):
+            held = A if target == "imusensor" else np.diag(np.diag(A))
+            wanted = held @ TRUTH[name][0] + b - TRUTH[name][0]
         elif target in ("airsim", "mvsim"):
             assert f"bias of the {name} cannot be held" in text
             wanted = np.zeros(3)
@@ -132,3 +167,63 @@ def test_the_simulators_own_law_gives_the_noise_of_the_unit(target):
         # One second of white noise, and a second of walk.
         tolerance = 6 * np.hypot(WHITE[name], WALK[name])
         np.testing.assert_allclose(reading, wanted, atol=tolerance)
+
+
+SLOW = {"accelerometer": 4e-5, "gyroscope": 2e-6}
+"""Walks [SI/√s] that stay below the noise of a pose over a session."""
+ALIGNED, BIASED = np.eye(3), {"accelerometer": np.array([0.3, -0.2, 0.1]), "gyroscope": np.array([0.01, -0.02, 0.03])}
+SCALED = {"accelerometer": np.diag([1.01, 0.99, 1.02]), "gyroscope": np.diag([1.02, 0.98, 1.01])}
+FULL = {s: SCALED[s] + 0.01 * np.array([[0, 0, 0], [0.4, 0, 0], [-0.6, 0.3, 0]]) for s in SCALED}
+PLAIN, UNBIASED = dict.fromkeys(SCALED, ALIGNED), dict.fromkeys(SCALED, np.zeros(3))
+SHAPE = {f"{s}-{what}" for s in ("accel", "gyro") for what in ("scale", "misalignment")} | {"triad-alignment"}
+
+
+def of_unit(S, b, layout, seed):
+    """A session of 18 poses of a unit whose noise is white with a walk."""
+    sensors = {}
+    for name, kind in (("accelerometer", Accelerometer), ("gyroscope", Gyroscope)):
+        noise = NoiseTerms(N=(WHITE[name],) * 3, K=(SLOW[name],) * 3)
+        matrix = tuple(tuple(float(v) for v in row) for row in S[name])
+        unit = {} if name == "accelerometer" else {"unit": RateUnit.RAD_S}
+        sensors[name] = kind(S=matrix, b=tuple(float(v) for v in b[name]), noise=noise, **unit)
+    motion = hand_session(18, pose_s=4.0, layout=layout)
+    return simulate(Scenario(motion, "unit", *sensors.values(), Clock(rate_hz=RATE)), seed)
+
+
+@pytest.mark.parametrize(
+    ("target", "S", "b", "lost"),
+    [
+        ("imusensor", FULL, BIASED, set()),
+        pytest.param("gazebo", PLAIN, BIASED, set(), marks=pytest.mark.slow),
+        pytest.param("gazebo", FULL, UNBIASED, SHAPE, marks=pytest.mark.slow),
+        pytest.param("gnss-ins-sim", PLAIN, BIASED, set(), marks=pytest.mark.slow),
+        pytest.param("gnss-ins-sim", FULL, UNBIASED, SHAPE, marks=pytest.mark.slow),
+        pytest.param("isaac", SCALED, BIASED, set(), marks=pytest.mark.slow),
+        pytest.param(
+            "isaac", FULL, UNBIASED, {"accel-misalignment", "gyro-misalignment", "triad-alignment"},
+            marks=pytest.mark.slow,
+        ),
+        pytest.param("airsim", PLAIN, UNBIASED, set(), marks=pytest.mark.slow),
+        pytest.param("airsim", PLAIN, BIASED, {"accel-bias", "gyro-bias"}, marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_a_simulators_log_is_consistent_with_the_units_or_differs_in_what_its_file_calls_lost(target, S, b, lost):
+    recording, _ = of_unit(S, b, 1, 1)
+    _, truth = of_unit(S, b, 2, 2)
+    units = {"accelerometer": "m/s^2", "gyroscope": "rad/s"}
+    sensors = [SensorCalibration(S[s], b[s], np.zeros((12, 12)), unit, unit, "given") for s, unit in units.items()]
+    noise = (SensorNoise(NoiseFigure(WHITE[s]), NoiseFigure(SLOW[s])) for s in units)
+    known = Calibration(*sensors, np.zeros((24, 24)), "lower", 9.80665, "given", "log", "")
+    text = export_files(known, target, ExportOptions(*noise, rate_hz=RATE))[""]
+    motion = {"accelerometer": truth.specific_force_m_s2, "gyroscope": truth.angular_rate_rad_s}
+    made = LAWS[target](text, np.random.default_rng(3), motion)
+    log = {"t": np.arange(len(made["gyroscope"])) / RATE, "acc": made["accelerometer"], "gyr": made["gyroscope"]}
+    simulated = trihedron.read(log, accelerometer_unit="m/s^2", gyroscope_unit="rad/s")
+    found = trihedron.diagnose(recording, against=simulated, gravity_m_s2=9.80665)
+    differs = {p.id for p in found.parameters if p.significant}
+    assert found.verdict == ("parameters-differ" if lost else "consistent")
+    assert not found.effects
+    assert differs <= lost
+    assert bool(differs) == bool(lost)
+    for word in {one.split("-")[1] for one in differs} - {"alignment"}:
+        assert re.search(f"{word}.* (cannot be held|is lost)", text, re.IGNORECASE), word

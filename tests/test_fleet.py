@@ -53,6 +53,15 @@ def test_every_log_has_its_row_and_the_bad_one_its_reason(done):
     np.testing.assert_allclose(sorted(-zero), sorted([0.01, 0.01, 0.015, 0.035]), rtol=0.05, atol=1e-3)
 
 
+def test_the_calibration_of_every_log_is_a_file_that_goes_into_another_programs(done, tmp_path):
+    _, out = done
+    files = sorted((out / "calibrations").iterdir())
+    assert [file.name[:12] for file in files] == [f"unit_{u}_log_{s}" for u in range(2) for s in range(2)]
+    assert trihedron.read_calibration(files[0]).accelerometer.quality is not None
+    assert main(["export", *map(str, files), "--to", "xio", "-o", str(tmp_path / "out")]) == 0
+    assert len(list((tmp_path / "out").iterdir())) == 4
+
+
 def test_the_page_names_the_device_that_changed(done):
     result, out = done
     moved = [(c.group, c.id) for c in result.summary.changes if c.significant]

@@ -61,6 +61,7 @@ def export(
     folder = output if str(output) != "-" and len(calibration) > 1 else None
     if folder is not None and folder.is_file():
         raise typer.BadParameter(f"{len(calibration)} calibrations need a folder, and {output} is a file")
+    names = _names(calibration)
     check_outputs(*(() if folder else (output,)), force=force, inputs=(*calibration, noise))
     from trihedron.api.exporting import export as made_of
     from trihedron.files.formats import any_calibration
@@ -69,9 +70,11 @@ def export(
     options: dict[str, Any] = {"noise": noise, "rate_hz": rate, "topic": topic, "accelerometer_lsb": accel_lsb}
     options |= {"gyroscope_lsb": gyro_lsb, "current_parameters": current_parameters}
     texts: dict[str, None] = {}
-    for path, one in zip(calibration, known, strict=True):
+    if folder:
+        folder.mkdir(exist_ok=True)
+    for name, one in zip(names, known, strict=True):
         made = made_of(one, to, **options)
-        place = None if str(output) == "-" else folder / f"{path.stem}.{to}" if folder else output
+        place = None if str(output) == "-" else folder / f"{name}.{to}" if folder else output
         _put(made, place, to, force, (*calibration, noise))
         texts |= dict.fromkeys(line for text in made.values() for line in text.splitlines())
     for line in texts:
@@ -79,6 +82,18 @@ def export(
         if any(word in line for word in LOSSES):
             say(line.strip(' #/*%",'))
     leave(tuple(finding for one in known for finding in one.findings))
+
+
+def _names(paths: list[Path]) -> list[str]:
+    """Of the files in a folder of several: that of each calibration, with its folder's where two are called alike."""
+    stems = [path.stem for path in paths]
+    names = [
+        path.stem if stems.count(path.stem) == 1 else f"{path.resolve().parent.name}_{path.stem}" for path in paths
+    ]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise typer.BadParameter(f"two calibrations would both be written as {twice}: give them names that differ")
+    return names
 
 
 def _put(made: dict[str, str], place: Path | None, to: str, force: bool, inputs: tuple[Path | None, ...]) -> None:

@@ -81,5 +81,6 @@ def fleet(
         typer.echo(to_text(document, sections=len(shown)), nl=False)
     write_json({"rows": list(result.rows)}, json, force=force)
     say(f"table: {out / 'fleet.parquet'}, {out / 'fleet.csv'}; page: {out / 'fleet.html'}")
+    say(f"calibrations, for export, verify and apply: {out / 'calibrations'}")
     if not document.is_trustworthy:
         raise typer.Exit(NOT_TO_BE_TRUSTED)

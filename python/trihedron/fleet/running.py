@@ -14,6 +14,7 @@ from typing import Any, Literal
 from trihedron.errors import RefusedError
 from trihedron.files.calibration import plain
 from trihedron.files.output import write_whole
+from trihedron.fleet.calibrations import write_calibrations
 from trihedron.fleet.logs import Job, find_jobs
 from trihedron.fleet.summary import FleetResult, summarise
 from trihedron.fleet.table import write_tables
@@ -43,7 +44,7 @@ def fleet(
     gyroscope_unit: str | None = None,
     progress: Progress | None = None,
 ) -> FleetResult:
-    """Calibrate and diagnose every log; write ``fleet.parquet``, ``fleet.csv`` and ``fleet.html`` into ``out``.
+    """Calibrate and diagnose every log; write tables, a page and each calibration into ``out``.
 
     Parameters
     ----------
@@ -101,13 +102,19 @@ def fleet(
     n_before = len(rows)
     for done, (job, row) in enumerate(_results(todo, options, scheduler, workers), 1):
         _keep(folder, job, row)
-        rows[job.key] = row
+        rows[job.key] = _of_table(row)
         tell(done / len(todo), f"{n_before + done} of {n_before + len(todo)} logs")
     made = [{"path": job.path, "name": job.name, "serial": job.serial, "key": job.key} | rows[job.key] for job in jobs]
     tell(1.0, "writing the table and the page")
     result = summarise(made, folder, n_before)
     write_tables(result.rows, result.summary, folder)
+    write_calibrations(jobs, folder / RESULTS, folder)
     return result
+
+
+def _of_table(row: Row) -> Row:
+    """A result without its calibration, of which thousands would stand in memory."""
+    return {name: value for name, value in row.items() if name != "calibration"}
 
 
 def _kept(folder: Path, job: Job) -> Row | None:
@@ -117,7 +124,7 @@ def _kept(folder: Path, job: Job) -> Row | None:
         row: Row = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return None if row.get("status") == "crashed" else row
+    return None if row.get("status") == "crashed" else _of_table(row)
 
 
 def _keep(folder: Path, job: Job, row: Row) -> None:

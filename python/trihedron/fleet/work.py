@@ -80,6 +80,7 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
 
 def _row(result: Any) -> Row:
     from trihedron.api.sessions import session_of
+    from trihedron.files.calibration import calibration_document
     from trihedron.invariants import anchor_of
     from trihedron.sensor_model import in_frame
 
@@ -107,4 +108,5 @@ def _row(result: Any) -> Row:
         "numbers": session.numbers.tolist(),
         "covariance": session.covariance.tolist(),
         "wander": session.wander.tolist(),
+        "calibration": calibration_document(result.calibration),
     }

@@ -87,8 +87,12 @@ def any_calibration(path: str | os.PathLike[str]) -> Calibration:
     text = _text(path)
     if f'"{OWN}"' in text:
         return read_calibration(path)
+    try:
+        found = _recognised(text, path)
+    except RefusedError as error:
+        raise CalibrationFileError(f"{path}: {error}") from None
     # What nobody recognises is a damaged file of ours, or none: our own reader says which.
-    return _recognised(text, path) or read_calibration(path)
+    return found or read_calibration(path)
 
 
 def is_calibration(path: str | os.PathLike[str]) -> bool:
@@ -98,7 +102,11 @@ def is_calibration(path: str | os.PathLike[str]) -> bool:
         text = _text(path)
     except CalibrationFileError:
         return False
-    return f'"{OWN}"' in text or _recognised(text, path) is not None
+    try:
+        return f'"{OWN}"' in text or _recognised(text, path) is not None
+    except RefusedError:
+        # A maker's file that lacks what is asked of it: read as a calibration it says so.
+        return True
 
 
 LARGEST = 4_000_000

@@ -23,7 +23,8 @@ from trihedron.files.formats.autopilot import (
     relative,
     triple,
 )
-from trihedron.files.formats.contract import ExportOptions, Format, Thermal, given, heading, lost_to_a_diagonal, number
+from trihedron.files.formats.contract import ExportOptions, Format, Thermal, given, heading, number
+from trihedron.files.formats.losses import lost_gyro_scale, lost_to_a_diagonal
 from trihedron.records import Calibration, Onboard
 from trihedron.records.plain import as_plain
 
@@ -52,9 +53,8 @@ def to_ardupilot(calibration: Calibration, options: ExportOptions) -> str:
             if name == "accelerometer":
                 lines.append(f"INS_{letters}{suffix}SCAL_{axis},{number(float(one.scale[k]))}")
         lines += thermal
-        if name == "gyroscope":
-            worst = 100.0 * float(np.abs(one.scale - 1.0).max())
-            lines.append(f"# ArduPilot has no gyro scale: up to {worst:.2g} % of scale is lost.")
+        if own.gyroscope is not None and name == "gyroscope":
+            lines += [f"# {line}" for line in lost_gyro_scale(own.gyroscope, "ArduPilot")]
             lines.append(f"# INS_GYR_CAL other than 0 measures INS_GYR{suffix}OFFS anew at every start.")
     return "\n".join([*lines, ""])
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
-from trihedron.files.plausible import LARGEST_SI_FACTOR, ROUNDING, has_one_handedness, named_sensors
+from trihedron.files.plausible import LARGEST_SI_FACTOR, has_one_handedness, named_sensors
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.thermal_model import parameters_at
 from trihedron.units import (
@@ -164,33 +164,6 @@ def effect_parameters(calibration: Calibration, effect_id: str) -> dict[str, flo
     return {}
 
 
-def lost_to_a_diagonal(calibration: Calibration) -> list[str]:
-    """What a model of scales and biases alone leaves of this calibration, in words with sizes."""
-    said = []
-    u, _, vt = np.linalg.svd(_unit_columns(calibration.accelerometer))
-    for name, sensor in named_sensors(calibration):
-        # How the accelerometer's triad as a whole is turned is a choice of frame, which no pose knows.
-        unit = (u @ vt).T @ _unit_columns(sensor)
-        off = np.abs(unit - np.diag(np.diag(unit)))
-        half_width = 1.96 * sensor.sigma_S * np.linalg.norm(np.linalg.inv(sensor.S), axis=1)
-        seen = off[(off > half_width) & (off > ROUNDING)]
-        if not len(seen):
-            continue
-        off = float(seen.max())
-        if name == "accelerometer":
-            size = f"{mm_s2_from_m_s2(off * calibration.gravity_m_s2):.3g} mm/s^2 at 1 g"
-        else:
-            size = f"{degrees_from_radians(off * np.radians(100.0)):.3g} deg/s at 100 deg/s"
-        said.append(f"This format has no misalignment: {100.0 * off:.2g} % of the {name}'s is lost, {size}.")
-    return said
-
-
-def _unit_columns(sensor: SensorCalibration) -> FloatArray:
-    """Columns at the length of one unit of truth: what is off the diagonal is the share of another axis."""
-    unit: FloatArray = sensor.S * np.linalg.norm(np.linalg.inv(sensor.S), axis=1)
-    return unit
-
-
 def thermal_of(calibration: Calibration, name: str) -> Thermal | None:
     """How a sensor's bias follows temperature, in its readings: from the effects of one recording or several at once.
 
@@ -277,20 +250,6 @@ def number(value: float) -> str:
 def matrix_rows(values: FloatArray, indent: int) -> list[str]:
     """Rows of a matrix as a YAML sequence of sequences."""
     return [f"{' ' * indent}- [{row(r)}]" for r in values]
-
-
-def lost_without_intrinsics(calibration: Calibration) -> list[str]:
-    """What a file without S and b leaves to its reader, in words with sizes."""
-    g = calibration.gravity_m_s2
-    error = calibration.accelerometer.S - np.eye(3)
-    worst = float(np.linalg.norm(error, 2)) * g
-    bias = float(np.linalg.norm(calibration.accelerometer.b))
-    size = f"{worst:.2g} m/s^2 of scale and misalignment at 1 g, {bias:.2g} m/s^2 of bias"
-    if calibration.gyroscope is not None:
-        rate = degrees_from_radians(float(np.linalg.norm(calibration.gyroscope.b)))
-        share = 100.0 * float(np.linalg.norm(calibration.gyroscope.S - np.eye(3), 2))
-        size += f", {share:.2g} % of rate and {rate:.2g} deg/s of bias"
-    return [f"Apply S and b to the readings before they get there; without them this is lost: {size}."]
 
 
 def given(

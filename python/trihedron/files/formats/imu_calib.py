@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.files.formats.contract import ExportOptions, Format, given, heading, of_si_readings, row
+from trihedron.files.formats.losses import has_matrix
 from trihedron.files.formats.parsing import array_of, yaml_of
 from trihedron.records import Calibration
 
@@ -13,7 +14,7 @@ def to_imu_calib(calibration: Calibration, options: ExportOptions) -> str:
     """``imu_calib.yaml``; the package measures the gyro's bias at start and has no scale of it."""
     known = of_si_readings(calibration, "imu_calib", options)
     lines = [f"# {line}" for line in heading(known, "corrected = SM raw - bias, SI, accelerometer only.")]
-    if known.gyroscope is not None:
+    if known.gyroscope is not None and has_matrix(known.gyroscope):
         worst = 100.0 * float(np.linalg.norm(known.gyroscope.S - np.eye(3), 2))
         lines.append(f"# The gyro's scale and misalignment are lost, up to {worst:.2g} % of the rate.")
     lines += [f"SM: [{row(known.accelerometer.S.ravel())}]", f"bias: [{row(-known.accelerometer.b)}]", ""]

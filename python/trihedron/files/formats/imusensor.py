@@ -15,7 +15,7 @@ def to_imusensor(calibration: Calibration, options: ExportOptions) -> str:
     """A MATLAB script that makes ``imu``."""
     known, pairs, figures = distortion(calibration, options, "imuSensor")
     equation = "reading = AxesMisalignment/100 * truth + ConstantBias + noise, SI."
-    lines = [f"% {line}" for line in said_of(known, options, equation, has_matrix=True)]
+    lines = [f"% {line}" for line in said_of(known, options, equation, holds_matrix=True)]
     lines += [f"imu = imuSensor('accel-gyro', 'SampleRate', {number(figures.rate_hz)});"]
     for attribute, make, name, N, K in (
         ("Accelerometer", "accelparams", "accelerometer", figures.accel_N, figures.accel_K),

@@ -21,7 +21,7 @@ from trihedron.files.formats.contract import (
 from trihedron.files.formats.lower import in_lower
 from trihedron.files.formats.matrices import lower_orthogonal
 from trihedron.files.formats.noise_keys import required, si_rows
-from trihedron.files.formats.parsing import array_of, yaml_of
+from trihedron.files.formats.parsing import array_of, without_readings, yaml_of
 from trihedron.records import Calibration
 from trihedron.sensor_model import other_form
 
@@ -61,10 +61,19 @@ def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
 
 
 def from_kalibr(text: str) -> Calibration | None:
-    """Intrinsics of an ``imu.yaml`` or of the results of ``kalibr_calibrate_imu_camera`` (``*-imu.yaml``)."""
+    """Intrinsics of an ``imu.yaml`` or of the results of ``kalibr_calibrate_imu_camera`` (``*-imu.yaml``).
+
+    Raises
+    ------
+    ValueError
+        When it is the chain of cameras beside those results, which knows the IMU's pose alone.
+    """
     document = yaml_of(text)
     if document is None or text.lstrip().startswith("%YAML:1.0"):
         return None
+    camera = document.get("cam0")
+    if isinstance(camera, dict) and "T_cam_imu" in camera and "imu0" not in document:
+        raise without_readings("Kalibr's camchain-imucam.yaml")
     document = document.get("imu0", document)
     if not isinstance(document, dict) or not {KEYS[0], KEYS[2]} <= document.keys():
         return None

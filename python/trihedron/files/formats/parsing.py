@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
 
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _PAIR = re.compile(r"^( *)(?:- )?([\w.]+)\s*:\s*(.*)$")
@@ -21,6 +22,14 @@ def json_of(text: str) -> dict[str, Any] | None:
     except ValueError:
         return None
     return document if isinstance(document, dict) else None
+
+
+def without_readings(what: str) -> RefusedError:
+    """The refusal of a file that states where an IMU sits and nothing of what it reads."""
+    return RefusedError(
+        f"{what} states the pose of the IMU, and no scale, misalignment or bias of its readings: there is nothing here "
+        "to judge or to apply."
+    )
 
 
 def numbers_in(text: str) -> list[float]:
@@ -42,7 +51,8 @@ def array_of(value: Any, shape: tuple[int, ...], default: FloatArray) -> FloatAr
 def yaml_of(text: str) -> dict[str, Any] | None:
     """Mappings, numbers, words and lists of numbers of a YAML text, as calibrations are written; ``None`` of others.
 
-    Block and flow lists of numbers both come flat: a matrix is told by its key. Nothing else of YAML is understood.
+    Block and flow lists of numbers both come flat: a matrix is told by its key. Nothing else of YAML is understood,
+    mappings in braces neither.
     """
     root: dict[str, Any] = {}
     levels: list[tuple[int, dict[str, Any]]] = [(-1, root)]
@@ -61,6 +71,8 @@ def yaml_of(text: str) -> dict[str, Any] | None:
         while levels[-1][0] >= depth:
             levels.pop()
         owner = levels[-1][1]
+        if value.startswith("{"):
+            return None
         if not value or value.startswith("!!"):
             owner[key] = {}
             levels.append((depth, owner[key]))

@@ -23,7 +23,8 @@ from trihedron.files.formats.autopilot import (
     relative,
     triple,
 )
-from trihedron.files.formats.contract import ExportOptions, Format, Thermal, given, heading, lost_to_a_diagonal, number
+from trihedron.files.formats.contract import ExportOptions, Format, Thermal, given, heading, number
+from trihedron.files.formats.losses import lost_gyro_scale, lost_to_a_diagonal
 from trihedron.records import Calibration, Onboard
 from trihedron.records.plain import as_plain
 
@@ -56,9 +57,8 @@ def to_px4(calibration: Calibration, options: ExportOptions) -> str:
             lines.append(_line(f"{root}_{axis}OFF", one.offset[k]))
             if name == "accelerometer" or has_scale:
                 lines.append(_line(f"{root}_{axis}SCALE", one.scale[k]))
-        if name == "gyroscope" and not has_scale:
-            worst = 100.0 * float(np.abs(one.scale - 1.0).max())
-            lines.append(f"# PX4 has no gyro scale: up to {worst:.2g} % of scale is lost.")
+        if own.gyroscope is not None and name == "gyroscope" and not has_scale:
+            lines += [f"# {line}" for line in lost_gyro_scale(own.gyroscope, "PX4")]
         lines += _thermal_lines(board, name, one)
     return "\n".join([*lines, ""])
 

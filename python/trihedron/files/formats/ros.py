@@ -4,14 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.files.formats.contract import (
-    ExportOptions,
-    Format,
-    heading,
-    lost_without_intrinsics,
-    of_si_readings,
-    row,
-)
+from trihedron.files.formats.contract import ExportOptions, Format, heading, of_si_readings, row
+from trihedron.files.formats.losses import lost_without_intrinsics
 from trihedron.files.formats.noise_keys import required
 from trihedron.records import Calibration
 

@@ -6,11 +6,11 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.files.formats.contract import ExportOptions, heading, of_si_readings
+from trihedron.files.formats.losses import has_bias, has_matrix, size_of_bias
 from trihedron.files.formats.noise_keys import Figures, required
 from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration
 from trihedron.sensor_model import other_form
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 
 def distortion(
@@ -34,7 +34,7 @@ def said_of(
     options: ExportOptions,
     equation: str,
     *,
-    has_matrix: bool = False,
+    holds_matrix: bool = False,
     lost_bias: tuple[str, ...] = (),
     lost: tuple[str, ...] = (),
 ) -> list[str]:
@@ -42,16 +42,11 @@ def said_of(
     lines = heading(calibration, equation)
     for name, sensor in named_sensors(calibration):
         A, b = other_form(sensor.S, sensor.b)
-        error = float(np.linalg.norm(A - np.eye(3), 2))
-        if not has_matrix and error > 0.0:
-            lines.append(
-                f"Scale and misalignment of the {name} cannot be held: {100 * error:.2g} % of its signal is lost."
-            )
-        if name in lost_bias:
-            size = f"{mm_s2_from_m_s2(float(np.linalg.norm(b))):.3g} mm/s^2"
-            if name == "gyroscope":
-                size = f"{degrees_from_radians(float(np.linalg.norm(b))):.3g} deg/s"
-            lines.append(f"The bias of the {name} cannot be held: {size} is lost.")
+        if not holds_matrix and has_matrix(sensor):
+            share = 100.0 * float(np.linalg.norm(A - np.eye(3), 2))
+            lines.append(f"Scale and misalignment of the {name} cannot be held: {share:.2g} % of its signal is lost.")
+        if name in lost_bias and has_bias(sensor):
+            lines.append(f"The bias of the {name} cannot be held: {size_of_bias(name, b)} is lost.")
     lines += lost
     for name, noise in (("accelerometer", options.accelerometer_noise), ("gyroscope", options.gyroscope_noise)):
         if noise is not None and noise.K.is_limit:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from trihedron.files.formats.contract import ExportOptions, heading, lost_without_intrinsics, of_si_readings
+from trihedron.files.formats.contract import ExportOptions, heading, of_si_readings
+from trihedron.files.formats.losses import lost_without_intrinsics
 from trihedron.files.formats.noise_keys import Figures, required
 from trihedron.records import Calibration
 

@@ -1,0 +1,134 @@
+"""What is written for another program is read back as the same calibration, and files laid out by their makers too."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+from test_export import NOISE, READINGS, calibration, with_g_sensitivity
+from trihedron.files.formats import any_calibration, export_files, formats, is_calibration
+
+READ = [name for name, one in formats().items() if one.read is not None and one.write is not None]
+BOARDS = ("ardupilot", "px4")
+GYRO_LOST = ("imu_calib",)
+
+
+def written(known, target, folder):
+    made = export_files(known, target, replace(NOISE, current_parameters="none"))
+    for ending, text in made.items():
+        (folder / f"unit{ending}").write_text(text)
+    return folder / f"unit{next(iter(made))}"
+
+
+def angles(sensor):
+    """What no choice of frame changes: SᵀS, and the reading that means zero."""
+    return sensor.S.T @ sensor.S, np.linalg.solve(sensor.S, sensor.b)
+
+
+@pytest.mark.parametrize("unit", ["si", "counts"])
+@pytest.mark.parametrize("target", READ)
+def test_a_calibration_is_read_back_from_the_file_of_another_program(target, unit, tmp_path):
+    known = calibration(unit)
+    if target in BOARDS:
+        # Their equation has scales of the accelerometer and offsets.
+        a, w = known.accelerometer, known.gyroscope
+        known = replace(known, accelerometer=replace(a, S=np.diag(np.diag(a.S))), gyroscope=replace(w, S=np.eye(3)))
+    if unit == "counts" and formats()[target].in_si:
+        pytest.skip("takes readings in SI")
+    if target == "kalibr" or target == "openvins" or target == "imucal":
+        known, G = with_g_sensitivity(known)
+    path = written(known, target, tmp_path)
+    assert is_calibration(path)
+    back = any_calibration(path)
+    assert back.extensions["maker"] == target
+    pairs = [(known.accelerometer, back.accelerometer), (known.gyroscope, back.gyroscope)]
+    for mine, read in pairs[: 1 if target in GYRO_LOST else 2]:
+        assert read.raw_unit == mine.raw_unit
+        # Residue of writing all digits and inverting matrices of condition 1.1, relative to the size of S.
+        tolerance = {"rtol": 1e-9, "atol": 1e-12 * np.linalg.norm(mine.S)}
+        for wanted, got in zip(angles(mine), angles(read), strict=True):
+            np.testing.assert_allclose(got, wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())
+        if target != "imu_tk":
+            np.testing.assert_allclose(read.S, mine.S, **tolerance)
+    # Both sensors are turned alike where the format has a frame of its own.
+    if target not in (*GYRO_LOST, *BOARDS):
+        relative = [np.linalg.solve(w.S, a.S) for a, w in ((s[0][0], s[1][0]) for s in [pairs])]
+        read = np.linalg.solve(back.gyroscope.S, back.accelerometer.S)
+        np.testing.assert_allclose(read, relative[0], rtol=1e-9, atol=1e-11)
+    if "effects" in known.extensions:
+        values = back.extensions["effects"][0]["model"]["values"]
+        np.testing.assert_allclose(np.reshape(values, (3, 3)), G, atol=1e-14)
+
+
+def test_results_of_kalibr_as_its_writer_dumps_them_with_a_second_imu_and_no_bias(tmp_path):
+    """``kalibr_calibrate_imu_camera`` dumps a mapping of IMUs by PyYAML: block lists in block lists, words sorted."""
+    known, G = with_g_sensitivity(calibration("si"))
+    flat = yaml.safe_load(export_files(known, "kalibr", NOISE)[""])
+    for sensor in ("accelerometers", "gyroscopes"):
+        del flat[sensor]["b"]
+    result = {"imu0": {"T_i_b": np.eye(4).tolist(), "time_offset": 0.0, **flat}}
+    result["imu1"] = {**result["imu0"], "accelerometers": {"M": (2 * np.eye(3)).tolist()}}
+    for style in (None, False):
+        path = tmp_path / f"log-imu-{style}.yaml"
+        path.write_text(yaml.dump(json.loads(json.dumps(result)), default_flow_style=style))
+        back = any_calibration(path)
+        np.testing.assert_allclose(back.accelerometer.S, known.accelerometer.S, atol=1e-12)
+        np.testing.assert_allclose(back.gyroscope.S, known.gyroscope.S, atol=1e-12)
+        values = back.extensions["effects"][0]["model"]["values"]
+        np.testing.assert_allclose(np.reshape(values, (3, 3)), G, atol=1e-14)
+        assert back.extensions["without_bias"] == ("accelerometer", "gyroscope")
+
+
+def test_a_basalt_file_with_cameras_around_the_imu(tmp_path):
+    known = calibration("si")
+    document = json.loads(export_files(known, "basalt", NOISE)[""])
+    document["value0"] |= {
+        "T_imu_cam": [{"px": 0.1, "py": 0, "pz": 0, "qx": 0, "qy": 0, "qz": 0, "qw": 1}],
+        "intrinsics": [{"camera_type": "ds", "intrinsics": {"fx": 500.0, "xi": -0.2, "alpha": 0.5}}],
+        "resolution": [[640, 480]],
+        "vignette": [],
+        "cam_time_offset_ns": 0,
+    }
+    (tmp_path / "calib.json").write_text(json.dumps(document))
+    back = any_calibration(tmp_path / "calib.json")
+    np.testing.assert_allclose(back.accelerometer.S, known.accelerometer.S, atol=1e-12)
+    np.testing.assert_allclose(READINGS @ back.gyroscope.S.T + back.gyroscope.b,
+                               READINGS @ known.gyroscope.S.T + known.gyroscope.b, atol=1e-12)  # fmt: skip
+
+
+CAMCHAIN = {
+    "cam0": {
+        "T_cam_imu": np.eye(4).tolist(),
+        "camera_model": "pinhole",
+        "intrinsics": [458.6, 457.3, 367.2, 248.4],
+        "timeshift_cam_imu": 0.0021,
+    }
+}
+OAK = {
+    "boardName": "BW1098OBC",
+    "cameraData": [],
+    "imuExtrinsics": {"rotationMatrix": np.eye(3).tolist(), "toCameraSocket": 0, "translation": {"x": 0, "y": 0}},
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        ("camchain-imucam.yaml", yaml.dump(CAMCHAIN), "Kalibr"),
+        ("oak.json", json.dumps(OAK), "depthai"),
+    ],
+)
+def test_a_file_of_where_the_imu_sits_is_refused_with_what_it_lacks(name, text, says, tmp_path):
+    """Kalibr's camera chain and the EEPROM of an OAK camera hold pose and delay of the IMU, nothing of its readings."""
+    (tmp_path / name).write_text(text)
+    with pytest.raises(ValueError, match=f"(?s){says}.*no scale, misalignment or bias"):
+        any_calibration(tmp_path / name)
+    assert is_calibration(tmp_path / name)
+
+
+def test_a_yaml_in_braces_is_no_calibration_and_no_crash(tmp_path):
+    known = yaml.safe_load(export_files(calibration("si"), "kalibr", NOISE)[""])
+    (tmp_path / "imu.yaml").write_text(yaml.dump({"imu0": known}, default_flow_style=True))
+    assert not is_calibration(tmp_path / "imu.yaml")
