@@ -130,7 +130,7 @@ def allan(
     write_json(machine, json, force=force)
     write_report(document, machine, report, force=force)
     if not full and report is None:
-        say("Customary units, how long to record, Kalibr's names: --full; curves: --plot F.png or --report F.html.")
+        say("Data-sheet units, how long to record, Kalibr's names: --full; curves: --plot F.png or --report F.html.")
     leave(all_findings(found))
 
 

@@ -14,8 +14,7 @@ from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pic
 from trihedron.report.diagnosis_charts import before_after_chart, effect_chart
 from trihedron.report.diagnosis_models import models_blocks
 from trihedron.report.diagnosis_numbers import (
-    differing_noise,
-    differing_numbers,
+    differing_blocks,
     noise_blocks,
     numbers_blocks,
     stages_blocks,
@@ -76,10 +75,8 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
     """Lay out a diagnosis; the first sections fit one screen."""
     sections = [Section("Result", _located(diagnosis))]
     if diagnosis.parameters:
-        numbers = [*differing_numbers(diagnosis), *differing_noise(diagnosis)]
-        words = tuple(("", word) for word in numbers) or (("", "None of the given parameters differs."),)
-        about = (*forest_pictures(diagnosis), *_traces(diagnosis))
-        sections.append(Section("Parameters that differ (recording minus model)", (Facts(words), *about)))
+        about = (*forest_pictures(diagnosis), *differing_blocks(diagnosis), *_traces(diagnosis))
+        sections.append(Section("Parameters that differ", about))
     sections += [
         Section("Missing effects", (*effects_blocks(diagnosis), *_physics(diagnosis))),
         Section("Unexplained", (Paragraph(_remaining(diagnosis)), *relations_blocks(diagnosis))),
@@ -116,29 +113,22 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
 
 def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     after = {d.domain: d for d in diagnosis.remaining}
-    rows: tuple[tuple[str, ...], ...] = tuple(
+    has_effects = bool(diagnosis.effects)
+    # What one came for stands first: on a narrow terminal the columns behind it move below.
+    rows = tuple(
         (
             MEANING[d.domain],
-            d.domain,
-            rms_in_words(d),
+            "disagrees" if d.disagrees else "agrees",
+            *([_after(d, after.get(d.domain))] if has_effects else []),
             plain_number(d.chi2_per_dof),
             p_in_words(d.p_value),
-            "disagrees" if d.disagrees else "agrees",
-            _after(d, after.get(d.domain)) if diagnosis.effects else "",
+            rms_in_words(d),
+            d.domain,
         )
         for d in diagnosis.domains
     )
-    head: tuple[str, ...] = (
-        "what",
-        "domain",
-        "residual of the session fit",
-        "χ²/dof",
-        "p",
-        "model",
-        "with the effects",
-    )
-    if not diagnosis.effects:
-        head, rows = head[:-1], tuple(row[:-1] for row in rows)
+    with_effects = ("with the effects",) if has_effects else ()
+    head = ("what", "model", *with_effects, "χ²/dof", "p", "residual of the session fit", "domain")
     blocks: list[Block] = [Table(head, rows)]
     # Which parameters differ has a section of its own.
     places = tuple(
@@ -337,6 +327,6 @@ def _headlines(diagnosis: Diagnosis) -> list[Headline]:
     tests = [d for d in diagnosis.domains if d.dof > 0]
     if not tests:
         return []
-    worst = min(tests, key=lambda d: (not d.disagrees, d.p_value))
+    worst = min((d for d in tests if d.disagrees), key=lambda d: d.p_value, default=tests[0])
     beside = f"χ² per degree of freedom, 1 by noise alone; p {p_in_words(worst.p_value)}"
     return [Headline(MEANING[worst.domain], plain_number(worst.chi2_per_dof), "", beside)]

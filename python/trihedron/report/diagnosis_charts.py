@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -92,6 +92,14 @@ def _bars_of_noise(time_s: FloatArray, sigma: FloatArray, *, is_angle: bool) -> 
     return Line(x, y, "2σ of noise", "shade")
 
 
+BENT: dict[str, tuple[str, Callable[[FloatArray], FloatArray], str]] = {
+    "accel-quadratic": ("K2", lambda f: f**2, "K2 f²"),
+    "accel-cubic": ("K3", lambda f: f**3, "K3 f³"),
+    "accel-scale-asymmetry": ("half_difference", np.abs, "a |f|"),
+}
+"""Effects that are a curve over the force along each axis: their parameters, the curve, its name."""
+LEAST_PART = 0.4
+"""Of gravity along an axis: a pose with less of it says little of that axis."""
 # What drives an effect, and the domain in which it is seen best.
 _FORCE = (
     "gyro-g-sensitivity", "accel-quadratic", "accel-cubic", "accel-scale-asymmetry", "accel-saturation",
@@ -119,6 +127,9 @@ def effect_chart(
     seen = (
         domains["static-gyro"] if effect.id == "gyro-g-sensitivity" and "static-gyro" in domains else domains[named[0]]
     )
+    bent = None if effect.id not in BENT or "static-accel" not in domains else domains["static-accel"]
+    if bent is not None and (chart := _bent(effect, bent, recording, calibration)) is not None:
+        return chart
     if effect.id == "gyro-g-sensitivity" and seen.domain == "static-gyro":
         return _g_sensitivity(effect, seen, recording, calibration)
     drivers = _drivers(effect.id, seen, recording, segments, calibration)
@@ -204,9 +215,42 @@ def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> P
             told = [said(f"{kind} {n}, with the effects", "", float(v), unit) for n, v in enumerate(after)]
             marks.append(Points(x, after, told, None, f"{channel}: with the effects", "accent", True))
         elif is_same:
+            if seen.domain == "static-gyro" and unit_x in ("s", "°C"):
+                order = np.argsort(x)
+                marks.append(Line(x[order], (data - after)[order], f"{channel}: model", colour))
+                continue
             told = [said(f"{kind} {n}, model", "", float(v), unit) for n, v in enumerate(data - after)]
             marks.append(Points(x, data - after, told, None, f"{channel}: explained by the effects", colour, True))
     return Panel(Scale(label, unit_x), Scale(f"{seen.quantity} [{unit}]", unit), tuple(marks), height_px=220)
+
+
+def _bent(
+    effect: AcceptedEffect, seen: DomainResiduals, recording: Recording, calibration: Calibration
+) -> Chart | None:
+    """The curve of every axis over force with its band, and on it what is left of gravity's error in every pose."""
+    prefix, curve, name = BENT[effect.id]
+    values = {p.name: (p.value, p.std) for p in effect.parameters}
+    if any(f"{prefix}_{j}" not in values for j in "xyz") or not len(seen.after) or recording.accelerometer is None:
+        return None
+    force = force_at(seen.time_after_s, recording, calibration)
+    part = force / np.linalg.norm(force, axis=1)[:, None]
+    line, panels = np.linspace(-10.0, 10.0, 81), []
+    for j, colour in enumerate(AXIS_COLOURS):
+        value, std = (mm_s2_from_m_s2(v) for v in values[f"{prefix}_{'xyz'[j]}"])
+        shape, half = value * curve(line), 2.0 * std * np.abs(curve(line))
+        picked = np.flatnonzero(np.abs(part[:, j]) >= LEAST_PART)
+        f = force[picked, j]
+        left = value * curve(f) + mm_s2_from_m_s2(1.0) * seen.after[picked, 0] / part[picked, j]
+        told = [f"pose {k + 1}: {plain_number(float(v))} mm/s²" for k, v in zip(picked, left, strict=True)]
+        marks: tuple[Mark, ...] = (
+            Band(line, shape - half, shape + half, "2σ of the model"),
+            Level(y=0.0),
+            Line(line, shape, f"model: {name}", colour),
+            Points(f, left, told, None, "model and what is left in a pose", colour),
+        )
+        x = Scale(f"f_{'xyz'[j]} [m/s²]", "m/s²", limits=(-10.6, 10.6))
+        panels.append(Panel(x, Scale("error of the reading [mm/s²]", "mm/s²"), marks, title=f"along {'XYZ'[j]}"))
+    return Chart(tuple(panels), columns=3)
 
 
 def _g_sensitivity(

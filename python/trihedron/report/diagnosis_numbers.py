@@ -35,9 +35,9 @@ _SENTENCES_FIRST = ("unit", "frame", "range", "rate")
 """What is wrong with every reading of a sensor is said before its noise."""
 _STAGES = {
     "as-given": "as given",
-    "numbers": "parameters re-estimated",
-    "noise": "with the recording's noise",
-    "effects": "with the effects",
+    "numbers": "parameters",
+    "noise": "noise",
+    "effects": "effects",
 }
 
 
@@ -57,6 +57,26 @@ def differing_numbers(diagnosis: Diagnosis) -> list[str]:
         ]
         said += list(dict.fromkeys(p.remark for p in members if p.remark))
     return said
+
+
+def differing_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """The parameters that differ as a table; what they resemble, and noise that differs, as sentences."""
+    shown = [p for p in diagnosis.parameters if p.significant]
+    rows = tuple((named(p), _value(p, p.model), _value(p, p.recording), _difference(p)) for p in shown)
+    sentences = [*_remarks_in_order(shown), *differing_noise(diagnosis)]
+    if not rows and not sentences:
+        return (Paragraph("None of the given parameters differs."),)
+    blocks: list[Block] = []
+    if rows:
+        head = ("parameter", "model", "recording", "recording − model")
+        blocks.append(Table(head, rows, "Parameters of the groups that differ"))
+    if sentences:
+        blocks.append(Facts(tuple(("", one) for one in sentences)))
+    return tuple(blocks)
+
+
+def _remarks_in_order(parameters: list[ParameterDifference]) -> list[str]:
+    return list(dict.fromkeys(p.remark for p in parameters if p.remark))
 
 
 def differing_in_short(diagnosis: Diagnosis) -> list[str]:
@@ -143,7 +163,8 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         )
         for n in diagnosis.noise_compared
     )
-    blocks: list[Block] = [Table(("", "term", "model", "recording", "ratio (interval)", "unit", ""), rows)]
+    head = ("", "term", "model", "recording", "ratio (interval)", "unit", "")
+    blocks: list[Block] = [Table(head, rows, "Noise and sampling of the model and of the recording")]
     remarks = tuple(("", n.remark) for n in diagnosis.noise_compared if n.remark and n.significant)
     if remarks:
         blocks.append(Facts(tuple(dict.fromkeys(remarks))))
@@ -156,30 +177,38 @@ def _term(n: NoiseDifference) -> str:
 
 
 def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ...]:
-    """Stage by stage how well the recording is predicted; ``size`` names the domains."""
-    domains = list(dict.fromkeys(d.domain for stage in diagnosis.stages for d in stage.domains))
-    rows = tuple((_STAGES[stage.stage], *(_stage(stage, d) for d in domains)) for stage in diagnosis.stages)
-    head = ("stage", *(size.get(d, d) for d in domains))
+    """Stage by stage how well the recording is predicted; ``size`` names the domains.
+
+    A stage that repeats the one before it has no column.
+    """
+    stages = [one for k, one in enumerate(diagnosis.stages) if not k or one.domains != diagnosis.stages[k - 1].domains]
+    domains = list(dict.fromkeys(d.domain for stage in stages for d in stage.domains))
+    rows = tuple(
+        (f"{size.get(d, d)} [{_unit_of(stages, d)}]", *(_stage(stage, d) for stage in stages)) for d in domains
+    )
     if not rows:
         return (Paragraph("No stages: the model was fitted to this recording."),)
-    caption = "Rms, and χ² per degree of freedom, on poses and moves that the fit of each stage did not see"
-    return (Table(head, rows, caption),)
+    kept = {stage.stage for stage in stages}
+    same = [_STAGES[stage.stage] for stage in diagnosis.stages if stage.stage not in kept]
+    caption = "Rms on poses and moves that the fit of each stage did not see"
+    caption += f"; {' and '.join(same)}: as before" if same else ""
+    return (Table(("rms", *(_STAGES[stage.stage] for stage in stages)), rows, caption),)
+
+
+def _unit_of(stages: list[Stage], domain: str) -> str:
+    return next(_printed(d.rms, d.unit)[1] for stage in stages for d in stage.domains if d.domain == domain)
 
 
 def _stage(stage: Stage, domain: str) -> str:
-    for d in stage.domains:
-        if d.domain == domain:
-            chi2 = "" if d.chi2_per_dof is None else f" (χ² {plain_number(d.chi2_per_dof)})"
-            return f"{_si(d.rms, d.unit)}{chi2}"
-    return "–"
+    return next((plain_number(_printed(d.rms, d.unit)[0]) for d in stage.domains if d.domain == domain), "–")
 
 
-def _si(value: float, unit: str) -> str:
+def _printed(value: float, unit: str) -> tuple[float, str]:
     if unit == "m/s^2":
-        return f"{plain_number(mm_s2_from_m_s2(value))} mm/s²"
+        return mm_s2_from_m_s2(value), "mm/s²"
     if unit == "rad/s":
-        return f"{plain_number(degrees_from_radians(value))} °/s"
-    return f"{plain_number(value)} {'°' if unit == 'deg' else unit_in_print(unit)}"
+        return degrees_from_radians(value), "°/s"
+    return value, "°" if unit == "deg" else unit_in_print(unit)
 
 
 def named(p: ParameterDifference) -> str:
@@ -205,7 +234,9 @@ def _size(p: ParameterDifference) -> str:
 
 def _value(p: ParameterDifference, value: float) -> str:
     scale, unit = _unit(p, is_difference=False)
-    return f"{_as_known(scale * value, scale * p.std)}{' ' + unit if unit else ''}"
+    # The error of a scale is relative to it.
+    sigma = p.std * abs(value) if p.id in ("accel-scale", "gyro-scale") else scale * p.std
+    return f"{_as_known(scale * value, sigma)}{' ' + unit if unit else ''}"
 
 
 def _as_known(value: float, sigma: float) -> str:

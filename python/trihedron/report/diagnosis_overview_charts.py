@@ -43,20 +43,29 @@ def strengths_chart(diagnosis: Diagnosis) -> Chart:
     """A bar a domain, as modelled and with the effects."""
     tests = [d for d in diagnosis.domains if d.chi2_per_dof > 0.0]
     after = {d.domain: d.chi2_per_dof for d in diagnosis.remaining} if diagnosis.effects else {}
-    both = [("as modelled", "accent", [d.chi2_per_dof for d in tests])]
+    chi2 = np.array([d.chi2_per_dof for d in tests])
+    differs = np.array([d.disagrees for d in tests])
+    sides: list[list[tuple[str, Colour, FloatArray]]] = [
+        [
+            ("disagrees", "accent", np.where(differs, chi2, math.nan)),
+            ("agrees", "soft", np.where(differs, math.nan, chi2)),
+        ]
+    ]
     if after:
-        both.append(("with the effects", "c1", [after.get(d.domain, math.nan) for d in tests]))
+        sides.append([("with the effects", "c1", np.array([after.get(d.domain, math.nan) for d in tests]))])
     marks: list[Mark] = []
-    width = 0.7 / len(both)
+    width = 0.7 / len(sides)
     names = tuple(MEANING.get(d.domain, d.domain) for d in tests)
-    for k, (name, colour, values) in enumerate(both):
-        place = -np.arange(1.0, len(tests) + 1.0) + width * (0.5 * (len(both) - 1) - k)
-        told = [f"{what}, {name}: χ²/dof {plain_number(v)}" for what, v in zip(names, values, strict=True)]
-        base = np.full(len(tests), LEAST_CHI2)
-        shown = np.maximum(values, LEAST_CHI2)
-        marks.append(Bars(shown, place, 0.92 * width, told, name, colour, base, is_across=True))  # type: ignore[arg-type]
+    base = np.full(len(tests), LEAST_CHI2)
+    for k, side in enumerate(sides):
+        place = -np.arange(1.0, len(tests) + 1.0) + width * (0.5 * (len(sides) - 1) - k)
+        for name, colour, values in side:
+            if np.any(np.isfinite(values)):
+                told = [f"{what}, {name}: χ²/dof {plain_number(v)}" for what, v in zip(names, values, strict=True)]
+                shown = np.maximum(values, LEAST_CHI2)
+                marks.append(Bars(shown, place, 0.92 * width, told, name, colour, base, is_across=True))
     marks.append(Level(x=1.0, name="noise alone", is_dashed=True))
-    top = max(max(v for v in values if math.isfinite(v)) for _, _, values in both)
+    top = float(np.nanmax([np.nanmax(v, initial=1.0) for side in sides for _, _, v in side]))
     x = Scale("χ² per degree of freedom", is_log=True, limits=(LEAST_CHI2, max(2.0 * top, 4.0)))
     return Chart((Panel(x, Scale("", names=names), tuple(marks), height_px=2 * ROW_PX + ROW_PX * len(tests)),))
 

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable
 from functools import partial
 
 from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.records.sessions import Change, Repeated
+from trihedron.report.chart import Chart
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.many_charts import fleet_chart, shown
 from trihedron.report.numbers import how_many, plain_number, with_sigma
 
+MOST_LEADING = 4
+"""Numbers of the first picture."""
 VERDICTS = {
     "consistent": "the linear model explains everything",
     "missing-physics": "physics beyond the linear model",
@@ -43,13 +47,8 @@ def fleet_report(summary: FleetSummary) -> Document:
     if summary.changes:
         sections.append(Section("Drift between sessions of one device", tuple(_drift(summary))))
     if n_done:
-        picture = Picture(
-            "numbers",
-            "Every number by device, one point a log with its own error; the line is the median of devices.",
-            later("chart_figures", "draw_chart", partial(fleet_chart, summary)),
-            partial(fleet_chart, summary),
-        )
-        sections.append(Section("Distributions", (picture,)))
+        caption = "Every number by device, one point a log with its own error; the line is the median of devices."
+        sections.append(Section("Distributions", (_picture("numbers", caption, partial(fleet_chart, summary)),)))
     sections.append(Section("Every log", (_logs(summary),)))
     verdict = f"{n_done} of {how_many(n, 'log')} of {how_many(len(devices), 'device')} were calibrated."
     if not bad:
@@ -70,7 +69,18 @@ def fleet_report(summary: FleetSummary) -> Document:
         verdict=verdict,
         is_trustworthy=n_done > 0 and not mixed,
         sections=tuple(sections),
+        lead=_lead(summary) if n_done else None,
     )
+
+
+def _lead(summary: FleetSummary) -> Picture:
+    caption = "The numbers in which devices differ most beside their own errors: one point a log with its error, about "
+    caption += "the median of devices."
+    return _picture("differ", caption, partial(fleet_chart, summary, MOST_LEADING))
+
+
+def _picture(name: str, caption: str, chart: Callable[[], Chart]) -> Picture:
+    return Picture(name, caption, later("chart_figures", "draw_chart", chart), chart)
 
 
 def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:

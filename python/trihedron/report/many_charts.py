@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from trihedron.records.fleet import FleetSummary
@@ -25,8 +27,8 @@ def shown(unit: str) -> tuple[float, str]:
     return SHOWN[unit]
 
 
-def sessions_chart(model: SessionsModel) -> Chart:
-    """One panel an id: departures from the common value, along temperature where it is modelled."""
+def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int = 1) -> Chart:
+    """One panel an id: departures from the common value, along temperature where it is modelled; ``only`` these ids."""
     thermal = model.thermal
     place = np.arange(1.0, len(model.sessions) + 1.0)
     if thermal is not None:
@@ -35,6 +37,8 @@ def sessions_chart(model: SessionsModel) -> Chart:
     names = tuple(session.name for session in model.sessions)
     panels = []
     for name in dict.fromkeys(one.parameter.id for one in model.repeated):
+        if only and name not in only:
+            continue
         picked = [k for k, parameter in enumerate(PARAMETERS) if parameter.id == name]
         factor, unit = shown(PARAMETERS[picked[0]].unit)
         marks: list[Band | Level | Line | Points] = [Level(y=0.0)]
@@ -61,11 +65,14 @@ def sessions_chart(model: SessionsModel) -> Chart:
             marks.append(Points(place + (k - picked[0] - 1) * step, values, told, error, axis, colour))
         x = Scale("temperature [°C]", "°C") if thermal is not None else Scale("recording", whole=True, names=names)
         panels.append(Panel(x, Scale(f"{name}  [{unit}]", unit), tuple(marks), height_px=170))
-    return Chart(tuple(panels), is_linked=True)
+    return Chart(tuple(panels), columns=columns, is_linked=True)
 
 
-def fleet_chart(summary: FleetSummary) -> Chart:
-    """One panel a number: devices along the axis, one point a log with its error, about the median of devices."""
+def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
+    """One panel a number: devices along the axis, one point a log with its error, about the median of devices.
+
+    ``most``: only so many numbers, those in which devices differ most beside their own errors.
+    """
     logs = [log for log in summary.logs if log.numbers is not None and log.std is not None]
     n = min((len(log.numbers) for log in logs if log.numbers is not None), default=0)
     serials = list(dict.fromkeys(log.serial for log in logs))
@@ -78,7 +85,10 @@ def fleet_chart(summary: FleetSummary) -> Chart:
     errors = np.array([log.std[:n] for log in logs if log.std is not None])
     x = Scale("device, in the order of the table", whole=True, names=tuple(serials))
     panels = []
-    for k in range(n):
+    apart = numbers - np.median(numbers, axis=0)
+    strength = np.sum((apart / np.where(errors > 0.0, errors, np.inf)) ** 2, axis=0)
+    chosen = range(n) if most is None else sorted(np.argsort(-strength)[:most].tolist())
+    for k in chosen:
         parameter = PARAMETERS[k]
         factor, unit = shown(parameter.unit)
         centre = float(np.median([numbers[serial_of == s, k].mean() for s in range(len(serials))]))
@@ -91,7 +101,7 @@ def fleet_chart(summary: FleetSummary) -> Chart:
                 marks.append(Points(across[part], values[part], told, error[part], name, colour))
         y = Scale(f"{parameter.id} {parameter.name}  [{unit}]", unit)
         panels.append(Panel(x, y, tuple(marks), height_px=150))
-    return Chart(tuple(panels), columns=3)
+    return Chart(tuple(panels), columns=3 if most is None else 2)
 
 
 def residual_chart(found: AgainstReference) -> Chart:
@@ -102,5 +112,5 @@ def residual_chart(found: AgainstReference) -> Chart:
     for k in range(3):
         marks = (Level(y=0.0), Line(*envelope(found.residual_time_s, left[:, k]), "", AXIS_COLOURS[k], is_thin=True))
         y = Scale(f"{'XYZ'[k]}  [°/s]", "°/s", limits=(-reach, reach))
-        panels.append(Panel(Scale("time of the log [s]", "s"), y, marks, height_px=150))
+        panels.append(Panel(Scale("time [s]", "s"), y, marks, height_px=110))
     return Chart(tuple(panels), is_linked=True, legend=False)

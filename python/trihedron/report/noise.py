@@ -12,7 +12,7 @@ from trihedron.records import Finding, FindingCode, Noise, NoiseAxis, NoiseTerm,
 from trihedron.report.document import Block, Code, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.noise_charts import allan_chart
+from trihedron.report.noise_charts import allan_chart, sensors_chart
 from trihedron.report.noise_units import TERM_WORDS, customary, unit_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
 from trihedron.units import degrees_from_radians, micro_g_from_m_s2
@@ -51,13 +51,13 @@ def noise_report(
         ),
         is_trustworthy=noise.is_trustworthy,
         headlines=tuple(_headlines(groups)),
-        lead=_picture(noise, *groups[0]) if groups else None,
+        lead=_lead(noise, groups) if groups else None,
         sections=(
             Section("Result", tuple(tables)),
+            Section("Data sheet", tuple(dict.fromkeys(b for unit, axes in groups for b in _customary(axes, unit)))),
             Section("Findings", (findings_block(findings),)),
-            *((Section("Figures", tuple(_picture(noise, *group) for group in groups[1:])),) if groups[1:] else ()),
+            *((Section("Figures", tuple(_picture(noise, *group) for group in groups)),) if groups else ()),
             *_intervals(groups),
-            Section("Customary units", tuple(b for unit, axes in groups for b in _customary(axes, unit))),
             *([Section("How long to record", (_lengths_table(noise, lengths, accuracy),))] if lengths else []),
             Section("Kalibr", _kalibr(noise)),
         ),
@@ -265,7 +265,13 @@ def _customary(axes: list[NoiseAxis], unit: str) -> list[Block]:
         if term is TermName.BIAS_INSTABILITY:
             lowest = [_lowest(axis, factor) for axis in axes]
             rows.append((f"   lowest deviation / 0.664 [{printed}]", *lowest))
-    return [Table(("", *(axis.name for axis in axes)), tuple(rows), "IEEE 952 names")]
+    return [
+        Table(
+            ("", *(axis.name for axis in axes)),
+            tuple(rows),
+            f"{axes[0].name.rsplit(' ', 1)[0]}: IEEE 952 names, units of data sheets",
+        )
+    ]
 
 
 def _lowest(axis: NoiseAxis, factor: float) -> str:
@@ -308,6 +314,15 @@ def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
         later("noise_figures", "draw_allan", noise.curve, [(unit, axes)]),
         partial(allan_chart, noise.curve, unit, axes),
     )
+
+
+def _lead(noise: Noise, groups: list[tuple[str, list[NoiseAxis]]]) -> Picture:
+    caption = (
+        "Allan deviation of both sensors with its 95 % interval; the orange marks are the least deviations, where "
+    )
+    caption += "a mean is best. The terms, each with its part of the curve, stand below."
+    chart = partial(sensors_chart, noise.curve, groups)
+    return Picture("sensors", caption, later("chart_figures", "draw_chart", chart), chart)
 
 
 def noise_picture(noise: Noise) -> Picture:

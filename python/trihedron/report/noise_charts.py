@@ -32,6 +32,30 @@ def allan_chart(curve: AllanCurve, unit: str, axes: Sequence[NoiseAxis]) -> Char
     return Chart(panels, columns=3)
 
 
+def sensors_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseAxis]]]) -> Chart:
+    """Both sensors side by side, three axes each, with where a mean is best."""
+    panels = []
+    for unit, axes in groups:
+        printed = unit_in_print(unit)
+        marks: list[Mark] = []
+        for k, axis in enumerate(axes):
+            c = curve.names.index(axis.name)
+            good = np.isfinite(curve.deviation[:, c])
+            tau, colour = curve.tau_s[good], AXIS_COLOURS[k % 3]
+            marks.append(Band(tau, curve.lower[good, c], curve.upper[good, c], "95 % interval"))
+            marks.append(Line(tau, curve.deviation[good, c], axis.name.split()[-1].upper(), colour))
+            best = axis.optimal_averaging()
+            if best is not None:
+                told = f"{axis.name}: best averaging time {plain_number(best[0])} s, {plain_number(best[1])} {printed}"
+                marks.append(
+                    Points(np.array([best[0]]), np.array([best[1]]), [told], None, "smallest deviation", "accent")
+                )
+        x = Scale("averaging time τ [s]", "s", is_log=True)
+        y = Scale(f"Allan deviation [{printed}]", printed, is_log=True)
+        panels.append(Panel(x, y, tuple(marks), title=axes[0].name.rsplit(" ", 1)[0], height_px=250))
+    return Chart(tuple(panels), columns=len(panels))
+
+
 def _times(curve: AllanCurve) -> FloatArray:
     return np.geomspace(curve.tau_s[0], curve.tau_s[-1], 240)
 

@@ -69,8 +69,10 @@ def _names(axis: NoiseAxis, symbol: str) -> tuple[str, str]:
         )
     if symbol == "lines":
         at = ", ".join(plain_number(line.frequency_hz, 3) for line in axis.lines[:4])
-        name = f"{'line' if len(axis.lines) == 1 else 'lines'} {at}{' …' if len(axis.lines) > 4 else ''} Hz"
-        return name, name
+        if len(axis.lines) == 1:
+            return f"line {at} Hz", f"line {at} Hz"
+        # Frequencies of several would run over the names beside them: who points at the mark reads them.
+        return f"{len(axis.lines)} lines", f"lines {at}{' …' if len(axis.lines) > 4 else ''} Hz"
     term, unit = axis.terms[TermName(symbol)], unit_of(TermName(symbol), axis.unit)
     if term.is_present:
         return f"{symbol} {plain_number(term.value, 2)}", f"{symbol} = {_digits(term.value, term.sigma)} {unit}"

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
+import numpy as np
+
 from trihedron.records.plan import ExperimentPlan, PosePlan
-from trihedron.report.document import Document, Facts, Paragraph, Section, Table
+from trihedron.report.chart import Chart, Line, Panel, Points, Scale
+from trihedron.report.document import Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.numbers import plain_number
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
+
+ALL_NUMBERS = 9
+"""Scale, angles and biases of a triad."""
+USUAL_POSES = 18
+FEWEST_SETS = 2
 
 
 def plan_report(plan: ExperimentPlan) -> Document:
@@ -25,6 +35,8 @@ def plan_report(plan: ExperimentPlan) -> Document:
         verdict=f"Turns of {angles} in {turns.duration_s:g} s about each axis give the gyro's scale to "
         f"{_percent(turns.scale)}.",
         is_trustworthy=True,
+        headlines=tuple(_headlines(plan)),
+        lead=_picture(plan.poses),
         sections=(
             Section("Known turns (method 1)", (_turns(plan),)),
             Section(
@@ -51,6 +63,43 @@ def plan_report(plan: ExperimentPlan) -> Document:
             ),
         ),
     )
+
+
+def _headlines(plan: ExperimentPlan) -> list[Headline]:
+    """What the usual set of poses and the turns would lead to."""
+    usual = next((p for p in plan.poses if p.n_poses == USUAL_POSES and p.rank == ALL_NUMBERS), None)
+    out = [Headline("gyro scale by turns", plain_number(100.0 * plan.turns.scale, 2), "%", "1 σ, worst axis")]
+    if usual is not None:
+        beside = f"1 σ, worst axis, {usual.n_poses} poses"
+        out.insert(0, Headline("accelerometer scale", plain_number(100.0 * usual.scale, 2), "%", beside))
+    return out
+
+
+def _picture(poses: tuple[PosePlan, ...]) -> Picture | None:
+    if sum(pose.rank == ALL_NUMBERS for pose in poses) < FEWEST_SETS:
+        return None
+    chart = partial(poses_chart, poses)
+    caption = "Largest standard uncertainty (1 σ) of the accelerometer against the number of poses; sets that leave a "
+    caption += "parameter undetermined are not drawn. → Where the curve is flat, more poses are not worth their time."
+    return Picture("poses", caption, later("chart_figures", "draw_chart", chart), chart)
+
+
+def poses_chart(poses: tuple[PosePlan, ...]) -> Chart:
+    """Uncertainty of scale, angle and bias against how many poses there are."""
+    known = [pose for pose in poses if pose.rank == ALL_NUMBERS]
+    n = np.array([pose.n_poses for pose in known], dtype=np.float64)
+    panels = []
+    for name, unit, values in (
+        ("scale", "%", [100.0 * pose.scale for pose in known]),
+        ("angle between axes", "mrad", [mrad_from_radians(pose.angle) for pose in known]),
+        ("bias", "mm/s²", [mm_s2_from_m_s2(pose.zero) for pose in known]),
+    ):
+        y = np.array(values)
+        told = [f"{pose.name}: {plain_number(v, 2)} {unit}" for pose, v in zip(known, values, strict=True)]
+        marks = (Line(n, y, "", "c1"), Points(n, y, told, None, "a set of poses", "c1"))
+        x = Scale("poses", whole=True, includes=(0.0,))
+        panels.append(Panel(x, Scale(f"σ of {name} [{unit}]", unit, includes=(0.0,)), marks, height_px=200))
+    return Chart(tuple(panels), columns=3)
 
 
 def plan_record(plan: ExperimentPlan) -> dict[str, Any]:
@@ -84,7 +133,7 @@ def _turns(plan: ExperimentPlan) -> Table:
 def _poses(poses: tuple[PosePlan, ...]) -> Table:
     rows = []
     for pose in poses:
-        if pose.rank < 9:
+        if pose.rank < ALL_NUMBERS:
             rows.append((pose.name, f"{pose.rank}", "not determined", "not determined", "not determined"))
             continue
         rows.append(

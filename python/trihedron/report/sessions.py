@@ -14,6 +14,9 @@ from trihedron.report.frames import Columns
 from trihedron.report.many_charts import sessions_chart, shown
 from trihedron.report.numbers import how_many, plain_number, with_sigma
 
+DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
+"""What a first picture shows of a unit over its sessions; all the others follow below."""
+
 
 def sessions_report(model: SessionsModel) -> Document:
     """Lay out what many recordings share, and how far each parameter repeats."""
@@ -41,7 +44,17 @@ def sessions_report(model: SessionsModel) -> Document:
         verdict=verdict_of(model.findings, good, usable, "NOT TO BE TRUSTED"),
         is_trustworthy=model.is_trustworthy,
         sections=tuple(sections),
+        lead=_lead(model),
     )
+
+
+def _lead(model: SessionsModel) -> Picture:
+    """Scales and biases alone: what a user carries from one session to the next."""
+    chart = partial(sessions_chart, model, DRIFTING, 2)
+    caption = (
+        "Scale and bias of both sensors in every recording, about the common value; the band: how far they repeat."
+    )
+    return Picture("drift", caption, later("chart_figures", "draw_chart", chart), chart)
 
 
 def _named(names: list[str]) -> str:
