@@ -94,7 +94,7 @@ def drawn(seed, kind, seconds):
     motion = ReferenceMotion(timestamps - timestamps[0], attitude=seen, source="truth")
     told = N * np.exp(0.05 * rng.normal())
     static = StaticNoise(Bounded(told, told * np.exp(-0.1), told * np.exp(0.1)), Bounded(K, 0.5 * K, 2 * K))
-    truth = np.array([N, V, K, white / np.sqrt(TRACK_HZ), sigma, tau, 0.0, 1.0])
+    truth = np.array([N, V, K, white / np.sqrt(TRACK_HZ), sigma, 0.0, tau])
     return log, motion, static, truth, left_over(M, w, C)
 
 

@@ -37,7 +37,7 @@ def still(m=60):
     )  # fmt: skip
 
 
-STRENGTHS = np.array([N, 0.0, K, 1e-5, SLOW, TAU, 0.0, 1.0])
+STRENGTHS = np.array([N, 0.0, K, 1e-5, SLOW, 0.0, TAU])
 
 
 def drawn(seed, m=60):
@@ -61,7 +61,7 @@ def test_errors_are_as_large_as_predicted_when_the_strengths_are_right():
     nees = [errors_over([(drawn(seed), 30)], STRENGTHS[None], 5.0).nees.mean() for seed in range(40)]
     # 40 runs of about five stretches apart: 3 with a standard error of sqrt(6/200) = 0.17.
     assert np.mean(nees) == pytest.approx(3.0, abs=0.6)
-    plain = np.array([N, 0.0, K, 1e-5, 0.0, 1.0, 0.0, 1.0])
+    plain = np.array([N, 0.0, K, 1e-5, 0.0, 0.0, 1.0])
     assert errors_over([(drawn(0), 30)], plain[None], 5.0).nees.mean() > 6.0
 
 
@@ -71,12 +71,12 @@ def test_no_start_has_room_for_a_horizon_that_is_too_long():
 
 def test_strengths_lie_within_their_intervals():
     prior = Prior(
-        np.log([2e-4, 1.0, 2e-5, 3e-5, 1e-3, 8.0, 1.0, 1.0]),
-        np.log([1.1, 2.0, 30.0, 3.0, 30.0, 4.0, 2.0, 2.0]),
-        np.array([1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]),
+        np.log([2e-4, 1.0, 2e-5, 3e-5, 1e-3, 8.0, 1.0]),
+        np.log([1.1, 2.0, 30.0, 3.0, 30.0, 4.0, 2.0]),
+        np.array([1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0]),
     )
     found = fit([drawn(3)], prior)
-    for name, true in (("noise", N), ("bias_walk", K), ("world", SLOW), ("world_s", TAU)):
+    for name, true in (("noise", N), ("bias_walk", K), ("world", SLOW), ("slow_s", TAU)):
         low, high = np.quantile(found.draws[:, NAMES.index(name)], [0.005, 0.995])
         assert low < true < high, name
     assert np.all(found.draws[:, 1] == 0.0)

@@ -28,20 +28,20 @@ from trihedron.records.filter_noise import (
 from trihedron.records.reference import ReferenceMotion
 
 ANGLE = Prior(
-    np.log([2e-4, 2e-4, 2e-5, 3e-4, 1e-3, 8.0, 1e-3, 8.0]),
-    np.log([30.0, 30.0, 30.0, 30.0, 30.0, 4.0, 30.0, 4.0]),
-    np.ones(8),
+    np.append(np.log([2e-4, 2e-4, 2e-5, 3e-4, 1e-3, 8.0]), 0.0),
+    np.append(np.log([30.0, 30.0, 30.0, 30.0, 30.0, 4.0]), 1.0),
+    np.ones(7),
 )
-"""Consumer gyros and optical trackers, a factor of 30 either way and of 4 for time constants, as for `--reference`."""
+"""Consumer gyros and optical trackers, a factor of 30 either way and of 4 for the time constant, as for `--reference`."""
 VELOCITY = Prior(
-    np.log([2e-3, 2e-3, 3e-4, 1e-3, 1e-3, 8.0, 1.0, 1.0]),
-    np.log([30.0, 30.0, 30.0, 30.0, 30.0, 4.0, 2.0, 2.0]),
-    np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]),
+    np.append(np.log([2e-3, 2e-3, 3e-4, 1e-3, 1e-3, 8.0]), 0.0),
+    ANGLE.sigma,
+    np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0]),
 )
 """The same of accelerometers beside a path: a millimetre of white error; a tilt of the world's attitude."""
 LEAST_S = 40.0
 """Shared motion below which two halves say nothing of ten seconds."""
-CALIBRATION_DRAWS, PREDICTING = 71, 8
+CALIBRATION_DRAWS, PREDICTING = 400, 20
 """Draws of the scale matrix for its share; of the strengths for a prediction."""
 
 
@@ -239,9 +239,8 @@ def left_of(S: FloatArray) -> FloatArray:
 
 
 def _worth(draws: FloatArray) -> ReferenceWorth:
-    slow = np.hypot(draws[:, 4], draws[:, 6])
-    is_body = np.median(draws[:, 6]) > np.median(draws[:, 4])
-    return ReferenceWorth(bounded(draws[:, 3]), bounded(slow), float(np.median(draws[:, 7 if is_body else 5])))
+    slow = np.hypot(draws[:, 4], draws[:, 5])
+    return ReferenceWorth(bounded(draws[:, 3]), bounded(slow), float(np.median(draws[:, 6])))
 
 
 def _resampled(values: FloatArray, n: int) -> FloatArray:

@@ -25,7 +25,7 @@ def errors_over(stretches: Sequence[tuple[Stretch, int]], draws: FloatArray, hor
     """What lies ``horizon_s`` ahead, predicted from all before; of each stretch from block number ``first`` on.
 
     With V = L Lᵀ and w = L⁻¹y an observation j given those up to k is L[j, :k] w[:k], and its covariance is
-    L[j, k:j] L[j, k:j]ᵀ: one factor holds the filter over every horizon. Strengths are known by ``draws`` (d, 8): means
+    L[j, k:j] L[j, k:j]ᵀ: one factor holds the filter over every horizon. Strengths are known by ``draws`` (d, 7): means
     and covariances are those of the mixture. None where no start has room.
     """
     nees, actual, predicted, apart = [], [], [], 0

@@ -14,7 +14,7 @@ from trihedron.records.filter_noise import CAUSES, Bounded, Share
 
 
 def parts_of(draws: FloatArray, horizon_s: float, tilt_m_s2: float | None = None) -> dict[str, FloatArray]:
-    """Mean squares (k,) of all three axes together by cause, under strengths (k, 8), without the calibration's.
+    """Mean squares (k,) of all three axes together by cause, under strengths (k, 7), without the calibration's.
 
     Of an angle over h: 3 N² h, 3 V² h, K² h³, and of a reference the difference of two of its errors,
     2 σ² (1 - k(h)) and white. ``tilt_m_s2`` makes it a velocity: a slow tilt adds g² over h, of two axes.
@@ -24,10 +24,10 @@ def parts_of(draws: FloatArray, horizon_s: float, tilt_m_s2: float | None = None
     out = {"rest": 3.0 * s["noise"] ** 2 * h, "vibration": 3.0 * s["vibration"] ** 2 * h}
     out["bias"] = s["bias_walk"] ** 2 * h**3
     if tilt_m_s2 is None:
-        slow = sum(6.0 * s[name] ** 2 * (1.0 - matern(h, s[f"{name}_s"])) for name in ("world", "body"))
+        slow = 6.0 * (s["world"] ** 2 + s["body"] ** 2) * (1.0 - matern(h, s["slow_s"]))
         out["reference"] = 6.0 * s["white"] ** 2 + slow
     else:
-        out["reference"] = 12.0 * s["white"] ** 2 + 2.0 * (tilt_m_s2 * s["world"]) ** 2 * _twice_summed(h, s["world_s"])
+        out["reference"] = 12.0 * s["white"] ** 2 + 2.0 * (tilt_m_s2 * s["world"]) ** 2 * _twice_summed(h, s["slow_s"])
     return out
 
 

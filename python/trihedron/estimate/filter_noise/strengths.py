@@ -1,4 +1,4 @@
-"""Strengths of noise by evidence: their mode, draws of their posterior, and a bias that forgets."""
+"""Strengths of noise by evidence: draws of their posterior, and a bias that forgets."""
 
 from __future__ import annotations
 
@@ -6,17 +6,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
+from scipy.special import gammaln, logsumexp, ndtr
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
 
+COORDINATES = ("noise", "vibration", "bias_walk", "white", "slow", "slow_s", "body")
+"""Logarithms of strengths, ``slow`` that of the reference's whole slow error, and last a standard normal number whose
+quantile is the part of its square that turns with the body: two strengths of which either may be nothing would have a
+posterior with a corner."""
 FARTHEST = 4.0
-"""Strengths beyond four prior σ are strengths of nothing."""
+"""Coordinates beyond four prior σ are those of nothing."""
 STEP, CURVATURE_STEP = 0.02, 0.3
-"""Steps in the logarithm of a strength for the slope, and for the curvature that the walk begins with."""
-STEPS, LEARNED, THINNED = 900, 200, 10
-"""Steps of the walk over strengths; the first 200 teach its size; every tenth of the others counts."""
+"""Steps in a coordinate for the slope, and for the curvature that sampling begins with."""
+LOWEST = -1e7
+"""Stands for the log posterior where a covariance is singular."""
+ROUNDS, PROPOSED, DRAWN = 6, 100, 400
+"""Rounds of proposals, proposals of each, and draws that are made of them."""
+TAILS = 5.0
+"""Degrees of freedom of a proposal: heavier tails than a posterior's."""
 TIMES_S = (10.0, 30.0, 100.0)
 """Time constants of a Gauss-Markov bias that are tried beside the walk."""
 PREFERRED = 6.0
@@ -27,7 +37,7 @@ ABSENT = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Of the logarithms of the strengths: ``mean`` (8,), ``sigma`` (8,); ``is_there`` (8,) those that there are."""
+    """Of the coordinates: ``mean`` (7,), ``sigma`` (7,); ``is_there`` (7,) those that there are."""
 
     mean: FloatArray
     sigma: FloatArray
@@ -36,75 +46,104 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Likeliest strengths (8,) in SI with their log evidence, and draws (k, 8) of their posterior."""
+    """Likeliest strengths (7,) in SI, log evidence of the model, draws (k, 7) of the strengths' posterior, the same as
+    coordinates (k, f), and of how many independent ones those are worth."""
 
     mode: FloatArray
     evidence: float
     draws: FloatArray
+    coordinates: FloatArray
+    n_effective: float
 
 
-def most_likely(
-    stretches: Sequence[Stretch], prior: Prior, start: FloatArray | None = None
-) -> tuple[FloatArray, float]:
-    """Logarithms (f,) of the strengths that the model has at their greatest posterior, and its logarithm there."""
+def most_likely(stretches: Sequence[Stretch], prior: Prior) -> FloatArray:
+    """(f,) coordinates that the model has, at their greatest posterior."""
     free = prior.is_there > 0.0
-    first = prior.mean[free] if start is None else start
     low = prior.mean[free] - FARTHEST * prior.sigma[free]
     high = prior.mean[free] + FARTHEST * prior.sigma[free]
 
     def descent(x: FloatArray) -> tuple[float, FloatArray]:
-        here = height(stretches, prior, x)
-        return -here, np.array([(here - height(stretches, prior, x + STEP * e)) / STEP for e in np.eye(len(x))])
+        # Line search turns back from a wall, not from infinity.
+        here = max(height(stretches, prior, x), LOWEST)
+        there = [max(height(stretches, prior, x + STEP * e), LOWEST) for e in np.eye(len(x))]
+        return -here, (here - np.array(there)) / STEP
 
-    bounds = list(zip(low, high, strict=True))
     found = minimize(
-        descent, np.clip(first, low, high), jac=True, method="L-BFGS-B", bounds=bounds,
+        descent, prior.mean[free], jac=True, method="L-BFGS-B", bounds=list(zip(low, high, strict=True)),
         options={"ftol": 1e-5, "maxiter": 50},
     )  # fmt: skip
-    return np.asarray(found.x), -float(found.fun)
+    return np.asarray(found.x)
 
 
 def height(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> float:
-    """Log posterior of logarithms (f,) of the strengths that the model has."""
+    """Log posterior of coordinates (f,) that the model has, up to the prior's norm."""
     free = prior.is_there > 0.0
     far = (x - prior.mean[free]) / prior.sigma[free]
+    if np.any(np.abs(far) > FARTHEST + STEP):
+        return -np.inf
     strengths = whole(prior, x)
     return float(sum(one.evidence(strengths) for one in stretches) - 0.5 * far @ far)
 
 
 def whole(prior: Prior, x: FloatArray) -> FloatArray:
-    """(8,) strengths in SI; those that the model does not have are none."""
-    out = np.zeros(len(NAMES))
-    out[prior.is_there > 0.0] = np.exp(x)
-    return out
+    """(7,) strengths in SI of coordinates (f,); those that the model does not have are none."""
+    every = np.full(len(COORDINATES), -np.inf)
+    every[prior.is_there > 0.0] = x
+    body = float(ndtr(every[-1]))
+    slow = np.exp(every[4])
+    return np.array([*np.exp(every[:4]), slow * np.sqrt(1.0 - body), slow * np.sqrt(body), np.exp(every[5])])
 
 
 def fit(stretches: Sequence[Stretch], prior: Prior, near: Fitted | None = None) -> Fitted:
-    """Mode of the strengths and a Metropolis walk over their posterior; ``near`` is a fit of a part, to begin with."""
-    free = prior.is_there > 0.0
-    best, top = most_likely(stretches, prior, None if near is None else np.log(near.mode[free]))
-    covariance = np.linalg.inv(_curvature(stretches, prior, best))
-    if near is not None:
-        covariance = 0.5 * np.cov(np.log(near.draws[:, free]).T) + 0.05 * covariance
+    """Posterior of the strengths by importance: each round's proposals are Student's with the moments of all before,
+    and every proposal counts against the mixture of all rounds (Cornuet et al. 2012); ``near`` is a fit of a part.
+    """
+    if near is None:
+        middle = most_likely(stretches, prior)
+        first = np.linalg.inv(_curvature(stretches, prior, middle))
+    else:
+        middle, first = near.coordinates.mean(axis=0), np.cov(near.coordinates.T)
     rng = np.random.default_rng(0)
-    now, here = best, top
-    seen: list[FloatArray] = []
-    root = np.linalg.cholesky(covariance)
-    for k in range(STEPS):
-        if k == LEARNED:
-            root = np.linalg.cholesky(0.9 * np.cov(np.array(seen).T) + 0.1 * covariance)
-        other = now + 2.4 / np.sqrt(len(best)) * root @ rng.normal(size=len(best))
-        far = np.abs(other - prior.mean[prior.is_there > 0.0]) / prior.sigma[prior.is_there > 0.0]
-        there = -np.inf if np.any(far > FARTHEST) else height(stretches, prior, other)
-        if np.log(rng.uniform()) < there - here:
-            now, here = other, there
-        seen.append(now)
-    draws = np.array([whole(prior, x) for x in seen[LEARNED::THINNED]])
-    return Fitted(whole(prior, best), top, draws)
+    spread, proposals = first, []
+    x, heights = np.empty((0, len(middle))), np.empty(0)
+    for _ in range(ROUNDS):
+        root = np.linalg.cholesky(spread)
+        proposals.append((middle, root))
+        widths = np.sqrt(TAILS / rng.chisquare(TAILS, size=(PROPOSED, 1)))
+        new = middle + widths * rng.normal(size=(PROPOSED, len(middle))) @ root.T
+        x = np.vstack([x, new])
+        heights = np.append(heights, [height(stretches, prior, one) for one in new])
+        logs = heights - _mixture(x, proposals)
+        weights = np.exp(logs - logs.max())
+        weights /= weights.sum()
+        # Few that count would make the next proposal too narrow: flatter weights until there are enough.
+        flat = weights if _effective(weights) > 3 * len(middle) else np.sqrt(weights) / np.sqrt(weights).sum()
+        middle = flat @ x
+        spread = ((x - middle).T * flat) @ (x - middle) + 0.02 * first
+    norm = 0.5 * len(middle) * np.log(2.0 * np.pi) + np.sum(np.log(prior.sigma[prior.is_there > 0.0]))
+    evidence = float(logs.max() + np.log(np.mean(np.exp(logs - logs.max()))) - norm)
+    chosen = np.searchsorted(np.cumsum(weights), (np.arange(DRAWN) + 0.5) / DRAWN).clip(max=len(x) - 1)
+    draws = np.array([whole(prior, one) for one in x[chosen]])
+    return Fitted(whole(prior, x[np.argmax(heights)]), evidence, draws, x[chosen], _effective(weights))
+
+
+def _effective(weights: FloatArray) -> float:
+    return float(1.0 / np.sum(weights**2))
+
+
+def _mixture(x: FloatArray, proposals: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
+    """(k,) log density of points (k, f) under the mean of Student's distributions, by middle and root."""
+    n = x.shape[1]
+    norm = gammaln(0.5 * (TAILS + n)) - gammaln(0.5 * TAILS) - 0.5 * n * np.log(TAILS * np.pi)
+    each = []
+    for middle, root in proposals:
+        far = np.sum(solve_triangular(root, (x - middle).T, lower=True) ** 2, axis=0)
+        each.append(norm - np.sum(np.log(np.diag(root))) - 0.5 * (TAILS + n) * np.log1p(far / TAILS))
+    return np.asarray(logsumexp(each, axis=0) - np.log(len(proposals)))
 
 
 def _curvature(stretches: Sequence[Stretch], prior: Prior, at: FloatArray) -> FloatArray:
-    """Minus the second derivatives (f, f) along each axis alone, no flatter than the prior: a walk learns the rest."""
+    """Minus the second derivatives (f, f) along each axis alone, no flatter than the prior: sampling learns the rest."""
     here = height(stretches, prior, at)
     flat = 1.0 / prior.sigma[prior.is_there > 0.0] ** 2
     steps = CURVATURE_STEP * np.eye(len(at))

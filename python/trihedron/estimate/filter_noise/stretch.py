@@ -17,7 +17,7 @@ from trihedron.arrays import FloatArray
 
 AnyFloats = np.ndarray[Any, np.dtype[Any]]
 
-NAMES = ("noise", "vibration", "bias_walk", "white", "world", "world_s", "body", "body_s")
+NAMES = ("noise", "vibration", "bias_walk", "white", "world", "body", "slow_s")
 """Strengths of a stretch, in this order."""
 ALIKE = ("noise", "vibration", "white")
 """Those whose errors have the same size along every axis."""
@@ -58,16 +58,16 @@ class Stretch:
         return np.abs(np.subtract.outer(self.time_s, self.time_s))
 
     def covariance(self, strengths: FloatArray) -> FloatArray:
-        """(3 m, 3 m) of everything random, under strengths (8,) in SI, a zero being none."""
+        """(3 m, 3 m) of everything random, under strengths (7,) in SI, a zero being none."""
         s = dict(zip(NAMES, strengths, strict=True))
         m = len(self.time_s)
+        correlation = matern(self.lag_s, s["slow_s"])
         out = s["bias_walk"] ** 2 * self.bias_walk
         parted = out.reshape(m, 3, m, 3)
         if self.attitude is not None and s["body"] > 0.0:
-            kernel = s["body"] ** 2 * matern(self.lag_s, s["body_s"])
-            parted += kernel[:, None, :, None] * self.turned
+            parted += s["body"] ** 2 * correlation[:, None, :, None] * self.turned
         same = sum(s[name] ** 2 * basis for name, basis in zip(ALIKE, self.alike, strict=True))
-        slow = s["world"] ** 2 * matern(self.lag_s, s["world_s"])
+        slow = s["world"] ** 2 * correlation
         if self.slow is not None:
             slow = self.slow @ slow @ self.slow.T
         for i, j in np.ndindex(3, 3):
