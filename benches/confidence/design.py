@@ -117,8 +117,9 @@ def _motion(of, rng):
             knock = np.exp(-0.5 * ((t - 0.5 * n * dt) / 0.04) ** 2)
             w, a = w + 0.15 * DEG / 0.1 * rng.normal(size=3) * knock, a + 0.8 * rng.normal(size=3) * knock
         add(w, a, True)
-    R = matrix(np.vstack(turned)[:-1])
     w, a = np.vstack(rates), np.vstack(pushes) + np.array([0.0, 0.0, G])
+    # At the middle of each step, as the rates are: half a step apart is a delay between the sensors.
+    R = matrix(multiply(np.vstack(turned)[:-1], exponential(0.5 * dt * w)))
     return w, np.einsum("nji,nj->ni", R, a), np.concatenate(rest), per
 
 
