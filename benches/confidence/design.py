@@ -1,4 +1,4 @@
-"""``python benches/confidence --design N``: thirteen factors of a session at once, coverage at each of their levels.
+"""``python benches/confidence --design N``: the factors of a session at once, coverage at each of their levels.
 
 A session is poses of a body that is moved by a hand, seen by two sensors; nothing here is taken from ``trihedron``.
 The bias that a session can know is the mean over its poses.
@@ -26,6 +26,7 @@ FACTORS = {
     "drift": ("none", "accelerometer", "gyro"),
     "support": ("rigid", "settling"),
     "outlier": ("none", "bumped pose"),
+    "delay_s": (0.0, 0.001),
 }
 """Levels of every factor, the healthy ones of a consumer's session among them."""
 DENSITY = {
@@ -61,7 +62,7 @@ def session(seed, **levels):
     of = {
         **{"rate_hz": 100.0, "bits": 16, "grade": "consumer", "poses": 18, "pose_s": 4.0, "move_s": 2.0},
         **{"path": "free", "tremor_deg_s": 2.0, "sampling": "points", "timestamps": "exact", "drift": "none"},
-        **{"support": "rigid", "outlier": "none"},
+        **{"support": "rigid", "outlier": "none", "delay_s": 0.0},
         **levels,
     }
     rng = np.random.default_rng([36, seed])
@@ -132,6 +133,9 @@ def _sampled(values, per, sampling):
 
 
 def _read_out(of, rates, forces, is_rest, per, rng):
+    if of["delay_s"]:
+        t = np.arange(len(forces)) / (of["rate_hz"] * per)
+        forces = np.column_stack([np.interp(t - of["delay_s"], t, column) for column in forces.T])
     w, f = _sampled(rates, per, of["sampling"]), _sampled(forces, per, of["sampling"])
     n, rate_hz = len(w), of["rate_hz"]
     gyro_n, accel_n, gyro_b, accel_b = DENSITY[of["grade"]]
