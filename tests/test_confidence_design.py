@@ -60,6 +60,8 @@ def test_quick_moves_of_a_sensor_that_averages_are_told_from_those_of_one_that_s
         for seed in range(100, 106):
             result, z = calibrated(seed, sampling=sampling, move_s=0.5, rate_hz=50.0, grade="industrial")
             assert result.is_trustworthy
+            # What later reads the moves of this calibration reads them as it did.
+            assert result.calibration.averaging == pytest.approx(float(sampling == "averages"), abs=0.2)
             scores.append(z["S_w"])
     for scores in every.values():
         # Six sessions of nine numbers each: their rms is known to 15 %. Taken for points it was 1.7 of averages.

@@ -118,7 +118,9 @@ def arranged(
         before=np.array(before, dtype=np.int64),
         sigma_time_s=measured.sigma_time_s,
         nominal_step_s=measured.nominal_step_s,
-        force_slope=np.vstack([np.zeros((len(pose_time_s), 3)), _slopes(recording.time_s, force, ranges)]),
+        force_slope=np.vstack(
+            [np.zeros((len(pose_time_s), 3)), _slopes(recording.with_distinct_timestamps().time_s, force, ranges)]
+        ),
         force_up=noise.force_up,
         force_scatter=noise.force_scatter,
     )
