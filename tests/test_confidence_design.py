@@ -1,4 +1,4 @@
-"""Sessions of the thirteen-factor design (thirteen_factors.py), one weakness a test."""
+"""Sessions of the many-factor design (benches/confidence/design.py), one weakness a test."""
 
 import sys
 from pathlib import Path
@@ -8,10 +8,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
+from confidence.design import session
 from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import table
-from thirteen_factors import session
 from trihedron import calibrate
 from trihedron.records import Recording
 from trihedron.session.averaging import Averaging, averaging_of, sharpened
@@ -60,6 +60,8 @@ def test_quick_moves_of_a_sensor_that_averages_are_told_from_those_of_one_that_s
         for seed in range(100, 106):
             result, z = calibrated(seed, sampling=sampling, move_s=0.5, rate_hz=50.0, grade="industrial")
             assert result.is_trustworthy
+            # What later reads the moves of this calibration reads them as it did.
+            assert result.calibration.averaging == pytest.approx(float(sampling == "averages"), abs=0.2)
             scores.append(z["S_w"])
     for scores in every.values():
         # Six sessions of nine numbers each: their rms is known to 15 %. Taken for points it was 1.7 of averages.
@@ -125,3 +127,24 @@ def test_turns_on_three_faces_calibrate_the_gyro_and_the_accelerometer_is_not_to
     accelerometer = found.accelerometer
     assert np.abs((accelerometer.S - truth.accelerometer_S) / accelerometer.sigma_S).max() < 4.0
     assert not found.is_trustworthy
+
+
+def test_a_delay_between_the_sensors_that_hides_in_the_noise_of_velocities_moves_no_scale():
+    scores = []
+    for seed in (700, 701, 702):
+        levels = {"path": "axis by axis", "grade": "poor", "pose_s": 2.0, "delay_s": 0.001}
+        result, z = calibrated(seed, **levels)
+        assert result.is_trustworthy
+        scores.append(z["S_w"])
+    # 27 numbers; S_w followed the delay by four to eight standard errors, X one way and Z the other.
+    assert np.abs(scores).max() < 4.0
+    assert np.sqrt(np.mean(np.square(scores))) < 1.5
+
+
+def test_the_pauses_of_slow_moves_about_one_axis_after_another_are_no_poses():
+    for seed in (710, 711):
+        levels = {"path": "axis by axis", "move_s": 25.0, "grade": "industrial", "poses": 12}
+        result, z = calibrated(seed, **levels)
+        # Stops of two seconds that still turned by a degree were poses, and S_w was off by six standard errors.
+        assert result.segments.n_poses == 12
+        assert largest(z)["S_w"] < 4.0

@@ -1,4 +1,4 @@
-"""``python benches/confidence [NAME ...] [--sessions N] [--first SEED ...] [--asked]``: do 95 % intervals hold?
+"""``python benches/confidence [NAME ...] [--sessions N] [--first SEED ...] [--asked | --design]``: do intervals hold?
 
 One line per setting: sessions answered and trusted (no serious finding), marked, refused; over the trusted ones the
 share within 1.96 σ and rms z of S and b of both sensors, and the largest of all in σ. A share is outside where it
@@ -15,6 +15,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from confidence import design
 from confidence.machine import robot
 from confidence.motion import G
 from confidence.sensor import lower
@@ -134,6 +135,22 @@ def line(name, rows):
     return f"| {name} | {counts} | {' | '.join(cells or ['–'] * 4)} | {worst:.1f} σ | {' '.join(outside)} |"
 
 
+def by_level(seeds):
+    """Rows of every level of every factor of the design, each session in one of every factor."""
+    rows = {}
+    for seed in seeds:
+        levels = design.drawn(seed)
+
+        def make(of, levels=levels):
+            made = design.session(of, **levels)
+            return made.force, made.rate, made.rate_hz, made.truth, made
+
+        said = session(make, {}, seed)
+        for name in ("all", *(f"{factor} {level}" for factor, level in levels.items())):
+            rows.setdefault(name, []).append(said)
+    return rows
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -143,8 +160,13 @@ def main() -> None:
     parser.add_argument("--gyro", type=float, help="°/s")
     parser.add_argument("--accel", type=float, help="mm/s²")
     parser.add_argument("names", nargs="*")
+    parser.add_argument("--design", action="store_true", help="every factor at once, a row for each of its levels")
     given = parser.parse_args()
     print("| setting | trusted, marked, refused | S_f | b_f | S_ω | b_ω | worst | outside |\n" + "|---" * 8 + "|")
+    if given.design:
+        for name, rows in sorted(by_level([first + k for first in given.first for k in range(given.sessions)]).items()):
+            print(line(name, rows))
+        return
     for name, (make, options) in SETTINGS.items():
         if given.names and not any(word in name for word in given.names):
             continue

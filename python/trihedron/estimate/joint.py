@@ -258,6 +258,7 @@ def _by_moves_alone(
         recording_source=recording.source,
         recording_sha256=recording.sha256,
         findings=(*findings_of(aligned, measured, held), *of_losses),
+        averaging=measured.averaging.share,
     )
 
 

@@ -32,15 +32,20 @@ def resting_ends(
         part = readings[first:last]
         if not np.isfinite(part).all():
             continue
-        away = np.column_stack(
-            [np.abs(_core.running_median(np.ascontiguousarray(part[:, k]), CHATTER) - rest[k]) for k in range(3)]
-        )
+        away = _away(part, quantum, rest)
         for ends, inside in ((out[first:last], away), (out[first:last][::-1], away[::-1])):
             own = {k: _still(inside[:, k] / quantum[k]) for k in np.flatnonzero(axes).tolist()}
             body = min((n for n in own.values() if n is not None), default=0)
             for k, n in own.items():
                 ends[: body if n is None else n, k] = True
     return out
+
+
+def _away(readings: FloatArray, quantum: FloatArray, rest: FloatArray) -> FloatArray:
+    """Distance (n, 3) from ``rest`` without toggling between neighbouring codes; what is further was no toggling."""
+    columns = [_core.running_median(np.ascontiguousarray(column), CHATTER) for column in readings.T]
+    away: FloatArray = np.maximum(np.abs(np.column_stack(columns) - rest), np.abs(readings - rest) - quantum)
+    return away
 
 
 def _still(away: FloatArray) -> int | None:

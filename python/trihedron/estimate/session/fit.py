@@ -20,6 +20,9 @@ NOISE_DOF = 100.0
 """The predicted noise is itself measured in the recording: to about 7 %, as 100 degrees of freedom give."""
 DEAF = 1e3
 """Widening at which a row no longer says anything beside the others."""
+DELAY_S = 0.005
+"""By how much one sensor's filter delays it more than the other's, beforehand, or one is read out later: parts of
+their data sheets differ by up to some ms."""
 STATIC_FORCE, MOVES, DYNAMICS = 0, 2, 3
 """Labels of rows: accelerometer at rest, gravity after a move, velocity over it."""
 
@@ -62,13 +65,15 @@ class SessionSolution:
 def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray) -> SessionSolution:
     """Fit a session from a start on raw readings (``S_a`` lower triangular).
 
-    How strong the noise of the session is, poses and gravity after moves say. A velocity that they do not expect is
-    left out: what makes it miss (arms between the accelerometers, a delay) follows the motion and is no noise. Widened
-    to its size it still pulled a real accelerometer by five of its standard errors.
+    How strong the noise of the session is, poses and gravity after moves say. Velocities are heard with a delay between
+    the sensors free: a millisecond hides in their noise, and turned about one axis after another S_ω followed it by
+    eight standard errors. A velocity that is not expected so is left out: what makes it miss (arms between the
+    accelerometers) follows the motion and is no noise. Widened to its size it still pulled a real accelerometer by five
+    of its standard errors.
     """
     core = fitted(observed, S_a, b_a + S_a @ observed.force_origin, S_w)
     corner, scatter, between, (gravity, _) = core.strengths
-    heard = _again(observed, core, (corner, scatter, between, (gravity, 1.0)))
+    heard = _again(observed, core, (corner, scatter, between, (gravity, 1.0)), np.zeros(1))
     chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in _misfits(heard))
     is_expected = dof < 1.0 or fdtrc(dof, NOISE_DOF, chi2 / dof) >= FALSE_ALARM
     return _solution(observed, heard if is_expected else core)
@@ -76,11 +81,14 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
 
 def refitted(observed: Observed, solution: SessionSolution) -> SessionSolution:
     """The solution with other readings of the moves, from where it stands, at the same strengths of all noise."""
-    return _solution(observed, _again(observed, solution.core, solution.core.strengths))
+    core = solution.core
+    return _solution(observed, _again(observed, core, core.strengths, np.asarray(core.effect)))
 
 
-def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths) -> _core.SessionFit:
-    """The fit of a session from where another one stands, strengths of all noise given."""
+def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths, delay_s: FloatArray) -> _core.SessionFit:
+    """The fit of a session from where another one stands, strengths of all noise given; ``delay_s`` (1,) of the
+    accelerometer to begin with where it is free, else (0,)."""
+    is_free = len(delay_s) > 0
     state = _core.SessionState(
         force_scale=core.force_scale,
         force_bias=core.force_bias,
@@ -88,9 +96,16 @@ def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths) -> 
         up=core.up,
         pose_rate_bias=core.pose_rate_bias,
         pose_force_bias=core.pose_force_bias,
-        effect=np.zeros(0),
+        effect=delay_s,
     )
-    return observed.model().fit(state=state, strengths=strengths, force_effect=None, rate_effect=None)
+    slope = np.ascontiguousarray((observed.force_slope @ np.asarray(core.force_scale).T)[:, :, None])
+    return observed.model().fit(
+        state=state,
+        strengths=strengths,
+        force_effect=slope if is_free else None,
+        rate_effect=None,
+        sizes=[DELAY_S] if is_free else None,
+    )
 
 
 def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:

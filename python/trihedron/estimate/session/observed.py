@@ -21,7 +21,8 @@ class Observed:
     """One session for the core, readings minus ``force_origin``, ``rate_origin`` (3,).
 
     Hold means and standard errors (n, 3), densities (3,) raw · √s, the samples of the ``moves`` with the holds
-    ``before`` (m,) they begin in; ``force_up``, ``force_scatter`` as in :class:`SessionNoise`.
+    ``before`` (m,) they begin in; ``force_slope`` (poses, then samples of moves, 3) raw/s, nothing in poses;
+    ``force_up``, ``force_scatter`` as in :class:`SessionNoise`.
     """
 
     gravity_m_s2: float
@@ -38,6 +39,7 @@ class Observed:
     before: npt.NDArray[np.int64]
     sigma_time_s: float
     nominal_step_s: float
+    force_slope: FloatArray
     force_up: Along | None = None
     force_scatter: float = 0.0
 
@@ -116,6 +118,9 @@ def arranged(
         before=np.array(before, dtype=np.int64),
         sigma_time_s=measured.sigma_time_s,
         nominal_step_s=measured.nominal_step_s,
+        force_slope=np.vstack(
+            [np.zeros((len(pose_time_s), 3)), _slopes(recording.with_distinct_timestamps().time_s, force, ranges)]
+        ),
         force_up=noise.force_up,
         force_scatter=noise.force_scatter,
     )
@@ -131,3 +136,10 @@ def _in_turn(ranges: list[tuple[int, int]]) -> npt.NDArray[np.int64]:
     ends = np.cumsum([b - a for a, b in ranges], dtype=np.int64)
     starts = np.concatenate([[0], ends[:-1]]) if ranges else ends
     return np.ascontiguousarray(np.column_stack([starts, ends]), dtype=np.int64).reshape(-1, 2)
+
+
+def _slopes(time_s: FloatArray, values: FloatArray, ranges: list[tuple[int, int]]) -> FloatArray:
+    """Time derivative of ``values`` (n, 3) at the samples of ``ranges``, one after the other."""
+    if not ranges:
+        return np.zeros((0, 3))
+    return _core.move_derivative(_samples_of(ranges, time_s), _samples_of(ranges, values), _in_turn(ranges))

@@ -1,4 +1,4 @@
-"""Sessions with thirteen factors, each at a level of its own: for tests of one weakness.
+"""``python benches/confidence --design --sessions N``: all factors at once, coverage at each of their levels.
 
 A session is poses of a body that is moved by a hand, seen by two sensors; nothing here is taken from ``trihedron``.
 The bias that a session can know is the mean over its poses.
@@ -12,6 +12,23 @@ from confidence.motion import G, attitude, exponential, matrix, multiply, runnin
 from confidence.sensor import DEG, Truth, one_over_f
 from confidence.sessions import directions
 
+FACTORS = {
+    "rate_hz": (25.0, 100.0, 400.0),
+    "bits": (10, 12, 14, 16),
+    "grade": ("industrial", "consumer", "poor"),
+    "poses": (12, 18, 30),
+    "pose_s": (2.0, 4.0, 8.0),
+    "move_s": (0.6, 2.0, 8.0, 25.0),
+    "path": ("free", "axis by axis"),
+    "tremor_deg_s": (0.0, 2.0),
+    "sampling": ("points", "averages"),
+    "timestamps": ("exact", "late", "milliseconds", "lost rows"),
+    "drift": ("none", "accelerometer", "gyro"),
+    "support": ("rigid", "settling"),
+    "outlier": ("none", "bumped pose"),
+    "delay_s": (0.0, 0.001),
+}
+"""Levels of every factor, the healthy ones of a consumer's session among them."""
 DENSITY = {
     "industrial": (0.0015 * DEG, 3e-4, 2.0 * DEG / 3600.0, 1e-4),
     "consumer": (0.005 * DEG, 1.2e-3, 8.0 * DEG / 3600.0, 4e-4),
@@ -34,12 +51,18 @@ class Session:
     rests: tuple[float, ...]
 
 
+def drawn(seed):
+    """Levels of all factors for one session."""
+    rng = np.random.default_rng([36, 13, seed])
+    return {name: levels[rng.integers(len(levels))] for name, levels in FACTORS.items()}
+
+
 def session(seed, **levels):
     """One session at the levels given; the other factors as a careful hand has them."""
     of = {
         **{"rate_hz": 100.0, "bits": 16, "grade": "consumer", "poses": 18, "pose_s": 4.0, "move_s": 2.0},
         **{"path": "free", "tremor_deg_s": 2.0, "sampling": "points", "timestamps": "exact", "drift": "none"},
-        **{"support": "rigid", "outlier": "none"},
+        **{"support": "rigid", "outlier": "none", "delay_s": 0.0},
         **levels,
     }
     rng = np.random.default_rng([36, seed])
@@ -95,8 +118,9 @@ def _motion(of, rng):
             knock = np.exp(-0.5 * ((t - 0.5 * n * dt) / 0.04) ** 2)
             w, a = w + 0.15 * DEG / 0.1 * rng.normal(size=3) * knock, a + 0.8 * rng.normal(size=3) * knock
         add(w, a, True)
-    R = matrix(np.vstack(turned)[:-1])
     w, a = np.vstack(rates), np.vstack(pushes) + np.array([0.0, 0.0, G])
+    # At the middle of each step, as the rates are: half a step apart is a delay between the sensors.
+    R = matrix(multiply(np.vstack(turned)[:-1], exponential(0.5 * dt * w)))
     return w, np.einsum("nji,nj->ni", R, a), np.concatenate(rest), per
 
 
@@ -109,6 +133,9 @@ def _sampled(values, per, sampling):
 
 
 def _read_out(of, rates, forces, is_rest, per, rng):
+    if of["delay_s"]:
+        t = np.arange(len(forces)) / (of["rate_hz"] * per)
+        forces = np.column_stack([np.interp(t - of["delay_s"], t, column) for column in forces.T])
     w, f = _sampled(rates, per, of["sampling"]), _sampled(forces, per, of["sampling"])
     n, rate_hz = len(w), of["rate_hz"]
     gyro_n, accel_n, gyro_b, accel_b = DENSITY[of["grade"]]
