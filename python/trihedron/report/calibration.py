@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, Recording, Segments, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST
 from trihedron.report.axes import Axes, axes_of
 from trihedron.report.calibration_charts import (
@@ -16,8 +16,8 @@ from trihedron.report.calibration_charts import (
     sphere_chart,
     strong_correlations,
 )
-from trihedron.report.calibration_residuals import residual_tables
 from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor
+from trihedron.report.calibration_residuals import residual_tables
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
@@ -32,7 +32,7 @@ from trihedron.report.numbers import (
     with_sigma,
 )
 from trihedron.report.segments import signals_picture
-from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
+from trihedron.units import mm_s2_from_m_s2, mrad_from_radians
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
 """The field's names of the frames."""
