@@ -274,7 +274,7 @@ def main() -> int:
     )
     applied: Recording = trihedron.apply(known, log)
     rest = rng.normal([0, 0, G, 0, 0, 0], [0.02] * 3 + [0.002] * 3, (20000, 6))
-    noise = trihedron.noise({"t": np.arange(20000) / 100, "acc": rest[:, :3], "gyr": rest[:, 3:]})
+    noise = trihedron.allan({"t": np.arange(20000) / 100, "acc": rest[:, :3], "gyr": rest[:, 3:]})
     sizes = {"accelerometer_lsb": f"{ACCEL_LSB!r} m/s^2", "gyroscope_lsb": f"{GYRO_LSB!r} rad/s"}
     rows = []
     for name in ("c", "c (float)", *(t for t in EVALUATED if not t.startswith("c"))):
