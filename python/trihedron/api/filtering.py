@@ -42,7 +42,23 @@ NoiseSource = AxisNoise | Sequence[AxisNoise] | Noise | str | os.PathLike[str]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class KalmanResult(Presented):
-    """What the filter found, with the segments and the recording that it was made from. ``print`` gives the report."""
+    """What the filter found, with the segments and the recording that it was made from. ``print`` gives the report.
+
+    Attributes
+    ----------
+    outcome : KalmanCalibration or NormKalmanCalibration
+        Constants, σ and innovations after every pose; with known attitudes, or by the norm of gravity.
+    calibration : Calibration
+        The accelerometer's S and b [m/s²].
+    segments : Segments
+    recording : Recording
+
+    Examples
+    --------
+    >>> found = trihedron.kalman(recording, gravity_m_s2=9.80665)
+    >>> found.calibration.accelerometer.b.shape
+    (3,)
+    """
 
     outcome: KalmanCalibration | NormKalmanCalibration
     calibration: Calibration
@@ -106,6 +122,11 @@ def kalman(
     ------
     ValueError
         When the question cannot be answered; one sentence says why and what to do.
+
+    Examples
+    --------
+    >>> trihedron.kalman(recording, gravity_m_s2=9.80665).calibration.accelerometer.S.shape
+    (3, 3)
     """
     gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
     recording = recording_of(recording)

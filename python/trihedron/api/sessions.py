@@ -35,7 +35,21 @@ thermometers in parts is 0.1 to 0.5 °C."""
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SessionsResult(Presented):
-    """Many recordings as one model, with each recording's own calibration. ``print`` gives the report."""
+    """Many recordings as one model, with each recording's own calibration. ``print`` gives the report.
+
+    Attributes
+    ----------
+    model : SessionsModel
+        ``repeated`` and ``changes``: how far each parameter repeats, and which changed.
+    results : tuple of CalibrationResult
+        Each recording by itself.
+
+    Examples
+    --------
+    >>> both = trihedron.calibrate_sessions([recording, recording], gravity_m_s2=9.80665)
+    >>> len(both.results)
+    2
+    """
 
     model: SessionsModel
     results: tuple[CalibrationResult, ...]
@@ -98,6 +112,12 @@ def calibrate_sessions(
     ------
     ValueError
         When fewer than two recordings can be calibrated, or what they are grouped by is not known.
+
+    Examples
+    --------
+    >>> model = trihedron.calibrate_sessions([recording, recording], gravity_m_s2=9.80665)
+    >>> len(model.model.sessions)
+    2
     """
     if by not in BYS:
         raise RefusedError(f"recordings are not grouped by {by!r}; choose one of {', '.join(BYS)}.")
