@@ -216,7 +216,7 @@ def resting(seed=1, seconds=120, n=N):
 
 
 def test_a_static_log_gives_back_the_static_values_with_a_factor_of_one():
-    rest = trihedron.noise(resting(2))
+    rest = trihedron.allan(resting(2))
     found = trihedron.filter_noise(resting(1), static=rest)
     gyro = found.sensor("gyroscope")
     assert gyro.static is not None
@@ -228,7 +228,7 @@ def test_a_static_log_gives_back_the_static_values_with_a_factor_of_one():
 
 def test_without_a_reference_the_tilt_over_moves_is_shown_beside_what_noise_predicts():
     log = turned_between_rests(scale=1.02)
-    found = trihedron.filter_noise(log, static=trihedron.noise(resting(2)))
+    found = trihedron.filter_noise(log, static=trihedron.allan(resting(2)))
     assert found.tilt is not None
     # Two per cent of 90°; noise at rest predicts hundredths of a degree.
     assert found.tilt.actual == pytest.approx(0.02 * np.pi / 2, rel=0.2)

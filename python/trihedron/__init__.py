@@ -22,7 +22,8 @@ attitude
     Where the body points: the rotation from its frame at a sample to that at the start. (:func:`integrate_rate`, from a
     corrected rate)
 diagnosis
-    Where a recording and its model differ, the effect (physical mechanism) left out, with ± and held-out proof.
+    Where a recording and its model differ, and which effect (physical mechanism) is missing, with σ and cross-validated
+    proof.
     (:func:`diagnose`)
 finding
     Something noticed that bears on the answer: what was seen, with its number; the likely cause; the next action. A
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
         KalmanResult,
         SessionsResult,
         VerificationResult,
+        allan,
         allan_deviation,
         apply,
         calibrate,
@@ -72,7 +74,6 @@ if TYPE_CHECKING:
         filter_noise,
         guide,
         kalman,
-        noise,
         plan,
         plot,
         ports,
@@ -122,6 +123,7 @@ __all__ = [
     "Truth",
     "VerificationResult",
     "__version__",
+    "allan",
     "allan_deviation",
     "apply",
     "calibrate",
@@ -141,7 +143,6 @@ __all__ = [
     "identify_noise",
     "integrate_rate",
     "kalman",
-    "noise",
     "plan",
     "plot",
     "ports",

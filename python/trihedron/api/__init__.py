@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from trihedron.api.extending import extend
     from trihedron.api.filter_noising import filter_noise
     from trihedron.api.filtering import kalman
-    from trihedron.api.identifying import noise, noise_of_curve, noise_of_file, recording_lengths
+    from trihedron.api.identifying import allan, noise_of_curve, noise_of_file, recording_lengths
     from trihedron.api.improving import improve
     from trihedron.api.planning import plan
     from trihedron.api.ranking import rank
@@ -50,6 +50,7 @@ __all__ = [
     "ReferencesResult",
     "SessionsResult",
     "VerificationResult",
+    "allan",
     "allan_deviation",
     "apply",
     "calibrate",
@@ -68,7 +69,6 @@ __all__ = [
     "guide",
     "improve",
     "kalman",
-    "noise",
     "noise_of_curve",
     "noise_of_file",
     "plan",
@@ -113,7 +113,7 @@ _HOME = {
     "filter_noise": "trihedron.api.filter_noising",
     "KalmanResult": "trihedron.records.results",
     "kalman": "trihedron.api.filtering",
-    "noise": "trihedron.api.identifying",
+    "allan": "trihedron.api.identifying",
     "noise_of_curve": "trihedron.api.identifying",
     "noise_of_file": "trihedron.api.identifying",
     "recording_lengths": "trihedron.api.identifying",

@@ -77,6 +77,11 @@ def kalman(
     ------
     ValueError
         When the question cannot be answered; one sentence says why and what to do.
+
+    Examples
+    --------
+    >>> trihedron.kalman(recording, gravity_m_s2=9.80665).calibration.accelerometer.S.shape
+    (3, 3)
     """
     gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
     recording = recording_of(recording)
@@ -127,7 +132,7 @@ def _settle_noise(
         return noise_from_identified(noise.axes, recording.accelerometer_unit), weighty, noise
     is_axes = isinstance(noise, Sequence) and all(isinstance(axis, AxisNoise) for axis in noise)
     if noise is not None and not isinstance(noise, AxisNoise) and not is_axes:
-        raise WrongTypeError(f"noise is what trihedron.noise found, or the name of a file, not {type(noise).__name__}.")
+        raise WrongTypeError(f"noise is what trihedron.allan found, or the name of a file, not {type(noise).__name__}.")
     return noise, (), None
 
 

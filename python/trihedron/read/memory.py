@@ -89,9 +89,9 @@ def _is_frame(data: object) -> bool:
 def frame_columns(frame: Any) -> list[tuple[str, Any]]:
     """Names and columns; a level of a pandas index that holds times, or has a name, is a column too."""
     columns: list[tuple[str, Any]] = []
-    index = getattr(frame, "index", None)
-    levels = range(getattr(index, "nlevels", 1)) if hasattr(index, "get_level_values") else ()
-    for level in (index.get_level_values(k) for k in levels):
+    index: Any = getattr(frame, "index", None)
+    levels = [index.get_level_values(k) for k in range(index.nlevels)] if hasattr(index, "get_level_values") else []
+    for level in levels:
         values = level.to_numpy()
         if values.dtype.kind in "Mm" or (level.name is not None and values.dtype.kind in "iuf"):
             columns.append((str(level.name or "time"), values))

@@ -50,7 +50,7 @@ class Stretch:
     def turned(self) -> FloatArray:
         """(m, 3, m, 3) the bodies' attitudes to one another."""
         assert self.attitude is not None
-        return np.einsum("kij,lmj->kilm", self.attitude, self.attitude)
+        return np.asarray(np.einsum("kij,lmj->kilm", self.attitude, self.attitude))
 
     @cached_property
     def lag_s(self) -> FloatArray:
@@ -72,7 +72,7 @@ class Stretch:
             slow = self.slow @ slow @ self.slow.T
         for i, j in np.ndindex(3, 3):
             parted[:, i, :, j] += self.plane[i, j] * slow + (same if i == j else 0.0)
-        return out
+        return np.asarray(out)
 
     def evidence(self, strengths: FloatArray) -> float:
         """Log evidence of the observations, the columns' coefficients integrated out (docs/reference.md, eq. 2)."""
