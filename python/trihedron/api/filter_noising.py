@@ -205,6 +205,8 @@ def _noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
     for one in sensors:
         if one.static is None:
             out.append(Finding.of(FindingCode.FILTER_NOISE_NO_STATIC, sensor=one.sensor))
+        if one.reference is not None and one.reference.follows:
+            out.append(Finding.of(FindingCode.FILTER_NOISE_FOLLOWED, sensor=one.sensor))
         mixed = one.reference is not None and (one.K.is_limit or one.reference.slow.is_limit)
         if mixed:
             out.append(Finding.of(FindingCode.FILTER_NOISE_NOT_SEPARATED, sensor=one.sensor))

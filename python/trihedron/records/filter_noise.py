@@ -9,9 +9,9 @@ from trihedron.records.finding import Finding
 from trihedron.records.plain import Plain
 from trihedron.records.presented import Presented
 
-Cause = Literal["rest", "vibration", "bias", "calibration", "reference"]
-CAUSES: tuple[Cause, ...] = ("rest", "vibration", "bias", "calibration", "reference")
-"""Noise as at rest, vibration, wandering bias, calibration left over, the reference's own error."""
+Cause = Literal["rest", "vibration", "bias", "calibration", "g-sensitivity", "reference"]
+CAUSES: tuple[Cause, ...] = ("rest", "vibration", "bias", "calibration", "g-sensitivity", "reference")
+"""Noise as at rest, vibration, wandering bias, what S and g-sensitivity would leave, the reference's own error."""
 
 
 @dataclass(frozen=True)
@@ -77,11 +77,15 @@ class Consistency(Plain):
 
 @dataclass(frozen=True)
 class ReferenceWorth(Plain):
-    """A reference's own error: of a block, and the slow one with its time constant [rad; m for ``white`` of a path]."""
+    """A reference's own error: of a block, and the slow one with its time constant [rad; m for ``white`` of a path].
+
+    ``follows`` the sensor's own noise, as an attitude computed from it does: noise is then that at rest.
+    """
 
     white: Bounded
     slow: Bounded
     slow_s: float
+    follows: bool = False
 
 
 @dataclass(frozen=True)

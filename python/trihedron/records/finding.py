@@ -112,6 +112,7 @@ class FindingCode(str, Enum):
     FILTER_NOISE_AT_REST = "filter-noise-at-rest"
     FILTER_NOISE_NO_STATIC = "filter-noise-no-static"
     FILTER_NOISE_NOT_SEPARATED = "filter-noise-not-separated"
+    FILTER_NOISE_FOLLOWED = "filter-noise-followed"
     FILTER_NOISE_INCONSISTENT = "filter-noise-inconsistent"
     ACCELEROMETER_NOMINAL = "accelerometer-nominal"
     SHARED_MOTION = "shared-motion"

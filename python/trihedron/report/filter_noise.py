@@ -21,6 +21,7 @@ CAUSE_WORDS = {
     "vibration": ("vibration", "dampers at the mount, a low-pass filter on the sensor, a higher rate"),
     "bias": ("bias random walk", "warm up, calibrate the temperature"),
     "calibration": ("calibration left over", "trihedron calibrate: none of it goes into N or K"),
+    "g-sensitivity": ("g-sensitivity", "trihedron calibrate with known motion: none of it goes into N or K"),
     "reference": ("error of the reference", "a better reference: none of it goes into N or K"),
 }
 """Every cause of the records, and what lowers its share."""
@@ -131,6 +132,7 @@ def _shares(one: SensorFilterNoise) -> Table:
     rows = tuple(
         (words, *(_percent(by[cause, h]) for h in horizons))  # type: ignore[index]
         for cause, (words, _) in CAUSE_WORDS.items()
+        if (cause, horizons[0]) in by
     )
     head = (f"share of the {one.sensor}'s error", *(f"{plain_number(h)} s [%]" for h in horizons))
     return Table(head, rows, "Shares of the mean square error, 95 % intervals")

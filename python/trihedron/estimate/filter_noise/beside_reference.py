@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.filter_noise.angle import angle_stretches
+from trihedron.estimate.filter_noise.axes import unlike_axes_beside
 from trihedron.estimate.filter_noise.held_out import Errors, errors_over
+from trihedron.estimate.filter_noise.left_over import Left, left_over
 from trihedron.estimate.filter_noise.shares import bounded, parts_of, shares_over
 from trihedron.estimate.filter_noise.strengths import PREFERRED, Fitted, Prior, fit, forgetting
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
 from trihedron.estimate.filter_noise.velocity import velocity_stretches
 from trihedron.estimate.reference.fit import laid_beside
-from trihedron.estimate.reference.motion import MotionFit, fit_motion
+from trihedron.estimate.reference.motion import fit_motion
 from trihedron.records import Recording
 from trihedron.records.filter_noise import (
     BiasModel,
@@ -32,7 +34,7 @@ ANGLE = Prior(
     np.append(np.log([30.0, 30.0, 30.0, 30.0, 30.0, 4.0]), 1.0),
     np.ones(7),
 )
-"""Consumer gyros and optical trackers, a factor of 30 either way and of 4 for the time constant, as for `--reference`."""
+"""Consumer gyros and optical trackers, a factor of 30 either way and of 4 for the time constant (as `--reference`)."""
 VELOCITY = Prior(
     np.append(np.log([2e-3, 2e-3, 3e-4, 1e-3, 1e-3, 8.0]), 0.0),
     ANGLE.sigma,
@@ -41,8 +43,8 @@ VELOCITY = Prior(
 """The same of accelerometers beside a path: a millimetre of white error; a tilt of the world's attitude."""
 LEAST_S = 40.0
 """Shared motion below which two halves say nothing of ten seconds."""
-CALIBRATION_DRAWS, PREDICTING = 400, 20
-"""Draws of the scale matrix for its share; of the strengths for a prediction."""
+PREDICTING = 20
+"""Draws of the strengths for a prediction."""
 
 
 @dataclass(frozen=True)
@@ -72,13 +74,12 @@ def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Asked
     known = 0.0 if asked.gyroscope is None else asked.gyroscope.N.value
     stretches = angle_stretches(found, asked.band_hz, known)
     _refuse_short(stretches, motion)
-    left = {h: calibration_left(found, h) for h in asked.horizons_s}
+    left = left_over(found, asked.horizons_s)
     out = [_sensor(stretches, ANGLE, asked, asked.gyroscope, left)]
     if motion.position is not None and side.force is not None:
         known = 0.0 if asked.accelerometer is None else asked.accelerometer.N.value
         more = velocity_stretches(side, found.points[0], asked.band_hz, known, asked.gravity_m_s2)
-        nothing = {h: np.zeros(1) for h in asked.horizons_s}
-        out.append(_sensor(more, VELOCITY, asked, asked.accelerometer, nothing))
+        out.append(_sensor(more, VELOCITY, asked, asked.accelerometer, {}))
     return tuple(out)
 
 
@@ -91,34 +92,37 @@ def _refuse_short(stretches: Sequence[Stretch], motion: ReferenceMotion) -> None
 
 
 def _sensor(
-    stretches: Sequence[Stretch], usual: Prior, asked: Asked, static: StaticNoise | None, left: dict[float, FloatArray]
+    stretches: Sequence[Stretch], usual: Prior, asked: Asked, static: StaticNoise | None, left: Left
 ) -> SensorFilterNoise:
     is_gyro = usual is ANGLE
     prior = informed(usual, stretches, static)
     half, held = halves(stretches)
-    taught = fit(half, prior)
-    found = fit(stretches, prior, taught)
+    taught, did_follow = independent_or_not(half, prior, usual)
+    near = (None, taught) if did_follow else (taught, None)
+    found, follows = independent_or_not(stretches, prior, usual, near)
     gain, sigma, tau = forgetting(stretches, found)
     is_gm = gain > PREFERRED
     draws = found.draws
-    N = np.hypot(draws[:, 0], draws[:, 1])
+    N, K = bounded(np.hypot(draws[:, 0], draws[:, 1])), bounded(draws[:, 2])
+    if follows:
+        # What is left beside it is the reference's as much as the sensor's.
+        assert static is not None
+        N, K = static.N, replace(K, lower=0.0, is_limit=True)
     shares = tuple(
         share
         for h in asked.horizons_s
-        for share in shares_over(
-            parts_of(draws, h, None if is_gyro else asked.gravity_m_s2), _resampled(left[h], len(draws)), h
-        )
+        for share in shares_over({**parts_of(draws, h, None if is_gyro else asked.gravity_m_s2), **left.get(h, {})}, h)
     )
     return SensorFilterNoise(
         sensor="gyroscope" if is_gyro else "accelerometer",
         unit="rad/s" if is_gyro else "m/s^2",
-        N=bounded(N),
-        K=bounded(draws[:, 2]),
+        N=N,
+        K=K,
         static=static,
         bias=BiasModel("gauss-markov", gain, sigma, tau) if is_gm else BiasModel("walk", gain),
-        axes_N=(),
-        vibration=bounded(draws[:, 1]) if prior.is_there[1] else None,
-        reference=_worth(draws),
+        axes_N=() if follows else unlike_axes_beside(stretches, found, N),
+        vibration=bounded(draws[:, 1]) if prior.is_there[1] and not follows else None,
+        reference=_worth(draws, follows),
         shares=shares,
         consistency=tuple(
             one for h in asked.horizons_s if (one := consistency(held, taught, static, h)) is not None
@@ -139,6 +143,24 @@ def informed(usual: Prior, stretches: Sequence[Stretch], static: StaticNoise | N
     shows = np.any(power > 0.0) and (static is not None or np.std(power) > 0.2 * np.mean(power))
     is_there[1] = float(shows)
     return Prior(mean, sigma, is_there)
+
+
+def independent_or_not(
+    stretches: Sequence[Stretch], prior: Prior, usual: Prior, near: tuple[Fitted | None, Fitted | None] = (None, None)
+) -> tuple[Fitted, bool]:
+    """The fit with noise at rest as a datum, or, where the evidence prefers it, of a reference that follows the sensor.
+
+    A smoother over this sensor repeats part of its noise, and what is left of it beside the reference may be any less.
+    ``near`` are fits of a part, of either kind.
+    """
+    apart = fit(stretches, prior, near[0])
+    if prior.sigma[0] == usual.sigma[0] or np.log(np.median(apart.draws[:, 0])) > prior.mean[0] - prior.sigma[0]:
+        return apart, False
+    wide = prior.sigma.copy()
+    wide[0] = usual.sigma[0]
+    other = fit(stretches, Prior(prior.mean, wide, prior.is_there), near[1])
+    follows = 2.0 * (other.evidence - apart.evidence) > PREFERRED
+    return (other, True) if follows else (apart, False)
 
 
 def halves(stretches: Sequence[Stretch]) -> tuple[list[Stretch], list[tuple[Stretch, int]]]:
@@ -185,63 +207,6 @@ def consistency(
     )
 
 
-def calibration_left(found: MotionFit, horizon_s: float) -> FloatArray:
-    """(k,) mean squares [rad²] of what one scale and square axes would leave over a horizon, drawn from the fit.
-
-    The mounting is nobody's fault, and a filter finds the bias: neither counts.
-    """
-    side, point = found.sides[0], found.points[0]
-    grid = side.grid
-    C = side.reference.attitude(grid.time_s * (1.0 + point.rate) + point.offset_s) @ point.mounting
-    raw = np.where(side.seen[:, None], grid.gyroscope - grid.gyroscope[side.seen].mean(axis=0), 0.0)
-    carried = np.cumsum(np.einsum("nij,nk->nijk", C, raw).reshape(len(raw), 3, 9), axis=0) * grid.step_s
-    ahead = max(1, round(horizon_s / grid.step_s))
-    if len(raw) <= ahead:
-        return np.zeros(1)
-    steps = carried[ahead:] - carried[:-ahead]
-    square = np.einsum("nai,naj->ij", steps, steps) / len(steps)
-    S, cov = found.value(0, "S"), found.covariance(0, ("S",))
-    errors = drawn_errors(left_of(S), _across(S) @ cov @ _across(S).T)
-    return np.asarray(np.einsum("ki,ij,kj->k", errors, square, errors))
-
-
-def drawn_errors(seen: FloatArray, cov: FloatArray) -> FloatArray:
-    """(k, 9) errors of a scale matrix seen as ``seen`` (9,) with covariance (9, 9), all elements of one unknown size.
-
-    What noise alone makes of a perfect matrix is no error: without a common size its square would be twice counted.
-    """
-    sizes = np.geomspace(1e-5, 0.1, 33)
-    width = [cov + size**2 * np.eye(9) for size in sizes]
-    log_p = np.array([-0.5 * (np.linalg.slogdet(V)[1] + seen @ np.linalg.solve(V, seen)) for V in width])
-    weight = np.exp(log_p - log_p.max())
-    rng = np.random.default_rng(0)
-    out = []
-    for k in rng.choice(len(sizes), CALIBRATION_DRAWS, p=weight / weight.sum()):
-        gain = sizes[k] ** 2 * np.linalg.inv(width[k])
-        left = sizes[k] ** 2 * (np.eye(9) - gain)
-        values, vectors = np.linalg.eigh(0.5 * (left + left.T))
-        out.append(gain @ seen + vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.normal(size=9)))
-    return np.array(out)
-
-
-def _across(S: FloatArray) -> FloatArray:
-    """(9, 9) derivative of what is left of S."""
-    step = 1e-6 * float(np.linalg.norm(S))
-    return np.array([(left_of(S + step * e) - left_of(S - step * e)) / (2.0 * step) for e in np.eye(9)]).T
-
-
-def left_of(S: FloatArray) -> FloatArray:
-    """(9,) S less the square, equal one that comes nearest to it; of readings in SI its scale is one."""
-    u, s, vt = np.linalg.svd(S.reshape(3, 3))
-    # Of counts the scale is a data sheet's, and no error.
-    scale = 1.0 if 0.5 < float(np.mean(s)) < 2.0 else float(np.mean(s))
-    return np.asarray(S - scale * (u @ vt).ravel())
-
-
-def _worth(draws: FloatArray) -> ReferenceWorth:
+def _worth(draws: FloatArray, follows: bool) -> ReferenceWorth:
     slow = np.hypot(draws[:, 4], draws[:, 5])
-    return ReferenceWorth(bounded(draws[:, 3]), bounded(slow), float(np.median(draws[:, 6])))
-
-
-def _resampled(values: FloatArray, n: int) -> FloatArray:
-    return np.asarray(values[np.arange(n) % len(values)])
+    return ReferenceWorth(bounded(draws[:, 3]), bounded(slow), float(np.median(draws[:, 6])), follows)

@@ -10,18 +10,18 @@ from scipy.integrate import trapezoid
 from trihedron.arrays import FloatArray
 from trihedron.estimate.filter_noise.strengths import ABSENT
 from trihedron.estimate.filter_noise.stretch import NAMES, matern
-from trihedron.records.filter_noise import CAUSES, Bounded, Share
+from trihedron.records.filter_noise import CAUSES, Bounded, Cause, Share
 
 
-def parts_of(draws: FloatArray, horizon_s: float, tilt_m_s2: float | None = None) -> dict[str, FloatArray]:
-    """Mean squares (k,) of all three axes together by cause, under strengths (k, 7), without the calibration's.
+def parts_of(draws: FloatArray, horizon_s: float, tilt_m_s2: float | None = None) -> dict[Cause, FloatArray]:
+    """Mean squares (k,) of all three axes together by cause, under strengths (k, 7), without the correction's.
 
     Of an angle over h: 3 N² h, 3 V² h, K² h³, and of a reference the difference of two of its errors,
     2 σ² (1 - k(h)) and white. ``tilt_m_s2`` makes it a velocity: a slow tilt adds g² over h, of two axes.
     """
     s = dict(zip(NAMES, draws.T, strict=True))
     h = horizon_s
-    out = {"rest": 3.0 * s["noise"] ** 2 * h, "vibration": 3.0 * s["vibration"] ** 2 * h}
+    out: dict[Cause, FloatArray] = {"rest": 3.0 * s["noise"] ** 2 * h, "vibration": 3.0 * s["vibration"] ** 2 * h}
     out["bias"] = s["bias_walk"] ** 2 * h**3
     if tilt_m_s2 is None:
         slow = 6.0 * (s["world"] ** 2 + s["body"] ** 2) * (1.0 - matern(h, s["slow_s"]))
@@ -31,11 +31,10 @@ def parts_of(draws: FloatArray, horizon_s: float, tilt_m_s2: float | None = None
     return out
 
 
-def shares_over(parts: dict[str, FloatArray], calibration: FloatArray, horizon_s: float) -> tuple[Share, ...]:
-    """Shares with 95 % intervals of causes' mean squares (k,), that of the calibration left over beside them."""
-    every = {**parts, "calibration": calibration}
-    total = np.sum(list(every.values()), axis=0)
-    return tuple(Share(name, horizon_s, bounded(every[name] / total)) for name in CAUSES)
+def shares_over(parts: dict[Cause, FloatArray], horizon_s: float) -> tuple[Share, ...]:
+    """Shares with 95 % intervals of causes' mean squares (k,); a cause without a part has no share."""
+    total = np.sum(list(parts.values()), axis=0)
+    return tuple(Share(name, horizon_s, bounded(parts[name] / total)) for name in CAUSES if name in parts)
 
 
 def bounded(values: Sequence[float] | FloatArray) -> Bounded:

@@ -143,7 +143,7 @@ def _mixture(x: FloatArray, proposals: Sequence[tuple[FloatArray, FloatArray]]) 
 
 
 def _curvature(stretches: Sequence[Stretch], prior: Prior, at: FloatArray) -> FloatArray:
-    """Minus the second derivatives (f, f) along each axis alone, no flatter than the prior: sampling learns the rest."""
+    """Minus the second derivatives (f, f) along each axis, no flatter than the prior: sampling learns the rest."""
     here = height(stretches, prior, at)
     flat = 1.0 / prior.sigma[prior.is_there > 0.0] ** 2
     steps = CURVATURE_STEP * np.eye(len(at))

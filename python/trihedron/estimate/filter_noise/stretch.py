@@ -76,7 +76,10 @@ class Stretch:
 
     def evidence(self, strengths: FloatArray) -> float:
         """Log evidence of the observations, the columns' coefficients integrated out (docs/reference.md, eq. 2)."""
-        V = self.covariance(strengths)
+        return self.evidence_under(self.covariance(strengths))
+
+    def evidence_under(self, V: FloatArray) -> float:
+        """The same under any covariance (3 m, 3 m)."""
         try:
             L = cholesky(V, lower=True, check_finite=False)
         except np.linalg.LinAlgError:

@@ -37,6 +37,16 @@ ENTRIES = (
         "Use the limit in a filter that must not be too sure, or record longer beside a better reference.",
     ),
     Entry(
+        Code.FILTER_NOISE_FOLLOWED,
+        "",
+        WARNING,
+        "The reference follows the {sensor}'s own noise: the difference is less than noise at rest allows. N is that "
+        "at rest; what motion adds to it is hidden.",
+        "An attitude or path computed with this unit's own readings (a filter or smoother over camera, tracker and "
+        "IMU).",
+        "Take the tracker's own poses as reference.",
+    ),
+    Entry(
         Code.FILTER_NOISE_INCONSISTENT,
         "",
         WARNING,

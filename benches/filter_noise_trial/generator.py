@@ -1,0 +1,126 @@
+"""Drones, cars and walks: a strapped gyro with known vibration, calibration left over and bias walk, and a truth whose
+own error is known too. Numpy and scipy only: the parts of an error over a horizon are written out here once more.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+HZ, TRACK_HZ, G = 100, 50, 9.81
+KINDS = ("drone", "car", "walk")
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Log (n,) s, (n, 3) m/s² and rad/s; truth (k,) s, (k, 3, 3); the density at rest as told, and what is true."""
+
+    t: np.ndarray
+    force: np.ndarray
+    rate: np.ndarray
+    truth_t: np.ndarray
+    truth: np.ndarray
+    told_N: float
+    N: float
+    """At rest and vibration together [rad/s/√Hz]."""
+    K: float
+    parts: dict[float, dict[str, float]]
+    """Mean square [rad²] by horizon and cause."""
+
+
+def smooth(rng, n, low, high):
+    """(n, 3) of unit rms between two frequencies [Hz]."""
+    spectrum = np.fft.rfft(rng.normal(size=(n, 3)), axis=0)
+    f = np.fft.rfftfreq(n, 1 / HZ)
+    x = np.fft.irfft(spectrum * ((f > low) & (f < high))[:, None], n, axis=0)
+    return x / x.std()
+
+
+def rates(rng, kind, t):
+    """(n, 3) rad/s of a motion."""
+    n = len(t)
+    if kind == "drone":
+        return 0.5 * smooth(rng, n, 0.05, 1.0)
+    if kind == "car":
+        return smooth(rng, n, 0.02, 0.2) * [0.02, 0.02, 0.25] + 0.05 * smooth(rng, n, 0.5, 2.0) * [1.0, 1.0, 0.2]
+    step = np.sin(2 * np.pi * 1.8 * t[:, None] + rng.uniform(0, 6, 3)) * rng.uniform(0.3, 0.8, 3)
+    return step + 0.4 * smooth(rng, n, 0.03, 0.3)
+
+
+def turned(w):
+    """Attitudes (n + 1) of rates (n, 3), products of all steps so far by doubling."""
+    q = Rotation.concatenate([Rotation.identity(), Rotation.from_rotvec(w / HZ)])
+    reach = 1
+    while reach < len(q):
+        q = Rotation.concatenate([q[:reach], q[:-reach] * q[reach:]])
+        reach *= 2
+    return q
+
+
+def slow_error(rng, time, sigma, tau):
+    """(k, 3) a Matérn-3/2 process by its exact steps."""
+    h, lam = time[1] - time[0], np.sqrt(3) / tau
+    decay = np.exp(-lam * h)
+    F = decay * np.array([[1 + lam * h, h], [-(lam**2) * h, 1 - lam * h]])
+    P = sigma**2 * np.diag([1.0, lam**2])
+    root, out = np.linalg.cholesky(P - F @ P @ F.T + 1e-14 * P), []
+    x = np.linalg.cholesky(P) @ rng.normal(size=(2, 3))
+    for _ in time:
+        out.append(x[0])
+        x = F @ x + root @ rng.normal(size=(2, 3))
+    return np.array(out)
+
+
+def drawn(seed, kind, seconds, horizons):
+    """One log of that length [s] and its truth."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0, seconds, 1 / HZ)
+    w = rates(rng, kind, t)
+    C = turned(w)
+    low, high = np.log([1e-4, 3e-6, 3e-4, 5e-4]), np.log([4e-4, 1e-4, 2e-3, 5e-3])
+    N, K, V, sigma = np.exp(rng.uniform(low, high))
+    V = V if kind == "drone" else 0.3 * V
+    tau, white = rng.uniform(3, 15), 3e-4
+    throttle = np.maximum(1 + 0.7 * smooth(rng, len(t), 0.0, 0.05)[:, 0], 0.1)
+    throttle = throttle**2 / np.mean(throttle**2)
+    shaking = {"drone": 0.1, "car": 0.02, "walk": 0.05}[kind] * smooth(rng, len(t), 30, 48) * np.sqrt(throttle)[:, None]
+    noise = np.sqrt(N**2 + V**2 * throttle)[:, None] * np.sqrt(HZ) * rng.normal(size=w.shape)
+    bias = 0.02 * rng.normal(size=3) + K / np.sqrt(HZ) * np.cumsum(rng.normal(size=w.shape), axis=0)
+    M = np.eye(3) + rng.uniform(-0.01, 0.01, (3, 3))
+    of_force = np.radians(0.1) / G * rng.normal(size=(3, 3))
+    middle = C[:-1] * Rotation.from_rotvec(0.5 * w / HZ)
+    force = middle.inv().apply([0, 0, G]) + 0.3 * smooth(rng, len(t), 0.1, 3)
+    raw = (w + shaking) @ M.T + force @ of_force.T + bias + noise
+    k = np.arange(0, len(t), HZ // TRACK_HZ)
+    truth_t = t[k] - 0.5 / HZ
+    off = slow_error(rng, truth_t, sigma, tau) + white * rng.normal(size=(len(k), 3))
+    parts = {}
+    left = {"calibration": w @ M.T @ left_over(M).T, "g-sensitivity": force @ of_force.T}
+    for h in horizons:
+        x = np.sqrt(3) * h / tau
+        parts[h] = {
+            "rest": 3 * N**2 * h,
+            "vibration": 3 * V**2 * h,
+            "bias": K**2 * h**3,
+            "reference": 6 * sigma**2 * (1 - (1 + x) * np.exp(-x)) + 6 * white**2 / TRACK_HZ,
+            **{cause: carried(wrong, middle, h) for cause, wrong in left.items()},
+        }
+    seen = (Rotation.from_rotvec(off) * C[k]).as_matrix()
+    force = force + 0.02 * rng.normal(size=w.shape)
+    return Drawn(
+        t, force, raw, truth_t, seen, N * np.exp(0.05 * rng.normal()), float(np.hypot(N, V)), K, parts
+    )  # fmt: skip
+
+
+def left_over(M):
+    """(3, 3) what one scale and square axes lack of the correction of a gyro that reads M w."""
+    S = np.linalg.inv(M)
+    u, _, vt = np.linalg.svd(S)
+    return S - u @ vt
+
+
+def carried(wrong, attitude, h):
+    """Mean square angle [rad²] of wrong rates (n, 3) over a horizon, their mean, which a filter finds, off."""
+    angle = np.cumsum(attitude.apply(wrong - wrong.mean(axis=0)), axis=0) / HZ
+    ahead = round(h * HZ)
+    return float(np.mean(np.sum((angle[ahead:] - angle[:-ahead]) ** 2, axis=1)))

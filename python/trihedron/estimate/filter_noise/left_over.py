@@ -1,0 +1,86 @@
+"""What S and g-sensitivity would leave over a horizon in a filter that does not know them, drawn from the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.estimate.filter_noise.strengths import DRAWN
+from trihedron.estimate.reference.motion import MotionFit
+from trihedron.records.filter_noise import Cause
+
+Left = dict[float, dict[Cause, FloatArray]]
+"""Mean squares (k,) [rad²] by horizon and cause."""
+
+
+def left_over(found: MotionFit, horizons_s: Sequence[float]) -> Left:
+    """Mean squares, over all starts of every horizon, of what one scale, square axes and no g-sensitivity leave.
+
+    The mounting is nobody's fault, and a filter finds the bias: neither counts.
+    """
+    side, point = found.sides[0], found.points[0]
+    grid = side.grid
+    C = side.reference.attitude(grid.time_s * (1.0 + point.rate) + point.offset_s) @ point.mounting
+
+    def carried(signal: FloatArray) -> FloatArray:
+        """(n, 3, 9) angle so far by each element of a matrix that multiplies a signal (n, 3)."""
+        apart = np.where(side.seen[:, None], signal - signal[side.seen].mean(axis=0), 0.0)
+        return np.cumsum(np.einsum("nij,nk->nijk", C, apart).reshape(len(C), 3, 9), axis=0) * grid.step_s
+
+    S, cov = found.value(0, "S"), found.covariance(0, ("S",))
+    by: dict[Cause, tuple[FloatArray, FloatArray]] = {
+        "calibration": (carried(grid.gyroscope), drawn_errors(left_of(S), _across(S) @ cov @ _across(S).T))
+    }
+    name = "gyro-g-sensitivity"
+    if side.force is not None and name in found.places[0]:
+        rng = np.random.default_rng(1)
+        drawn = rng.multivariate_normal(found.value(0, name), found.covariance(0, (name,)), DRAWN)
+        by["g-sensitivity"] = (carried(side.force), drawn)
+    return {
+        h: {cause: _mean_square(angle, errors, max(1, round(h / grid.step_s))) for cause, (angle, errors) in by.items()}
+        for h in horizons_s
+    }
+
+
+def _mean_square(angle: FloatArray, errors: FloatArray, ahead: int) -> FloatArray:
+    """(k,) of matrices (k, 9) over so many samples, by what each element does (n, 3, 9)."""
+    if len(angle) <= ahead:
+        return np.zeros(len(errors))
+    steps = angle[ahead:] - angle[:-ahead]
+    square = np.einsum("nai,naj->ij", steps, steps) / len(steps)
+    return np.asarray(np.einsum("ki,ij,kj->k", errors, square, errors))
+
+
+def drawn_errors(seen: FloatArray, cov: FloatArray) -> FloatArray:
+    """(k, 9) errors of a scale matrix seen as ``seen`` (9,) with covariance (9, 9), all elements of one unknown size.
+
+    What noise alone makes of a perfect matrix is no error: without a common size its square would be twice counted.
+    """
+    sizes = np.geomspace(1e-5, 0.1, 33)
+    width = [cov + size**2 * np.eye(9) for size in sizes]
+    log_p = np.array([-0.5 * (np.linalg.slogdet(V)[1] + seen @ np.linalg.solve(V, seen)) for V in width])
+    weight = np.exp(log_p - log_p.max())
+    rng = np.random.default_rng(0)
+    out = []
+    for k in rng.choice(len(sizes), DRAWN, p=weight / weight.sum()):
+        gain = sizes[k] ** 2 * np.linalg.inv(width[k])
+        left = sizes[k] ** 2 * (np.eye(9) - gain)
+        values, vectors = np.linalg.eigh(0.5 * (left + left.T))
+        out.append(gain @ seen + vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.normal(size=9)))
+    return np.array(out)
+
+
+def _across(S: FloatArray) -> FloatArray:
+    """(9, 9) derivative of what is left of S."""
+    step = 1e-6 * float(np.linalg.norm(S))
+    return np.array([(left_of(S + step * e) - left_of(S - step * e)) / (2.0 * step) for e in np.eye(9)]).T
+
+
+def left_of(S: FloatArray) -> FloatArray:
+    """(9,) S less the square, equal one that comes nearest to it; of readings in SI its scale is one."""
+    u, s, vt = np.linalg.svd(S.reshape(3, 3))
+    # Of counts the scale is a data sheet's, and no error.
+    scale = 1.0 if 0.5 < float(np.mean(s)) < 2.0 else float(np.mean(s))
+    return np.asarray(S - scale * (u @ vt).ravel())
