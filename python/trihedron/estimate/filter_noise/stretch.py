@@ -82,11 +82,12 @@ class Stretch:
         """The same under any covariance (3 m, 3 m)."""
         try:
             L = cholesky(V, lower=True, check_finite=False)
+            half = solve_triangular(L, np.column_stack([self.columns, self.observed]), lower=True, check_finite=False)
+            X, y = half[:, :-1], half[:, -1] - half[:, :-1] @ self.centre
+            inner = cholesky(np.eye(X.shape[1]) + X.T @ X, lower=True, check_finite=False)
         except np.linalg.LinAlgError:
+            # Strengths so unlike that V is singular to working precision.
             return -np.inf
-        half = solve_triangular(L, np.column_stack([self.columns, self.observed]), lower=True, check_finite=False)
-        X, y = half[:, :-1], half[:, -1] - half[:, :-1] @ self.centre
-        inner = cholesky(np.eye(X.shape[1]) + X.T @ X, lower=True)
         gain = solve_triangular(inner, X.T @ y, lower=True)
         log_det = np.sum(np.log(np.diag(L))) + np.sum(np.log(np.diag(inner)))
         return float(-0.5 * (y @ y - gain @ gain) - log_det - 0.5 * len(y) * np.log(2.0 * np.pi))
