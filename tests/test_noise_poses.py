@@ -1,12 +1,14 @@
 """Noise inside poses: simulated sessions of known figures, and one held against another."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from trihedron.estimate.noise import noise_of_poses, ratio_of
+from trihedron.estimate.noise.correlation_time import correlation_time
 
 RATE = 100.0
 
@@ -165,3 +167,18 @@ def test_holds_that_a_hand_shakes_lift_white_noise_below_a_corner_no_more_than_t
         below = [o.density.value for o in axis.octaves if o.low_hz >= 1.0 and o.high_hz <= 8.0]
         # The mean over all poses is six times the octaves' typical pose, its root 2.4; a filter's shape is worth 10 %.
         assert axis.white.value < 1.3 * math.sqrt(float(np.mean(below)))
+
+
+@pytest.mark.parametrize("corner_hz", [0.5, 3.0, 19.0])
+def test_a_correlation_time_is_found_wherever_its_corner_lies_between_the_octaves(corner_hz):
+    edges = 0.0625 * 2.0 ** np.arange(10)  # up to 32 Hz
+    angle = np.arctan(edges / corner_hz)
+    density = 1.0 + corner_hz * np.diff(angle) / np.diff(edges)
+    octaves = [
+        SimpleNamespace(low_hz=low, high_hz=high, density=SimpleNamespace(value=value, sigma_log=0.01))
+        for low, high, value in zip(edges[:-1], edges[1:], density, strict=True)
+    ]
+    found = correlation_time([SimpleNamespace(white=1.0, octaves=octaves)])
+    # Eight are tried to the octave.
+    assert found.value == pytest.approx(1.0 / (2.0 * np.pi * corner_hz), rel=0.06)
+    assert found.lower < found.value < found.upper

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -180,8 +180,15 @@ def _deviances(spectrum: Spectrum, grid: FloatArray, rate_hz: float, axes: int) 
 
     if not np.any(power > 0.0):
         return np.zeros((len(ORDERS) + 1, len(grid))), 0.0
-    table = [[deviance(gain_of(frequency, float(c), shape, rate_hz)) for c in grid] for shape in (0, *ORDERS)]
-    return np.array(table), deviance(np.ones(len(power)))
+    tried = _gains(frequency.tobytes(), grid.tobytes(), rate_hz)
+    return np.array([[deviance(gain) for gain in of_shape] for of_shape in tried]), deviance(np.ones(len(power)))
+
+
+@lru_cache(maxsize=8)
+def _gains(frequency_hz: bytes, corners_hz: bytes, rate_hz: float) -> FloatArray:
+    """Gains (shapes, corners, bins) of all filters that are tried: the axes of a sensor, and its logs, ask alike."""
+    frequency, corners = np.frombuffer(frequency_hz), np.frombuffer(corners_hz)
+    return np.array([[gain_of(frequency, float(c), shape, rate_hz) for c in corners] for shape in (0, *ORDERS)])
 
 
 def _around(grid: FloatArray, table: FloatArray) -> FloatArray:
