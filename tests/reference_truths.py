@@ -121,7 +121,7 @@ def truth(
     size = np.radians(size_deg or np.exp(rng.uniform(np.log(0.1), np.log(2))))
     error = small_turn(slow(rng, len(k), size, lasting_s or np.exp(rng.uniform(np.log(4), np.log(40)))))
     seen = error @ C[k] if rng.uniform() < 0.5 else C[k] @ error
-    seen = jittered(seen, rng, np.radians(white_deg))
+    seen = jittered(seen, rng, np.radians(0.05))
     position = path[k] + 3e-4 * rng.normal(size=(len(k), 3)) if has_path else None
     log = Recording.from_arrays(times(len(gyro), STEP), accelerometer, gyro)
     timestamps = t[k] * (1 + 1e-6 * ppm) + lead
