@@ -55,7 +55,7 @@ def test_a_move_in_which_nothing_is_seen_to_turn_is_not_said_to_be_still():
 
 
 def test_an_axis_that_turns_slowly_beside_a_quick_one_is_as_still_as_itself_shows():
-    """The place in its step must not act on what codes miss: not on an axis that leaves its step long after the rest."""
+    """Its place must not act on what codes miss, nor on an axis that leaves its step long after the others do."""
     places = (np.arange(400) + 0.5) / 400.0 - 0.5
     u = np.clip((np.arange(260) - 30.0) / 200.0, 0.0, 1.0)[:, None]
     rng, told = np.random.default_rng(5), []

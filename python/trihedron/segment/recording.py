@@ -33,6 +33,7 @@ from trihedron.segment.runs import (
     set_down,
     trim_edges,
     widen,
+    without_approaches,
 )
 from trihedron.segment.shaken import find_shaken
 from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks
@@ -129,6 +130,7 @@ def _find_runs(recording: Recording, channels: Channels, quiet: BoolArray, loose
     edges = EdgeNoise.of(channels, noise)
     joined = join_quiet(channels, quiet, loose, noise)
     steady = [trim_edges(channels, run, edges) for run in long_enough(channels, joined, MIN_POSE_S)]
+    steady = without_approaches(channels, steady)
     unsteady = find_unsteady(channels, loose, steady, _gravity_reading(recording, channels))
     other = set_down(channels, joined, loose, [*steady, *unsteady])
     short = [trim_edges(channels, run, edges) for run in other]

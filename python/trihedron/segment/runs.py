@@ -223,7 +223,7 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
         run = Run(first, last, (), True)
         if last - first < shortest or _sway(attitude, [run]) > SWAY_RAD:
             continue
-        if zero is not None and _turns_on(channels, first, last, zero):
+        if zero is not None and turns_on(channels, first, last, zero):
             continue
         if any(
             max(first - near.last, near.first - last) < bump and _sway(attitude, [near, run]) < SWAY_RAD
@@ -238,7 +238,24 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
     return found
 
 
-def _turns_on(channels: Channels, first: int, last: int, zero: FloatArray) -> bool:
+def without_approaches(channels: Channels, steady: list[Run]) -> list[Run]:
+    """Poses without the last of a slow move before it is set down, or the first of one that is lifted: what still turns
+    beside a longer pose is its fringe."""
+    beside = channels.blocks(BUMP_S)
+    kept = []
+    for run in steady:
+        longer = [
+            near
+            for near in steady
+            if near.last - near.first > run.last - run.first
+            and 0 <= max(run.first - near.last, near.first - run.last) < beside
+        ]
+        if not any(turns_on(channels, run.first, run.last, run_mean(channels, near)[0]) for near in longer):
+            kept.append(run)
+    return kept
+
+
+def turns_on(channels: Channels, first: int, last: int, zero: FloatArray) -> bool:
     """The gyro's reading follows a straight line: a slow move, or its pause, turning back or on about another axis.
 
     A hand that tries to hold still goes to and fro.

@@ -13,7 +13,7 @@ from trihedron.records import Recording
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.floor import Activity, quiet_channels
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
-from trihedron.segment.runs import BUMP_S, SEEN_S, SWAY_RAD, EdgeNoise, Run, close_gaps, trim_edges, widen
+from trihedron.segment.runs import BUMP_S, SEEN_S, SWAY_RAD, EdgeNoise, Run, close_gaps, trim_edges, turns_on, widen
 
 SMOOTH_S = 1.0
 """Raised cosine over which a shaking of some hertz and more averages out of the attitude, and a carried body's way
@@ -62,8 +62,8 @@ def find_shaken(
     gravity, radians_per_reading = scales
     if gravity is None or radians_per_reading is None or not steady or gyro.all() or not gyro.any():
         return taken
-    zero = medians(np.vstack([channels.mean[a:b] for a, b in steady])[:, gyro])
-    rate = np.where(channels.is_valid[:, None], channels.mean[:, gyro] - zero, 0.0) * radians_per_reading
+    usual = medians(np.vstack([channels.mean[a:b] for a, b in steady]))
+    rate = np.where(channels.is_valid[:, None], channels.mean[:, gyro] - usual[gyro], 0.0) * radians_per_reading
     force = np.where(channels.is_valid[:, None], channels.mean[:, ~gyro], 0.0)
     seen = _Seen(_smoothed(force, channels) / gravity, rate * channels.step_s, steady)
     quiet = widen(close_gaps(quiet_channels(channels, activity, gyro), channels.is_valid), channels.is_valid)
@@ -71,6 +71,7 @@ def find_shaken(
     white = (activity.white_variance[~gyro], activity.white_variance[gyro])
     settled = [run for run in taken if not run.is_unsteady]
     seen_calm = _poses(channels, seen, calm & free & channels.is_valid, settled, SEEN_S)
+    seen_calm = [run for run in seen_calm if not turns_on(channels, run.first, run.last, usual)]
     spans = [(run.first * channels.length, run.last * channels.length) for run in seen_calm]
     lines = [run for run, span in zip(seen_calm, spans, strict=True) if is_shaken_by_a_support(recording, span, white)]
     # Where a line beats, a part of the pose is calm enough to be an unsteady pose of its own.
