@@ -161,7 +161,7 @@ def parse_name(name: str) -> ColumnName:
     text = re.sub(r"([XYZ])(Mps2|RadPerSec|MicroT)\b", lambda m: f" {m[1]} {m[2].lower()}", text)
     bracket = ""
     index = ""
-    text = re.sub(r"\s+in\s+([^\s\])]+(?: s)?)$", r" [\1]", text)
+    text = re.sub(r"(?:\s+in\s+|_(?=\d+/))([^\s\])]+(?: s)?)$", r" [\1]", text)
     found = re.search(r"[\[({]\s*([^\])}]*?)\s*[\])}]\s*$", text)
     if found:
         inside = found.group(1)
