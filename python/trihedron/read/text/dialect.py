@@ -27,7 +27,8 @@ _PREFIXES = (
 )
 _VALUE = rf"\d{{4}}-\d\d-\d\d[T ]{_CLOCK}|{_CLOCK}|{_NUMBER}"
 _PAIR = re.compile(
-    rf"([^\W\d][\w.\[\]()/^°² -]*?)\s*[:=：]\s*({_VALUE})(?![\d:])(?:\s*((?:[^\W\d_]|°)[\w/^°²*]*)(?!\s*[:=：\w\[(]|\.\w))?"
+    rf"([^\W\d][\w.\[\]()/^°² -]*?)\s*[:=：]\s*({_VALUE})(?![\d:])"
+    r"(?:\s*((?:[^\W\d_]|°)[\w/^°²*]*)(?!\s*[:=：\w\[(]|\.\w))?"
 )
 _HAS_LABEL = re.compile(r".*?(?:[^\W\d]|[\])])\s*[:=：]")
 _BARE_TIMESTAMP = re.compile(rf"\s*({_VALUE})\s*[,;]?\s+(?=[^\W\d_])")
