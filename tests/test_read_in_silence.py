@@ -474,3 +474,19 @@ def test_a_counter_of_a_byte_says_that_its_loss_is_the_least(tmp_path):
     log = written(tmp_path / "log.csv", *table(t[kept], force[kept], rate[kept])[1:], count, header=f"{HEADER[2:]},seq")
     (lost,) = [f for f in read_recording(log, rate_hz=100.0).findings if f.code is FindingCode.SAMPLES_LOST]
     assert "at least 60 samples" in lost.seen
+
+
+@pytest.mark.parametrize(
+    ("force", "rate"), [("加速度{}", "角速度{}"), ("Accel.{}", "Rot.{}"), ("Ускорение_{}", "Скорость_угловая_{}")]
+)
+def test_labels_in_every_script_are_read_and_none_takes_anothers_place(tmp_path, force, rate):
+    t, *readings = motion(n_poses=3)
+    names = ["t", *(name.format(a) for name in (force, rate) for a in "XYZ")]
+    # Axis by axis, so that each label stands between another sensor's.
+    order = [0, 1, 4, 2, 5, 3, 6]
+    names, rows = [names[k] for k in order], np.column_stack([t, *readings])[:, order]
+    log = tmp_path / "log.txt"
+    log.write_text("\n".join(" ".join(f"{n}:{x:.6f}" for n, x in zip(names, row, strict=True)) for row in rows))
+    recording = read_recording(log)
+    np.testing.assert_allclose(recording.accelerometer, readings[0], atol=1e-5)
+    np.testing.assert_allclose(recording.gyroscope, readings[1], atol=1e-5)

@@ -20,7 +20,7 @@ _MEANINGS = {
     "angular": "angulaire\\w* angolar\\w* katow\\w* uhlov\\w* ac[iı]sal угл\\w* кутов\\w*",
     "velocity": "geschwindigkeit\\w* vitesse velocidad\\w* velocita predkosc rychlost h[iı]z скор\\w* швидк\\w*",
     "linear": "linear[ei]\\w* lineal\\w* lineaire\\w* liniow\\w* линейн\\w*",
-    "time": "uhrzeit heure hora czas tijd\\w* cas zaman aika врем\\w* 시간 \\w*[时時][间間刻]\\w*",
+    "time": "uhrzeit heure hora czas tijd cas zaman aika врем\\w* 시간 \\w*[时時][间間刻]\\w*",
     "temperature": "темп\\w* [温溫]度",
     "axis": "achse axe eje eixo asse axel osa ось оси [轴軸] 축",
     **{"s": "с сек sek 秒", "ms": "мс 毫秒", "us": "мкс 微秒", "m": "м", "rad": "рад", "deg": "град"},

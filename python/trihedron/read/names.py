@@ -90,7 +90,7 @@ _UNITS = {
     },
     "gyroscope": {
         "mdeg/s": "mdps mdegs mdegsec mdegps",
-        "rad/s": "rads radsec rad rads-1 radps radpersec",
+        "rad/s": "rads radss radsec rad rads-1 radps radpersec",
         "mrad/s": "mrads mrad mradps",
         "deg/s": "dps degs deg degsec degps °s ° degs-1 °s-1",
         "deg/h": "dph degh deghr degphr °h °hr degperhour",
@@ -161,6 +161,7 @@ def parse_name(name: str) -> ColumnName:
     text = re.sub(r"([XYZ])(Mps2|RadPerSec|MicroT)\b", lambda m: f" {m[1]} {m[2].lower()}", text)
     bracket = ""
     index = ""
+    text = re.sub(r"(?:\s+in\s+|_(?=\d+/))([^\s\])]+(?: s)?)$", r" [\1]", text)
     found = re.search(r"[\[({]\s*([^\])}]*?)\s*[\])}]\s*$", text)
     if found:
         inside = found.group(1)

@@ -27,15 +27,16 @@ _PREFIXES = (
 )
 _VALUE = rf"\d{{4}}-\d\d-\d\d[T ]{_CLOCK}|{_CLOCK}|{_NUMBER}"
 _PAIR = re.compile(
-    rf"([A-Za-z_][\w.\[\]()/^°² -]*?)\s*[:=]\s*({_VALUE})(?![\d:])(?:\s*([A-Za-zµ°][\w/^°²*]*)(?!\s*[:=\w\[(]))?"
+    rf"([^\W\d][\w.\[\]()/^°² -]*?)\s*[:=：]\s*({_VALUE})(?![\d:])"
+    r"(?:\s*((?:[^\W\d_]|°)[\w/^°²*]*)(?!\s*[:=：\w\[(]|\.\w))?"
 )
-_HAS_LABEL = re.compile(r".*?[A-Za-z_\])]\s*[:=]")
-_BARE_TIMESTAMP = re.compile(rf"\s*({_VALUE})\s*[,;]?\s+(?=[A-Za-z])")
+_HAS_LABEL = re.compile(r".*?(?:[^\W\d]|[\])])\s*[:=：]")
+_BARE_TIMESTAMP = re.compile(rf"\s*({_VALUE})\s*[,;]?\s+(?=[^\W\d_])")
 _THREE = re.compile(
-    rf"([A-Za-z_]\w*)\s*[:=]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})(?![\d:.])(?!\s*[,;\s]\s*[-+.\d])"
+    rf"([^\W\d]\w*)\s*[:=：]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})(?![\d:.])(?!\s*[,;\s]\s*[-+.\d])"
 )
 _MOST_LABELS = 64
-_GROUP = re.compile(r"([A-Za-z]\w*)\s*[:=]?\W*$")
+_GROUP = re.compile(r"([^\W\d_]\w*)\s*[:=：]?\W*$")
 
 
 @dataclass(frozen=True, eq=False)

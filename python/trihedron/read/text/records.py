@@ -12,7 +12,7 @@ from trihedron.read.text.dialect import Rewritten
 from trihedron.read.text.layout import is_number, split
 
 _SAMPLE_LINES = 4000
-_WORD = re.compile(r"\$?[A-Za-z_]\w*:?$")
+_WORD = re.compile(r"\$?[^\W\d]\w*:?$")
 
 
 def split_records(text: str) -> tuple[dict[str, Rewritten], Counter[str]] | None:
