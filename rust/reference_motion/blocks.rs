@@ -276,29 +276,9 @@ fn seen(
         one.wrt_clock[0] += rate * share;
         one.wrt_clock[1] += rate * ((row.time_s - middle_s) * share);
     }
-    // The gyro's noise is in the observation and in its rate alike and would pull the clock. The slope of what the
-    // reference says on top takes it out: a line's slope and its mean do not share their errors.
-    let slope = slope_of(&path.rows, &off, &keep, one.time_s);
-    one.wrt_clock[0] += slope;
-    one.wrt_clock[1] += slope * (one.time_s - middle_s);
     one.angle += mean;
     one.moments = before + turned(start, &moments);
     Some((mean, one))
-}
-
-/// Slope over time of the rotations `off` that hold, about the rows' mean time, rad/s.
-fn slope_of(rows: &[Row], off: &[Vector3<f64>], keep: &[bool], mean_s: f64) -> Vector3<f64> {
-    let (mut sum, mut square) = (Vector3::zeros(), 0.0);
-    for ((row, d), _) in rows.iter().zip(off).zip(keep).filter(|(_, k)| **k) {
-        let from_mean = row.time_s - mean_s;
-        sum += d * from_mean;
-        square += from_mean * from_mean;
-    }
-    if square > 0.0 {
-        sum / square
-    } else {
-        Vector3::zeros()
-    }
 }
 
 /// Which rotations stand with the others of their block.
