@@ -102,9 +102,7 @@ def readings(rng, u, C, path):
     return gyro, f @ u.N.T + u.d + 0.02 * rng.normal(size=(n, 3)), bias.mean(axis=0)
 
 
-def truth(
-    seed, kind, seconds=120, has_g_sensitivity=False, has_path=False, size_deg=None, lasting_s=None, white_deg=0.05
-):
+def truth(seed, kind, seconds=120, has_g_sensitivity=False, has_path=False, size_deg=None, lasting_s=None):
     """One trial: ``kind`` of motion, its truth off by 0.1 to 2° over 4 to 40 s in world or body, clocks apart."""
     rng = np.random.default_rng(seed)
     u = unit(rng)
