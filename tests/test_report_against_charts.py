@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trihedron.records.diagnosis import NoiseDifference, Stage, StageDomain
-from trihedron.report.chart import Line
+from trihedron.report.chart import Line, Points
 from trihedron.report.diagnosis_against_charts import (
     allan_chart,
     allan_of,
@@ -59,13 +59,17 @@ def test_an_allan_curve_is_made_of_octaves_that_adjoin():
     assert [picture.name for picture in noise_pictures(alone)] == ["spectra-both"]
 
 
-def test_stages_are_drawn_domain_by_domain():
+def test_every_domain_is_a_slope_from_its_own_first_stage():
     stages = [
         Stage(name, (StageDomain("moves", size, None, "deg"), StageDomain("noise", 3.0, None, "dB")))
         for name, size in (("as-given", 1.0), ("numbers", 0.1), ("noise", 0.1), ("effects", 0.05))
     ]
     chart = stages_chart(SimpleNamespace(stages=stages))
-    assert [panel.title for panel in chart.panels] == ["tilt error after rotations", "noise, octave by octave"]
+    (panel,) = chart.panels
+    slopes = [mark for mark in panel.marks if isinstance(mark, Points)]
+    assert [slope.name for slope in slopes] == ["tilt error after rotations", "noise, octave by octave"]
+    assert [list(slope.y) for slope in slopes] == [pytest.approx([100.0, 10.0, 10.0, 5.0]), pytest.approx([100.0] * 4)]
+    assert "0.05 ° rms" in slopes[0].said[-1] or "0.0500 ° rms" in slopes[0].said[-1]
     assert chart.panels[0].x.names == ("as given", "parameters", "noise", "effects")
     assert len(stages_pictures(SimpleNamespace(stages=stages))) == 1
     assert stages_pictures(SimpleNamespace(stages=())) == ()

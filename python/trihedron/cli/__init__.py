@@ -34,6 +34,7 @@ from trihedron.cli.output import silence_stdout
 from trihedron.cli.plan import plan
 from trihedron.cli.ports import ports
 from trihedron.cli.provenance import begin
+from trihedron.cli.report import report
 from trihedron.cli.segment import segment
 from trihedron.cli.simulate import simulate
 from trihedron.cli.speech import spell_out
@@ -61,6 +62,7 @@ COMMANDS = (
     apply,
     convert,
     export,
+    report,
     simulate,
 )
 

@@ -20,6 +20,6 @@ def check(source: LogSource, report: Report = None, json: Json = None, force: Fo
     document = check_report(recording, result.segments, result.calibration, result.findings)
     machine = check_record(recording, result.segments, result.calibration, result.findings)
     show(document, json, sections=None)
-    write_json(machine, json, force=force)
+    write_json(machine, json, force=force, document=document)
     write_report(document, machine, report, force=force)
     leave(result.findings)

@@ -113,7 +113,7 @@ def diagnose(
     document = diagnosis_report(result)
     machine = diagnosis_document(result)
     show(document, json, sections=None if full else first_screen(result))
-    write_json(machine, json, force=force)
+    write_json(machine, json, force=force, document=document)
     write_report(document, machine, report, force=force)
     if improved is not None and against is not None:
         _improve(against, result, improved, force=force)
@@ -153,7 +153,7 @@ def _diagnose_many(
         )
     document, machine = shared_diagnosis_report(found), shared_diagnosis_record(found)
     show(document, json, sections=None)
-    write_json(machine, json, force=force)
+    write_json(machine, json, force=force, document=document)
     write_report(document, machine, report, force=force)
 
 

@@ -27,6 +27,9 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             'trihedron guide log.csv --accuracy "accel 0.05 %"',
         ),
     ),
+    "report": (
+        ("A page of a result that was saved with --json:", "trihedron report result.json --report result.html"),
+    ),
     "check": (("Before anything else:", "trihedron check log.csv"),),
     "segment": (
         ("The table of poses and the signals with them shaded:", "trihedron segment log.csv --report poses.html"),

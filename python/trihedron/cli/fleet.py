@@ -79,7 +79,7 @@ def fleet(
     if json is None or str(json) != "-":
         shown = tuple(section for section in document.sections if section.heading != "Every log")
         typer.echo(to_text(document, sections=len(shown)), nl=False)
-    write_json({"rows": list(result.rows)}, json, force=force)
+    write_json({"rows": list(result.rows)}, json, force=force, document=document)
     say(f"table: {out / 'fleet.parquet'}, {out / 'fleet.csv'}; page: {out / 'fleet.html'}")
     say(f"calibrations, for export, verify and apply: {out / 'calibrations'}")
     if not document.is_trustworthy:

@@ -14,7 +14,7 @@ COMMAND_GROUPS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Calibrate", ("check", "segment", "calibrate", "kalman", "allan", "noise")),
     ("Judge", ("verify", "diagnose")),
     ("Many devices", ("fleet",)),
-    ("Use", ("apply", "export", "convert")),
+    ("Use", ("apply", "export", "convert", "report")),
     ("Simulate", ("simulate",)),
 )
 _OF_THE_LOG = (

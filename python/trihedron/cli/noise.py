@@ -97,7 +97,7 @@ def noise(
         put(text)
     else:
         show(document, json, sections=None if full else FIRST_SCREEN)
-    write_json(machine, json, force=force)
+    write_json(machine, json, force=force, document=document)
     write_report(document, machine, report, force=force)
     if text is not None and str(output) != "-":
         write_whole(output, text, overwrite=force)

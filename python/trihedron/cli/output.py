@@ -47,7 +47,7 @@ def write_report(document: Document, machine: dict[str, Any], report: Path | Non
     """The report in the format that its name asks for."""
     if report is None:
         return
-    document = with_provenance(document)
+    document = _with_provenance(document)
     kind = report.suffix.lower()
     if kind == ".html":
         from trihedron.report.page import to_html
@@ -59,15 +59,25 @@ def write_report(document: Document, machine: dict[str, Any], report: Path | Non
 
         content = to_text(with_its_making(document))
     else:
-        from trihedron.report.machine import json_text
-
-        content = json_text(machine)
+        content = _saved(machine, document)
     write_whole(report, content, overwrite=force)
     say(f"report: {report}")
 
 
-def write_json(machine: dict[str, Any], target: Path | None, *, force: bool) -> None:
-    """The result for machines, to a file or ('-') to stdout."""
+def _with_provenance(document: Document) -> Document:
+    """How a report was made; one that is laid out again keeps how it was."""
+    return document if document.provenance else with_provenance(document)
+
+
+def _saved(machine: dict[str, Any], document: Document) -> str:
+    from trihedron.report.machine import json_text
+    from trihedron.report.saved import with_report
+
+    return json_text(with_report(machine, document))
+
+
+def write_json(machine: dict[str, Any], target: Path | None, *, force: bool, document: Document | None = None) -> None:
+    """The result for machines, to a file or ('-') to stdout; a file holds the report too, for ``trihedron report``."""
     if target is None:
         return
     from trihedron.report.machine import json_text
@@ -75,7 +85,8 @@ def write_json(machine: dict[str, Any], target: Path | None, *, force: bool) -> 
     if str(target) == "-":
         typer.echo(json_text(machine), nl=False)
         return
-    write_whole(target, json_text(machine), overwrite=force)
+    content = json_text(machine) if document is None else _saved(machine, _with_provenance(document))
+    write_whole(target, content, overwrite=force)
     say(f"JSON: {target}")
 
 
@@ -109,7 +120,7 @@ class Ending:
             say(f"calibration: {self.output}")
         if self.json is not None or self.report is not None:
             made = machine()
-            write_json(made, self.json, force=self.force)
+            write_json(made, self.json, force=self.force, document=document)
             write_report(document, made, self.report, force=self.force)
         if more and not self.full and self.report is None:
             say(more)

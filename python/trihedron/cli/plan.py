@@ -43,5 +43,5 @@ def plan(
     document = plan_report(planned)
     machine = plan_record(planned)
     show(document, json, sections=None)
-    write_json(machine, json, force=force)
+    write_json(machine, json, force=force, document=document)
     write_report(document, machine, report, force=force)

@@ -31,6 +31,6 @@ def segment(
         segments = api.segment(recording, progress=tell)
     document, machine = segments_report(recording, segments), segments_record(recording, segments)
     show(document, json, sections=None)
-    write_json(machine, json, force=force)
+    write_json(machine, json, force=force, document=document)
     write_report(document, machine, report, force=force)
     leave((*recording.findings, *segments.findings))

@@ -83,7 +83,7 @@ def segment_stream(
     recording, shown = condensed(log, segments)
     document, machine = segments_report(recording, shown), segments_record(recording, shown)
     show(document, json, sections=None)
-    write_json(machine, json, force=force)
+    write_json(machine, json, force=force, document=document)
     write_report(document, machine, report, force=force)
     leave(segments.findings)
 

@@ -58,7 +58,7 @@ def verify(
         with progress("ranking") as tell:
             ranking = api.rank(paths, recording, progress=tell, **place_of)
         show(ranking_report(ranking), json, sections=None if full else FIRST_SCREEN)
-        write_json(ranking_record(ranking), json, force=force)
+        write_json(ranking_record(ranking), json, force=force, document=ranking_report(ranking))
         write_report(ranking_report(ranking), ranking_record(ranking), report, force=force)
         leave(ranking.best.verification.findings)
         return
@@ -69,7 +69,7 @@ def verify(
     document = verification_report(result.verification, result.segments, recording)
     machine = verification_record(result.verification)
     show(document, json, sections=None if full else FIRST_SCREEN)
-    write_json(machine, json, force=force)
+    write_json(machine, json, force=force, document=document)
     write_report(document, machine, report, force=force)
     if not full and report is None:
         say("Every pose and move: --full, or --report FILE.html with figures.")

@@ -74,11 +74,7 @@ def _domain_marks(
     marks: list[Mark] = [Level(y=0.0), _bars_of_noise(time_s, sigma, is_angle=is_angle)]
     for k, channel in enumerate(residuals.channels):
         colour: Colour = AXIS_COLOURS[k] if len(residuals.channels) > 1 else "accent"
-        told = [
-            f"{said(f'{kind} {n}, {channel}', '', float(v), unit)} at {plain_number(float(t), 4)} s "
-            f"(noise {plain_number(float(s), 2)})"
-            for n, (t, v, s) in enumerate(zip(time_s, value[:, k], sigma, strict=True), start=1)
-        ]
+        told = [said(f"{kind} {n}, {channel}", "", float(v), unit) for n, v in enumerate(value[:, k], start=1)]
         marks.append(Points(time_s, value[:, k], told, None, channel, colour))
     return tuple(marks)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from html import escape
 
 import numpy as np
@@ -33,6 +34,7 @@ from trihedron.report.ticks import ticks
 
 UNITS = 10000
 """Across a panel, both ways. Marks are in these; a page of 4 k is a third as fine."""
+FEWEST_SAID = 2
 MOST_LETTERS = 32
 """Of all names below a panel; half a page has room for these side by side. Longer ones are counted."""
 
@@ -222,13 +224,30 @@ def _points(mark: Points, at: _Places) -> str:
             if math.isfinite(x + y + a + b)
         )
         out.append(f'<path class="err {mark.colour}" d="{bars}"/>')
+    first, last = shared_ends(mark.said)
+    dots = []
     for x, y, said in zip(xs, ys, mark.said, strict=True):
         if math.isfinite(x + y):
             dot = f'd="M{x:.0f} {y:.0f}h0"'
-            out.append(f'<path class="dot {mark.colour}" data-t="{escape(said)}" {dot}/>')
+            dots.append(f'<path class="dot" data-t="{escape(said[len(first) : len(said) - len(last)])}" {dot}/>')
             if mark.is_hollow:
-                out.append(f'<path class="hole" {dot}/>')
+                dots.append(f'<path class="hole" {dot}/>')
+    told = f' data-a="{escape(first)}" data-z="{escape(last)}"'
+    out.append(f'<g class="{mark.colour}"{told}>{"".join(dots)}</g>')
     return "".join(out)
+
+
+def shared_ends(said: Sequence[str]) -> tuple[str, str]:
+    """What all begin and end with, told once: most of a page of dots would be these words again and again."""
+    if len(said) < FEWEST_SAID:
+        return "", ""
+    least, most = min(said), max(said)
+    n = next((k for k, (a, b) in enumerate(zip(least, most, strict=False)) if a != b), len(least))
+    turned = [one[::-1] for one in said]
+    least, most = min(turned), max(turned)
+    m = next((k for k, (a, b) in enumerate(zip(least, most, strict=False)) if a != b), len(least))
+    m = min(m, min(map(len, said)) - n)
+    return said[0][:n], said[0][len(said[0]) - m :]
 
 
 def _bars(mark: Bars, at: _Places) -> str:

@@ -8,6 +8,8 @@
     const text = size >= 1e-4 && size < 1e6 ? String(+v.toPrecision(4)) : v.toExponential(3).replace("e+", "e");
     return text.replace(/-/g, MINUS);
   };
+  /* What all marks of a group begin and end with is said once, by the group. */
+  const told = (node) => { const g = node.parentNode.dataset; return (g.a || "") + node.dataset.t + (g.z || ""); };
   function show(text, event) {
     tip.textContent = text; tip.hidden = false;
     const left = Math.min(event.pageX + 12, scrollX + document.documentElement.clientWidth - tip.offsetWidth - 4);
@@ -163,7 +165,7 @@
         if (d < least) { least = d; best = node; }
       }
       this.mark(best);
-      if (best) return show(best.dataset.t, e);
+      if (best) return show(told(best), e);
       const said = [];
       for (const [name, xs, ys] of lines) {
         let k = 0, near = Infinity;

@@ -87,7 +87,9 @@ def png_of(picture: Picture) -> bytes:
 
 @cache
 def _file(name: str) -> str:
-    return (files("trihedron.report") / name).read_text(encoding="utf-8")
+    """A part of every page, without the indents that only its authors need."""
+    text = (files("trihedron.report") / name).read_text(encoding="utf-8")
+    return "\n".join(line.strip() for line in text.splitlines())
 
 
 def _version() -> str:

@@ -36,6 +36,7 @@ from trihedron.report.noise_files import noise_record
 from trihedron.report.page import to_html
 from trihedron.report.plan import plan_record, plan_report
 from trihedron.report.ranking import ranking_record, ranking_report
+from trihedron.report.saved import with_report
 from trihedron.report.sessions import sessions_columns, sessions_record, sessions_report
 from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
 from trihedron.report.text import to_text
@@ -217,7 +218,7 @@ def report(result: object, path: str | os.PathLike[str] | None = None, *, overwr
     elif ending == ".txt":
         content = text
     elif ending == ".json":
-        content = machine.json_text(_kind(result).record(result))
+        content = machine.json_text(with_report(_kind(result).record(result), laid_out))
     else:
         raise OutputError(f"{path}: the ending tells the format of a report; give {', '.join(REPORT_ENDINGS)}.")
     write_whole(path, content, overwrite=overwrite)

@@ -1,0 +1,77 @@
+"""The first screen of every kind of page, photographed for docs/reports.md, and how large the pages are.
+
+    python benches/pages.py
+
+Everything is simulated with fixed seeds; needs Chromium and the extra ``test``. One minute.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+from playwright.sync_api import sync_playwright
+
+from trihedron.cli import main
+from trihedron.files.log import write_recording
+from trihedron.simulate import hand_session, scenario_by_name, simulate
+
+FIGURES = Path(__file__).parents[1] / "docs" / "figures"
+GRAVITY = ("--gravity", "9.80665")
+VIEWS = ((1280, 860, "light"), (390, 844, "dark"))
+ON_A_PHONE = ("calibrate", "diagnose")
+"""Pages that are also shown as a phone in the dark shows them."""
+
+
+def logs(folder: Path) -> list[str]:
+    """Three sessions of one unit, and an hour of rest."""
+    made = []
+    for name, n_poses, seed in (("monday", 24, 3), ("tuesday", 18, 9), ("friday", 18, 12)):
+        motion = hand_session(n_poses=n_poses, pose_s=3.0, move_s=2.5, first_pose_s=5.0)
+        path = folder / name / "log.csv"
+        path.parent.mkdir()
+        write_recording(simulate(replace(scenario_by_name("hand-session"), motion=motion), seed)[0], path)
+        made.append(str(path))
+    main(["simulate", "rest-hour", "--seed", "2", "-o", str(folder / "rest.npz")])
+    return made
+
+
+def pages(folder: Path) -> dict[str, Path]:
+    """A page of every kind by name."""
+    first, *others = logs(folder)
+    main(["demo", str(folder / "demo"), "--seed", "3"])
+    lines = {
+        "calibrate": ["calibrate", first, *GRAVITY],
+        "many-recordings": ["calibrate", first, *others, *GRAVITY],
+        "plan": ["plan"],
+        "allan": ["allan", str(folder / "rest.npz"), "--accel-lsb", "0.061 mg", "--gyro-lsb", "0.00763 deg/s"],
+        "kalman": ["kalman", first, *GRAVITY],
+    }
+    found = {"diagnose": folder / "demo" / "disagreement.html"}
+    for name, line in lines.items():
+        found[name] = folder / f"{name}.html"
+        main([*line, "--report", str(found[name])])
+    main(["fleet", str(folder / "*" / "log.csv"), "-o", str(folder / "fleet"), "--workers", "0", *GRAVITY])
+    return {**found, "fleet": folder / "fleet" / "fleet.html"}
+
+
+def photograph(found: dict[str, Path]) -> None:
+    """Shots into docs/figures, sizes to stdout."""
+    chromium = next((path for name in ("chromium", "google-chrome") if (path := shutil.which(name))), None)
+    with sync_playwright() as tool:
+        browser = tool.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        for name, path in found.items():
+            for width, height, scheme in VIEWS if name in ON_A_PHONE else VIEWS[:1]:
+                view = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
+                view.goto(path.as_uri())
+                view.screenshot(path=FIGURES / f"page_{name}{'' if scheme == 'light' else '_phone'}.png")
+                view.close()
+            print(f"{name:16s}{path.stat().st_size / 1000:6.0f} kB")
+        browser.close()
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as place:
+        photograph(pages(Path(place)))

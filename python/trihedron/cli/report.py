@@ -1,0 +1,54 @@
+"""``trihedron report``."""
+
+from __future__ import annotations
+
+import json as json_format
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from trihedron.cli.options import Force, Report
+from trihedron.cli.output import check_outputs, show, write_report
+from trihedron.errors import RefusedError
+
+if TYPE_CHECKING:
+    from trihedron.report import Document
+
+MOST_BYTES = 200_000_000
+"""Of a saved result; no report comes near it."""
+
+
+def report(
+    result: Annotated[Path, typer.Argument(metavar="RESULT.json", help="A saved result, or a calibration file.")],
+    report: Report = None,
+    force: Force = False,
+) -> None:
+    """Lay out a saved result again: text here, a page with --report FILE.html."""
+    check_outputs(force=force, report=report, inputs=[result])
+    document, saved = _read(result)
+    show(document, None, sections=None)
+    write_report(document, saved, report, force=force)
+
+
+def _read(path: Path) -> tuple[Document, dict[str, Any]]:
+    """The report and what it was saved with; that of a bare calibration file is made from its numbers."""
+    from trihedron.report.saved import KEY, report_of
+
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise RefusedError(f"{path}: too large for a saved result.")
+        saved = json_format.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise RefusedError(f"{path}: there is no such file; check the name and the folder.") from None
+    except (OSError, ValueError, RecursionError):
+        raise RefusedError(f"{path}: not a saved result (JSON).") from None
+    if isinstance(saved, dict) and KEY not in saved and "accelerometer" in saved:
+        from trihedron.files.calibration import read_calibration
+        from trihedron.report.calibration import calibration_report
+
+        return calibration_report(read_calibration(path)), saved
+    try:
+        return report_of(saved), {key: value for key, value in saved.items() if key != KEY}
+    except RefusedError as error:
+        raise RefusedError(f"{path}: {error}") from None
