@@ -1,0 +1,79 @@
+"""INAV: ``corrected = (reading - acczero) accgain/4096`` per axis in counts, ``reading - gyro_zero`` of the gyro.
+
+Whole numbers, in the axes of the sensor, before the alignments. By applyAccelerationZero and gyroUpdateAndCalibrate of
+https://github.com/iNavFlight/inav.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
+from trihedron.files.formats.autopilot import AXES, AxisCorrection, Composed, composed
+from trihedron.files.formats.contract import ExportOptions, Format, heading, number
+from trihedron.files.formats.losses import HALF_WIDTH, lost_gyro_scale, lost_to_a_diagonal, size_of_bias
+from trihedron.files.plausible import named_sensors
+from trihedron.records import Calibration
+from trihedron.units import acceleration_lsb_to_si, rate_lsb_to_si
+
+UNIT_GAIN = 4096
+LARGEST_GAIN, LARGEST_ZERO = 8192, 32767
+"""Of the settings' ranges."""
+
+
+def to_inav(calibration: Calibration, options: ExportOptions) -> str:
+    """Lines for its command line, of readings that nothing had corrected.
+
+    Raises
+    ------
+    ValueError
+        When the readings were not raw, the size of a count was not said, or a setting cannot hold what it must.
+    """
+    if calibration.accelerometer.raw_unit != "counts" and options.current_parameters.strip().lower() != "none":
+        raise RefusedError(
+            "INAV logs readings that its own zeros and gains have corrected and its alignments have turned: calibrate "
+            "raw counts (debug_mode = ACC), or say --current-parameters none where the readings were raw."
+        )
+    own, sensors = composed(calibration, options, "INAV", lambda _: AxisCorrection(np.zeros(3), np.ones(3), np.eye(3)))
+    lines = [f"# {line}" for line in heading(own, "corrected = (reading - acczero) * accgain / 4096, in counts.")]
+    lines += [f"# {line}" for line in lost_to_a_diagonal(own)]
+    for name, sensor in named_sensors(own):
+        count = _size_of_a_count(name, options)
+        half = np.full(3, 0.5 * count)
+        if half[0] > HALF_WIDTH * float(sensor.sigma_b.max()):
+            lines.append(f"# Zeros are whole counts: up to {size_of_bias(name, half)} of bias of the {name} is lost.")
+        lines += _lines(name, sensors[name], count)
+        if name == "gyroscope":
+            lines += [f"# {line}" for line in lost_gyro_scale(sensor, "INAV")]
+            lines += ["# Without this the gyro's zero is measured anew at every start:", "set init_gyro_cal = OFF"]
+    return "\n".join([*lines, "save", ""])
+
+
+def _size_of_a_count(name: str, options: ExportOptions) -> float:
+    is_accel = name == "accelerometer"
+    said, option, example = (
+        (options.accel_lsb, "--accel-lsb", "0.488 mg") if is_accel else (options.gyro_lsb, "--gyro-lsb", "0.061 deg/s")
+    )
+    if not said:
+        raise RefusedError(f"INAV holds whole counts: say the size of one of the {name} with {option} '{example}'.")
+    return acceleration_lsb_to_si(said) if is_accel else rate_lsb_to_si(said)
+
+
+def _lines(name: str, one: Composed, count: float) -> list[str]:
+    is_accel = name == "accelerometer"
+    lines = _settings("acczero" if is_accel else "gyro_zero", one.offset / count, -LARGEST_ZERO, LARGEST_ZERO)
+    return lines + (_settings("accgain", UNIT_GAIN * one.scale, 1, LARGEST_GAIN) if is_accel else [])
+
+
+def _settings(word: str, values: FloatArray, low: int, high: int) -> list[str]:
+    whole = np.rint(values)
+    if np.any((whole < low) | (whole > high)):
+        raise RefusedError(
+            f"{word} of INAV is from {low} to {high} and would be {number(float(whole[np.abs(whole).argmax()]))}: is "
+            "the size of a count that of INAV's driver?"
+        )
+    return [f"set {word}_{axis.lower()} = {value:.0f}" for axis, value in zip(AXES, whole, strict=True)]
+
+
+FORMAT = Format("inav", to_inav, in_si=True)
