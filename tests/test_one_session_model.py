@@ -8,7 +8,7 @@ import pytest
 from trihedron import calibrate, diagnose, verify
 from trihedron.records import FindingCode
 from trihedron.records.published import published_figures
-from trihedron.report.calibration import figures_in_words
+from trihedron.report.calibration_fit import figures_table
 from trihedron.report.machine import calibration_record
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.simulate.effects import with_effect
@@ -53,13 +53,12 @@ def test_calibrate_and_diagnose_publish_the_same_figures_in_print_and_in_json(he
     assert set(figures) == {"gravity_error_in_static_poses", "tilt_error_after_rotations"}
     assert "one bias for the session" in figures["gravity_error_in_static_poses"]["definition"]
     assert "bias refitted per pose" in figures["tilt_error_after_rotations"]["definition"]
-    words = figures_in_words(result.calibration)
-    assert any("held out" in value for _, value in words)
+    table = figures_table(result.calibration, {})
+    assert table is not None
+    assert table.head[2:4] == ("S and b, in sample", "cross-validated")
     for text in (str(result), str(diagnosis)):
         flat = " ".join(text.split())
-        for _, value in words:
-            # Long cells wrap; numbers and units stay together.
-            assert all(part in flat for part in value.split("; "))
+        assert all(value in flat for row in table.rows for value in row[2:])
 
 
 def test_a_calibration_verified_on_its_own_session_shows_the_figures_that_it_published(healthy):

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
-from trihedron.records.published import AFTER_MOVES, AT_REST, counted_moves
+from trihedron.records import Calibration, Recording, Segments, SensorCalibration
+from trihedron.records.published import AFTER_MOVES, AT_REST
 from trihedron.report.axes import Axes, axes_of
 from trihedron.report.calibration_charts import (
     correlation_table,
-    move_noise_deg,
     strong_correlations,
 )
+from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor
 from trihedron.report.calibration_pictures import correlation_picture, figure_blocks, lead_picture
 from trihedron.report.calibration_residuals import residual_tables
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Section, Table
@@ -26,7 +26,7 @@ from trihedron.report.numbers import (
     unit_in_print,
     with_sigma,
 )
-from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
+from trihedron.units import mm_s2_from_m_s2, mrad_from_radians
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
 """The field's names of the frames."""
@@ -76,9 +76,9 @@ def _headlines(calibration: Calibration) -> list[Headline]:
         out.append(Headline("gravity error in static poses", plain_number(mm_s2_from_m_s2(rms)), "mm/s²", beside))
     gyroscope = calibration.gyroscope
     if gyroscope is not None and gyroscope.quality is not None:
-        seen = [(label, rms) for label, rms, _ in _angles(gyroscope.quality)]
+        seen = [(label, rms) for label, rms, _ in angles_of(gyroscope.quality)]
         if seen:
-            beside = f"rms, {seen[-1][0]}, {AFTER_MOVES}; noise alone {plain_number(_move_floor(gyroscope.quality))}°"
+            beside = f"rms, {seen[-1][0]}, {AFTER_MOVES}; noise alone {plain_number(move_floor(gyroscope.quality))}°"
             out.append(Headline("tilt error after a rotation", plain_number(seen[-1][1]), "°", beside))
     for name, sensor in _sensors(calibration):
         relative = sensor.sigma_S.diagonal() / np.abs(sensor.S.diagonal())
@@ -90,12 +90,6 @@ def _headlines(calibration: Calibration) -> list[Headline]:
 def _relative(sigma: float) -> tuple[str, str]:
     """A relative uncertainty and its unit: ppm below a tenth of a percent, else %."""
     return (plain_number(1e6 * sigma, 2), "ppm") if sigma < 1e-3 else (plain_number(100.0 * sigma, 2), "%")
-
-
-def _move_floor(quality: FitQuality) -> float:
-    """Angle after a move by noise alone, rms over the moves that count, degrees."""
-    noise = move_noise_deg(quality)[counted_moves(quality)]
-    return float(np.sqrt(np.mean(noise**2))) if len(noise) else float("nan")
 
 
 def verdict(calibration: Calibration) -> str:
@@ -118,7 +112,7 @@ def _result(calibration: Calibration, segments: Segments | None, recording: Reco
     facts.append(("frame", FRAMES[calibration.frame]))
     blocks: list[Block] = [Facts(tuple(facts))]
     for name, sensor in _sensors(calibration):
-        blocks += [parameter_table(name, sensor), Facts(tuple(_fit_in_words(name, sensor)))]
+        blocks += [parameter_table(name, sensor), Facts(tuple(fit_in_words(name, sensor)))]
     strong = strong_correlations(calibration)
     if strong:
         blocks.append(Facts((("correlations above 0.5", _pairs(strong)),)))
@@ -161,76 +155,9 @@ def _percent(value: float, sigma: float) -> str:
     return f"± {plain_number(100.0 * sigma / abs(value), 2)} %" if 0.0 < sigma < abs(value) else ""
 
 
-def _fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]:
-    rows = [("method", sensor.method)]
-    quality = sensor.quality
-    if quality is None:
-        return rows
-    if name == "accelerometer":
-        rows.append(("gravity error in static poses", f"{_norm_words(quality)}; {AT_REST}"))
-    elif _angles(quality):
-        rows.append(("tilt error after a rotation", f"{_angle_words(quality)}; {AFTER_MOVES}"))
-    else:
-        rows.append(("residual", _angle_words(quality)))
-    return rows
-
-
 def _pairs(strong: list[tuple[str, str, float]]) -> str:
     more = f"; {len(strong) - MOST_PAIRS} more" if len(strong) > MOST_PAIRS else ""
     return ", ".join(f"{a} and {b} {plain_number(r, 2)}" for a, b, r in strong[:MOST_PAIRS]) + more
-
-
-def figures_in_words(calibration: Calibration) -> tuple[tuple[str, str], ...]:
-    """What the saved S and b leave, each figure under its definition: the same words in every report."""
-    rows = [row for name, sensor in _sensors(calibration) for row in _fit_in_words(name, sensor)]
-    return tuple(row for row in rows if row[0] != "method")
-
-
-def _norm_words(quality: FitQuality) -> str:
-    def words(value: float) -> str:
-        return f"{plain_number(mm_s2_from_m_s2(value))} mm/s² ({plain_number(mg_from_m_s2(value), 2)} mg)"
-
-    n = how_many(len(quality.residual), "pose")
-    parts = [f"{words(quality.rms)} rms in sample ({n})"]
-    if quality.dof <= 0:
-        parts = ["none in sample: as many parameters as poses, so the fit cannot be judged"]
-    if quality.held_out_rms is not None:
-        parts.append(f"{words(quality.held_out_rms)} cross-validated (held out)")
-    parts.append(f"noise alone {words(quality.floor)}")
-    return "; ".join(parts)
-
-
-def _angles(quality: FitQuality) -> list[tuple[str, float, float]]:
-    """Label, rms and worst angle, in and out of sample, over the same moves."""
-    if quality.angle_deg is None:
-        return []
-    counted = counted_moves(quality)
-    held = quality.held_out_angle_deg
-    pairs = [("in sample", quality.angle_deg)]
-    if held is not None and np.any(np.isfinite(held[counted])):
-        pairs.append(("cross-validated (held out)", held))
-    out = []
-    for label, angles in pairs:
-        known = angles[counted & np.isfinite(angles)]
-        if len(known):
-            out.append((label, float(np.sqrt(np.mean(known**2))), float(known.max())))
-    return out
-
-
-def _angle_words(quality: FitQuality) -> str:
-    angles = _angles(quality)
-    if angles:
-        parts = [f"{plain_number(rms)}° rms, {plain_number(worst)}° worst {label}" for label, rms, worst in angles]
-        assert quality.angle_deg is not None
-        n_seen, n_counted = int(np.isfinite(quality.angle_deg).sum()), int(counted_moves(quality).sum())
-        if n_counted < n_seen:
-            parts[0] += f" ({n_counted} of {n_seen} moves, the others excluded)"
-        parts.append(f"noise alone {plain_number(_move_floor(quality))}° rms")
-        return "; ".join(parts)
-    if quality.dof <= 0:
-        return "none: as many parameters as measured turns, so the fit cannot be judged"
-    seen, noise = (plain_number(degrees_from_radians(value)) for value in (quality.rms, quality.floor))
-    return f"error of a turn's angle {seen}° rms; noise alone {noise}°"
 
 
 def _meaning(calibration: Calibration) -> tuple[Block, ...]:
@@ -261,7 +188,7 @@ def _axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
         for k, pair in enumerate(("X-Y", "X-Z", "Y-Z"))
     ]
     return Table(
-        ("", f"sensitivity{unit}", "relative σ", f"raw reading at zero input [{raw}]"),
+        ("", f"sensitivity{unit}", "relative σ", f"bias: raw reading at zero input [{raw}]"),
         tuple(rows),
         f"{name.capitalize()} axes; angles between axes exceed 90° by {', '.join(skew)}",
     )

@@ -9,7 +9,7 @@ from functools import partial
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
-from trihedron.report.calibration import figures_in_words
+from trihedron.report.calibration_fit import figures_table
 from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pictures
 from trihedron.report.diagnosis_charts import before_after_chart, effect_chart
 from trihedron.report.diagnosis_models import models_blocks
@@ -119,20 +119,20 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
         (
             MEANING[d.domain],
             "disagrees" if d.disagrees else "agrees",
-            *([_after(d, after.get(d.domain))] if has_effects else []),
+            *([_judged_after(d, after.get(d.domain))] if has_effects else []),
+            rms_in_words(d),
             plain_number(d.chi2_per_dof),
             p_in_words(d.p_value),
-            rms_in_words(d),
-            d.domain,
+            *(_figures_after(after.get(d.domain)) if has_effects else ()),
         )
         for d in diagnosis.domains
     )
-    with_effects = ("with the effects",) if has_effects else ()
-    head = ("what", "model", *with_effects, "χ²/dof", "p", "residual of the session fit", "domain")
+    judged, figures = (("with the effects",), ("rms with them", "χ²/dof with them")) if has_effects else ((), ())
+    head = ("residual", "linear model", *judged, "rms", "χ²/dof", "p", *figures)
     blocks: list[Block] = [Table(head, rows)]
     # Which parameters differ has a section of its own.
     places = tuple(
-        (d.domain, place)
+        (MEANING[d.domain], place)
         for d in diagnosis.domains
         if d.disagrees and d.domain != "numbers" and (place := where_in_words(d))
     )
@@ -140,19 +140,22 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
         blocks.append(Facts(places))
     own = getattr(diagnosis, "calibration", None)
     if own is not None and not getattr(diagnosis, "model_is_given", False):
-        figures = figures_in_words(own)
-        named = ((("saved S and b" if not k else ""), f"{name} {said}") for k, (name, said) in enumerate(figures))
-        blocks.append(Facts(tuple(named)))
+        table = figures_table(own, {MEANING[d.domain]: rms_in_words(d).replace(" °", "°") for d in diagnosis.domains})
+        blocks += [table] if table is not None else []
     return tuple(blocks)
 
 
-def _after(before: DomainTest, test: DomainTest | None) -> str:
+def _judged_after(before: DomainTest, test: DomainTest | None) -> str:
     if test is None:
         return "–"
     if before.disagrees and not test.disagrees and test.chi2_per_dof == before.chi2_per_dof:
         # An effect explains it without changing the residual: poses that were not still, a line of interference.
         return "explained"
-    return f"{plain_number(test.chi2_per_dof)} {'disagrees' if test.disagrees else 'agrees'}"
+    return "disagrees" if test.disagrees else "agrees"
+
+
+def _figures_after(test: DomainTest | None) -> tuple[str, str]:
+    return ("–", "–") if test is None else (rms_in_words(test), plain_number(test.chi2_per_dof))
 
 
 def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -222,7 +225,7 @@ def _remaining(diagnosis: Diagnosis) -> str:
         beside = "beside the relation below" if diagnosis.relations else "in this recording"
         return f"Unexplained: nothing detectable {beside}."
     said = [
-        f"{d.domain} ({MEANING[d.domain]}): χ²/dof {plain_number(d.chi2_per_dof)}"
+        f"{MEANING[d.domain]}: χ²/dof {plain_number(d.chi2_per_dof)}"
         + (f", {place}" if (place := where_in_words(d)) else "")
         for d in left
     ]
@@ -233,7 +236,7 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
     rows = tuple(
         (
             effect.id,
-            held.domain,
+            quantity(held),
             *(
                 "–" if held.rms_before == held.rms_after == 0.0 else size_in_words(v, held.unit)
                 for v in _both_rms(held)
@@ -246,7 +249,7 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
     )
     if not rows:
         return (Paragraph("No effect was added, so there is no before and after."),)
-    head = ("effect", "domain", "rms before", "rms after", "χ²/dof before", "after")
+    head = ("effect", "residual", "rms before", "rms after", "χ²/dof before", "after")
     caption = "Poses and moves predicted by fits that did not see them (held out); noise alone gives χ²/dof 1"
     return (Table(head, rows, caption),)
 

@@ -41,14 +41,13 @@ def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Char
     end = max((float(t.max()) for _, t, _, _ in sides if t.size), default=1.0)
     panels = []
     for title, time_s, value, sigma in sides:
-        rms = float(np.sqrt(np.mean(value**2))) * factor if value.size else 0.0
         marks = _domain_marks(residuals, time_s, factor * value, factor * sigma, unit)
         panels.append(
             Panel(
                 Scale("time [s]", "s", limits=(-0.02 * end, 1.02 * end)),
                 Scale(f"{residuals.quantity} [{unit}]", unit, limits=(low, high)),
                 marks,
-                title=f"{title}: {plain_number(rms)} {unit} rms",
+                title=title,
                 height_px=200,
             )
         )
@@ -78,7 +77,7 @@ def _domain_marks(
         told = [
             f"{said(f'{kind} {n}, {channel}', '', float(v), unit)} at {plain_number(float(t), 4)} s "
             f"(noise {plain_number(float(s), 2)})"
-            for n, (t, v, s) in enumerate(zip(time_s, value[:, k], sigma, strict=True))
+            for n, (t, v, s) in enumerate(zip(time_s, value[:, k], sigma, strict=True), start=1)
         ]
         marks.append(Points(time_s, value[:, k], told, None, channel, colour))
     return tuple(marks)
@@ -206,20 +205,20 @@ def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> P
         told = [
             f"{said(f'{kind} {n}, {channel}', '', float(v), unit)}, "
             f"{label.split(' [')[0]} {plain_number(float(a))} {unit_x}"
-            for n, (a, v) in enumerate(zip(x, data, strict=True))
+            for n, (a, v) in enumerate(zip(x, data, strict=True), start=1)
         ]
         marks.append(Points(x, data, told, None, f"{channel}: without the effects", colour))
         # An angle between vectors is not a difference: the part explained would be no physics.
         after = factor * seen.after[:, k]
         if is_same and seen.domain == "moves":
-            told = [said(f"{kind} {n}, with the effects", "", float(v), unit) for n, v in enumerate(after)]
+            told = [said(f"{kind} {n}, with the effects", "", float(v), unit) for n, v in enumerate(after, 1)]
             marks.append(Points(x, after, told, None, f"{channel}: with the effects", "accent", True))
         elif is_same:
             if seen.domain == "static-gyro" and unit_x in ("s", "°C"):
                 order = np.argsort(x)
                 marks.append(Line(x[order], (data - after)[order], f"{channel}: model", colour))
                 continue
-            told = [said(f"{kind} {n}, model", "", float(v), unit) for n, v in enumerate(data - after)]
+            told = [said(f"{kind} {n}, model", "", float(v), unit) for n, v in enumerate(data - after, 1)]
             marks.append(Points(x, data - after, told, None, f"{channel}: explained by the effects", colour, True))
     return Panel(Scale(label, unit_x), Scale(f"{seen.quantity} [{unit}]", unit), tuple(marks), height_px=220)
 

@@ -35,8 +35,7 @@ def draw_before_after(residuals: DomainResiduals, *, has_effects: bool) -> Figur
     ][:n]
     for axis, (title, time_s, value, sigma) in zip(axes, sides, strict=True):
         _draw(axis, time_s, factor * value, factor * sigma, residuals.channels)
-        rms = float(np.sqrt(np.mean(value**2))) * factor if value.size else 0.0
-        axis.set_title(f"{title}: {rms:.3g} {unit} rms", fontsize=10, loc="left")
+        axis.set_title(title, fontsize=10, loc="left")
         axis.set_xlabel("time [s]")
     if len(residuals.channels) > 1:
         axes[-1].legend(ncols=3, frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 1.0))

@@ -31,8 +31,8 @@ def _followed(diagnosis: Diagnosis) -> str:
 
 def verdict_in_words(diagnosis: Diagnosis) -> str:
     """The verdict and what carries it, in one sentence."""
-    off: list[str] = [d.domain for d in diagnosis.domains if d.disagrees]
-    left: list[str] = [d.domain for d in diagnosis.remaining if d.disagrees]
+    off: list[str] = [MEANING[d.domain] for d in diagnosis.domains if d.disagrees]
+    left: list[str] = [MEANING[d.domain] for d in diagnosis.remaining if d.disagrees]
     numbers = differing_in_short(diagnosis)
     if diagnosis.verdict == "consistent":
         return (
@@ -51,7 +51,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
             + (f"; parameters differ too ({listed(numbers)})." if numbers else ".")
         )
     if diagnosis.verdict == "not-testable":
-        tested = listed([d.domain for d in diagnosis.domains]) if diagnosis.domains else "nothing"
+        tested = listed([MEANING[d.domain] for d in diagnosis.domains]) if diagnosis.domains else "nothing"
         return (
             f"NOT TESTABLE: this recording has too few poses for a diagnosis (tested: {tested}, no effect found); "
             "record 18 or more poses of 3 to 5 s in different orientations."

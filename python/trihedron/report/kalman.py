@@ -71,9 +71,10 @@ def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headl
     )
     of = "" if len(seen) == 1 else f", {name.upper()}"
     rms = float(np.sqrt(np.mean(outcome.residual_m_s2**2)))
+    what = "residual" if isinstance(outcome, KalmanCalibration) else "gravity error in static poses"
     return [
         Headline(f"mean NIS{of}", plain_number(worst.nis_mean), "", beside),
-        Headline("residual", plain_number(mm_s2_from_m_s2(rms)), "mm/s²", f"rms over {how_many(n, 'pose')}, in sample"),
+        Headline(what, plain_number(mm_s2_from_m_s2(rms)), "mm/s²", f"rms over {how_many(n, 'pose')}, in sample"),
     ]
 
 
@@ -142,7 +143,7 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
         ("poses", f"{len(outcome.residual_m_s2)} in unknown attitudes"),
         ("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"),
         ("frame", FRAMES[calibration.frame]),
-        ("residual", _residual_words(outcome.residual_m_s2)),
+        ("gravity error in static poses", _residual_words(outcome.residual_m_s2)),
     )
     pictures: tuple[Block, ...] = (
         Picture(
@@ -160,7 +161,7 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
         ),
         Picture(
             "residual",
-            "Length of the corrected reading minus |g| in every pose.",
+            "Gravity error in every static pose: length of the corrected reading minus |g|.",
             later("kalman_figures", "draw_residual", outcome.residual_m_s2[:, None]),
             partial(residual_chart, outcome.residual_m_s2[:, None]),
         ),

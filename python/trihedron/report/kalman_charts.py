@@ -12,7 +12,7 @@ from trihedron.records import CONSTANT_NAMES, AxisKalmanResult, NormKalmanCalibr
 from trihedron.report.calibration_charts import mm_s2
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Colour, Level, Line, Panel, Points, Scale
 from trihedron.report.drawn import said
-from trihedron.report.numbers import unit_in_print
+from trihedron.report.numbers import one_of, unit_in_print
 
 WINDOW = 15
 """Poses of a running mean of NIS: its 99 % interval is then 0.31 to 2.19 (χ² with 15 degrees of freedom)."""
@@ -57,12 +57,9 @@ def norm_convergence_chart(outcome: NormKalmanCalibration) -> Chart:
         if sigma[-1] == 0.0:
             continue
         last = float(value[-1])
-        unit = (
-            "m/s²"
-            if k >= 9 or outcome.accelerometer.raw_unit == "m/s^2"
-            else "m/s² per " + outcome.accelerometer.raw_unit.removesuffix("s")
-        )
-        y = Scale(f"{name} [{unit}]", unit, limits=_frame([value], sigma, last))
+        raw = outcome.accelerometer.raw_unit
+        unit = "m/s²" if k >= 9 else "" if raw == "m/s^2" else f"m/s² per {one_of(raw)}"
+        y = Scale(f"{name} [{unit}]" if unit else name, unit, limits=_frame([value], sigma, last))
         marks = (
             Band(pose, last - 3 * sigma, last + 3 * sigma, "3σ about the last value"),
             Line(pose, value, "after so many poses", "c1"),

@@ -156,7 +156,7 @@ def _terms_table(axes: list[NoiseAxis], unit: str) -> Table:
     return Table(
         ("", *(axis.name for axis in axes)),
         tuple(rows),
-        "Noise terms ± standard error; < is the upper end of the 95 % interval",
+        "Noise terms ± standard uncertainty (1 σ); < is the upper end of the 95 % interval",
     )
 
 

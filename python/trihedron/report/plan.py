@@ -30,7 +30,7 @@ def plan_report(plan: ExperimentPlan) -> Document:
         title="Plan of an experiment",
         subtitle=(
             f"gyro noise {plain_number(degrees_from_radians(plan.gyroscope_density), 2)} °/s/√Hz, accelerometer noise "
-            f"{plain_number(1e3 * mg_from_m_s2(plan.accelerometer_density), 2)} µg/√Hz, poses held {plan.pose_s:g} s"
+            f"{plain_number(1e3 * mg_from_m_s2(plan.accelerometer_density), 2)} µg/√Hz, poses of {plan.pose_s:g} s"
         ),
         verdict=f"Turns of {angles} in {turns.duration_s:g} s about each axis give the gyro's scale to "
         f"{_percent(turns.scale)}.",
@@ -154,7 +154,8 @@ def _worth(pose: PosePlan) -> str:
     best = pose.worth[0]
     if math.isinf(best.loss):
         n = sum(math.isinf(one.loss) for one in pose.worth)
-        return f"none of {n} of the {pose.n_poses} poses may be missing: each determines a parameter"
+        which = "every pose is" if n == pose.n_poses else f"{n} of the {pose.n_poses} poses are"
+        return f"{which} necessary: without it a parameter is not determined"
     # To a thousandth of a per cent: beyond that only rounding of the arithmetic is left.
     share, least = (round(100.0 * (loss - 1.0), 3) for loss in (best.loss, pose.worth[-1].loss))
     return (

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.records import Recording, Truth
+from trihedron.records import Recording, TermName, Truth
+from trihedron.report.calibration import SYMBOLS
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.noise_units import unit_of
 from trihedron.report.numbers import duration, how_many, one_of, plain_number, unit_in_print
 from trihedron.report.session_charts import truth_chart
 
@@ -34,7 +36,7 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
         sections=(
             Section("Result", (Facts(facts),)),
             Section("Effects", (_effects(truth.effects),)),
-            Section("True parameters", (_linear(recording, truth), *_noise(truth))),
+            Section("True parameters", (*_linear(recording, truth), *_noise(truth))),
         ),
         headlines=(
             Headline("poses", str(len(truth.poses)), "", how_many(len(truth.moves), "move")),
@@ -68,26 +70,31 @@ def in_rows(value: Any) -> str:
     return "; ".join(", ".join(f"{float(v):.6g}" for v in row) for row in rows)
 
 
-def _linear(recording: Recording, truth: Truth) -> Table:
-    rows = []
-    for sign, S, b, raw, unit in (
-        ("f", truth.accelerometer_S, truth.accelerometer_b, recording.accelerometer_unit.value, "m/s²"),
-        ("ω", truth.gyroscope_S, truth.gyroscope_b, recording.gyroscope_unit.value, "rad/s"),
+def _linear(recording: Recording, truth: Truth) -> tuple[Table, ...]:
+    """The true S and b of both sensors, laid out as a calibration lays out what it found."""
+    out = []
+    for name, S, b, raw, unit in (
+        ("accelerometer", truth.accelerometer_S, truth.accelerometer_b, recording.accelerometer_unit.value, "m/s²"),
+        ("gyroscope", truth.gyroscope_S, truth.gyroscope_b, recording.gyroscope_unit.value, "rad/s"),
     ):
-        same = unit_in_print(raw) == unit
-        of = unit if same else f"{unit} per {one_of(raw)}"
-        for i in range(3):
-            cells = (*(plain_number(float(v), 6) for v in S[i]), of, plain_number(float(b[i]), 6), unit)
-            rows.append((f"{sign}{i + 1} =", *cells))
-    head = ("", "raw 1 ×", "raw 2 ×", "raw 3 ×", "unit", "+ b", "unit of b")
-    return Table(head, tuple(rows), "truth = S raw + b, the instrument without its further effects")
+        true, read = SYMBOLS[name]
+        rows = tuple(
+            (f"{true}_{axis} =", *(plain_number(float(v), 6) for v in S[i]), plain_number(float(b[i]), 6))
+            for i, axis in enumerate("xyz")
+        )
+        of_S = "S dimensionless" if unit_in_print(raw) == unit else f"S in {unit} per {one_of(raw)}"
+        head = ("", *(f"{read}′_{axis}" for axis in "xyz"), f"b [{unit}]")
+        caption = f"{name.capitalize()}: {true} = S {read}′ + b, {of_S}; its further effects stand above"
+        out.append(Table(head, rows, caption))
+    return tuple(out)
 
 
 def _noise(truth: Truth) -> tuple[Block, ...]:
+    si = {"accelerometer": "m/s^2", "gyroscope": "rad/s"}
     rows = tuple(
-        (sensor, term, *(plain_number(float(v), 3) for v in values))
+        (f"{sensor} {term} [{unit_of(TermName(term), si[sensor])}]", *(plain_number(float(v), 3) for v in values))
         for sensor, terms in truth.noise.items()
         for term, values in terms.items()
         if any(values)
     )
-    return (Table(("sensor", "term", "x", "y", "z"), rows, "Noise (SI)"),) if rows else ()
+    return (Table(("", "X", "Y", "Z"), rows, "Noise"),) if rows else ()

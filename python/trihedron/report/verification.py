@@ -139,7 +139,7 @@ def _tables(verification: Verification, segments: Segments | None) -> list[Block
     if len(v.angle_deg):
         rows = tuple(
             (
-                str(v.moves[k]),
+                str(v.moves[k] + 1),
                 plain_number(float(v.angle_deg[k]), 2),
                 plain_number(float(v.angle_noise_deg[k]), 2),
                 plain_number(float(v.angle_sigma_deg[k]), 2),

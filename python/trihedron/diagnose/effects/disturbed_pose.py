@@ -185,7 +185,7 @@ class DisturbedPose(DirectEffect):
         parameters = tuple(EffectParameter("pose_at", 0.5 * (a + b), 0.5 * max(b - a, 0.1), "s") for a, b in spans[:6])
         return Evidence(
             1e-30, strength, parameters, told, "within-static",
-            Where((), tuple(f"pose {i + 1}" for i in restless), spans), held, share=min(len(spans) / obs.n_poses, 1.0),
+            Where((), obs.pose_names(restless), spans), held, share=min(len(spans) / obs.n_poses, 1.0),
         )  # fmt: skip
 
     def variants(self, context: Context) -> list[Variant]:
@@ -194,7 +194,7 @@ class DisturbedPose(DirectEffect):
             columns = np.zeros((context.n_points, 3, 3))
             columns[i] = np.eye(3)
             shape = {"pose": (float(i), "index")}
-            out.append(Variant(force_only(columns), per_axis("push"), ("m/s^2",) * 3, shape, f"pose {i + 1}"))
+            out.append(Variant(force_only(columns), per_axis("push"), ("m/s^2",) * 3, shape, *context.obs.pose_names([i])))
         return out
 
     def statement(self, parameters: tuple[EffectParameter, ...]) -> Words:

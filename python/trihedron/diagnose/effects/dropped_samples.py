@@ -139,7 +139,7 @@ class DroppedSamples(DirectEffect):
 
         where = Where(
             (),
-            tuple(dict.fromkeys(f"move {loss.move + 1}" for loss in losses)),
+            tuple(dict.fromkeys(obs.move_names([loss.move for loss in losses]))),
             tuple((float(t[loss.sample]), float(t[loss.sample + 1])) for loss in losses),
         )
         gain = sum(loss.gain for loss in losses)

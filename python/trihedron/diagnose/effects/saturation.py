@@ -90,7 +90,7 @@ class _Saturation(DirectEffect):
             p = min(p, 1e-30)
         return Evidence(
             p, -2.0 * np.log(p), parameters, statement, "moves" if is_gyro else "dynamics",
-            Where(channels, tuple(f"move {m + 1}" for m in touched[:8]), times), reweigh=reweigh,
+            Where(channels, obs.move_names(touched[:8]), times), reweigh=reweigh,
             restate=lambda later: self._limits(later, runs, sigma),  # false moves had bent the scale factors
         )  # fmt: skip
 

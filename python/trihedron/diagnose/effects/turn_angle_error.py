@@ -52,7 +52,7 @@ class TurnAngleError(DirectEffect):
             self.told(
                 "turns", wrong=len(bad), turns=len(turns), most_rad=max(abs(errors[k]) for k in bad), near_deg=NEAR_DEG
             ),
-            "moves", Where(("gx", "gy", "gz"), tuple(f"move {turns[k].move + 1}" for k in bad), spans),
+            "moves", Where(("gx", "gy", "gz"), context.obs.move_names([turns[k].move for k in bad]), spans),
         )  # fmt: skip
 
 

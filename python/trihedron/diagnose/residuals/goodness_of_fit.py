@@ -96,7 +96,7 @@ def _inside_poses(fitted: Fit, label: int) -> tuple[float, float, Where]:
     holds, t = found.holds[k], fitted.line.obs.time_s
     parts = [fitted.line.obs.segments.poses[i] for i in holds]
     spans = tuple((float(t[hold.start]), float(t[hold.stop - 1])) for hold in parts)
-    return found.p_value[k], found.ratio[k], Where((), tuple(f"pose {i + 1}" for i in holds), spans)
+    return found.p_value[k], found.ratio[k], Where((), fitted.line.obs.pose_names(holds), spans)
 
 
 AT_END = 1.01
@@ -172,8 +172,7 @@ def locate(fitted: Fit, label: int) -> Where:
     for s in heavy:
         first, last = (obs.segments.poses[s].start, obs.segments.poses[s].stop) if is_pose else obs.move_ranges[s]
         spans.append((float(t[first]), float(t[last - 1])))
-    kind = "pose" if is_pose else "move"
-    return Where(channels, tuple(f"{kind} {s + 1}" for s in heavy), tuple(spans))
+    return Where(channels, obs.pose_names(heavy) if is_pose else obs.move_names(heavy), tuple(spans))
 
 
 def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[dict[int, float], dict[int, str]]:

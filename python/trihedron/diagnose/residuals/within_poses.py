@@ -296,7 +296,8 @@ def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
     p_line = min((line.p_value for line in lines), default=1.0)
     p = min(1.0, 2.0 * min(p_scatter, p_line))
     dof = float(scatter.dof.sum() * scatter.ratio.shape[1])
-    chi2_per_dof = float(np.average(scatter.ratio, axis=0, weights=scatter.dof).mean())
+    weight = scatter.dof * steady if steady.any() else scatter.dof
+    chi2_per_dof = float(np.average(scatter.ratio, axis=0, weights=weight).mean())
     disagrees = p < alpha / N_DOMAINS_TESTED
     where = Where()
     if disagrees:
@@ -306,7 +307,5 @@ def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
         strong = [line for line in lines if line.p_value < alpha]
         loud_channels = [CHANNELS[c] for c in np.flatnonzero(loud.min(axis=0) * n_looks < alpha)]
         channels = tuple(dict.fromkeys([line.channel for line in strong] + loud_channels))
-        where = Where(
-            channels, tuple(f"pose {i + 1}" for i in holds), spans, tuple(line.frequency_hz for line in strong)
-        )
+        where = Where(channels, obs.pose_names(holds), spans, tuple(line.frequency_hz for line in strong))
     return DomainTest("within-static", chi2_per_dof, dof, p, disagrees, where, 0.0, "")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -80,6 +80,15 @@ class Observations:
     def n_moves(self) -> int:
         """Number of moves between neighbouring poses."""
         return len(self.move_ranges)
+
+    def pose_names(self, which: Iterable[int]) -> tuple[str, ...]:
+        """Poses by their numbers in the recording, from 1, before they were cut at bumps."""
+        poses = self.segments.poses
+        return tuple(self.whole.pose_name(poses[i].start, poses[i].stop) for i in which)
+
+    def move_names(self, which: Iterable[int]) -> tuple[str, ...]:
+        """Moves by their numbers in the recording, from 1."""
+        return tuple(self.whole.move_name(*self.move_ranges[m]) for m in which)
 
     @property
     def pose_rate_noise(self) -> FloatArray | None:

@@ -38,7 +38,7 @@ ENTRIES = (
         "poses-rank",
         SERIOUS,
         "The poses determine {rank:.0f} of the {n_parameters:.0f} parameters of the accelerometer; not observable: "
-        "{unseen:&, }, held within {anchor:.0f %} of a perfect triad.",
+        "{unseen:&, }, constrained to {anchor:.0f %} of an ideal triad.",
         "Too few different orientations: six faces alone are six equations for nine parameters.",
         _ADD_POSES,
     ),
@@ -47,7 +47,7 @@ ENTRIES = (
         "poses-weak",
         SERIOUS,
         "The poses determine the accelerometer so weakly that some pose could be wrong by {at_worst:.2g %} of "
-        "gravity; least certain is the {weakest}. All parameters were held within {anchor:.0f %} of a perfect triad.",
+        "gravity; least certain is the {weakest}. All parameters were constrained to {anchor:.0f %} of an ideal triad.",
         "The orientations are too much alike.",
         _ADD_POSES,
         numbers=("rank", "n_parameters", "worst_prediction_g"),

@@ -16,12 +16,12 @@ _TIMESTAMPS = (
         Code.TIME_JITTER,
         "",
         NOTE,
-        "Steps between timestamps vary by {jitter_s:.3g ms} rms (median {median_step_s:.5g ms} = {median_rate_hz:.5g} "
-        "Hz, mean {mean_step_s:.5g ms} = {mean_rate_hz:.5g} Hz, {least_s:.3g !ms} to {largest_s:.3g ms})"
-        "{is_irregular:?, and no even clock lies behind them|}; the rate used is {rate_hz:.5g} Hz.",
+        "Steps between timestamps vary by {jitter_s:.3g ms} rms (median {median_step_s:.5g ms}, mean "
+        "{mean_step_s:.5g ms}, {least_s:.3g !ms} to {largest_s:.3g ms}){is_irregular:?, and no even clock lies behind them|}; the rate used is {rate_hz:.5g} Hz.",
         "{is_irregular:?A program that samples in its own time: its timestamps were kept.|Timestamps taken when the "
         "data arrived, or rounded.}",
         "Take timestamps in the sensor's own interrupt if turns matter.",
+        numbers=("median_rate_hz", "mean_rate_hz"),
         or_severity=WARNING,
     ),
     Entry(
@@ -84,17 +84,17 @@ _TIMESTAMPS = (
         Code.TIME_UNIT_DETECTED,
         "",
         NOTE,
-        "The time column steps by {step:.6g}, so its unit is {unit} ({rate_hz:.5g} Hz){has_others:?; {others:&, } "
-        "would be possible too|}.",
+        "The time column steps by {step:.6g}, so its unit is {unit}{has_others:?; {others:&, } would be possible too|}.",
+        numbers=("rate_hz",),
     ),
     Entry(
         Code.TIME_UNIT_DETECTED,
         "unsure",
         WARNING,
-        "The time column steps by {step:.6g}, so its unit is {unit} ({rate_hz:.5g} Hz){has_others:?; {others:&, } "
-        "would be possible too|}.",
+        "The time column steps by {step:.6g}, so its unit is {unit}{has_others:?; {others:&, } would be possible too|}.",
         "The step alone does not determine the unit; every rate and every noise density depends on it.",
         "Say it with --time-unit s, ms, us or ns if this is wrong.",
+        numbers=("rate_hz",),
     ),
     Entry(
         Code.TIME_UNIT_DETECTED,
@@ -162,16 +162,16 @@ _RATES = (
     ),
 )
 
-_EVEN = "T = {period_s:.6g !ms} ± {sigma_period_s:.1g ms} ({rate_hz:.6g} Hz)"
+_EVEN = "of {rate_hz:.5g} Hz"
 _HOW = (
     "{is_rounded:?rounded to {grid_s:.3g ms}|{is_late:?late by {timestamp_error_s:.2g ms} rms, as they are when "
-    "samples are timestamped on arrival|scattered by {timestamp_error_s:.2g ms} rms}}"
+    "samples are timestamped on arrival|with {timestamp_error_s:.2g ms} rms of jitter}}"
 )
 _BY_MOTION = (
-    "{motion_tells:?the readings follow {followed:.2f} ± {sigma_followed:.2g} of it|no motion shows when the samples "
-    "were taken}"
+    "{motion_tells:?of which the readings show {followed:.2f} ± {sigma_followed:.2g}|no motion shows when the "
+    "samples were taken}"
 )
-_WITH_THEM = ("timestamp_error_s", "shared_fraction", "followed", "sigma_followed", "grid_s", "is_partly")
+_WITH_THEM = ("period_s", "sigma_period_s", "timestamp_error_s", "shared_fraction", "followed", "sigma_followed", "grid_s", "is_partly")
 _LOG_COUNTER = "Log the sensor's own sample counter or data-ready times if turns matter."
 
 _CLOCKS = (
@@ -179,21 +179,21 @@ _CLOCKS = (
         Code.EVEN_CLOCK,
         "",
         NOTE,
-        f"The timestamps are those of an even clock, {_EVEN}, {_HOW} ({_BY_MOTION}); the even clock was taken.",
+        f"The timestamps are those of an even clock {_EVEN}, {_HOW} ({_BY_MOTION}); the even clock was used.",
         numbers=_WITH_THEM,
     ),
     Entry(
         Code.TIMESTAMPS_KEPT,
         "",
         NOTE,
-        f"The timestamps differ from an even clock ({_EVEN}) by {{timestamp_error_s:.2g ms}} rms, {_BY_MOTION}: kept.",
+        f"The timestamps differ from an even clock {_EVEN} by {{timestamp_error_s:.2g ms}} rms, {_BY_MOTION}: kept.",
         numbers=(*_WITH_THEM, "is_rounded", "is_late"),
     ),
     Entry(
         Code.CLOCK_UNDECIDED,
         "",
         WARNING,
-        f"The timestamps are {_HOW} about an even clock ({_EVEN}) and {_BY_MOTION}: {{is_partly:?both partly right, |}}"
+        f"The timestamps are {_HOW} about an even clock {_EVEN} and {_BY_MOTION}: {{is_partly:?both partly right, |}}"
         "the timestamps were kept.",
         "{is_partly:?Samples taken unevenly and timestamped inexactly.|A sensor that is sampled evenly and timestamped "
         "on arrival, or one that is sampled unevenly.}",

@@ -106,7 +106,7 @@ _MOVES = (
         Code.GYRO_G_SENSITIVITY,
         "",
         NOTE,
-        "the gyro's bias depends on gravity, by up to {per_g_rad_s:.2g deg/s} per g ({rate_axis:axis} for force along "
+        "the gyro's bias depends on gravity, by up to {per_g_rad_s:.2g °/s} per g ({rate_axis:axis} for force along "
         "{force_axis:axis}); with it, {scatter_left:.0f %} of the bias changes between poses remain. The moves were "
         "fitted without it; S and b alone cannot correct it.",
         "g-sensitivity of the gyro",
@@ -118,7 +118,7 @@ _MOVES = (
         Code.GYRO_BIAS_DRIFT,
         "poses",
         NOTE,
-        "the gyro's bias changes between poses by up to {change_rad_s:.2g deg/s} ({axis:axis}), {times:.1f} times its "
+        "the gyro's bias changes between poses by up to {change_rad_s:.2g °/s} ({axis:axis}), {times:.1f} times its "
         "noise; each move uses the biases of the two poses next to it.",
         _BIAS_CHANGES,
         "Let the sensor warm up; use the stated bias only near this temperature.",

@@ -13,7 +13,7 @@ _SAY_ACCEL_UNIT = "Say it with --accel-unit m/s^2, g, mg, ..., or counts, if thi
 _SAY_GYRO_UNIT = "Say it with --gyro-unit rad/s, deg/s, ..., or counts, if this is wrong."
 _SOURCE = "{is_given:?as you said|by its column names}"
 _TURNING = (
-    "gravity turns {factor:.3g} (± {percent:.1g} %) times as fast as a gyro in {unit} says "
+    "gravity rotates {factor:.3g} (± {percent:.1g} %) times as fast as a gyro in {unit} would read "
     "(correlation {correlation:.2f})"
 )
 _INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."

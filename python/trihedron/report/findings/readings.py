@@ -86,7 +86,7 @@ ENTRIES = (
         "",
         NOTE,
         "The {sensor} is in {unit} but steps like counts ({steps:each} {unit}; {per_unit:.5g} per "
-        "{is_accelerometer:?g|deg/s}).",
+        "{is_accelerometer:?g|°/s}).",
         "{is_decimal:?Rounded to so many decimals when it was written.|Counts times a nominal scale.}",
         lines=MappingProxyType({"steps": "{v0} {v1:.5g}"}),
     ),

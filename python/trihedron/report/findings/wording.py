@@ -36,7 +36,6 @@ UNITS: Mapping[str, Callable[[float], float]] = {
     "ms": ms_from_s,
     "cm": cm_from_m,
     "deg": degrees_from_radians,
-    "deg/s": degrees_from_radians,
     "°/s": degrees_from_radians,
     "%": lambda share: 100.0 * share,
 }

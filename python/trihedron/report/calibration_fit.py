@@ -1,0 +1,113 @@
+"""How well S and b fit: each figure under its definition, the same in every report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from trihedron.records import Calibration, FitQuality, SensorCalibration
+from trihedron.records.published import AFTER_MOVES, AT_REST, counted_moves
+from trihedron.report.calibration_charts import move_noise_deg
+from trihedron.report.document import Table
+from trihedron.report.numbers import how_many, plain_number
+from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2
+
+METHODS = {
+    "joint": "both sensors in one fit of poses and moves",
+    "moves": "gravity after rotations between poses",
+}
+"""Methods of the records that are ids; the others are words already."""
+
+
+def fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]:
+    rows = [("method", METHODS.get(sensor.method, sensor.method))]
+    quality = sensor.quality
+    if quality is None:
+        return rows
+    if name == "accelerometer":
+        rows.append(("gravity error in static poses", f"{_norm_words(quality)}; {AT_REST}"))
+    elif angles_of(quality):
+        rows.append(("tilt error after a rotation", f"{_angle_words(quality)}; {AFTER_MOVES}"))
+    else:
+        rows.append(("residual", _angle_words(quality)))
+    return rows
+
+
+def _norm_words(quality: FitQuality) -> str:
+    def words(value: float) -> str:
+        return f"{plain_number(mm_s2_from_m_s2(value))} mm/s² ({plain_number(mg_from_m_s2(value), 2)} mg)"
+
+    n = how_many(len(quality.residual), "pose")
+    parts = [f"{words(quality.rms)} rms in sample ({n})"]
+    if quality.dof <= 0:
+        parts = ["none in sample: as many parameters as poses, so the fit cannot be judged"]
+    if quality.held_out_rms is not None:
+        parts.append(f"{words(quality.held_out_rms)} cross-validated (held out)")
+    parts.append(f"noise alone {words(quality.floor)}")
+    return "; ".join(parts)
+
+
+def angles_of(quality: FitQuality) -> list[tuple[str, float, float]]:
+    """Label, rms and worst angle, in and out of sample, over the same moves."""
+    if quality.angle_deg is None:
+        return []
+    counted = counted_moves(quality)
+    held = quality.held_out_angle_deg
+    pairs = [("in sample", quality.angle_deg)]
+    if held is not None and np.any(np.isfinite(held[counted])):
+        pairs.append(("cross-validated (held out)", held))
+    out = []
+    for label, angles in pairs:
+        known = angles[counted & np.isfinite(angles)]
+        if len(known):
+            out.append((label, float(np.sqrt(np.mean(known**2))), float(known.max())))
+    return out
+
+
+def _angle_words(quality: FitQuality) -> str:
+    angles = angles_of(quality)
+    if angles:
+        parts = [f"{plain_number(rms)}° rms, {plain_number(worst)}° worst {label}" for label, rms, worst in angles]
+        assert quality.angle_deg is not None
+        n_seen, n_counted = int(np.isfinite(quality.angle_deg).sum()), int(counted_moves(quality).sum())
+        if n_counted < n_seen:
+            parts[0] += f" ({n_counted} of {n_seen} moves, the others excluded)"
+        parts.append(f"noise alone {plain_number(move_floor(quality))}° rms")
+        return "; ".join(parts)
+    if quality.dof <= 0:
+        return "none: as many parameters as measured turns, so the fit cannot be judged"
+    seen, noise = (plain_number(degrees_from_radians(value)) for value in (quality.rms, quality.floor))
+    return f"error of a turn's angle {seen}° rms; noise alone {noise}°"
+
+
+def move_floor(quality: FitQuality) -> float:
+    """Angle after a move by noise alone, rms over the moves that count, degrees."""
+    noise = move_noise_deg(quality)[counted_moves(quality)]
+    return float(np.sqrt(np.mean(noise**2))) if len(noise) else float("nan")
+
+
+def figures_table(calibration: Calibration, session_fit: Mapping[str, str]) -> Table | None:
+    """What the S and b that are saved leave, beside what the fit of the session leaves, whose biases vary."""
+    rows = []
+    at_rest = calibration.accelerometer.quality
+    if at_rest is not None:
+        held = "–" if at_rest.held_out_rms is None else _mm(at_rest.held_out_rms)
+        rows.append(("gravity error in static poses", _mm(at_rest.rms), held, _mm(at_rest.floor)))
+    moved = None if calibration.gyroscope is None else calibration.gyroscope.quality
+    seen = [f"{plain_number(rms)}°" for _, rms, _ in angles_of(moved)] if moved is not None else []
+    if moved is not None and seen:
+        noise = f"{plain_number(move_floor(moved))}°"
+        rows.append(("tilt error after a rotation", seen[0], seen[1] if seen[1:] else "–", noise))
+    if not rows:
+        return None
+    head = ("rms", "session fit", "S and b, in sample", "cross-validated", "noise alone")
+    caption = (
+        "The same residuals by this diagnosis (session fit) and by the S and b that calibrate saves for this log: poses "
+        f"with {AT_REST}, rotations with the {AFTER_MOVES}"
+    )
+    return Table(head, tuple((row[0], session_fit.get(row[0], "–"), *row[1:]) for row in rows), caption)
+
+
+def _mm(value: float) -> str:
+    return f"{plain_number(mm_s2_from_m_s2(value))} mm/s²"
