@@ -58,7 +58,7 @@ def filter_noise_report(found: FilterNoise) -> Document:
 
 def _headline(one: SensorFilterNoise) -> Headline:
     beside = "" if one.static is None else f"static {_number(one.static.N)}"
-    return Headline(f"{one.sensor} N", plain_number(one.N.filter_value), f"{unit_in_print(one.unit)}/√Hz", beside)
+    return Headline(f"{one.sensor} N", _number(one.N), f"{unit_in_print(one.unit)}/√Hz", beside)
 
 
 def values_table(found: FilterNoise) -> Table:

@@ -122,7 +122,7 @@ def _mixed(summary: FleetSummary) -> list[Block]:
         "Scales and directions of axes of one unit repeat within 1 %. Name devices with --serial, or give each a "
         "folder; until then these logs are compared with nothing."
     )
-    return [Paragraph(said), Table(("taken for one device", "logs", "number", "differs by"), tuple(rows))]
+    return [Paragraph(said), Table(("taken for one device", "logs", "parameter", "differs by"), tuple(rows))]
 
 
 def _physics(summary: FleetSummary) -> list[Block]:
@@ -143,11 +143,11 @@ def _physics(summary: FleetSummary) -> list[Block]:
 
 def _spread(summary: FleetSummary) -> list[Block]:
     is_grouped = any(one.between is not None for one in summary.repeated)
-    head = ["number", "mean ± σ", "device to device" if is_grouped else "from log to log", "95 %"]
+    head = ["parameter", "mean ± σ", "device to device" if is_grouped else "from log to log", "95 %"]
     head += ["session to session", "95 %"] if is_grouped else []
     rows = [tuple(_spread_row(one, is_grouped)) for one in summary.repeated]
     said = (
-        "Standard deviations beyond each log's own error. Scales are relative; misalignments are departures from 90°."
+        "Standard deviations beyond each log's uncertainty. Scales are relative; misalignments differ from 90°."
     )
     if summary.passed_over:
         said += f" Not counted: {summary.passed_over}."
@@ -178,7 +178,7 @@ def _outliers(summary: FleetSummary) -> list[Block]:
         away = f"{plain_number(one.deviation * factor, 2)} {unit}"
         cells = (one.serial, f"{one.parameter.id} {one.parameter.name}", away, plain_number(one.sigmas, 2))
         rows.append((*cells, f"{one.p_adjusted:.1g}"))
-    return [Table(("device", "number", "from the median", "in spreads of the others", "p"), tuple(rows))]
+    return [Table(("device", "parameter", "from the median", "in spreads of the others", "p"), tuple(rows))]
 
 
 def _drift(summary: FleetSummary) -> list[Block]:
@@ -190,7 +190,7 @@ def _drift(summary: FleetSummary) -> list[Block]:
     if not moved:
         return [Paragraph(f"No calibration shift between sessions beyond uncertainty and drift: {tested}")]
     rows = tuple((change.group, change.id, *_drift_cells(change)) for change in moved)
-    return [Paragraph(f"Tested: {tested}"), Table(("device", "number", "how", "by", "p"), rows)]
+    return [Paragraph(f"Tested: {tested}"), Table(("device", "parameter", "how", "by", "p"), rows)]
 
 
 def _drift_cells(change: Change) -> tuple[str, str, str]:

@@ -6,7 +6,7 @@ import math
 
 from trihedron.records.ranking import Ranked, Ranking, Suspicion
 from trihedron.report.document import Document, Facts, Section, Table
-from trihedron.report.numbers import how_many, plain_number
+from trihedron.report.numbers import how_many, plain_number, with_sigma
 from trihedron.report.verification import parameters_table
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_from_m_s2
 
@@ -65,7 +65,7 @@ def _mistake(found: Suspicion) -> str:
         words += f" ({found.factor:.5f} times that of this place)"
     elif found.kind == "unit":
         words += f" (by a factor of {_factor(found.factor)})"
-    return f"{words}: undone, it misses {plain_number(found.rms_undone / found.rms, 2)} times as far"
+    return f"{words}: undone, the error is {plain_number(found.rms_undone / found.rms, 2)} times as large"
 
 
 def _factor(factor: float) -> str:
@@ -90,7 +90,7 @@ def _order(ranking: Ranking) -> Table:
             _with_interval(one.verification.norm_rms, one.norm_interval, mm_s2_from_m_s2(1.0)),
             _with_interval(one.verification.angle_rms_deg, one.angle_interval, 1.0),
             plain_number(degrees_from_radians(one.rest_rms), 2),
-            f"{plain_number(one.behind, 3)} ± {plain_number(one.behind_sigma, 2)}",
+            with_sigma(one.behind, one.behind_sigma) if one.behind_sigma > 0.0 else plain_number(one.behind, 3),
             "rejected" if one.is_rejected else "",
         )
         for k, one in enumerate(ranking.candidates)

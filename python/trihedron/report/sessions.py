@@ -22,7 +22,7 @@ def sessions_report(model: SessionsModel) -> Document:
     """Lay out what many recordings share, and how far each parameter repeats."""
     n = len(model.sessions)
     changed = [change for change in model.changes if change.significant]
-    good = f"{how_many(n, 'recording')} agree: no number of the model changed beyond its error."
+    good = f"{how_many(n, 'recording')} agree: no parameter changed beyond its uncertainty."
     if model.thermal is not None:
         good = f"{how_many(n, 'recording')} make one model from {_range(model.thermal)}."
     sections = [
@@ -96,7 +96,7 @@ def _repeatability(model: SessionsModel) -> list[Block]:
     between = {"date": "day to day", "device": "device to device"}.get(model.by, "between")
     head = ["parameter", "common ± σ", "turn-on to turn-on" if grouped else "repeats to", "95 %"]
     head += [between, "95 %"] if grouped else []
-    head += ["one recording's σ"]
+    head += ["median σ of one"]
     rows = [tuple(_row(one, grouped)) for one in model.repeated]
     return [
         Table(
@@ -141,7 +141,7 @@ def _changes(model: SessionsModel) -> list[Block]:
     for change in model.changes:
         cells = [change.id, *([change.group] if with_group else []), f"{change.p_adjusted:.2g}"]
         rows.append((*cells, "yes" if change.significant else "no", _said(change) if change.significant else ""))
-    head = ("number", *(["device"] if with_group else []), "p", "changed", "how")
+    head = ("parameter", *(["device"] if with_group else []), "p", "changed", "how")
     return [
         Paragraph(
             "Each parameter of all recordings against one common value, by each recording's uncertainty and the drift "
@@ -188,7 +188,7 @@ def _thermal(thermal: ThermalModel) -> list[Block]:
             f"Polynomials of T − {thermal.reference_degc:.2f} °C; the order is the one that predicts recordings it "
             f"has not seen. Valid from {_range(thermal)}: `trihedron apply` holds the ends outside it and says so."
         ),
-        Table(("number", "x or xy", "y or xz", "z or yz"), tuple(rows)),
+        Table(("parameter", "x or xy", "y or xz", "z or yz"), tuple(rows)),
     ]
 
 

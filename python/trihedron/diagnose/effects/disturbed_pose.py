@@ -193,8 +193,8 @@ class DisturbedPose(DirectEffect):
         for i in np.flatnonzero(_shows_itself(context)):
             columns = np.zeros((context.n_points, 3, 3))
             columns[i] = np.eye(3)
-            shape = {"pose": (float(i), "index")}
-            out.append(Variant(force_only(columns), per_axis("push"), ("m/s^2",) * 3, shape, *context.obs.pose_names([i])))
+            shape, (name,) = {"pose": (float(i), "index")}, context.obs.pose_names([int(i)])
+            out.append(Variant(force_only(columns), per_axis("push"), ("m/s^2",) * 3, shape, name))
         return out
 
     def statement(self, parameters: tuple[EffectParameter, ...]) -> Words:

@@ -16,8 +16,9 @@ _TIMESTAMPS = (
         Code.TIME_JITTER,
         "",
         NOTE,
-        "Steps between timestamps vary by {jitter_s:.3g ms} rms (median {median_step_s:.5g ms}, mean "
-        "{mean_step_s:.5g ms}, {least_s:.3g !ms} to {largest_s:.3g ms}){is_irregular:?, and no even clock lies behind them|}; the rate used is {rate_hz:.5g} Hz.",
+        "Steps between timestamps vary by {jitter_s:.3g ms} rms (median {median_step_s:.5g ms}, mean {mean_step_s:.5g "
+        "ms}, {least_s:.3g !ms} to {largest_s:.3g ms}){is_irregular:?, and no even clock lies behind them|}; the rate "
+        "used is {rate_hz:.5g} Hz.",
         "{is_irregular:?A program that samples in its own time: its timestamps were kept.|Timestamps taken when the "
         "data arrived, or rounded.}",
         "Take timestamps in the sensor's own interrupt if turns matter.",
@@ -84,14 +85,16 @@ _TIMESTAMPS = (
         Code.TIME_UNIT_DETECTED,
         "",
         NOTE,
-        "The time column steps by {step:.6g}, so its unit is {unit}{has_others:?; {others:&, } would be possible too|}.",
+        "The time column steps by {step:.6g}, so its unit is {unit}{has_others:?; {others:&, } would be "
+        "possible too|}.",
         numbers=("rate_hz",),
     ),
     Entry(
         Code.TIME_UNIT_DETECTED,
         "unsure",
         WARNING,
-        "The time column steps by {step:.6g}, so its unit is {unit}{has_others:?; {others:&, } would be possible too|}.",
+        "The time column steps by {step:.6g}, so its unit is {unit}{has_others:?; {others:&, } would be "
+        "possible too|}.",
         "The step alone does not determine the unit; every rate and every noise density depends on it.",
         "Say it with --time-unit s, ms, us or ns if this is wrong.",
         numbers=("rate_hz",),
@@ -171,7 +174,10 @@ _BY_MOTION = (
     "{motion_tells:?of which the readings show {followed:.2f} ± {sigma_followed:.2g}|no motion shows when the "
     "samples were taken}"
 )
-_WITH_THEM = ("period_s", "sigma_period_s", "timestamp_error_s", "shared_fraction", "followed", "sigma_followed", "grid_s", "is_partly")
+_WITH_THEM = (
+    "period_s", "sigma_period_s", "timestamp_error_s", "shared_fraction", "followed", "sigma_followed", "grid_s",
+    "is_partly",
+)  # fmt: skip
 _LOG_COUNTER = "Log the sensor's own sample counter or data-ready times if turns matter."
 
 _CLOCKS = (

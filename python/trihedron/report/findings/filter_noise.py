@@ -22,7 +22,7 @@ ENTRIES = (
         Code.FILTER_NOISE_NO_STATIC,
         "",
         NOTE,
-        "Nothing is known of the {sensor} at rest: noise at rest and vibration are told apart only where the vibration "
+        "Nothing is known of the {sensor} at rest: noise at rest and vibration are separable only where the vibration "
         "changes.",
         "No static log was given, and the log does not rest for 20 s.",
         "Give a static log of the unit with --static REST.",

@@ -1,0 +1,75 @@
+"""One report says one thing once: poses and moves keep their numbers, parameters their units, residuals their names."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import trihedron
+from trihedron.diagnose.session.observations import observe
+from trihedron.records.domains import DOMAINS
+from trihedron.report import to_text
+from trihedron.report.diagnosis import diagnosis_report
+from trihedron.report.simulation import simulation_report
+from trihedron.report.verification import verification_report
+from trihedron.segment import resegment
+from trihedron.simulate import hand_session, scenario_by_name, simulate
+from written_session import G, simulated
+
+GRAVITY = float(G)
+
+
+@pytest.fixture(scope="module")
+def made():
+    recording = simulated(hand_session(n_poses=14, pose_s=2.0, move_s=1.0))
+    result = trihedron.calibrate(recording, gravity_m_s2=GRAVITY)
+    return recording, result, trihedron.diagnose(recording, gravity_m_s2=GRAVITY)
+
+
+def test_moves_of_a_verification_are_counted_from_one_as_in_its_figure(made):
+    recording, result, _ = made
+    checked = trihedron.verify(result, recording, gravity_m_s2=GRAVITY)
+    document = verification_report(checked.verification, checked.segments)
+    moves = next(s for s in document.sections if s.heading == "Poses and moves").blocks[1]
+    assert [row[0] for row in moves.rows] == [str(k + 1) for k in checked.verification.moves]
+
+
+def test_a_pose_cut_where_it_was_bumped_keeps_its_number(made):
+    recording, result, _ = made
+    segments = result.segments
+    pose = segments.poses[4]
+    middle = (pose.start + pose.stop) // 2
+    bumped = replace(pose, disturbed=((middle, middle + 10),))
+    cut = resegment(recording, replace(segments, poses=(*segments.poses[:4], bumped, *segments.poses[5:])))
+    obs = observe(recording, cut)
+    assert cut.n_poses == segments.n_poses + 1
+    assert obs.pose_names(range(3, 8)) == ("pose 4", "pose 5", "pose 5", "pose 6", "pose 7")
+    assert obs.move_names(range(3, 6)) == ("move 4", "a bump in pose 5", "move 5")
+
+
+def test_no_report_of_a_diagnosis_names_a_domain_by_its_id(made):
+    ids = [name for name in DOMAINS if "-" in name]
+    assert not re.search("|".join(ids), to_text(diagnosis_report(made[2])))
+
+
+def test_a_simulation_states_its_parameters_as_a_calibration_does():
+    recording, truth = simulate(scenario_by_name("hand-session"), 3)
+    text = to_text(simulation_report(recording, truth))
+    assert "f_x =" in text
+    assert "S in m/s² per count" in text
+    assert "gyroscope N [rad/s/√Hz]" in text
+
+
+def test_the_filter_has_no_unit_for_the_scale_of_a_log_in_si(made, tmp_path):
+    recording, result, _ = made
+    force = recording.accelerometer @ result.accelerometer.S.T + result.accelerometer.b
+    rate = recording.gyroscope @ result.gyroscope.S.T + result.gyroscope.b
+    log = {"t": recording.time_s, "ax [m/s^2]": force[:, 0], "ay [m/s^2]": force[:, 1], "az [m/s^2]": force[:, 2]}
+    log |= {f"g{axis} [rad/s]": rate[:, k] for k, axis in enumerate("xyz")}
+    found = trihedron.kalman(log, gravity_m_s2=GRAVITY)
+    trihedron.report(found, tmp_path / "kalman.html")
+    page = (tmp_path / "kalman.html").read_text(encoding="utf-8")
+    assert "S_xx" in page
+    assert not re.search(r"S_xx \[", page)
+    assert np.isfinite(found.calibration.accelerometer.S).all()
