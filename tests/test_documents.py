@@ -8,11 +8,16 @@ import sys
 import threading
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from importlib.util import find_spec
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
 import yaml
+
+try:
+    import tomllib
+except ModuleNotFoundError:  # Python 3.10
+    import tomli as tomllib
 
 import trihedron
 from documented import DOCS, blocks
@@ -77,6 +82,21 @@ def test_the_readme_is_short_and_its_pictures_are_in_the_repository():
     assert all((ROOT / picture).is_file() for picture in pictures)
     evidence = text.partition("## Evidence")[2].partition("\n## ")[0]
     assert 3 < len(re.findall(r"^\|", evidence, re.MULTILINE)) <= 2 + 12
+
+
+def test_on_a_package_index_every_link_of_the_readme_is_absolute_and_the_package_has_urls():
+    spec = spec_from_file_location("index_readme", ROOT / ".ci/index_readme.py")
+    made = module_from_spec(spec)
+    spec.loader.exec_module(made)
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    page = made.absolute(text, "https://host.example/owner/trihedron", "v0.1.0")
+    links = LINK.findall(page)
+    assert len(links) == len(LINK.findall(text))
+    assert all(link.startswith("https://host.example/owner/trihedron/") for link in links)
+    assert "](https://host.example/owner/trihedron/raw/v0.1.0/docs/figures/overview.png)" in page
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8") + made.urls("https://host.example/o/t", "v1"))
+    assert set(project["project"]["urls"]) == {"Source", "Documentation", "Changelog"}
+    assert "name" in project["project"]
 
 
 def test_what_a_release_says_of_itself_agrees():

@@ -146,9 +146,7 @@ def _spread(summary: FleetSummary) -> list[Block]:
     head = ["parameter", "mean ± σ", "device to device" if is_grouped else "from log to log", "95 %"]
     head += ["session to session", "95 %"] if is_grouped else []
     rows = [tuple(_spread_row(one, is_grouped)) for one in summary.repeated]
-    said = (
-        "Standard deviations beyond each log's uncertainty. Scales are relative; misalignments differ from 90°."
-    )
+    said = "Standard deviations beyond each log's uncertainty. Scales are relative; misalignments differ from 90°."
     if summary.passed_over:
         said += f" Not counted: {summary.passed_over}."
     return [Paragraph(said), Table(tuple(head), tuple(rows))]
