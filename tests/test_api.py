@@ -43,7 +43,7 @@ def results(recording, result):
         trihedron.check(recording),
         trihedron.diagnose(recording, gravity_m_s2=9.819),
         trihedron.kalman(recording, latitude_deg=60.0),
-        trihedron.noise(rest),
+        trihedron.allan(rest),
         trihedron.allan_deviation(rest["acc"], 100.0),
     ]
 
@@ -55,9 +55,7 @@ def test_dir_shows_the_public_names_and_nothing_else():
 
 def test_every_command_is_a_verb():
     names = {command.__name__ for command in COMMANDS}
-    # What the command calls by its method, Python calls by what it finds.
-    verbs = {{"allan": "noise", "noise": "filter_noise"}.get(name, name) for name in names}
-    assert verbs <= set(trihedron.__all__)
+    assert names <= set(trihedron.__all__)
     assert {"report", "plot", "twin"} <= set(trihedron.__all__)
 
 
@@ -191,7 +189,7 @@ def test_results_take_each_other(result, recording, tmp_path):
 def test_noise_that_was_just_found_goes_into_an_export():
     rng = np.random.default_rng(4)
     acc = rng.normal([0, 0, 9.8], 0.02, (6000, 3))
-    noise = trihedron.noise({"t": np.arange(6000) / 100, "acc": acc, "gyr": rng.normal(0, 0.001, (6000, 3))})
+    noise = trihedron.allan({"t": np.arange(6000) / 100, "acc": acc, "gyr": rng.normal(0, 0.001, (6000, 3))})
     S = np.diag([1.01, 0.99, 1.0])
     from trihedron.records import SensorCalibration
 

@@ -141,7 +141,7 @@ def test_the_simulators_own_law_gives_the_noise_of_the_unit(target):
     text = export_files(known, target, OPTIONS)[""]
     made = LAWS[target](text, np.random.default_rng(7), TRUTH)
     log = {"t": np.arange(N) / RATE, "acc": made["accelerometer"], "gyr": made["gyroscope"]}
-    noise = trihedron.noise(trihedron.read(log, accelerometer_unit="m/s^2", gyroscope_unit="rad/s"))
+    noise = trihedron.allan(trihedron.read(log, accelerometer_unit="m/s^2", gyroscope_unit="rad/s"))
     for axis in noise.axes:
         name = "accelerometer" if axis.unit == "m/s^2" else "gyroscope"
         terms = axis.terms

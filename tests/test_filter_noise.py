@@ -128,7 +128,7 @@ def static(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def found(moved, static):
-    return trihedron.filter_noise(moved[0], static=static, reference=moved[1], horizons_s=[1, 10], gravity_m_s2=G)
+    return trihedron.noise(moved[0], static=static, reference=moved[1], horizons_s=[1, 10], gravity_m_s2=G)
 
 
 def test_a_healthy_gyro_before_a_good_truth_keeps_its_static_noise(found):
@@ -216,8 +216,8 @@ def resting(seed=1, seconds=120, n=N):
 
 
 def test_a_static_log_gives_back_the_static_values_with_a_factor_of_one():
-    rest = trihedron.noise(resting(2))
-    found = trihedron.filter_noise(resting(1), static=rest)
+    rest = trihedron.allan(resting(2))
+    found = trihedron.noise(resting(1), static=rest)
     gyro = found.sensor("gyroscope")
     assert gyro.static is not None
     assert gyro.N.value / gyro.static.N.value == pytest.approx(1.0, abs=0.04)
@@ -228,7 +228,7 @@ def test_a_static_log_gives_back_the_static_values_with_a_factor_of_one():
 
 def test_without_a_reference_the_tilt_over_moves_is_shown_beside_what_noise_predicts():
     log = turned_between_rests(scale=1.02)
-    found = trihedron.filter_noise(log, static=trihedron.noise(resting(2)))
+    found = trihedron.noise(log, static=trihedron.allan(resting(2)))
     assert found.tilt is not None
     # Two per cent of 90°; noise at rest predicts hundredths of a degree.
     assert found.tilt.actual == pytest.approx(0.02 * np.pi / 2, rel=0.2)
@@ -258,14 +258,14 @@ def turned_between_rests(scale):
 )
 def test_impossible_questions_are_one_sentence(moved, more, said):
     with pytest.raises(ValueError, match=said):
-        trihedron.filter_noise(moved[0], reference=moved[1], **more)
+        trihedron.noise(moved[0], reference=moved[1], **more)
 
 
 def test_a_reference_of_rates_is_refused(moved):
     log, motion = moved
     rates = ReferenceMotion(motion.time_s, rate=np.zeros((len(motion.time_s), 3)), source="table.csv")
     with pytest.raises(ValueError, match="holds rates; give attitudes"):
-        trihedron.filter_noise(log, reference=rates)
+        trihedron.noise(log, reference=rates)
 
 
 def test_the_command_on_a_log_at_rest(tmp_path, capsys):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.api import noise, noise_of_curve
+from trihedron.api import allan, noise_of_curve
 from trihedron.records.finding import FindingCode
 from trihedron.records.noise import TermName
 
@@ -16,7 +16,7 @@ def codes(axis):
 @pytest.fixture(scope="module")
 def adis(real_data):
     recording = trihedron.read(real_data / "adis16405" / "adis16405_imu1.npz")
-    return noise(recording, gyroscope_lsb="0.05 deg/s", accelerometer_lsb="3.33 mg")
+    return allan(recording, gyroscope_lsb="0.05 deg/s", accelerometer_lsb="3.33 mg")
 
 
 def test_the_white_noise_of_the_adis16405_is_the_published_one(adis):
@@ -37,7 +37,7 @@ def test_what_else_the_adis16405_log_holds_is_found(adis):
 
 def test_colouring_of_the_phone_log_is_recognised_and_terms_come_from_below(real_data):
     recording = trihedron.read(real_data / "galaxy_s5" / "samsung_galaxy_s5.csv.gz", rate_hz=10.0)
-    found = noise(recording)
+    found = allan(recording)
     assert FindingCode.REPEATED_ROWS in {finding.code for finding in found.findings}
     for axis in found.axes:
         assert FindingCode.SPECTRUM_COLOURED in codes(axis)

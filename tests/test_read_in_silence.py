@@ -339,7 +339,7 @@ def test_the_size_of_a_count_is_refused_where_readings_are_in_a_unit(tmp_path):
     header = "t_s,ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
     log = written(tmp_path / "log.csv", *table(t, force, rate), header=header)
     with pytest.raises(ValueError, match=r"gyro are in rad/s, not in counts"):
-        trihedron.noise(log, gyroscope_lsb="0.05 deg/s")
+        trihedron.allan(log, gyroscope_lsb="0.05 deg/s")
 
 
 def test_verbs_are_pickled_under_the_name_that_people_call():

@@ -105,7 +105,7 @@ def test_names_of_files_do_not_break_the_line_of_a_repr(tmp_path):
     results = [recording, trihedron.calibrate(recording, gravity_m_s2=float(G)), trihedron.check(recording)]
     results += [
         results[1].calibration,
-        trihedron.noise(recording),
+        trihedron.allan(recording),
         trihedron.diagnose(recording, gravity_m_s2=float(G)),
     ]
     for result in results:

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from trihedron.api.driving import driven
     from trihedron.api.exporting import export
     from trihedron.api.extending import extend
-    from trihedron.api.filter_noising import filter_noise
+    from trihedron.api.filter_noising import noise
     from trihedron.api.filtering import kalman
-    from trihedron.api.identifying import noise, noise_of_curve, noise_of_file, recording_lengths
+    from trihedron.api.identifying import allan, noise_of_curve, noise_of_file, recording_lengths
     from trihedron.api.improving import improve
     from trihedron.api.planning import plan
     from trihedron.api.ranking import rank
@@ -50,6 +50,7 @@ __all__ = [
     "ReferencesResult",
     "SessionsResult",
     "VerificationResult",
+    "allan",
     "allan_deviation",
     "apply",
     "calibrate",
@@ -64,7 +65,6 @@ __all__ = [
     "driven",
     "export",
     "extend",
-    "filter_noise",
     "guide",
     "improve",
     "kalman",
@@ -110,10 +110,10 @@ _HOME = {
     "diagnose_sessions": "trihedron.api.diagnosing_sessions",
     "extend": "trihedron.api.extending",
     "export": "trihedron.api.exporting",
-    "filter_noise": "trihedron.api.filter_noising",
     "KalmanResult": "trihedron.records.results",
     "kalman": "trihedron.api.filtering",
-    "noise": "trihedron.api.identifying",
+    "allan": "trihedron.api.identifying",
+    "noise": "trihedron.api.filter_noising",
     "noise_of_curve": "trihedron.api.identifying",
     "noise_of_file": "trihedron.api.identifying",
     "recording_lengths": "trihedron.api.identifying",

@@ -37,7 +37,7 @@ def export(
     target : str
         One of ``trihedron.files.formats.targets()`` (docs/export.md): kalibr, px4, gazebo, c, ...
     noise : Noise or path, optional
-        What ``trihedron.noise`` found, or the JSON of ``trihedron allan``: white density and walk, for targets that
+        What ``trihedron.allan`` found, or the JSON of ``trihedron allan``: white density and walk, for targets that
         hold them.
     rate_hz : float, optional
         Rate of the samples; that of the static log when not given.

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.choices import settle_gravity
-from trihedron.api.identifying import noise
+from trihedron.api.identifying import allan
 from trihedron.api.reading import AnyRecording, read, recording_of, segment
 from trihedron.api.referring import AnyReference, motion_of
 from trihedron.errors import REFUSALS, RefusedError
@@ -33,7 +33,7 @@ CONSISTENT = (1.0, 9.0)
 Static = dict[str, StaticNoise]
 
 
-def filter_noise(
+def noise(
     recording: AnyRecording,
     *,
     static: Noise | str | os.PathLike[str] | None = None,
@@ -52,7 +52,7 @@ def filter_noise(
     recording : Recording, or what trihedron.read takes
         The log in motion.
     static : Noise or path, optional
-        The sensor at rest: what ``trihedron.noise`` found, a static log, or the JSON of ``trihedron allan``. Without it
+        The sensor at rest: what ``trihedron.allan`` found, a static log, or the JSON of ``trihedron allan``. Without it
         the longest rest of the log, if it lasts 20 s.
     reference : path, Recording or ReferenceMotion, optional
         Attitude, and with a position also the accelerometer's part. Without it only what rests and gravity tell.
@@ -78,7 +78,7 @@ def filter_noise(
 
     Examples
     --------
-    >>> found = trihedron.filter_noise("flight.csv", static="rest.csv", reference="truth.csv")  # doctest: +SKIP
+    >>> found = trihedron.noise("flight.csv", static="rest.csv", reference="truth.csv")  # doctest: +SKIP
     >>> found.sensor("gyroscope").N.value  # doctest: +SKIP
     0.00017
     """
@@ -146,7 +146,7 @@ def _of_rest(recording: Recording, segments: Segments) -> Noise | None:
         gyroscope_unit=recording.gyroscope_unit,
     )
     try:
-        found = noise(part)
+        found = allan(part)
     except REFUSALS:
         return None
     return found if _sensors(found) else None
@@ -165,10 +165,10 @@ def _static(given: Noise | str | os.PathLike[str]) -> Static:
         figures, _ = read_noise(given)
         return {name: StaticNoise(_told(one.N), _told(one.K)) for name, one in figures.items()}
     if isinstance(given, str | os.PathLike):
-        given = noise(read(given))
+        given = allan(read(given))
     if not isinstance(given, Noise):
         raise WrongTypeError(
-            f"static is what trihedron.noise found, or the name of a file, not {type(given).__name__}."
+            f"static is what trihedron.allan found, or the name of a file, not {type(given).__name__}."
         )
     known = _sensors(given)
     if not known:

@@ -127,7 +127,7 @@ def _settle_noise(
         return noise_from_identified(noise.axes, recording.accelerometer_unit), weighty, noise
     is_axes = isinstance(noise, Sequence) and all(isinstance(axis, AxisNoise) for axis in noise)
     if noise is not None and not isinstance(noise, AxisNoise) and not is_axes:
-        raise WrongTypeError(f"noise is what trihedron.noise found, or the name of a file, not {type(noise).__name__}.")
+        raise WrongTypeError(f"noise is what trihedron.allan found, or the name of a file, not {type(noise).__name__}.")
     return noise, (), None
 
 

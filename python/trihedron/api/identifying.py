@@ -35,7 +35,7 @@ IN_MEMORY_BYTES = 1 << 29
 """A log up to this size is taken whole even when it is read in pieces: events can then be found and left out."""
 
 
-def noise(
+def allan(
     recording: AnyRecording,
     *,
     exclude_s: Sequence[tuple[float, float]] = (),

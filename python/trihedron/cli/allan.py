@@ -140,7 +140,7 @@ def _of_log(source: LogSource, *, stream: bool, checkpoint: Path | None, options
     if not stream:
         recording = source.read()
         with progress("identifying"):
-            return api.noise(recording, **options)
+            return api.allan(recording, **options)
     if source.log is None or source.columns is None or source.rate is None:
         raise typer.BadParameter("--stream needs LOG, --columns (as in gx,gy,gz,ax,ay,az) and --rate")
     with progress("identifying"):

@@ -80,7 +80,7 @@ def noise(
     from trihedron.report.filter_noise import filter_noise_record, filter_noise_report
 
     with progress("estimating"):
-        found = api.filter_noise(
+        found = api.noise(
             recording,
             static=static,
             reference=reference,

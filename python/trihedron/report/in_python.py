@@ -41,7 +41,7 @@ _PARAMETERS = {
 }
 _COMMANDS = {
     "trihedron allan --json": "trihedron.report(noise, path)",
-    "trihedron allan": "trihedron.noise",
+    "trihedron allan": "trihedron.allan",
     "trihedron apply": "trihedron.apply",
     "trihedron calibrate -o": "trihedron.write_calibration",
     "trihedron diagnose --json": "trihedron.report(diagnosis, path)",
