@@ -22,7 +22,8 @@ attitude
     Where the body points: the rotation from its frame at a sample to that at the start. (:func:`integrate_rate`, from a
     corrected rate)
 diagnosis
-    Where a recording and its model differ, the effect (physical mechanism) left out, with ± and held-out proof.
+    Where a recording and its model differ, and which effect (physical mechanism) is missing, with σ and cross-validated
+    proof.
     (:func:`diagnose`)
 finding
     Something noticed that bears on the answer: what was seen, with its number; the likely cause; the next action. A

@@ -63,6 +63,10 @@ def write_calibration(calibration: AnyCalibration, path: str | os.PathLike[str],
     ------
     OutputError
         (a ``ValueError``) when the file exists or cannot be written.
+
+    Examples
+    --------
+    >>> trihedron.write_calibration(result, "calibration.json")  # doctest: +SKIP
     """
     write_file(calibration_of(calibration), path, overwrite=overwrite)
 

@@ -122,6 +122,10 @@ def capture(
     ------
     CaptureError
         (a ``ValueError``) when the board is silent or not understood, or the disk is full; it says what was saved.
+
+    Examples
+    --------
+    >>> trihedron.capture("/dev/ttyUSB0", "log.csv", seconds=60)  # doctest: +SKIP
     """
     if seconds is not None and not seconds > 0.0:
         raise RefusedError(f"seconds is how long to record, not {seconds:g}")
@@ -170,6 +174,10 @@ def ports() -> list[Port]:
     -------
     list of Port
         Each with its name, and what the system says of the device behind it.
+
+    Examples
+    --------
+    >>> [port.name for port in trihedron.ports()]  # doctest: +SKIP
     """
     return list_ports()
 

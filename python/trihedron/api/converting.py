@@ -26,6 +26,10 @@ def convert(log: Any, output: str | os.PathLike[str], *, overwrite: bool = False
     ------
     ValueError
         When the log cannot be read, or the file cannot be written.
+
+    Examples
+    --------
+    >>> trihedron.convert("flight.bag", "flight.csv")  # doctest: +SKIP
     """
     if options and (isinstance(log, Recording) or hasattr(log, "recording")):
         raise RefusedError(f"{', '.join(options)}: how a log is read cannot be said of one that was read already.")

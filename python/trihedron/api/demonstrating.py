@@ -67,6 +67,10 @@ def demo(
     ------
     ValueError
         When the folder exists and may not be written into.
+
+    Examples
+    --------
+    >>> calibrated, contradicted = trihedron.demo("demo")  # doctest: +SKIP
     """
     target = Path(folder)
     if target.exists() and not overwrite:

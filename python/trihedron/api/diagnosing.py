@@ -55,7 +55,7 @@ def diagnose(
     alpha: float = 0.01,
     progress: Progress | None = None,
 ) -> DiagnosisResult:
-    """Where a recording and its model differ, which physics was excluded, how big it is, and how sure that is.
+    """Where a recording and its model differ, which physics is missing, how large it is, and how sure that is.
 
     Parameters
     ----------
@@ -85,6 +85,12 @@ def diagnose(
     ------
     ValueError
         When there is nothing to hold a model against, units differ, or two models are given.
+
+    Examples
+    --------
+    >>> found = trihedron.diagnose(recording, gravity_m_s2=9.80665)
+    >>> found.verdict, [effect.id for effect in found.effects]
+    ('consistent', [])
     """
     if calibration is not None and against is not None:
         raise RefusedError("two models were given: a calibration or a simulated recording to compare with, not both.")

@@ -1,4 +1,4 @@
-"""Extend: a calibration with the effects that its own recording demands, where they predict what was excluded."""
+"""Extend: a calibration with the effects that its own recording demands, where they predict unseen poses and moves."""
 
 from __future__ import annotations
 
@@ -34,6 +34,10 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
     ------
     ValueError
         When the calibration is in another frame than ``lower``.
+
+    Examples
+    --------
+    >>> trihedron.extend(result).calibration.extensions  # doctest: +SKIP
     """
     if not isinstance(result, CalibrationResult):
         raise WrongTypeError(f"trihedron.extend takes what trihedron.calibrate gave, not {type(result).__name__}.")

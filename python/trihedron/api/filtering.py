@@ -77,6 +77,11 @@ def kalman(
     ------
     ValueError
         When the question cannot be answered; one sentence says why and what to do.
+
+    Examples
+    --------
+    >>> trihedron.kalman(recording, gravity_m_s2=9.80665).calibration.accelerometer.S.shape
+    (3, 3)
     """
     gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
     recording = recording_of(recording)

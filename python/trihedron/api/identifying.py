@@ -46,7 +46,18 @@ def allan(
 ) -> Noise:
     """Noise terms of every axis of a static recording, in SI units where the log tells them (docs/noise.md).
 
-    ``accelerometer_lsb`` and ``gyroscope_lsb`` say the size of a count of a log in counts, as in ``"0.05 deg/s"``.
+    Parameters
+    ----------
+    recording : Recording, or what trihedron.read takes
+        A static log, an hour or more.
+    exclude_s : sequence of (float, float)
+        Stretches [s] that the fit leaves out.
+    automatic : bool
+        Whether disturbances are found and excluded.
+    clusters : sequence of int, optional
+        Readings per cluster of the Allan curve; evenly spaced in the logarithm when not given.
+    accelerometer_lsb, gyroscope_lsb : str, optional
+        The size of a count of a log in counts: ``"0.05 deg/s"``.
 
     Returns
     -------
@@ -57,6 +68,12 @@ def allan(
     ------
     ValueError
         When the log is too short or has too many gaps; one sentence says why and what to do.
+
+    Examples
+    --------
+    >>> rest = {"t": [k / 100 for k in range(6000)], "acc": [[0.0, 0.0, 9.8]] * 6000}
+    >>> found = trihedron.allan(rest)  # doctest: +SKIP
+    >>> found.axis("gyro x").terms  # doctest: +SKIP
     """
     recording = recording_of(recording)
     readings, names, units = readings_of(

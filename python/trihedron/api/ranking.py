@@ -56,6 +56,10 @@ def rank(
     ------
     ValueError
         When fewer than two calibrations are given, units differ, or the recording has no pose.
+
+    Examples
+    --------
+    >>> trihedron.rank([result, result], recording).candidates[0].name  # doctest: +SKIP
     """
     if len(calibrations) < 2:
         raise RefusedError("a ranking needs two calibrations at least; one is judged by `trihedron verify`.")

@@ -55,6 +55,10 @@ def calibrate_references(
     ------
     ValueError
         When logs and references are not as many, or as :func:`trihedron.diagnose` with a reference.
+
+    Examples
+    --------
+    >>> trihedron.calibrate_references(["a.csv", "b.csv"], ["a-truth.csv", "b-truth.csv"])  # doctest: +SKIP
     """
     if len(recordings) != len(references) or not recordings:
         raise RefusedError(f"{len(recordings)} logs need as many references, not {len(references)}.")

@@ -66,6 +66,10 @@ def guide(
     ------
     ValueError
         When there is no accelerometer, the accuracy is not understood, or no calibration can be made.
+
+    Examples
+    --------
+    >>> calibrated, checked = trihedron.guide("session.csv", "accel 0.1 %, gyro 0.2 %")  # doctest: +SKIP
     """
     done = replay(recording_of(recording), Accuracy.parse(accuracy), gravity_m_s2=gravity_m_s2, on_pose=on_pose)
     return conclude(done.recording, done.cut_s, gravity_m_s2=gravity_m_s2)

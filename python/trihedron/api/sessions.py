@@ -70,6 +70,12 @@ def calibrate_sessions(
     ------
     ValueError
         When fewer than two recordings can be calibrated, or what they are grouped by is not known.
+
+    Examples
+    --------
+    >>> model = trihedron.calibrate_sessions([recording, recording], gravity_m_s2=9.80665)
+    >>> len(model.model.sessions)
+    2
     """
     if by not in BYS:
         raise RefusedError(f"recordings are not grouped by {by!r}; choose one of {', '.join(BYS)}.")

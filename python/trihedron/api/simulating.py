@@ -81,6 +81,12 @@ def twin(recording: AnyRecording, calibration: AnyCalibration, seed: int = 0) ->
     ------
     ValueError
         When the recording has no poses, or lacks a sensor.
+
+    Examples
+    --------
+    >>> copy, truth = trihedron.twin(recording, result)
+    >>> copy.rate_hz == recording.rate_hz
+    True
     """
     recording, known = recording_of(recording), calibration_of(calibration)
     return run(twin_scenario(recording, segment_recording(recording), known), seed)

@@ -75,6 +75,10 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
     ------
     CalibrationFileError
         When the file is missing, is not JSON, is not a calibration, or is of a format this version does not know.
+
+    Examples
+    --------
+    >>> trihedron.read_calibration("calibration.json").gyroscope.b  # doctest: +SKIP
     """
     path = Path(path)
     try:

@@ -73,6 +73,10 @@ def fleet(
     ValueError
         When there is no log, Dask is needed and not installed, or its scheduler does not answer.
 
+    Examples
+    --------
+    >>> trihedron.fleet("logs", "results", latitude_deg=50.1).summary  # doctest: +SKIP
+
     Notes
     -----
     A script that calls this with a local cluster needs ``if __name__ == "__main__":`` around it, as every use of

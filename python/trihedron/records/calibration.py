@@ -77,8 +77,17 @@ class FitQuality(Frozen):
 class SensorCalibration(Frozen):
     """Direct model of one sensor: ``truth = S raw + b``, raw unit → SI.
 
-    ``covariance`` (12, 12) in the order of :data:`PARAMETER_NAMES`; rows of parameters fixed by the choice of frame are
-    zero. ``sigma_S`` (3, 3) and ``sigma_b`` (3,) are its diagonal's roots.
+    Attributes
+    ----------
+    S : (3, 3)
+        SI per raw unit; dimensionless for a log in SI.
+    b : (3,)
+        m/s² or rad/s.
+    covariance : (12, 12)
+        In the order of :data:`PARAMETER_NAMES`; rows of parameters fixed by the choice of frame are zero. ``sigma_S``
+        (3, 3) and ``sigma_b`` (3,) are its diagonal's roots.
+    quality, observability : FitQuality, Observability or None
+        Residuals pose by pose or move by move, and what the motion determined.
     """
 
     S: FloatArray

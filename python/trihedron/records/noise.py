@@ -305,7 +305,16 @@ def _gauss_markov_allan(process: GaussMarkov, tau: FloatArray) -> FloatArray:
 class Noise(Presented):
     """The noise of a log: its axes, the Allan curve as the picture, and what is wrong with the log.
 
-    ``excluded_s`` are the stretches left out, ``breaks_s`` the instants where the level jumped and the fit starts anew.
+    Attributes
+    ----------
+    axes : tuple of NoiseAxis
+        Of each channel ``terms``: Q, N, B, K, R with σ and 95 % interval, SI (or the log's unit where none is known).
+    curve : AllanCurve
+    excluded_s : tuple of (float, float)
+        Stretches [s] that were left out.
+    breaks_s : tuple of float
+        Instants [s] where the level jumped and the fit starts anew.
+    findings : tuple of Finding
     """
 
     axes: tuple[NoiseAxis, ...]

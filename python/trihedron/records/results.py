@@ -18,7 +18,24 @@ from trihedron.sanitise import one_line
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CalibrationResult(Presented):
-    """A calibration with the segments and the recording that it was made from. ``print`` gives the report."""
+    """A calibration with the segments and the recording that it was made from. ``print`` gives the report.
+
+    Attributes
+    ----------
+    calibration : Calibration
+        Both sensors, gravity [m/s²], frame and findings: what a calibration file holds.
+    segments : Segments
+        The poses and moves that were used.
+    recording : Recording
+        The log, in its own unit.
+
+    Examples
+    --------
+    >>> result.accelerometer.S.shape, result.gyroscope.b.shape
+    ((3, 3), (3,))
+    >>> bool(result.accelerometer.sigma_b.max() < 0.01)  # m/s²
+    True
+    """
 
     calibration: Calibration
     segments: Segments
@@ -54,7 +71,23 @@ class CalibrationResult(Presented):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class VerificationResult(Presented):
-    """A calibration judged on another recording. ``print`` gives the report."""
+    """A calibration judged on another recording. ``print`` gives the report.
+
+    Attributes
+    ----------
+    verification : Verification
+        ``norm_error`` and ``norm_sigma`` (n_poses,) [m/s²], ``angle_deg`` and ``angle_sigma_deg`` (n_moves,) [°].
+    calibration : Calibration
+        What was judged.
+    segments : Segments
+    recording : Recording
+
+    Examples
+    --------
+    >>> checked = trihedron.verify(result, recording)
+    >>> checked.is_passed, checked.verification.norm_error.shape == (checked.segments.n_poses,)
+    (True, True)
+    """
 
     verification: Verification
     calibration: Calibration
@@ -80,8 +113,22 @@ class VerificationResult(Presented):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CheckResult(Presented):
-    """Is a log fit for calibration? ``calibration`` holds the uncertainties to expect, ``None`` where it cannot be
-    made."""
+    """Whether a log is fit for calibration. ``print`` gives the report.
+
+    Attributes
+    ----------
+    recording : Recording
+    segments : Segments
+    calibration : Calibration or None
+        The uncertainties to expect; None where none can be made.
+    findings : tuple of Finding
+
+    Examples
+    --------
+    >>> checked = trihedron.check(recording)
+    >>> checked.is_fit, checked.segments.n_poses
+    (True, 24)
+    """
 
     recording: Recording
     segments: Segments
@@ -106,11 +153,32 @@ class CheckResult(Presented):
 class DiagnosisResult(Diagnosis, Presented):
     """A diagnosis with what it was made from. ``print`` gives a short laboratory report.
 
-    ``calibration`` is the linear model at the start: fitted to this recording, or given (``model_is_given``);
-    ``updated`` the recording's own calibration where one was given and the recording can carry another;
-    ``reference`` what known motion beside the log says;
-    ``simulated`` what a given scenario reads, moved as the recording was;
-    ``own_effects`` every effect that the recording has, those that the given model has too included.
+    Attributes
+    ----------
+    verdict : str
+        ``consistent``, ``parameters-differ``, ``missing-physics``, ``unexplained`` or ``not-testable``.
+    effects : tuple of AcceptedEffect
+        Missing effects with parameters, σ, p and cross-validated gain; ``parameters`` are differing parameters.
+    domains, remaining : tuple of DomainTest
+        χ² of every kind of residual with the linear model, and with the effects.
+    recording, segments : Recording, Segments
+        What was diagnosed.
+    calibration : Calibration or None
+        The linear model at the start: fitted to this recording, or given (``model_is_given``).
+    updated : Calibration or None
+        The recording's own calibration where one was given and the recording can carry another.
+    reference : AgainstReference or None
+        What known motion beside the log says.
+    simulated
+        What a given scenario reads, moved as the recording was.
+    own_effects : tuple of AcceptedEffect
+        Every effect that the recording has, those that the given model has too included.
+
+    Examples
+    --------
+    >>> found = trihedron.diagnose(recording, gravity_m_s2=9.80665)
+    >>> found.verdict, len(found.effects)
+    ('consistent', 0)
     """
 
     recording: Recording = field(kw_only=True)
@@ -145,7 +213,23 @@ class DiagnosisResult(Diagnosis, Presented):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class KalmanResult(Presented):
-    """What the filter found, with the segments and the recording that it was made from. ``print`` gives the report."""
+    """What the filter found, with the segments and the recording that it was made from. ``print`` gives the report.
+
+    Attributes
+    ----------
+    outcome : KalmanCalibration or NormKalmanCalibration
+        Constants, σ and innovations after every pose; with known attitudes, or by the norm of gravity.
+    calibration : Calibration
+        The accelerometer's S and b [m/s²].
+    segments : Segments
+    recording : Recording
+
+    Examples
+    --------
+    >>> found = trihedron.kalman(recording, gravity_m_s2=9.80665)
+    >>> found.calibration.accelerometer.b.shape
+    (3,)
+    """
 
     outcome: KalmanCalibration | NormKalmanCalibration
     calibration: Calibration
@@ -171,7 +255,21 @@ class KalmanResult(Presented):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SessionsResult(Presented):
-    """Many recordings as one model, with each recording's own calibration. ``print`` gives the report."""
+    """Many recordings as one model, with each recording's own calibration. ``print`` gives the report.
+
+    Attributes
+    ----------
+    model : SessionsModel
+        ``repeated`` and ``changes``: how far each parameter repeats, and which changed.
+    results : tuple of CalibrationResult
+        Each recording by itself.
+
+    Examples
+    --------
+    >>> both = trihedron.calibrate_sessions([recording, recording], gravity_m_s2=9.80665)
+    >>> len(both.results)
+    2
+    """
 
     model: SessionsModel
     results: tuple[CalibrationResult, ...]

@@ -163,6 +163,10 @@ def plot(result: object, name: str | None = None, *, ax: Axes | Sequence[Axes] |
         When it is no result.
     ValueError
         When there is no such figure, it has another number of panels, or matplotlib is not installed.
+
+    Examples
+    --------
+    >>> trihedron.plot(result, "residuals").savefig("residuals.png")  # doctest: +SKIP
     """
     there = pictures(result)
     chosen = next(iter(there), None) if name is None else name
