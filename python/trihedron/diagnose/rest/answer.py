@@ -9,7 +9,7 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
@@ -30,7 +30,6 @@ from trihedron.session.noise import NOISE_CORNER_S
 from trihedron.units import rate_to_si
 
 Sensor = Literal["accelerometer", "gyroscope"]
-AXES = ("x", "y", "z")
 PREFIX: dict[Sensor, str] = {"accelerometer": "accel", "gyroscope": "gyro"}
 DOMAIN: dict[Sensor, Domain] = {"accelerometer": "static-accel", "gyroscope": "static-gyro"}
 BEYOND_NOISE = 3.0
