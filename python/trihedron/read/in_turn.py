@@ -86,6 +86,6 @@ def _without_counter(table: Table, counter: int | None) -> Table:
 
 
 def _filled(table: Table) -> Table:
-    """Without the columns that hold nothing in these rows."""
+    """Without the columns that pose nothing in these rows."""
     columns = tuple(c if len(c) and np.isfinite(c).any() else np.empty(0) for c in table.columns)
     return replace(table, columns=columns)

@@ -1,1 +1,1 @@
-"""Logs that hold one or two orientations: no calibration, but zeros against temperature and time, and lines."""
+"""Logs that pose one or two orientations: no calibration, but zeros against temperature and time, and lines."""

@@ -251,7 +251,7 @@ def _model(variant: str, series: Mapping[str, Any]) -> MappingProxyType[str, Any
 
 
 def _drift(pieces: RestPieces, sensor: Sensor) -> tuple[DriftCurve | None, float, bool]:
-    """The curve of zeros that change slowly, p of any slow change, and whether a walk alone does not make it.
+    """The curve of biases that change slowly, p of any slow change, and whether a walk alone does not make it.
 
     ``None`` where they do not change slowly. A walk is what every sensor's noise becomes; a smooth drift is not.
     """

@@ -23,7 +23,7 @@ from trihedron.records.reference import ReferenceMotion
 from trihedron.units import acceleration_to_si, rate_to_si
 
 LONG_ROW_S = 0.5
-"""Rows of rate further apart than this are commands that hold until the next: no logger of a table is so slow."""
+"""Rows of rate further apart than this are commands that pose until the next: no logger of a table is so slow."""
 SHORTEST_STEP = 0.1
 """Rows nearer than a tenth of the usual step share an arrival: one of them is excluded."""
 
