@@ -1,4 +1,4 @@
-//! Motion in the means of blocks of a log: where a hold begins, and which part of a change the gyro foretells.
+//! Motion in the means of blocks of a log: where a pose begins, and which part of a change the gyro foretells.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -38,7 +38,7 @@ pub fn first_clean(
     })
 }
 
-/// What the ends of a hold are compared by; one number a channel, or a row a channel wide.
+/// What the ends of a pose are compared by; one number a channel, or a row a channel wide.
 #[derive(Debug, Clone, Copy)]
 pub struct Edges<'a> {
     /// Variance of a mean over T seconds is `white / T + flicker + walk T / 3`: three rows.
@@ -55,10 +55,10 @@ pub struct Edges<'a> {
     pub limit: f64,
 }
 
-/// Blocks to take off both ends of a hold until no stretch at an end departs from its middle half; at most a third each.
+/// Blocks to take off both ends of a pose until no stretch at an end departs from its middle half; at most a third each.
 ///
 /// `rows` are its blocks, `bumps` ranges of them that are left out. Nothing is taken off where hardly a middle is left:
-/// such a hold creeps throughout, which is said instead.
+/// such a pose creeps throughout, which is said instead.
 #[must_use]
 pub fn ends_to_trim(rows: &[f64], bumps: &[[usize; 2]], edges: &Edges) -> (usize, usize) {
     let channels = edges.rounding.len().max(1);

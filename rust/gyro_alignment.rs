@@ -7,9 +7,9 @@
 //! ```
 //!
 //! `Tⱼ` spans the plane across `f_j`: the length of `f` belongs to the accelerometer, so a move carries rank-two
-//! information. `z` is the zero reading of the gyro, interpolated between the means of the two holds. The residuals are
-//! weighed by their full covariance (5.8), in which neighbouring moves are correlated through the hold they share. With
-//! free accelerometer parameters the rows `|f_h| − |g|` of every hold join in, and the fit is the joint one. A given
+//! information. `z` is the zero reading of the gyro, interpolated between the means of the two poses. The residuals are
+//! weighed by their full covariance (5.8), in which neighbouring moves are correlated through the pose they share. With
+//! free accelerometer parameters the rows `|f_h| − |g|` of every pose join in, and the fit is the joint one. A given
 //! accelerometer with standard errors is held to them by rows of its own, which is to weigh its errors as noise that all
 //! moves share.
 
@@ -38,7 +38,7 @@ pub struct StillPose {
     pub var_bias: Vector3<f64>,
 }
 
-/// A move joins two holds.
+/// A move joins two poses.
 #[derive(Debug, Clone, Copy)]
 pub struct Link {
     /// Hold before.
@@ -56,7 +56,7 @@ pub struct Model {
     pub accelerometer_bias: Vector3<f64>,
     /// `S_ω`.
     pub gyroscope_scale: Matrix3<f64>,
-    /// A rate in the moves that the holds do not show, rad/s (zero unless asked for).
+    /// A rate in the moves that the poses do not show, rad/s (zero unless asked for).
     pub rate_offset: Vector3<f64>,
     /// How far each free accelerometer direction was followed from the start.
     pub followed: DVector<f64>,
@@ -82,7 +82,7 @@ pub struct Alignment {
     /// Directions in `(S_f row by row, b_f)` that are free: `(12, k)`; no columns when the accelerometer is given.
     pub accelerometer_basis: DMatrix<f64>,
     /// Whether these directions are standard errors of a given accelerometer (each then has a row of its own that holds
-    /// it to zero) instead of free parameters, for which the norms of the holds speak.
+    /// it to zero) instead of free parameters, for which the norms of the poses speak.
     pub is_accelerometer_given: bool,
     /// Whether the rate offset is free.
     pub is_offset_free: bool,
@@ -113,7 +113,7 @@ pub fn tangent_plane(direction: &Vector3<f64>) -> Matrix3x2<f64> {
     Matrix3x2::from_columns(&[first, second])
 }
 
-/// The model evaluated: forces of the holds and rotations of the moves.
+/// The model evaluated: forces of the poses and rotations of the moves.
 struct Evaluated {
     model: Model,
     forces: Vec<Vector3<f64>>,
@@ -140,7 +140,7 @@ impl Alignment {
     /// Checks that sizes agree.
     ///
     /// # Errors
-    /// When they do not, or a link names a hold that does not exist.
+    /// When they do not, or a link names a pose that does not exist.
     pub fn check(&self) -> Result<()> {
         let m = self.moves.len();
         if self.links.len() != m || self.used.len() != m {
@@ -302,7 +302,7 @@ impl Alignment {
 enum Rows {
     /// A given accelerometer direction, in its standard errors: one row.
     Given(usize),
-    /// `|f| − |g|` of a hold: one row.
+    /// `|f| − |g|` of a pose: one row.
     Norm(usize),
     /// A move, with the plane it is seen in: two rows.
     Move(usize, Matrix2x3<f64>),

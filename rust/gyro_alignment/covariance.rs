@@ -1,7 +1,7 @@
 //! Covariance of the stacked residuals, and the residuals themselves.
 //!
-//! A move's own part is the noise of its integrated rate and the wandering of the zero reading between the holds; the
-//! means of the holds enter every row that used them, so neighbouring moves are correlated:
+//! A move's own part is the noise of its integrated rate and the wandering of the zero reading between the poses; the
+//! means of the poses enter every row that used them, so neighbouring moves are correlated:
 //!
 //! ```text
 //! C = Σ_h A_h var(a'_h) A_hᵀ + Σ_h Z_h var(z_h) Z_hᵀ + blockdiag(D C_θ Dᵀ)                  (5.8)
@@ -150,7 +150,7 @@ impl Layout {
         Ok((c.cholesky()?, mahalanobis))
     }
 
-    /// How the rows answer to the zero reading of every hold: `(n, 3)` each.
+    /// How the rows answer to the zero reading of every pose: `(n, 3)` each.
     pub fn wrt_bias(&self, problem: &Alignment, at: &Evaluated) -> Vec<DMatrix<f64>> {
         let mut out = vec![DMatrix::zeros(self.n, 3); problem.holds.len()];
         for source in self
@@ -167,7 +167,7 @@ impl Layout {
         out
     }
 
-    /// The means of every hold and the rows they entered.
+    /// The means of every pose and the rows they entered.
     fn sources(&self, problem: &Alignment, at: &Evaluated) -> Vec<Source> {
         let mut readings: Vec<Source> = (0..problem.holds.len())
             .map(|hold| Source {
@@ -219,7 +219,7 @@ impl Layout {
     }
 }
 
-/// The mean of one hold, its variance, and the derivative of every block that used it.
+/// The mean of one pose, its variance, and the derivative of every block that used it.
 struct Source {
     hold: usize,
     is_zero: bool,
@@ -252,7 +252,7 @@ fn add_block(c: &mut Banded, row: usize, column: usize, block: &DMatrix<f64>) {
 pub(super) fn own_covariance(problem: &Alignment, at: &Evaluated, index: usize) -> Matrix3<f64> {
     let turn = &at.turns[index];
     let wrt_angle = problem.move_row(at, index).wrt_angle;
-    // A zero reading that walks freely between the holds leaves the interpolated one, over the move's share Δ of the
+    // A zero reading that walks freely between the poses leaves the interpolated one, over the move's share Δ of the
     // span T, off by var(∫) = q² Δ² (1/4 − Δ/6T): a Brownian bridge, in which q² is the variance of the whole change.
     let share = (turn.duration_s / problem.moves[index].span_s()).clamp(0.0, 1.0);
     let rate = (turn.wrt_bias_before + turn.wrt_bias_after) * at.model.gyroscope_scale;

@@ -75,7 +75,7 @@ const SETTLED: f64 = 1e-3;
 
 /// Fits from each start and keeps the best; then weighs by the full covariance.
 ///
-/// `bias_weights` `(n_poses)` are the weights of each hold's zero reading in the mean that the caller forms.
+/// `bias_weights` `(n_poses)` are the weights of each pose's zero reading in the mean that the caller forms.
 ///
 /// # Errors
 /// When the pieces do not fit together, no start is given, or no start gives finite residuals.

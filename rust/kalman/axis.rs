@@ -14,13 +14,13 @@ pub const N_CONSTANTS: usize = 4;
 /// One reading of the axis in a known attitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    /// Mean raw reading over the hold.
+    /// Mean raw reading over the pose.
     pub reading: f64,
     /// Specific force [m/s²] along the three reference axes.
     pub reference: [f64; 3],
-    /// Start of the hold, s.
+    /// Start of the pose, s.
     pub start: f64,
-    /// Length of the hold, s.
+    /// Length of the pose, s.
     pub hold: f64,
     /// Variance on top of the noise model (a disturbed pose, an uncertain reference), raw².
     pub extra_variance: f64,
@@ -277,7 +277,7 @@ pub struct AxisTrack {
     pub innovation: Vec<f64>,
     /// Variances that the filter predicted for them.
     pub innovation_variance: Vec<f64>,
-    /// Filtered slow noise at the end of each hold.
+    /// Filtered slow noise at the end of each pose.
     pub drift: Vec<f64>,
     /// Its standard error.
     pub drift_sigma: Vec<f64>,

@@ -73,7 +73,7 @@ pub struct Shaping {
 pub struct Layout {
     /// Whether state 0 is the running mean of the current hold.
     pub averages: bool,
-    /// Whether two states hold the quantisation errors at the end and the start of the hold.
+    /// Whether two states hold the quantisation errors at the end and the start of the pose.
     pub quantises: bool,
     /// Number of slow states (flicker, walk, ramp).
     pub n_slow: usize,
@@ -264,7 +264,7 @@ impl Shaping {
         p
     }
 
-    /// Row of the measurement: how the reading of a hold depends on the noise states at its end.
+    /// Row of the measurement: how the reading of a pose depends on the noise states at its end.
     pub fn measurement_row(&self, hold: f64, h: &mut [f64]) {
         let layout = self.layout();
         h.fill(0.0);
@@ -280,10 +280,10 @@ impl Shaping {
         }
     }
 
-    /// Transition over a pause of `gap` seconds and the hold of `hold` seconds after it, exactly.
+    /// Transition over a pause of `gap` seconds and the pose of `hold` seconds after it, exactly.
     ///
     /// During the hold the running mean `m' = h·s / hold` starts from zero. With no pause the quantisation error at
-    /// the start of this hold is the one at the end of the last: first differences, not independent errors.
+    /// the start of this pose is the one at the end of the last: first differences, not independent errors.
     #[must_use]
     pub fn step(&self, gap: f64, hold: f64) -> (DMatrix<f64>, DMatrix<f64>) {
         let layout = self.layout();
@@ -320,7 +320,7 @@ impl Shaping {
         if layout.quantises {
             let e = usize::from(layout.averages);
             q[(e, e)] = 1.0;
-            // Shorter than a millionth of the hold is no pause but the rounding of the clock.
+            // Shorter than a millionth of the pose is no pause but the rounding of the clock.
             if gap <= 1e-6 * hold {
                 phi[(e + 1, e)] = 1.0;
             } else {
@@ -330,7 +330,7 @@ impl Shaping {
         (phi, q)
     }
 
-    /// Noise of the slow terms alone at the end of a hold, `h·s`, as a row over all noise states.
+    /// Noise of the slow terms alone at the end of a pose, `h·s`, as a row over all noise states.
     #[must_use]
     pub fn slow_row(&self) -> DVector<f64> {
         let layout = self.layout();

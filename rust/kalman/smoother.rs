@@ -13,7 +13,7 @@ use crate::error::Result;
 /// Smoothed noise and constants at each pose.
 #[derive(Debug, Clone)]
 pub struct Smoothed {
-    /// Slow noise at the end of each hold, and its standard error.
+    /// Slow noise at the end of each pose, and its standard error.
     pub drift: Vec<(f64, f64)>,
     /// Constants at each pose (all alike unless they walk).
     pub constants: Vec<[f64; N_CONSTANTS]>,

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 /// Steps remembered: regular logs need one, and a forgotten one costs microseconds.
 const REMEMBERED_STEPS: usize = 64;
 
-/// Shorter than this part of the hold is no time but the rounding of the clock.
+/// Shorter than this part of the pose is no time but the rounding of the clock.
 const CLOCK_ROUNDING: f64 = 1e-6;
 
 /// Poses in order of time.
@@ -29,10 +29,10 @@ impl Timeline {
         self.n_poses
     }
 
-    /// Pause before a hold of `hold` seconds from `start` on.
+    /// Pause before a pose of `hold` seconds from `start` on.
     ///
     /// # Errors
-    /// When the hold is not a stretch of time, or starts before the last one ended.
+    /// When the pose is not a stretch of time, or starts before the last one ended.
     pub fn gap(&self, start: f64, hold: f64) -> Result<f64> {
         let pose = self.n_poses + 1;
         if !(hold.is_finite() && hold > 0.0 && start.is_finite()) {
@@ -50,7 +50,7 @@ impl Timeline {
         }
     }
 
-    /// Take the hold.
+    /// Take the pose.
     pub fn pass(&mut self, start: f64, hold: f64) {
         self.end = Some(start + hold);
         self.n_poses += 1;

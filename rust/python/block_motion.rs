@@ -19,7 +19,7 @@ fn wrong(what: &str) -> PyErr {
     PyValueError::new_err(what.to_owned())
 }
 
-/// Blocks to take off both ends of a hold of `rows` `(n, c)` without `bumps`: by the `law` `(3, c)` of a mean's noise, the
+/// Blocks to take off both ends of a pose of `rows` `(n, c)` without `bumps`: by the `law` `(3, c)` of a mean's noise, the
 /// variance of `rounding` `(c,)`, blocks of `step_s`, `variances` `(k, c)` of the means of 1, 2, 4 ... blocks, and the
 /// `limit` of the channels `is_live` `(c,)`.
 #[pyfunction]

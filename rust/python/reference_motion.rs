@@ -117,7 +117,7 @@ impl ReferenceBlocks {
             .to_pyarray(py)
     }
 
-    /// `(m, 2)` rows of the reference that hold, and that were left out.
+    /// `(m, 2)` rows of the reference that count, and that were left out.
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<usize>>> {
         let flat: Vec<usize> = self.0.iter().flat_map(|b| b.rows).collect();
         flat.to_pyarray(py).reshape([self.0.len(), 2])

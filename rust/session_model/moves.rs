@@ -72,7 +72,7 @@ impl Move {
         }
         let (first, last) = (time_s[0], time_s[used.last().copied().unwrap_or_default()]);
         let duration_s = last - first;
-        // Zeros belong to the middles of their holds.
+        // Zeros belong to the middles of their poses.
         let span = (anchors_s[1] - anchors_s[0]).max(duration_s);
         let steps = step_weights(time_s, &used, RateModel::Coning);
         Self {
@@ -104,7 +104,7 @@ impl Move {
     }
 }
 
-/// Model values that a move needs: both sensors, zeros of its two holds, verticals, distortion of each sample.
+/// Model values that a move needs: both sensors, zeros of its two poses, verticals, distortion of each sample.
 #[derive(Debug)]
 pub struct Sees<'a> {
     /// |g|.
@@ -115,7 +115,7 @@ pub struct Sees<'a> {
     pub force_bias: Vector3<f64>,
     /// Gyro `S`.
     pub rate_scale: Matrix3<f64>,
-    /// Raw zeros of the gyro in the holds before and after.
+    /// Raw zeros of the gyro in the poses before and after.
     pub pose_rate_bias: [Vector3<f64>; 2],
     /// Raw zeros of the accelerometer there.
     pub pose_force_bias: [Vector3<f64>; 2],

@@ -187,7 +187,7 @@ impl Fit {
     }
 }
 
-/// From all unknowns to `(S_a, b_a)` on raw readings, row by row, in the first of `n` columns; one zero for the session
+/// From all unknowns to `(S_a, b_a)` on raw readings, row by row, in the first of `n` columns; one bias for the session
 /// (11.16b).
 fn force_map(state: &State, layout: Layout, origin: &Vector3<f64>, n: usize) -> DMatrix<f64> {
     let mut map = DMatrix::zeros(layout.n(), n);

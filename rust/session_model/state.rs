@@ -106,7 +106,7 @@ impl State {
         all.map(|(zero, own)| zero - own).sum::<Vector3<f64>>() / self.pose_force_bias.len() as f64
     }
 
-    /// Accelerometer `b`, on centred readings, with one zero for the session (docs/model-session.md, 11.16b).
+    /// Accelerometer `b`, on centred readings, with one bias for the session (docs/model-session.md, 11.16b).
     #[must_use]
     pub fn session_force_bias(&self) -> Vector3<f64> {
         self.force_bias - self.force_scale * self.mean_pose_force_bias()

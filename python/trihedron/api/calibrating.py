@@ -51,7 +51,7 @@ METHODS: tuple[Method, ...] = get_args(Method)
 Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
 
 MOST_CREEPING = 0.05
-"""Share of holds that may be seen to creep. The creep that is seen is the top of what is not: with one of 18 seen, on a
+"""Share of poses that may be seen to creep. The creep that is seen is the top of what is not: with one of 18 seen, on a
 support that yields, the gyro's scale lay outside its 95 % bars in a fifth of its elements."""
 
 Found = tuple[Finding, ...]

@@ -13,7 +13,7 @@ from trihedron.errors import RefusedError
 from trihedron.records.pose_noise import Measured, Ratio
 
 MOST_LEFT_OUT = 0.25
-"""Share of holds that may be excluded for noise far above the rest's: a disturbed pose, not another sensor."""
+"""Share of poses that may be excluded for noise far above the rest's: a disturbed pose, not another sensor."""
 UNKNOWN = 50.0
 """Logarithm beyond which an interval says no more: 21 decades either way."""
 FAR = 5.0

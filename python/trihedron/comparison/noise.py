@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from scipy.stats import chi2
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.comparison.draws import one_draw_for_all, uniform_for_normal
 from trihedron.diagnose.against import FittedModel
 from trihedron.errors import REFUSALS
@@ -56,7 +56,6 @@ RESEMBLES = 1.06
 """A ratio this near to √rate, or to its inverse, is taken for it."""
 SHOWS = 0.5
 """Noise of half an ADC step moves its last digit in every third reading: it cannot be overlooked."""
-_AXES = ("x", "y", "z")
 _SCATTERED = (TimestampKind.LATE, TimestampKind.SCATTERED)
 
 
@@ -123,7 +122,7 @@ def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[
     for sensor in sensors:
         if sensor not in model.noise or sensor not in recording.noise:
             continue
-        pairs = list(zip(_AXES, model.noise[sensor], recording.noise[sensor], strict=True))
+        pairs = list(zip(AXES, model.noise[sensor], recording.noise[sensor], strict=True))
         n_octaves = 2 * sum(len(r.octaves) for _, _, r in pairs)
         white = [_white(sensor, axis, m, r, alpha * SHARE / 6.0) for axis, m, r in pairs]
         even = _are_even([m.white for _, m, _ in pairs]) and not _are_even([r.white for _, _, r in pairs])
@@ -134,7 +133,7 @@ def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[
         for axis, m, r in pairs:
             out += _step(sensor, axis, (m, model.noise[sensor]), (r, recording.noise[sensor]))
             # Axes that share a filter have one corner, measured on all of them: one question.
-            corners = [] if is_one_part and axis != _AXES[0] else [*_corner(sensor, axis, m, r, alpha * SHARE / 6.0)]
+            corners = [] if is_one_part and axis != AXES[0] else [*_corner(sensor, axis, m, r, alpha * SHARE / 6.0)]
             out += [replace(row, axis="") if is_one_part else row for row in corners]
             out += _octaves(sensor, axis, m, r, alpha * SHARE / max(n_octaves, 1))
         n = min(model.n_differences[sensor], recording.n_differences[sensor])
@@ -223,7 +222,7 @@ def _resembling(
 def _are_even(white: Sequence[Measured | None]) -> bool:
     """Whether densities of three axes are one, but for how well each is known and 5 %."""
     known = [w for w in white if w is not None and w.value > 0.0]
-    if len(known) < len(_AXES):
+    if len(known) < len(AXES):
         return False
     logs = np.log([w.value for w in known])
     if float(np.ptp(logs)) < math.log(SAME_ON_ALL_AXES):

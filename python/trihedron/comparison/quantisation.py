@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron.arrays import AXES
 from trihedron.comparison.noise import Sampled, Sensor
 from trihedron.estimate.noise import ratio_of
 from trihedron.records.diagnosis import NoiseDifference
@@ -20,7 +21,6 @@ STANDS_OUT = 4.0
 LEAST_RATIO = 1.5
 """In Q, as an octave's density must differ by."""
 FEWEST_OCTAVES = 4
-_AXES = ("x", "y", "z")
 _ROUNDS = 5
 
 
@@ -87,8 +87,8 @@ def quantisation_noise(model: Sampled, recording: Sampled, *, alpha: float) -> t
     return tuple(
         row
         for sensor in sensors
-        for axis, m, r in zip(_AXES, model.noise.get(sensor, ()), recording.noise.get(sensor, ()), strict=False)
-        for row in _axis(sensor, axis, m, r, alpha * SHARE / (2 * len(_AXES)))
+        for axis, m, r in zip(AXES, model.noise.get(sensor, ()), recording.noise.get(sensor, ()), strict=False)
+        for row in _axis(sensor, axis, m, r, alpha * SHARE / (2 * len(AXES)))
     )
 
 

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.comparison.noise import Sensor
 from trihedron.diagnose.against import FREE_CURVES
 from trihedron.estimate.noise.of_biases import PoseBiases, SlowDifference, compare_slow
@@ -30,7 +30,6 @@ TESTS = 24.0
 NO_SHAPE = frozenset({"gyro-bias-repeatability", "accel-bias-repeatability", "disturbed-pose", "periodic-interference"})
 """Effects that leave the course of a bias from pose to pose as it is."""
 DOMAINS: Mapping[str, Domain] = MappingProxyType({"gyroscope": "static-gyro", "accelerometer": "static-accel"})
-AXES = ("x", "y", "z")
 Side = tuple[Diagnosis, Recording, Segments]
 
 

@@ -27,7 +27,7 @@ LEAST_SWING_V = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """Signals at the twin's points (one per hold, then every sample of every move), SI, instrument frame.
+    """Signals at the twin's points (one per pose, then every sample of every move), SI, instrument frame.
 
     Everything is computed from the fitted twin when first asked for. ``latitude_deg`` is the user's, if given.
     """
@@ -54,7 +54,7 @@ class Context:
 
     @cached_property
     def time_s(self) -> FloatArray:
-        """(points,) middle of each hold, time of each sample."""
+        """(points,) middle of each pose, time of each sample."""
         times: FloatArray = self.obs.time_s[self.fitted.line.path.point_samples].copy()
         times[: self.obs.n_poses] = self.obs.pose_time_s
         return times
@@ -136,7 +136,7 @@ class Context:
 
     # -- whole-recording signals ----------------------------------------------------------------------------------
     def at_points(self, samples: FloatArray) -> FloatArray:
-        """Values of a whole-recording signal (n, ...) at the points: hold means, then move samples."""
+        """Values of a whole-recording signal (n, ...) at the points: pose means, then move samples."""
         out = np.array(samples[self.fitted.line.path.point_samples], dtype=np.float64)
         out[: self.obs.n_poses] = self.obs.pose_means(samples)
         return out
@@ -194,7 +194,7 @@ class Context:
 
     @cached_property
     def pose_power(self) -> FloatArray:
-        """(holds, 3) variance of the accelerometer inside each hold, SI², along the instrument axes."""
+        """(poses, 3) variance of the accelerometer inside each pose, SI², along the instrument axes."""
         obs, S = self.obs, self.fitted.twin.accel_S
         out: FloatArray = np.einsum("ij,hjk,ik->hi", S, obs.pose_scatter, S)
         for i in np.flatnonzero(np.isnan(out).any(axis=1)):
@@ -210,7 +210,7 @@ class Context:
 
     @cached_property
     def vibration_power(self) -> FloatArray:
-        """(points, 3) power of vibration above the quiet floor, SI²: of a hold its variance, in moves a running one.
+        """(points, 3) power of vibration above the quiet floor, SI²: of a pose its variance, in moves a running one.
 
         In moves the slow motion is taken out by a local parabola; what a parabola takes out of the vibration itself is
         made good by the ratio that the shaken holds show.
@@ -253,7 +253,7 @@ class Context:
 
     @cached_property
     def pose_attitude(self) -> FloatArray:
-        """(holds, 3, 3) local level (z up, arbitrary azimuth) → body, chained through the moves and levelled at holds.
+        """(poses, 3, 3) local level (z up, arbitrary azimuth) → body, chained through the moves and levelled at holds.
 
         Holds that no chain of moves reaches keep NaN.
         """

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.accepted import held_out_records
 from trihedron.diagnose.relations.search import Follows, Related
-from trihedron.diagnose.relations.signals import AXES, ROOM_VECTOR
+from trihedron.diagnose.relations.signals import ROOM_VECTOR
 from trihedron.records.diagnosis import EffectParameter, Relation
 from trihedron.records.domains import Domain, HeldOut
 from trihedron.records.words import relation_experiment, relation_resembles, words

@@ -44,7 +44,7 @@ def calibrate_joint(
     gravity_source: str,
     options: MoveOptions | None = None,
 ) -> Calibration:
-    """Fit ``S_f, b_f, S_ω`` to the norm of every hold and the rotation of every move at once (equations 5.7, 5.8).
+    """Fit ``S_f, b_f, S_ω`` to the norm of every pose and the rotation of every move at once (equations 5.7, 5.8).
 
     The noise of a pose's mean enters its norm and both neighbouring moves, with its full covariance. The frame is that
     of ``accelerometer``, which is also the start: nothing in the data turns the trihedron as a whole.

@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import AXES
+
 SUFFIX = "_fifo"
-_AXES = ("x", "y", "z")
 
 
 def expanded(data: dict[str, Any]) -> dict[str, npt.NDArray[np.float64]] | None:
     """Samples of every message in order: ``timestamp_sample`` [µs] and x, y, z in SI; None where fields are missing."""
     present = {"timestamp_sample", "dt", "scale", "samples"} <= set(data)
     width = sum(f"x[{k}]" in data for k in range(256))
-    if not present or not width or any(f"{axis}[{width - 1}]" not in data for axis in _AXES):
+    if not present or not width or any(f"{axis}[{width - 1}]" not in data for axis in AXES):
         return None
     counts = np.clip(np.asarray(data["samples"], dtype=np.int64), 0, width)
     message = np.repeat(np.arange(len(counts)), counts)
@@ -28,7 +29,7 @@ def expanded(data: dict[str, Any]) -> dict[str, npt.NDArray[np.float64]] | None:
     step = np.asarray(data["dt"], dtype=np.float64)
     scale = np.asarray(data["scale"], dtype=np.float64)
     out = {"timestamp_sample": stamp[message] - (counts[message] - 1 - place) * step[message]}
-    for axis in _AXES:
+    for axis in AXES:
         block = np.column_stack([data[f"{axis}[{k}]"] for k in range(width)]).astype(np.float64)
         out[axis] = block[message, place] * scale[message]
     return out

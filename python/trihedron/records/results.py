@@ -169,6 +169,8 @@ class DiagnosisResult(Diagnosis, Presented):
         The recording's own calibration where one was given and the recording can carry another.
     reference : AgainstReference or None
         What known motion beside the log says.
+    simulated
+        What a given scenario reads, moved as the recording was.
     own_effects : tuple of AcceptedEffect
         Every effect that the recording has, those that the given model has too included.
 
@@ -211,7 +213,23 @@ class DiagnosisResult(Diagnosis, Presented):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class KalmanResult(Presented):
-    """What the filter found, with the segments and the recording that it was made from. ``print`` gives the report."""
+    """What the filter found, with the segments and the recording that it was made from. ``print`` gives the report.
+
+    Attributes
+    ----------
+    outcome : KalmanCalibration or NormKalmanCalibration
+        Constants, σ and innovations after every pose; with known attitudes, or by the norm of gravity.
+    calibration : Calibration
+        The accelerometer's S and b [m/s²].
+    segments : Segments
+    recording : Recording
+
+    Examples
+    --------
+    >>> found = trihedron.kalman(recording, gravity_m_s2=9.80665)
+    >>> found.calibration.accelerometer.b.shape
+    (3,)
+    """
 
     outcome: KalmanCalibration | NormKalmanCalibration
     calibration: Calibration
@@ -237,7 +255,21 @@ class KalmanResult(Presented):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SessionsResult(Presented):
-    """Many recordings as one model, with each recording's own calibration. ``print`` gives the report."""
+    """Many recordings as one model, with each recording's own calibration. ``print`` gives the report.
+
+    Attributes
+    ----------
+    model : SessionsModel
+        ``repeated`` and ``changes``: how far each parameter repeats, and which changed.
+    results : tuple of CalibrationResult
+        Each recording by itself.
+
+    Examples
+    --------
+    >>> both = trihedron.calibrate_sessions([recording, recording], gravity_m_s2=9.80665)
+    >>> len(both.results)
+    2
+    """
 
     model: SessionsModel
     results: tuple[CalibrationResult, ...]

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from trihedron.arrays import AXES
 from trihedron.records import Recording
 from trihedron.records.channel_facts import Limit, LowPass
 from trihedron.report.document import Table
 from trihedron.report.numbers import MINUS, plain_number, unit_in_print
 
-AXES = ("x", "y", "z")
 UNKNOWN = "not known"
 
 

@@ -119,15 +119,16 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
         (
             MEANING[d.domain],
             "disagrees" if d.disagrees else "agrees",
-            *([_after(d, after.get(d.domain))] if has_effects else []),
+            *([_judged_after(d, after.get(d.domain))] if has_effects else []),
+            rms_in_words(d),
             plain_number(d.chi2_per_dof),
             p_in_words(d.p_value),
-            rms_in_words(d),
+            *(_figures_after(after.get(d.domain)) if has_effects else ()),
         )
         for d in diagnosis.domains
     )
-    with_effects = ("with the effects",) if has_effects else ()
-    head = ("what", "model", *with_effects, "χ²/dof", "p", "residual of the session fit")
+    judged, figures = (("with the effects",), ("rms with them", "χ²/dof with them")) if has_effects else ((), ())
+    head = ("residual", "linear model", *judged, "rms", "χ²/dof", "p", *figures)
     blocks: list[Block] = [Table(head, rows)]
     # Which parameters differ has a section of its own.
     places = tuple(
@@ -144,13 +145,17 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _after(before: DomainTest, test: DomainTest | None) -> str:
+def _judged_after(before: DomainTest, test: DomainTest | None) -> str:
     if test is None:
         return "–"
     if before.disagrees and not test.disagrees and test.chi2_per_dof == before.chi2_per_dof:
         # An effect explains it without changing the residual: poses that were not still, a line of interference.
         return "explained"
-    return f"{plain_number(test.chi2_per_dof)} {'disagrees' if test.disagrees else 'agrees'}"
+    return "disagrees" if test.disagrees else "agrees"
+
+
+def _figures_after(test: DomainTest | None) -> tuple[str, str]:
+    return ("–", "–") if test is None else (rms_in_words(test), plain_number(test.chi2_per_dof))
 
 
 def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:

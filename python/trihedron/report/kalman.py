@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.files.calibration import calibration_document
 from trihedron.records import (
     CONSTANT_NAMES,
@@ -31,7 +31,6 @@ from trihedron.report.kalman_charts import (
 from trihedron.report.numbers import how_many, plain_number, unit_in_print, with_sigma
 from trihedron.units import mm_s2_from_m_s2
 
-AXES = "xyz"
 CLOSE = 0.01
 """A track has arrived when every sensitivity stays within this part of the axis' own of its last value."""
 

@@ -1,4 +1,4 @@
-"""What is weak about the holds that were found, said as findings."""
+"""What is weak about the poses that were found, said as findings."""
 
 from __future__ import annotations
 

@@ -29,13 +29,13 @@ def coloured_variance(
 
     Parameters
     ----------
-    pose_sigma : (holds, 3)
+    pose_sigma : (poses, 3)
         Standard errors of pose means that do not assume whiteness, raw units.
-    halves : (holds, 3)
+    halves : (poses, 3)
         Mean of every pose's second half minus that of its first, raw units.
     density : (3,)
         White noise, raw units per √Hz.
-    pose_duration_s, move_duration_s : (holds,), (moves,)
+    pose_duration_s, move_duration_s : (poses,), (moves,)
 
     Returns
     -------

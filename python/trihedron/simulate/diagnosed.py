@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from trihedron.arrays import AXES
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.scenario import Scenario
 
 Parameters = Mapping[str, float]
 Size = dict[str, Any]
-_AXES = ("x", "y", "z")
 
 
 class _NotSimulated(Exception):
@@ -67,7 +67,7 @@ def _sizes(effect_id: str, values: Parameters, variant: str) -> list[Size]:
 
 
 def _axis(values: Parameters, symbol: str, separator: str = "_") -> tuple[float, float, float]:
-    x, y, z = (values.get(f"{symbol}{separator}{axis}", 0.0) for axis in _AXES)
+    x, y, z = (values.get(f"{symbol}{separator}{axis}", 0.0) for axis in AXES)
     return (x, y, z)
 
 
@@ -98,19 +98,19 @@ def _thermal(symbol: str) -> Callable[[Parameters, str], Size]:
 
 
 def _g_sensitivity(values: Parameters, _variant: str) -> Size:
-    return {"matrix": tuple(tuple(values.get(f"G_{i}{j}", 0.0) for j in _AXES) for i in _AXES)}
+    return {"matrix": tuple(tuple(values.get(f"G_{i}{j}", 0.0) for j in AXES) for i in AXES)}
 
 
 def _limit(values: Parameters, _variant: str) -> Size:
     limits = []
-    for axis in _AXES:
+    for axis in AXES:
         seen = [abs(values[f"limit_{axis}{sign}"]) for sign in "+-" if f"limit_{axis}{sign}" in values]
         limits.append(min(seen) if seen else math.inf)
     return {"limit": tuple(limits)}
 
 
 def _places(values: Parameters, _variant: str) -> Size:
-    rows = [tuple(values.get(f"r{j}{axis}-r1{axis}", 0.0) for axis in _AXES) for j in (2, 3)]
+    rows = [tuple(values.get(f"r{j}{axis}-r1{axis}", 0.0) for axis in AXES) for j in (2, 3)]
     return {"places_m": ((0.0, 0.0, 0.0), *rows)}
 
 
@@ -137,7 +137,7 @@ def _losses(values: Parameters, _variant: str) -> Size:
 def _interference(values: Parameters, _variant: str) -> list[Size]:
     out: list[Size] = []
     for sensor, letter in (("accelerometer", "a"), ("gyroscope", "g")):
-        amplitude = tuple(values.get(f"amplitude_{letter}{axis}", 0.0) for axis in _AXES)
+        amplitude = tuple(values.get(f"amplitude_{letter}{axis}", 0.0) for axis in AXES)
         if any(amplitude):
             out.append({"sensor": sensor, "frequency_hz": values["frequency"], "amplitude": amplitude})
     return out

@@ -46,7 +46,7 @@ pub struct NormFilter {
     settled: Vec<f64>,
 }
 
-/// Transition of the noise of all three axes over a pause and a hold.
+/// Transition of the noise of all three axes over a pause and a pose.
 fn transition<'a>(
     steps: &'a mut Steps,
     shapings: &[Shaping; 3],

@@ -2,14 +2,14 @@
 
 use super::N_PARAMETERS;
 
-/// Mean reading of all three axes over one hold.
+/// Mean reading of all three axes over one pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NormPose {
     /// Mean raw readings.
     pub reading: [f64; 3],
-    /// Start of the hold, s.
+    /// Start of the pose, s.
     pub start: f64,
-    /// Length of the hold, s.
+    /// Length of the pose, s.
     pub hold: f64,
     /// Variance on top of the noise model per axis, raw².
     pub extra_variance: [f64; 3],

@@ -106,7 +106,7 @@ impl AxisKalmanModel {
         Ok(Self { inner })
     }
 
-    /// Variance of a reading over a hold that is white from pose to pose.
+    /// Variance of a reading over a pose that is white from pose to pose.
     fn white_variance(&self, pose_s: f64) -> f64 {
         self.inner.white_variance(pose_s)
     }

@@ -60,7 +60,7 @@ impl SessionFit {
         self.fit.state.force_bias.as_slice().to_pyarray(py)
     }
 
-    /// With one zero for the session.
+    /// With one bias for the session.
     #[getter]
     fn session_force_bias<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.fit

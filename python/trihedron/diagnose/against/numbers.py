@@ -13,7 +13,7 @@ import numpy.typing as npt
 from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.against.fitted import FittedModel
 from trihedron.invariants import (
     PAIRS,
@@ -59,7 +59,6 @@ ADRIFT = 1e-9
 """Variance, relative to its group's largest, below which a covariance is not told from zero."""
 
 NOTHING_OPEN: Mapping[str, float] = MappingProxyType({})
-_AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,10 +239,10 @@ def _sensor(
     assert len(names) == len(PAIRS)
     # S is SI per raw unit: what reads a larger count for the same truth has the smaller S, so a scale is -ln k.
     groups = [
-        _Group(f"{prefix}-bias", sensor, _AXES, a.zero, r.zero, r.zero - a.zero, covariance[:3, :3], unit, WANDER_DOF,
+        _Group(f"{prefix}-bias", sensor, AXES, a.zero, r.zero, r.zero - a.zero, covariance[:3, :3], unit, WANDER_DOF,
                _never_added(prefix, a.zero, r.zero, J_m @ covariances[0] @ J_m.T, wander_model)),
         _Group(
-            f"{prefix}-scale", sensor, _AXES, np.exp(log_m), np.exp(log_r), change, scale_covariance, "1",
+            f"{prefix}-scale", sensor, AXES, np.exp(log_m), np.exp(log_r), change, scale_covariance, "1",
             remark=_relative_to(prefix, a, r, units) if is_relative else "", is_relative=is_relative,
         ),
         _Group(
@@ -322,7 +321,7 @@ def _triads(model: FittedModel, recording: FittedModel) -> _Group:
     covariance = J_m @ model.covariance @ J_m.T + J_r @ recording.covariance @ J_r.T
     difference = rotation_vector(turned[1] @ turned[0].T)
     before, after = rotation_vector(turned[0]), rotation_vector(turned[1])
-    return _Group("triad-alignment", "both", _AXES, before, after, difference, covariance, "rad")
+    return _Group("triad-alignment", "both", AXES, before, after, difference, covariance, "rad")
 
 
 def _as_gravity(scale: _Group, alpha: float) -> _Group:

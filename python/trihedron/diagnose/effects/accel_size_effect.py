@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import AXES
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import AXES, Effect, Variant, force_only
+from trihedron.diagnose.effects.contract import Effect, Variant, force_only
 from trihedron.records.words import why_not
 
 

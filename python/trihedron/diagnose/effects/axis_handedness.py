@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import AXES
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import AXES
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import AXES, Effect, Variant
+from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain
 from trihedron.records.words import Words, why_not

@@ -11,14 +11,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.twin import Distortion
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain
 from trihedron.records.words import Words, effect_words, experiment_for
 
-AXES = ("x", "y", "z")
 TYPICAL_M_S2, TYPICAL_RAD_S = 0.03, 2e-3
 """3 mg and 0.1 °/s: what consumer parts stray by."""
 LEAST_RMS = 1e-12

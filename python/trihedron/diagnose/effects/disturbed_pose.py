@@ -29,7 +29,7 @@ MUST_FALL = 0.9
 OWN_SIGMA = 4.0
 """How far a pose's own readings must be off before a push of it is considered."""
 BUMP_SIGMA = 7.0
-"""A tenth of a second must leave the line through its surroundings by this much: drift inside a hold does not."""
+"""A tenth of a second must leave the line through its surroundings by this much: drift inside a pose does not."""
 FEWEST_BLOCKS = 4
 """Blocks of a tenth of a second a pose must have: two on either side carry the line."""
 SHAKES_P = 1e-6
@@ -126,7 +126,7 @@ def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
 
 
 def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
-    """(holds,) whether a pose's own readings tell of a disturbance: its norm, or its first half against its second.
+    """(poses,) whether a pose's own readings tell of a disturbance: its norm, or its first half against its second.
 
     Moves that disagree on both sides of a pose are no sign of it: whatever else is missing in moves does the same.
     """
@@ -145,7 +145,7 @@ def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
 
 
 class DisturbedPose(DirectEffect):
-    """A bump seen inside the hold, or one pose with an acceleration of its own."""
+    """A bump seen inside the pose, or one pose with an acceleration of its own."""
 
     id = "disturbed-pose"
     size = 0.05

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 from scipy.special import fdtrc
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import AXES
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.sample_steps import clipped_samples
 from trihedron.records.diagnosis import EffectParameter

@@ -41,10 +41,10 @@ mean is then exp(-2π²·0.69²)/π, 3·10⁻⁵ steps. Around a missing code st
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """The grid of one channel: step in raw units, noise before the converter, and what each hold's mean truly was.
+    """The grid of one channel: step in raw units, noise before the converter, and what each pose's mean truly was.
 
-    ``sigma`` in raw units, ``scatter`` the noise the plain readings seem to have; ``mean_shift`` (holds,) best mean
-    minus plain mean and ``mean_sigma`` (holds,) its error, raw units; ``missing`` codes skipped amid visited ones;
+    ``sigma`` in raw units, ``scatter`` the noise the plain readings seem to have; ``mean_shift`` (poses,) best mean
+    minus plain mean and ``mean_sigma`` (poses,) its error, raw units; ``missing`` codes skipped amid visited ones;
     ``dead`` half-width of the zone around one code in which nothing moves, raw units.
     """
 
@@ -59,7 +59,7 @@ class Lattice:
 
 
 def missing_codes(holds: list[FloatArray], sigma: float, step: float) -> int | None:
-    """Number of codes skipped amid visited ones on the converter's grid, or ``None`` where the holds show no grid."""
+    """Number of codes skipped amid visited ones on the converter's grid, or ``None`` where the poses show no grid."""
     values = np.concatenate(holds)
     codes = np.unique(values)
     if step == 0.0 or len(codes) < FEWEST_CODES or len(codes) > MOST_CODES * len(values):
@@ -80,7 +80,7 @@ def missing_codes(holds: list[FloatArray], sigma: float, step: float) -> int | N
 
 
 def before_converter(holds: list[FloatArray], step: float) -> tuple[float, FloatArray, FloatArray]:
-    """Noise in front of the converter and the true mean of every hold, by likelihood of the codes seen.
+    """Noise in front of the converter and the true mean of every pose, by likelihood of the codes seen.
 
     A hold that sits on a code's middle shows no scatter and one on its edge half a step, whatever the noise: the plain
     scatter says nothing about noise below half a step, the shares of the codes do (interval-censored normal readings).
@@ -223,7 +223,7 @@ LEAST_LEFT = 0.01
 
 
 def _resolved(obs: Observations, one: Lattice) -> Observations:
-    """Observations with one channel's hold means and noise as the codes truly tell them."""
+    """Observations with one channel's pose means and noise as the codes truly tell them."""
     is_accel = one.channel < 3
     k = one.channel % 3
     mean = (obs.pose_force if is_accel else obs.pose_rate).copy()  # type: ignore[union-attr]

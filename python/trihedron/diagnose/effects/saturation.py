@@ -9,10 +9,9 @@ from typing import ClassVar
 import numpy as np
 from scipy.special import chdtrc
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.possible_limits import BAND_SIGMA, MIN_PLATEAUS
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import AXES
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence, without_moves
 from trihedron.diagnose.effects.plateaus import Plateau, plateaus_of
 from trihedron.diagnose.session.observations import Observations

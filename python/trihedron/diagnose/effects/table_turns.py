@@ -23,7 +23,7 @@ HALF_RIGHT_RAD = np.pi / 4
 
 @dataclass(frozen=True, eq=False)
 class TableTurn:
-    """One move about the vertical between two holds of the same face: angle and its distance from the multiple."""
+    """One move about the vertical between two poses of the same face: angle and its distance from the multiple."""
 
     move: int
     angle_rad: float

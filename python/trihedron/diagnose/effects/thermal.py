@@ -27,7 +27,7 @@ class Thermal(Effect):
 
 
 class ThermalScale(Thermal):
-    """Relative scale linear in temperature (about its mean over the holds)."""
+    """Relative scale linear in temperature (about its mean over the poses)."""
 
     size = 3e-4
     """1/K: 300 ppm."""

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from trihedron.arrays import AXES
 from trihedron.diagnose.candidates import PRIOR_SCALES
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, rate_only
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again
-from trihedron.diagnose.relations.signals import AXES, ROOM_VECTOR, Signal, room, signals
+from trihedron.diagnose.relations.signals import ROOM_VECTOR, Signal, room, signals
 
 N_FITTED = 3
 """Relations whose strengths of noise are found anew before the best is chosen."""

@@ -12,11 +12,10 @@ from typing import Literal
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 
 Sensor = Literal["accelerometer", "gyroscope"]
-AXES = ("x", "y", "z")
 ROOM_VECTOR = "vector fixed in the room"
 
 

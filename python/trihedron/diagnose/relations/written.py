@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from trihedron.arrays import AXES
 from trihedron.records.diagnosis import Relation
-
-AXES = ("x", "y", "z")
 
 
 def effect_file(relation: Relation, effect_id: str = "named-relation") -> str | None:

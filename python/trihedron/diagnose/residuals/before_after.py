@@ -84,7 +84,7 @@ def _shown(fitted: Fit, named: Collection[int] = ()) -> dict[str, _Shown]:
 def with_covariance(model: LinearModel, fitted: Fit) -> LinearModel:
     """The linear model with the full covariance of its numbers, in the order of a calibration file.
 
-    On raw readings: S row by row, then b, of the gyro with one zero for the session (eq. 11.16).
+    On raw readings: S row by row, then b, of the gyro with one bias for the session (eq. 11.16).
     """
     covariance = fitted.linear[0]
     return replace(model, covariance=covariance[:12, :12] if model.gyroscope is None else covariance)

@@ -18,7 +18,7 @@ N_BLOCKS = 6
 SETTLES_S = (0.7, 1.4, 2.8, 5.6)
 """Time constants with which supports give: foam and skin, not hours of a glue."""
 SIZES = np.concatenate([[0.0], np.logspace(-1.0, 4.0, 31)])
-"""Scatter and creep tried, in rms of the readings' error: a quarter of a step of the grid is 10 %."""
+"""Scatter and creep tried, in rms of the readings' error: a quarter of an LSB is 10 %."""
 LEVEL = 0.5
 """Cosine to the vertical that parts the level axes (0) from it (1)."""
 CERTAIN = 20.0

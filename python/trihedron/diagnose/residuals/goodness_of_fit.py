@@ -87,7 +87,7 @@ def _unsettled(fitted: Fit, label: int, rows: npt.NDArray[np.bool_]) -> FloatArr
 
 
 def _inside_poses(fitted: Fit, label: int) -> tuple[float, float, Where]:
-    """p, ratio of variances and place of zeros that change inside some poses: their means' error bars swallow it."""
+    """p, ratio of variances and place of biases that change inside some poses: their means' error bars swallow it."""
     side = fitted.line.distortion.force if label == STATIC_ACCEL else fitted.line.distortion.rate
     if side is not None:
         return 1.0, 1.0, Where()  # what an effect changes inside a pose is not known here
@@ -118,7 +118,7 @@ def _strayed(fitted: Fit, label: int) -> tuple[float, float, Where]:
 
 @dataclass(frozen=True)
 class HiddenBias:
-    """What the model's walk of a sensor's zero absorbed, SI: ``rms`` about its mean, ``noise`` the median error of a
+    """What the model's walk of a sensor's bias absorbed, SI: ``rms`` about its mean, ``noise`` the median error of a
     pose's mean, with scatter where that was named, and whether the walk is as strong as the model allows."""
 
     rms: float
@@ -132,7 +132,7 @@ class HiddenBias:
 
 
 def hidden_biases(fitted: Fit) -> tuple[HiddenBias, HiddenBias | None]:
-    """Accelerometer, gyro: zeros of the holds about their session mean, absorbed by hidden states."""
+    """Accelerometer, gyro: biases of the poses about their session mean, absorbed by hidden states."""
     twin, obs = fitted.twin, fitted.line.obs
     edge = [corner <= AT_END * NOISE_CORNER_S for corner in fitted.line.core.strengths[0]]
     out: list[HiddenBias | None] = []

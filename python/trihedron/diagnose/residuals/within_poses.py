@@ -28,7 +28,7 @@ LOUD = 3.0
 """Variance of a pose over that of the others from which it disagrees, and is named: real noise is not exactly Gaussian
 or white, and a pose on another support has half as much again."""
 SHORTEST = 32
-"""Readings of a piece of a hold: twice as many have 33 frequencies, two windows of the median."""
+"""Readings of a piece of a pose: twice as many have 33 frequencies, two windows of the median."""
 ENOUGH_STRETCHES = 6
 """Spectra in the average before longer ones are preferred: it is then known to 40 %."""
 PARTS = 8
@@ -69,7 +69,7 @@ class Line:
 
 
 def pose_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
-    """``(first sample, (n, 6 or 3) raw readings minus their hold mean)`` of every hold."""
+    """``(first sample, (n, 6 or 3) raw readings minus their hold mean)`` of every pose."""
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     out = []
     # A line is looked for where the place is quiet: shaking has a spectrum of its own.
@@ -105,7 +105,7 @@ def _averaged_spectrum(pieces: list[tuple[int, FloatArray]], n: int) -> tuple[Fl
 
 @lru_cache(maxsize=4)
 def find_lines(obs: Observations, p_limit: float = 1e-4) -> list[Line]:
-    """Lines that stand out of the smooth spectrum of the holds, one at most per channel."""
+    """Lines that stand out of the smooth spectrum of the poses, one at most per channel."""
     pieces = pose_pieces(obs)
     if not pieces:
         return []
@@ -162,7 +162,7 @@ def _refine(
     p: float,
     density: float,
 ) -> Line | None:
-    """Frequency and amplitude by coherent least squares over all holds; half of each hold predicts the other half."""
+    """Frequency and amplitude by coherent least squares over all poses; half of each pose predicts the other half."""
     t = np.concatenate([obs.time_s[a : a + len(x)] for a, x in pieces])
     x = np.concatenate([part[:, c] for _, part in pieces])
     early = np.concatenate([np.arange(len(part)) < len(part) // 2 for _, part in pieces])
@@ -256,7 +256,7 @@ def project_piece(t: FloatArray, x: FloatArray, f: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PoseScatter:
-    """Fast scatter of every hold against the common level: variances ``ratio`` (holds, channels), ``dof`` (holds,)."""
+    """Fast scatter of every pose against the common level: variances ``ratio`` (poses, channels), ``dof`` (poses,)."""
 
     ratio: FloatArray
     dof: FloatArray
@@ -265,7 +265,7 @@ class PoseScatter:
 
 @lru_cache(maxsize=4)
 def pose_scatter(obs: Observations) -> PoseScatter:
-    """Variance of first differences per hold over the median of all: blind to slow drift, sharp on shaking."""
+    """Variance of first differences per pose over the median of all: blind to slow drift, sharp on shaking."""
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     ratio, dof = [], []
     for hold in obs.segments.poses:

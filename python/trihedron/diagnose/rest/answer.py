@@ -9,7 +9,7 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
@@ -30,7 +30,6 @@ from trihedron.session.noise import NOISE_CORNER_S
 from trihedron.units import rate_to_si
 
 Sensor = Literal["accelerometer", "gyroscope"]
-AXES = ("x", "y", "z")
 PREFIX: dict[Sensor, str] = {"accelerometer": "accel", "gyroscope": "gyro"}
 DOMAIN: dict[Sensor, Domain] = {"accelerometer": "static-accel", "gyroscope": "static-gyro"}
 BEYOND_NOISE = 3.0
@@ -252,7 +251,7 @@ def _model(variant: str, series: Mapping[str, Any]) -> MappingProxyType[str, Any
 
 
 def _drift(pieces: RestPieces, sensor: Sensor) -> tuple[DriftCurve | None, float, bool]:
-    """The curve of zeros that change slowly, p of any slow change, and whether a walk alone does not make it.
+    """The curve of biases that change slowly, p of any slow change, and whether a walk alone does not make it.
 
     ``None`` where they do not change slowly. A walk is what every sensor's noise becomes; a smooth drift is not.
     """

@@ -1,4 +1,4 @@
-"""What the recording says, arranged for the twin: hold means with their noise, and the samples of every move."""
+"""What the recording says, arranged for the twin: pose means with their noise, and the samples of every move."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ class Observations:
 
     ``segments`` has its poses cut at bumps, ``whole`` as they were found.
     ``raw_force`` (n, 3), ``raw_rate`` (n, 3) are raw readings minus ``force_origin`` / ``rate_origin`` (the mean over
-    the holds): counts around 32768 would cost the normal equations ten digits. ``pose_force``, ``pose_rate`` (h, 3) are
-    the centred hold means, ``pose_force_sigma``, ``pose_rate_sigma`` (h, 3) their standard errors. ``move_ranges`` are
-    half-open sample ranges that include the last sample of the hold before and the first of the hold after, so that
-    neighbouring still samples bracket the whole motion; ``move_poses`` (m, 2) their holds. ``force_density`` and
+    the poses): counts around 32768 would cost the normal equations ten digits. ``pose_force``, ``pose_rate`` (h, 3) are
+    the centred pose means, ``pose_force_sigma``, ``pose_rate_sigma`` (h, 3) their standard errors. ``move_ranges`` are
+    half-open sample ranges that include the last sample of the pose before and the first of the pose after, so that
+    neighbouring still samples bracket the whole motion; ``move_poses`` (m, 2) their poses. ``force_density`` and
     ``rate_density`` (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sample instants about
     their timestamps, once a diagnosis has found it; ``bumped_s`` are stretches of poses that were seen disturbed.
-    ``unresolved`` maps a move's two holds to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
+    ``unresolved`` maps a move's two poses to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
     by motion faster than the samples, by noise slower than a move and by shaking that stands in a pose's end.
     ``pose_settling`` (h, 3), once it was seen: by how much (one sigma,
     raw units) poses turn that settle; it is in ``pose_rate_sigma``.
@@ -104,13 +104,13 @@ class Observations:
 
     @cached_property
     def _still(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], FloatArray]:
-        """Samples of all holds one after the other, the first of each among them, and how many each has."""
+        """Samples of all poses one after the other, the first of each among them, and how many each has."""
         samples = [hold.samples() for hold in self.segments.poses]
         lengths = np.array([len(one) for one in samples])
         return np.concatenate(samples), np.cumsum(lengths) - lengths, lengths.astype(np.float64)
 
     def pose_means(self, samples: FloatArray) -> FloatArray:
-        """(holds, ...) means over each hold of a whole-recording signal (n, ...), missing readings left out."""
+        """(poses, ...) means over each pose of a whole-recording signal (n, ...), missing readings left out."""
         index, first, n = self._still
         values = samples[index]
         sums = np.add.reduceat(values, first, axis=0)
@@ -123,11 +123,11 @@ class Observations:
 
     @cached_property
     def half_means(self) -> tuple[FloatArray, FloatArray | None]:
-        """(holds, 2, 3) raw means over the first and the second half of every hold, accelerometer and gyro."""
+        """(poses, 2, 3) raw means over the first and the second half of every pose, accelerometer and gyro."""
         return self.part_means(2)
 
     def part_means(self, parts: int) -> tuple[FloatArray, FloatArray | None]:
-        """(holds, parts, 3) the same over that many equal parts."""
+        """(poses, parts, 3) the same over that many equal parts."""
 
         def of(raw: FloatArray) -> FloatArray:
             every = [np.array_split(raw[hold.start : hold.stop], parts) for hold in self.segments.poses]
@@ -137,7 +137,7 @@ class Observations:
 
     @cached_property
     def pose_scatter(self) -> FloatArray:
-        """(holds, 3, 3) covariance of raw accelerometer readings inside every hold; NaN where some are missing."""
+        """(poses, 3, 3) covariance of raw accelerometer readings inside every pose; NaN where some are missing."""
         out = np.empty((self.n_poses, 3, 3))
         for i, hold in enumerate(self.segments.poses):
             away = self.raw_force[hold.start : hold.stop]
@@ -237,7 +237,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
 
 
 def _turned_at_ends(rate_sigma: FloatArray, lasts_s: FloatArray) -> FloatArray:
-    """(holds, 3) variance, (raw unit · s)², of the angle between a pose's mean and its end where it was not still.
+    """(poses, 3) variance, (raw unit · s)², of the angle between a pose's mean and its end where it was not still.
 
     A rate that changes inside a pose (the tail of a move, a push) makes its mean uncertain, and turns its ends away
     from its middle by as much, times half of the pose. Poses with the session's usual noise have none.

@@ -72,12 +72,12 @@ class Fit:
         return self.line.core.log_marginal
 
     def covariance(self) -> FloatArray:
-        """(18 + effects, same) covariance of what all holds share: S_a lower, b_a, S_w on centred readings, effects."""
+        """(18 + effects, same) covariance of what all poses share: S_a lower, b_a, S_w on centred readings, effects."""
         return self.line.core.border_covariance()
 
     @cached_property
     def linear(self) -> tuple[FloatArray, FloatArray]:
-        """(24, 24) covariance of ``(S_a, b_a, S_w, b_w)`` on raw readings; ``b_w`` with one zero for the session.
+        """(24, 24) covariance of ``(S_a, b_a, S_w, b_w)`` on raw readings; ``b_w`` with one bias for the session.
 
         Error bars allow for zeros that scatter, as those of a calibration do (eq. 11.12b).
         """

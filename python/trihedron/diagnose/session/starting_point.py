@@ -42,7 +42,7 @@ def lower_frame(S: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def start_twin(obs: Observations, calibration: Calibration) -> Twin:
-    """The calibration in the lower frame on centred readings, every hold at its measured vertical and bias."""
+    """The calibration in the lower frame on centred readings, every pose at its measured vertical and bias."""
     Q, L = lower_frame(calibration.accelerometer.S)
     b = Q.T @ calibration.accelerometer.b + L @ obs.force_origin
     gyro_S = np.eye(3) if calibration.gyroscope is None else Q.T @ calibration.gyroscope.S
@@ -167,7 +167,7 @@ def prior_of(obs: Observations, calibration: Calibration) -> Prior:
 
 
 def linear_model(fitted: Fit) -> LinearModel:
-    """S, b of both sensors from a fitted session, with standard errors, on raw readings; one zero for the session."""
+    """S, b of both sensors from a fitted session, with standard errors, on raw readings; one bias for the session."""
     twin, obs = fitted.twin, fitted.line.obs
     covariance, gyro_b = fitted.linear
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))

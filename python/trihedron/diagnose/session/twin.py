@@ -23,7 +23,7 @@ STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)
 
 _LOWER: tuple[tuple[int, int], ...] = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
 N_ACCEL, N_GYRO = 9, 9
-"""Unknowns that all holds share: accelerometer, gyro."""
+"""Unknowns that all poses share: accelerometer, gyro."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Twin:
-    """State of the model. ``accel_S``, ``accel_b``, ``gyro_S`` act on centred raw readings; the rest is per hold.
+    """State of the model. ``accel_S``, ``accel_b``, ``gyro_S`` act on centred raw readings; the rest is per pose.
 
     Biases are in SI; ``strengths`` are those of the session's noise.
     """
@@ -60,7 +60,7 @@ class Twin:
 class Distortion:
     """What effects add to the corrected readings, linear in their parameters: SI, instrument frame.
 
-    ``force`` and ``rate`` (points, 3, K) or None, at the points of :class:`Trajectory` (holds, then move samples).
+    ``force`` and ``rate`` (points, 3, K) or None, at the points of :class:`Trajectory` (poses, then move samples).
     """
 
     force: FloatArray | None
@@ -98,7 +98,7 @@ def stacked(parts: list[Distortion]) -> Distortion:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """The motion as the twin sees it, at its *points*: one per hold, then every sample of every move.
+    """The motion as the twin sees it, at its *points*: one per pose, then every sample of every move.
 
     ``force`` (points, 3) specific force and ``rate`` (points, 3) angular rate in SI, corrected by the twin (distortions
     of accepted effects removed); ``attitude`` (move samples, 3, 3) rotation since the move began; ``move_slices`` the
@@ -116,7 +116,7 @@ class Trajectory:
 class System:
     """Whitened residuals of a fit and their labels, (rows,) each.
 
-    ``domain`` and ``segment`` (number of the hold or move) say what a row judges, ``channel`` its axis; ``walk`` is 0
+    ``domain`` and ``segment`` (number of the pose or move) say what a row judges, ``channel`` its axis; ``walk`` is 0
     for readings, 1 and 2 for walks of the accelerometer's and the gyro's bias, more for what else is not a reading.
     """
 
@@ -156,14 +156,14 @@ class Linearisation:
 
     @cached_property
     def accel_white(self) -> FloatArray:
-        """(holds, 3, 3) from an error in SI to a whitened row of the accelerometer at rest."""
+        """(poses, 3, 3) from an error in SI to a whitened row of the accelerometer at rest."""
         inverse = np.linalg.inv(self.twin.accel_S)
         white: FloatArray = core_poses(self.obs).force_white() @ inverse
         return white
 
     @cached_property
     def gyro_white(self) -> FloatArray | None:
-        """(holds, 3, 3) the same of the gyro; ``None`` without one."""
+        """(poses, 3, 3) the same of the gyro; ``None`` without one."""
         if self.obs.pose_rate_sigma is None:
             return None
         inverse = np.linalg.inv(self.twin.gyro_S)

@@ -58,7 +58,7 @@ def opposite_headings(
     # Turns of one placement hear one uneven table: their errors are not averaged.
     variance = np.array([np.mean([v for _, v in found[k]], axis=0) for k in poses.tolist()])
     at_rest = np.asarray(sigma)[poses] ** 2
-    # The mean of both headings is as uncertain as the hold and A: it stands in both.
+    # The mean of both headings is as uncertain as the pose and A: it stands in both.
     noise = 3.0 * at_rest + 4.0 * variance
     return OppositeHeadings(mean[poses] - 2.0 * lean, np.einsum("ni,ij->nij", noise, np.eye(3)), poses)
 

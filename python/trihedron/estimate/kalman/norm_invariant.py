@@ -87,7 +87,7 @@ class LiveNormCalibration:
         relinearise: bool = True,
         look_ahead: int = 50,
     ) -> LiveEstimate:
-        """Take the mean raw reading (3,) of one hold and say where things stand.
+        """Take the mean raw reading (3,) of one pose and say where things stand.
 
         ``relinearise`` repeats the run over all poses at the latest constants (milliseconds). ``next_reference`` of the
         answer is a direction of specific force in the body frame; ``constants`` are rows of ``[S | b]``.

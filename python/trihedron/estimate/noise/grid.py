@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.records import Recording
 from trihedron.units import acceleration_to_si, rate_to_si
-
-AXES = ("x", "y", "z")
 
 
 def refuse_size_of_a_unit(sensor: str, unit: str, size: float | None) -> None:

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.estimate.reference.accelerometer import ForceFit, fit_accelerometer, force_along
 from trihedron.estimate.reference.beside import Beside, Point
 from trihedron.estimate.reference.bias import bias_over_time
@@ -41,7 +41,6 @@ FORCE_WINDOW_S = 0.1
 """Forces are compared up to 5 Hz: beyond it a position differentiated twice is noise."""
 TURNED_ROUND = 0.2
 """Beyond this part of the motion left the other direction is tried: shared motion leaves some hundredths."""
-AXES = ("x", "y", "z")
 UNITS = {
     "gyro-g-sensitivity": "(rad/s)/(m/s^2)",
     "gyro-scale-nonlinearity": "1/(rad/s), 1/(rad/s)^2",

@@ -115,7 +115,7 @@ class Scored:
         own = next(own for own in self.fitted.places if all(name in own for name in names))
         at = np.concatenate([own[name] for name in names])
         prior = np.eye(len(at))
-        told = np.linalg.eigvalsh(np.linalg.inv(self.fitted.fitted.covariance[np.ix_(at, at)]) - prior)
+        told: FloatArray = np.linalg.eigvalsh(np.linalg.inv(self.fitted.fitted.covariance[np.ix_(at, at)]) - prior)
         told = np.maximum(told, 0.0) / self.wider**2
 
         def short(size: float) -> float:

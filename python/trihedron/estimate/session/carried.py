@@ -45,7 +45,7 @@ def carried(
     S_w: FloatArray,
     covariance_S_w: FloatArray | None = None,
 ) -> Carried:
-    """``B f_i - f_j`` of every move with the hold means at both ends, each hold with a zero of its own.
+    """``B f_i - f_j`` of every move with the pose means at both ends, each pose with a bias of its own.
 
     The one definition of gravity after moves: in sample, held out, and of a calibration held against another session.
     ``covariance_S_w`` (9, 9) is that of S_w row by row.

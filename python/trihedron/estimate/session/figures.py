@@ -1,6 +1,6 @@
 """The published figures of a calibration, in sample and held out: always those of the saved S and b.
 
-Norm of gravity at rest with one zero for the session; gravity carried through each move with a zero per pose.
+Norm of gravity at rest with one bias for the session; gravity carried through each move with a bias per pose.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ N_ACCELEROMETER, N_GYROSCOPE = 9, 9
 def norm_quality(
     observed: Observed, solution: SessionSolution, held: FloatArray | None, held_sigma: FloatArray | None
 ) -> FitQuality:
-    """Norm of every hold at the saved S, b of the accelerometer; ``held`` (n,) is that of fits without the hold."""
+    """Norm of every pose at the saved S, b of the accelerometer; ``held`` (n,) is that of fits without the pose."""
     residual, sigma = norm_errors(observed, solution.S_a, solution.b_a)
     dof = max(len(residual) - N_ACCELEROMETER, 0)
     total, chi2 = float(np.sum(residual**2)), float(np.sum((residual / np.maximum(sigma, 1e-300)) ** 2))
@@ -56,7 +56,7 @@ def norm_errors(observed: Observed, S_a: FloatArray, b_a: FloatArray) -> tuple[F
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """What fits without them leave of every hold's norm (n,) with its sigma, and of every move."""
+    """What fits without them leave of every pose's norm (n,) with its sigma, and of every move."""
 
     norm: FloatArray
     norm_sigma: FloatArray

@@ -1,4 +1,4 @@
-"""What the session model is given: hold means, moves and their noise, centred, in raw units."""
+"""What the session model is given: pose means, moves and their noise, centred, in raw units."""
 
 from __future__ import annotations
 

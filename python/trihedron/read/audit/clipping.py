@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from trihedron.arrays import AXES
 from trihedron.records import Finding, FindingCode
 from trihedron.records.channel_facts import Limit
 
 Place = Callable[[int], str]
-AXES = "xyz"
 
 
 def short(sensor: str) -> str:

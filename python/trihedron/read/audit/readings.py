@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.quiet import Windows
-from trihedron.read.audit.clipping import AXES, audit_clipping, short
+from trihedron.read.audit.clipping import audit_clipping, short
 from trihedron.read.audit.repeats import Repeats, longest_by_chance
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.records.channel_facts import ChannelFacts

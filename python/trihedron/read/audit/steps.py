@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from trihedron.arrays import AXES
 from trihedron.channel_facts.quiet import Windows
-from trihedron.read.audit.clipping import AXES, short
+from trihedron.read.audit.clipping import short
 from trihedron.records import Finding, FindingCode
 from trihedron.records.channel_facts import ChannelFacts
 from trihedron.units import (

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from trihedron.arrays import AXES
 from trihedron.read.errors import ReadError
 from trihedron.read.text.dialect import Rewritten
 
 _TIMESTAMPS = ("timestamp", "time", "t")
-_AXES = "xyz"
 
 
 def is_json(text: str) -> bool:
@@ -165,7 +165,7 @@ def _flat(value: Mapping[str, Any], prefix: str = "") -> Row:
         if isinstance(leaf, Mapping):
             out |= _flat(leaf, f"{name}.")
         elif isinstance(leaf, list) and len(leaf) == 3 and _are_numbers(leaf):
-            out |= {f"{name}.{axis}": v for axis, v in zip(_AXES, leaf, strict=True)}
+            out |= {f"{name}.{axis}": v for axis, v in zip(AXES, leaf, strict=True)}
         else:
             out[name] = leaf
     return out
