@@ -115,12 +115,12 @@ class Scored:
         own = next(own for own in self.fitted.places if all(name in own for name in names))
         at = np.concatenate([own[name] for name in names])
         prior = np.eye(len(at))
-        told: FloatArray = np.linalg.eigvalsh(np.linalg.inv(self.fitted.fitted.covariance[np.ix_(at, at)]) - prior)
+        told = np.linalg.eigvalsh(np.linalg.inv(self.fitted.fitted.covariance[np.ix_(at, at)]) - prior)
         told = np.maximum(told, 0.0) / self.wider**2
 
         def short(size: float) -> float:
             gain = told * size**2
-            return float(np.sum(gain - np.log1p(gain))) - PAID - ACCEPTED
+            return float(np.sum(gain - np.log1p(gain)) - PAID - ACCEPTED)
 
         return float(brentq(short, 0.0, LARGEST)) if short(LARGEST) > 0.0 else float("inf")
 
