@@ -490,3 +490,11 @@ def test_labels_in_every_script_are_read_and_none_takes_anothers_place(tmp_path,
     recording = read_recording(log)
     np.testing.assert_allclose(recording.accelerometer, readings[0], atol=1e-5)
     np.testing.assert_allclose(recording.gyroscope, readings[1], atol=1e-5)
+
+
+def test_long_rows_of_whole_numbers_beside_another_cell_are_judged_at_once(tmp_path):
+    # Each cell of 8 digits that could be divided in eight ways, 30 of them: more ways than any reader has time for.
+    row = "\t".join(["12345678"] * 30 + ["59,93"])
+    (tmp_path / "log.txt").write_text("\n".join([row] * 20) + "\n")
+    with pytest.raises(ReadError):
+        read_recording(tmp_path / "log.txt")

@@ -12,9 +12,10 @@ COMMENT_STARTS = ("#", "%", "//")
 MISSING = frozenset({"", "na", "n/a", "null", "none", "nan", "-", "--", "?", "#n/a", "missing"})
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
 _NUMBER_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
+# Every digit in one place only: a cell that is no number must not make the others be tried in all their divisions.
 _NUMBERS, _NUMBERS_COMMA = (
     re.compile(
-        rf"(?:[+-]?(?:(?:\d+{mark}?\d*|{mark}\d+)(?:[eE][+-]?\d+)?|nan|inf|infinity)(?:\n|\Z))+\Z", re.IGNORECASE
+        rf"(?:[+-]?(?:(?:\d+(?:{mark}\d*)?|{mark}\d+)(?:[eE][+-]?\d+)?|nan|inf|infinity)(?:\n|\Z))+\Z", re.IGNORECASE
     )
     for mark in (r"\.", ",")
 )
