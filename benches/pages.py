@@ -7,6 +7,7 @@ Everything is simulated with fixed seeds; needs Chromium and the extra ``test``.
 
 from __future__ import annotations
 
+import os
 import shutil
 import tempfile
 from dataclasses import replace
@@ -65,7 +66,7 @@ def photograph(found: dict[str, Path]) -> None:
         for name, path in found.items():
             for width, height, scheme in VIEWS if name in ON_A_PHONE else VIEWS[:1]:
                 view = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
-                view.goto(path.as_uri())
+                view.goto(path.resolve().as_uri())
                 view.screenshot(path=FIGURES / f"page_{name}{'' if scheme == 'light' else '_phone'}.png")
                 view.close()
             print(f"{name:16s}{path.stat().st_size / 1000:6.0f} kB")
@@ -74,4 +75,6 @@ def photograph(found: dict[str, Path]) -> None:
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as place:
-        photograph(pages(Path(place)))
+        # Names in the pages are those of a working folder.
+        os.chdir(place)
+        photograph(pages(Path()))

@@ -50,6 +50,7 @@ OUTPUTS = {
         ["simulate", "s.toml", "-o", "x.csv", "--truth"],
     ],
     "guide": [["guide", "log.csv", "-o"]],
+    "report": [["report", "n.json", "--report"]],
 }
 NO_INPUT_FILE = {"demo", "plan", "ports", "capture"}
 # Writes a folder of its own; tests/test_fleet.py says what it does to one that exists.

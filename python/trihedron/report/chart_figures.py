@@ -26,14 +26,16 @@ FEW_DECADES = 100.0
 
 
 def draw_onto(chart: Callable[[], Chart], axes: Sequence[Axes]) -> Figure:
-    """The panels of a chart on axes of the caller's own, one for each.
+    """The panels of a chart on axes of the caller's own, one for each; on a single one the first.
 
     Raises
     ------
     ValueError
-        When there are not as many axes as panels.
+        When there are several axes, but not as many as panels.
     """
     laid_out = [panel for panel in chart().panels if isinstance(panel, Panel)]
+    if len(axes) == 1:
+        laid_out = laid_out[:1]
     if len(axes) != len(laid_out):
         raise RefusedError(f"this figure needs {len(laid_out)} axes, one a panel; ax has {len(axes)}.")
     for axis, panel in zip(axes, laid_out, strict=True):
