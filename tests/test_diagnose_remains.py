@@ -111,7 +111,9 @@ def test_an_effect_that_changes_one_sensor_inside_poses_leaves_the_other_judged(
     monkeypatch.setattr(goodness_of_fit, "jumps_in_poses", lambda _obs: found)
     changed = np.zeros((2, 3))
     for force, rate, accel, gyro in ((changed, None, 1.0, 0.3), (None, changed, 0.2, 1.0), (None, None, 0.2, 0.3)):
-        line = SimpleNamespace(distortion=SimpleNamespace(force=force, rate=rate), obs=SimpleNamespace(time_s=()))
+        line = SimpleNamespace(
+            distortion=SimpleNamespace(force=force, rate=rate), obs=SimpleNamespace(time_s=(), pose_names=tuple)
+        )
         line.obs.segments = SimpleNamespace(poses=())
         p_values = [
             goodness_of_fit._inside_poses(SimpleNamespace(line=line), k)[0] for k in (STATIC_ACCEL, STATIC_GYRO)

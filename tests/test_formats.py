@@ -16,7 +16,7 @@ from trihedron.files.formats.parsing import yaml_of
 from trihedron.records import Calibration
 from trihedron.sensor_model import in_frame
 
-READ = [name for name, one in formats().items() if one.read is not None]
+READ = [name for name, one in formats().items() if one.read is not None and one.write is not None]
 
 
 def read_back(known, target, folder):

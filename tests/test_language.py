@@ -58,7 +58,7 @@ RETIRED = {
     r"\b(bumped|pushed) poses?\b|\bposes? (was|were) (bumped|pushed)\b": "disturbed pose",
     r"\bwhat (was|is|it|the model|a model) left out\b|\bleft out of (the|a|your) model\b": "missing effects",
     r"(?<!power )(?<!power-)\blaws?\b": "empirical relation",
-    r"(?<!digital )\btwins?\b": "session state; digital twin of simulate",
+    r"(?<!digital )(?<!trihedron\.)\btwins?\b": "session state; digital twin of simulate",
     r"\b[afw]['′]\d|\b[af]\d =|\bS[123][123]\b|(?<!its )\bax[ei]s [123]\b|\bpoints? half (up|down)\b": "X, Y, Z, S_xx",
     r"\binstrument trihedron\b": "body frame",
     r"\b(taken|takes?) off\b": "compensate",

@@ -59,7 +59,7 @@ def test_the_table_names_every_term_and_the_files_hold_the_same(log, tmp_path, c
     rows = list(csv.reader(io.StringIO(files["csv"].read_text())))
     assert len(rows) == 1 + len(document["curve"]["tau_s"])
     assert files["png"].read_bytes().startswith(b"\x89PNG")
-    assert files["html"].read_text().count("<figure id=") == 2
+    assert files["html"].read_text().count("<figure id=") == 3  # both sensors, then each
 
 
 def test_slow_noise_that_is_neither_flicker_nor_walk_is_said_so(tmp_path, capsys):

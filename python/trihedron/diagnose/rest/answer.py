@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType, SimpleNamespace
 from typing import Any, Literal, cast
@@ -46,6 +46,10 @@ class _Samples:
     raw_force: FloatArray
     raw_rate: FloatArray | None
     segments: Any
+
+    def pose_names(self, which: Iterable[int]) -> tuple[str, ...]:
+        """Stretches at rest by their number from 1."""
+        return tuple(f"pose {i + 1}" for i in which)
 
 
 def diagnose_rest(recording: Recording, model: LinearModel, gravity_m_s2: float, alpha: float) -> Diagnosis:
