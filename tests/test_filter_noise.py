@@ -83,6 +83,9 @@ def test_strengths_lie_within_their_intervals():
         low, high = np.quantile(found.draws[:, NAMES.index(name)], [0.005, 0.995])
         assert low < true < high, name
     assert np.all(found.draws[:, 1] == 0.0)
+    # A part that left one draw that counts has no covariance to begin from.
+    one = replace(found, coordinates=np.repeat(found.coordinates[:1], 400, axis=0), n_effective=1.0)
+    assert fit([drawn(3)], prior, one).n_effective == found.n_effective
 
 
 def turning(m, ratios, seed):

@@ -25,8 +25,9 @@ def cap_threads() -> None:
 def side_by_side(make: Callable[[Given], Made], given: Iterable[Given]) -> list[Made]:
     """``make`` of each, as many at a time as the core may start threads: fits that do not need one another."""
     work = list(given)
-    allowed = os.environ.get("RAYON_NUM_THREADS", "").strip()
-    n = min(int(allowed) if allowed.isdecimal() and int(allowed) else os.cpu_count() or 1, len(work))
+    asked = os.environ.get("RAYON_NUM_THREADS", "").strip()
+    allowed = int(asked) if asked.isdecimal() and int(asked) > 0 else os.cpu_count() or 1
+    n = min(allowed, len(work))
     if n <= 1:
         return [make(one) for one in work]
     with ThreadPoolExecutor(n) as pool:

@@ -8,8 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import read, segment
@@ -21,21 +19,18 @@ from trihedron.api.referring import (
     held_against,
 )
 from trihedron.errors import REFUSALS, RefusedError
-from trihedron.estimate.reference import moves_along
+from trihedron.estimate.reference import moves_along, poses_at_rest
 from trihedron.read.reference import of_recording
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
+from trihedron.records import Calibration, Finding, FindingCode, Recording
 from trihedron.records.reference import AgainstReference
 from trihedron.records.results import DiagnosisResult
 from trihedron.records.words import words
 from trihedron.sensor_model import correct
-from trihedron.units import AccelerationUnit, RateUnit, radians_from_degrees, rate_to_si
+from trihedron.units import AccelerationUnit, RateUnit, rate_to_si
 
 ANOTHER_UNIT = "the log of another unit"
 FEWEST_POSES = 9
 """Nine numbers of an accelerometer need nine poses: with fewer the poses have no model to hold against anything."""
-
-TURNING = radians_from_degrees(0.5)
-"""A body that turns faster lies in no pose: gravity leaves its place by a hundredth of g within a second or so."""
 
 
 def beside(
@@ -62,7 +57,7 @@ def beside(
     found = held_against(recording, reference, gravity, columns=columns, given=given)
     segments = segment(recording)
     try:
-        resting = _n_resting(segments, found)
+        resting = poses_at_rest(segments, found.gyroscope)
         if resting < FEWEST_POSES:
             raise RefusedError(f"{resting} poses are too few for a model of their own")
         result = ordinary()
@@ -96,14 +91,6 @@ def beside(
     return replace(
         result, verdict=verdict, effects=effects, reference=found, findings=(*result.findings, *found.findings)
     )
-
-
-def _n_resting(segments: Segments, found: AgainstReference) -> int:
-    """Poses in which the unit rested: a vehicle in steady flight reads as evenly as one on a table, and turns."""
-    if segments.gyroscope_mean is None:
-        return segments.n_poses
-    rate = segments.gyroscope_mean @ found.gyroscope.S.T + found.gyroscope.b
-    return int(np.count_nonzero(np.linalg.norm(rate, axis=1) < TURNING))
 
 
 def in_si(log: Recording, gravity: float | None) -> Recording:

@@ -25,6 +25,8 @@ LOWEST = -1e7
 """Stands for the log posterior where a covariance is singular."""
 ROUNDS, PROPOSED, DRAWN = 6, 100, 400
 """Rounds of proposals, proposals of each, and draws that are made of them."""
+LEAST_DRAWS = 3
+"""Independent draws for each strength below which their covariance is too narrow, or singular, to propose from."""
 TAILS = 5.0
 """Degrees of freedom of a proposal: heavier tails than a posterior's."""
 TIMES_S = (10.0, 30.0, 100.0)
@@ -98,7 +100,7 @@ def fit(stretches: Sequence[Stretch], prior: Prior, near: Fitted | None = None) 
     """Posterior of the strengths by importance: each round's proposals are Student's with the moments of all before,
     and every proposal counts against the mixture of all rounds (Cornuet et al. 2012); ``near`` is a fit of a part.
     """
-    if near is None:
+    if near is None or near.n_effective < LEAST_DRAWS * near.coordinates.shape[1]:
         middle = most_likely(stretches, prior)
         first = np.linalg.inv(_curvature(stretches, prior, middle))
     else:
@@ -117,7 +119,7 @@ def fit(stretches: Sequence[Stretch], prior: Prior, near: Fitted | None = None) 
         weights = np.exp(logs - logs.max())
         weights /= weights.sum()
         # Few that count would make the next proposal too narrow: flatter weights until there are enough.
-        flat = weights if _effective(weights) > 3 * len(middle) else np.sqrt(weights) / np.sqrt(weights).sum()
+        flat = weights if _effective(weights) > LEAST_DRAWS * len(middle) else np.sqrt(weights) / np.sqrt(weights).sum()
         middle = flat @ x
         spread = ((x - middle).T * flat) @ (x - middle) + 0.02 * first
     norm = 0.5 * len(middle) * np.log(2.0 * np.pi) + np.sum(np.log(prior.sigma[prior.is_there > 0.0]))

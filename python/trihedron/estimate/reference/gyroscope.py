@@ -10,10 +10,14 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.reference.coloured import NoiseModel, Solution, solve
 from trihedron.estimate.reference.together import Grid, Reference
 from trihedron.estimate.reference.windows import Windows
+from trihedron.records import Segments
+from trihedron.records.reference import FitToReference
 
 WHITE = NoiseModel(grows=False, order=0)
 TURNS = 6
 """Gauss-Newton steps of the clock: from a sample off, three reach a microsecond."""
+TURNING_RAD_S = np.radians(0.5)
+"""A body that turns faster lies in no pose: gravity leaves its place by a hundredth of g within a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,3 +114,11 @@ def _vector(D: FloatArray) -> FloatArray:
     """(k, 3) axial vector of the skew part of (k, 3, 3)."""
     out = 0.5 * np.stack([D[:, 2, 1] - D[:, 1, 2], D[:, 0, 2] - D[:, 2, 0], D[:, 1, 0] - D[:, 0, 1]], axis=1)
     return np.asarray(out, dtype=np.float64)
+
+
+def poses_at_rest(segments: Segments, gyroscope: FitToReference) -> int:
+    """Poses in which the unit rested: a vehicle in steady flight reads as evenly as one on a table, and turns."""
+    if segments.gyroscope_mean is None:
+        return segments.n_poses
+    rate = segments.gyroscope_mean @ gyroscope.S.T + gyroscope.b
+    return int(np.count_nonzero(np.linalg.norm(rate, axis=1) < TURNING_RAD_S))
