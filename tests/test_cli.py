@@ -127,6 +127,7 @@ def test_two_files_with_clocks_of_their_own_are_merged(recording, tmp_path, caps
     assert "Gyroscope" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_simulations")
 def test_the_demonstration_writes_its_files_and_never_over_others(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -146,7 +146,7 @@ def test_one_of_six_devices_far_off_is_seen_and_sound_fleets_have_none(tmp_path)
     found, alarms = 0, 0
     # Kinds of numbers with sizes of their own, axes of one kind made alike.
     sizes = np.repeat([0.3, 0.01, 0.01, 0.02, 0.01, 0.01, 0.01], 3)
-    for _ in range(150):
+    for _ in range(40):
         numbers = rng.normal(size=(6, 21)) * sizes
         rows = [row(f"u{k}", str(k), one) for k, one in enumerate(numbers)]
         alarms += bool(summarise(rows, tmp_path).summary.outliers)
@@ -154,9 +154,9 @@ def test_one_of_six_devices_far_off_is_seen_and_sound_fleets_have_none(tmp_path)
         numbers[k, j] += 8.0 * sizes[j]
         strays = summarise([row(f"u{k}", str(k), one) for k, one in enumerate(numbers)], tmp_path).summary.outliers
         found += (f"u{k}", j) in [(one.serial, PARAMETERS.index(one.parameter)) for one in strays]
-    # One in a hundred sound fleets: 1.5 expected. Of the strays three in four: by each axis alone one in fifteen.
-    assert alarms <= 6
-    assert found >= 90
+    # One in a hundred sound fleets: 0.4 expected. Of the strays three in four: by each axis alone one in fifteen.
+    assert alarms <= 3
+    assert found >= 22
 
 
 def test_logs_of_two_units_in_one_folder_are_not_one_device(tmp_path):

@@ -13,6 +13,7 @@ G = 9.80665
 CHANGE = (0.05, -0.08, 0.06)
 
 
+@pytest.mark.slow
 def test_a_straight_drift_is_carried_into_the_improved_scenario(tmp_path, monkeypatch):
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(4)

@@ -54,7 +54,7 @@ def fine_unit(seed, earth=None):
 
 def test_the_earths_rate_is_told_with_its_direction_and_is_neither_a_zero_nor_a_g_sensitivity():
     z, seen = [], []
-    for seed in range(3):
+    for seed in range(2):
         trial, found = fine_unit(seed, NORTH_OF_48_DEG)
         z.append(z_of(found, trial)[9:])
         assert found.earth_rate is not None
@@ -64,7 +64,7 @@ def test_the_earths_rate_is_told_with_its_direction_and_is_neither_a_zero_nor_a_
             np.abs(found.earth_rate.value - NORTH_OF_48_DEG) < 4.5 * found.earth_rate.std + 0.02 * EARTH_RAD_S
         )
         assert max(e.score for e in found.effects.values()) < 8.0
-    # Nine zeros; before the Earth was a part of the model they stood 4.5 uncertainties off (rms of 24).
+    # Six zeros; before the Earth was a part of the model they stood 4.5 uncertainties off (rms of 24).
     assert np.sqrt(np.mean(np.square(z))) < 2.0
     lean = np.degrees(np.arcsin(np.mean(seen, axis=0)[2] / EARTH_RAD_S))
     assert abs(lean - 48.0) < 10.0
@@ -88,10 +88,10 @@ def test_an_earths_rate_that_the_log_cannot_tell_is_in_the_uncertainty_of_the_bi
 
 
 def test_error_bars_of_a_wobbling_table_cover_the_truth():
-    z = np.array([z_of(fit_reference(t.log, t.motion, G), t) for t in (measured_table(500 + k, 45) for k in range(6))])
-    # 72 numbers, not independent: 68 % within one sigma, less four standard errors of 12 independent ones a run.
-    assert np.mean(np.abs(z) < 1.0) > 0.45
-    assert np.mean(np.abs(z) < 2.0) > 0.83
+    z = np.array([z_of(fit_reference(t.log, t.motion, G), t) for t in (measured_table(500 + k, 45) for k in range(4))])
+    # 48 numbers, not independent: 68 % within one sigma, less four standard errors of 12 independent ones a run.
+    assert np.mean(np.abs(z) < 1.0) > 0.4
+    assert np.mean(np.abs(z) < 2.0) > 0.8
 
 
 def test_commands_of_a_rate_table_are_enough():
@@ -200,7 +200,7 @@ def test_a_clock_that_jumps_late_is_refused_with_the_place(seed, by_s):
 
 
 def test_no_part_of_a_sound_reference_is_called_elsewhere_however_noisy():
-    for seed in range(70, 74):
+    for seed in range(70, 72):
         trial = tracked(seed, sigma_deg=0.3)
         assert fit_reference(trial.log, trial.motion, G).overlap_s > 40.0
 
