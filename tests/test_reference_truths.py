@@ -71,3 +71,16 @@ def test_stretches_of_even_flight_are_no_poses(real_data):
     found = trihedron.diagnose(log, reference=beside, gravity_m_s2=9.807)
     assert found.verdict == "consistent"
     assert not found.effects
+
+
+def test_a_truth_that_wanders_in_the_body_leaves_the_accelerometer_within_its_uncertainty():
+    # The gyro tells how the truth's error of 0.85° changes, and no motion tells its mean: that turns both sensors.
+    trial = truth(1006, "walk", has_path=True)
+    found = fit_reference(trial.log, trial.motion, G)
+    S = np.linalg.inv(trial.unit.N)
+    off = found.accelerometer.S - S
+    sigma = np.sqrt(np.diag(found.accelerometer.covariance)[:9])
+    assert np.abs(off.ravel() / sigma).max() < 4.5  # 9 with the truth's attitudes as they are
+    # A turn of all axes is not known to half a degree, and scales are to some 1e-4.
+    assert np.degrees(np.sqrt(np.trace(found.frame_covariance))) > 0.3
+    assert np.abs(np.diag(off @ trial.unit.N)).max() < 1e-3

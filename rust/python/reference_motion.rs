@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use super::arrays::{
     as_vectors, dmatrix, flat1, flat2, flat3, matrices3, matrix, of3, stack3, vectors,
 };
-use crate::reference_motion::{Block, Log, Strengths, Truth, blocks, normal, smoothed_bias};
+use crate::reference_motion::{Block, Log, Strengths, Truth, blocks, normal, smoothed};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<ReferenceLog>()?;
@@ -178,19 +178,25 @@ impl ReferenceBlocks {
         })
     }
 
-    /// The bias walk as a combination `(3 m, p)` of the columns, and its covariance `(m, 3, 3)` beside them.
-    #[allow(clippy::type_complexity, reason = "a pair of arrays")]
-    fn bias<'py>(
+    /// The bias walk as a combination `(3 m, p)` of the columns, its covariance `(m, 3, 3)` beside them, and the
+    /// reference's slow error as such a combination.
+    #[allow(clippy::type_complexity, reason = "three arrays")]
+    fn smoothed<'py>(
         &self,
         py: Python<'py>,
         columns: PyReadonlyArray2<'py, f64>,
         strengths: [f64; 7],
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
+    ) -> PyResult<(
+        Bound<'py, PyArray2<f64>>,
+        Bound<'py, PyArray3<f64>>,
+        Bound<'py, PyArray2<f64>>,
+    )> {
         let columns = dmatrix(&columns);
-        let found = super::run(py, || smoothed_bias(&self.0, &columns, &named(strengths)))?;
+        let found = super::run(py, || smoothed(&self.0, &columns, &named(strengths)))?;
         Ok((
-            matrix(py, &found.columns)?,
-            stack3(py, found.cov.into_iter())?,
+            matrix(py, &found.bias)?,
+            stack3(py, found.bias_cov.into_iter())?,
+            matrix(py, &found.error)?,
         ))
     }
 }

@@ -56,13 +56,15 @@ pub struct Normal {
     pub cov_mean_bias: Matrix3<f64>,
 }
 
-/// The bias about its value at the start, over time.
+/// What moves, smoothed over time: values as combinations of the columns, 3 rows per block.
 #[derive(Debug, Clone)]
-pub struct Bias {
-    /// Its smoothed value as a combination of the columns, 3 rows per block.
-    pub columns: DMatrix<f64>,
+pub struct Smoothed {
+    /// The bias about its value at the start, rad/s.
+    pub bias: DMatrix<f64>,
     /// Its covariance where the columns' coefficients are known.
-    pub cov: Vec<Matrix3<f64>>,
+    pub bias_cov: Vec<Matrix3<f64>>,
+    /// The reference's slow error, of world and body together, as a rotation of the world, rad.
+    pub error: DMatrix<f64>,
 }
 
 /// One step of the filter, as the smoother wants it.
@@ -81,17 +83,18 @@ pub fn normal(blocks: &[Block], columns: &DMatrix<f64>, with: &Strengths) -> Res
     filter(blocks, columns, with, |_| ())
 }
 
-/// The bias walk over time, by fixed-interval smoothing (Bryson and Frazier: nothing of the state is inverted).
+/// The bias walk and the reference's slow error over time, by fixed-interval smoothing (Bryson and Frazier: nothing of the state is inverted).
 ///
 /// # Errors
 /// As [`normal`].
-pub fn smoothed_bias(blocks: &[Block], columns: &DMatrix<f64>, with: &Strengths) -> Result<Bias> {
+pub fn smoothed(blocks: &[Block], columns: &DMatrix<f64>, with: &Strengths) -> Result<Smoothed> {
     let mut steps = Vec::with_capacity(blocks.len());
     filter(blocks, columns, with, |step| steps.push(step()))?;
     let p = columns.ncols();
-    let mut out = Bias {
-        columns: DMatrix::zeros(3 * blocks.len(), p),
-        cov: vec![Matrix3::zeros(); blocks.len()],
+    let mut out = Smoothed {
+        bias: DMatrix::zeros(3 * blocks.len(), p),
+        bias_cov: vec![Matrix3::zeros(); blocks.len()],
+        error: DMatrix::zeros(3 * blocks.len(), p),
     };
     let slow = Slow::both(with, block_length(blocks));
     let step_s = block_length(blocks);
@@ -104,10 +107,13 @@ pub fn smoothed_bias(blocks: &[Block], columns: &DMatrix<f64>, with: &Strengths)
             adjoint = left.transpose() * adjoint - weight * innovation;
             information = left.transpose() * information * left + weight * seen;
         }
-        let at = step.cov.fixed_rows::<3>(BIAS);
-        let value = step.predicted.fixed_rows::<3>(BIAS) - at * &adjoint;
-        out.columns.fixed_rows_mut::<3>(3 * k).copy_from(&value);
-        out.cov[k] = (step.cov - step.cov * information * step.cov)
+        let state = &step.predicted - step.cov * &adjoint;
+        let error = state.fixed_rows::<3>(WORLD) + blocks[k].attitude * state.fixed_rows::<3>(BODY);
+        out.error.fixed_rows_mut::<3>(3 * k).copy_from(&error);
+        out.bias
+            .fixed_rows_mut::<3>(3 * k)
+            .copy_from(&state.fixed_rows::<3>(BIAS));
+        out.bias_cov[k] = (step.cov - step.cov * information * step.cov)
             .fixed_view::<3, 3>(BIAS, BIAS)
             .into();
         let mut transition = State::identity();

@@ -15,4 +15,4 @@ mod blocks;
 mod evidence;
 
 pub use blocks::{Block, Log, Truth, blocks};
-pub use evidence::{Bias, Normal, Strengths, normal, smoothed_bias};
+pub use evidence::{Normal, Smoothed, Strengths, normal, smoothed};

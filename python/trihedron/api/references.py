@@ -12,7 +12,7 @@ from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.api.referring import AnyReference, calibration_by, motion_of
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
-from trihedron.estimate.reference import fit_references
+from trihedron.estimate.reference import fit_references, turns_of_frame
 from trihedron.records import Calibration, Frame, Recording
 from trihedron.records.reference import AgainstReference, FitToReference
 
@@ -67,8 +67,7 @@ def calibrate_references(
     pairs = [(log, motion_of(one, reference_columns)) for log, one in zip(logs, references, strict=True)]
     found = fit_references(pairs, gravity)
     gyro = _with_repeatability([one.gyroscope for one in found])
-    forces = [one.accelerometer for one in found if one.accelerometer is not None]
-    first = replace(found[0], gyroscope=gyro, accelerometer=_averaged(forces) if forces else None)
+    first = replace(found[0], gyroscope=gyro, accelerometer=_averaged(found))
     calibration = calibration_by(first, logs[0], gravity, source, frame)
     findings = (*said, *(finding for one in found for finding in one.findings))
     return ReferencesResult(replace(calibration, findings=findings), found, logs)
@@ -83,12 +82,19 @@ def _with_repeatability(fits: Sequence[FitToReference]) -> FitToReference:
     return replace(fits[0], b=b.mean(axis=0), covariance=covariance)
 
 
-def _averaged(fits: Sequence[FitToReference]) -> FitToReference:
-    """Weighted mean of S and b, wider by as much as the recordings disagree."""
+def _averaged(found: Sequence[AgainstReference]) -> FitToReference | None:
+    """Weighted mean of S and b, wider by as much as the recordings disagree; the frame is that of the shared gyro."""
+    seen = [(one.accelerometer, one.frame_covariance) for one in found if one.accelerometer is not None]
+    if not seen:
+        return None
+    fits = [fit for fit, _ in seen]
+    of_frame = [J @ frame @ J.T for J, frame in ((turns_of_frame(fit.S, fit.b), frame) for fit, frame in seen)]
     theta: list[FloatArray] = [np.concatenate([fit.S.ravel(), fit.b]) for fit in fits]
-    weights = [np.linalg.pinv(fit.covariance, hermitian=True) for fit in fits]
+    weights = [
+        np.linalg.pinv(fit.covariance - shared, hermitian=True) for fit, shared in zip(fits, of_frame, strict=True)
+    ]
     covariance = np.linalg.pinv(np.sum(weights, axis=0), hermitian=True)
     mean = covariance @ np.sum([w @ t for w, t in zip(weights, theta, strict=True)], axis=0)
     chi2 = sum(float((t - mean) @ w @ (t - mean)) for w, t in zip(weights, theta, strict=True))
     wide = max(1.0, chi2 / max(12 * (len(fits) - 1), 1))
-    return replace(fits[0], S=mean[:9].reshape(3, 3), b=mean[9:], covariance=wide * covariance)
+    return replace(fits[0], S=mean[:9].reshape(3, 3), b=mean[9:], covariance=wide * covariance + of_frame[0])

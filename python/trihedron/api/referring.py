@@ -13,7 +13,7 @@ from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import read
 from trihedron.diagnose.against import FittedModel, compare_numbers, model_of_calibration
 from trihedron.errors import RefusedError
-from trihedron.estimate.reference import ACCEPTED, fit_reference
+from trihedron.estimate.reference import ACCEPTED, fit_reference, turns_of_frame
 from trihedron.read import ReadError
 from trihedron.read.reference import of_recording, read_reference
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, SensorCalibration
@@ -122,6 +122,11 @@ def calibration_by(
         findings, wanted = (*findings, finding), "case"
     covariance = np.zeros((24, 24))
     covariance[:12, :12], covariance[12:, 12:] = accelerometer.covariance, gyroscope.covariance
+    if found.accelerometer is not None:
+        # What is not known of the reference's body turns both sensors at once.
+        of_force, of_rate = (turns_of_frame(one.S, one.b) for one in (accelerometer, gyroscope))
+        covariance[:12, 12:] = of_force @ found.frame_covariance @ of_rate.T
+        covariance[12:, :12] = covariance[:12, 12:].T
     calibration = Calibration(
         accelerometer, gyroscope, covariance, "case", gravity, source, recording.source, recording.sha256, findings
     )

@@ -182,6 +182,8 @@ class AgainstReference(Plain):
     ``clock_offset_s``: by how much the reference's clock is ahead at ``clock_middle_s`` of the log, and its σ.
     ``earth_rate``: along the axes of the reference's world, where the log tells where it points; else it is in the
     uncertainties of the gyro's numbers.
+    ``frame_covariance`` (3, 3) [rad²]: of the turn between the body and what the reference shows of it on the whole,
+    which both sensors' uncertainties hold alike.
     """
 
     kind: str
@@ -204,6 +206,7 @@ class AgainstReference(Plain):
     residual_time_s: FloatArray = field(default_factory=lambda: np.zeros(0))
     residual_rate: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     earth_rate: Estimate | None = None
+    frame_covariance: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
     LAYOUT: ClassVar[Layout] = Layout(
         {},
         (

@@ -36,6 +36,25 @@ class ForceFit:
     arm_covariance: FloatArray | None
     solution: Solution
 
+    def within(self, frame: FloatArray) -> ForceFit:
+        """The same where the reference's body is known to ``frame`` (3, 3) [rad²] only."""
+        J = turns_of_frame(self.S, self.b)
+        arm_covariance = self.arm_covariance
+        if self.arm is not None and arm_covariance is not None:
+            of_arm = turns(self.arm[:, None])
+            arm_covariance = arm_covariance + of_arm @ frame @ of_arm.T
+        return replace(self, covariance=self.covariance + J @ frame @ J.T, arm_covariance=arm_covariance)
+
+
+def turns(columns: FloatArray) -> FloatArray:
+    """(3 n, 3) by how much vectors (3, n), row by row, change with small turns of the frame that they stand in."""
+    return np.stack([np.cross(axis, columns.T).T.ravel() for axis in np.eye(3)], axis=1)
+
+
+def turns_of_frame(S: FloatArray, b: FloatArray) -> FloatArray:
+    """(12, 3) by how much (S row by row, b) change with small turns of the frame that they lead to."""
+    return np.vstack([turns(S), turns(b[:, None])])
+
 
 def fit_accelerometer(
     grid: Grid, reference: Reference, windows: Windows, offset_s: float, rate: float, gravity: float, handedness: float

@@ -12,7 +12,6 @@ import numpy.typing as npt
 from trihedron.arrays import AXES, FloatArray
 from trihedron.estimate.reference.accelerometer import ForceFit, fit_accelerometer, force_along
 from trihedron.estimate.reference.beside import Beside, Point
-from trihedron.estimate.reference.bias import bias_over_time
 from trihedron.estimate.reference.clocks import Alignment, align
 from trihedron.estimate.reference.coloured import Solution
 from trihedron.estimate.reference.earth import earth_of
@@ -24,6 +23,7 @@ from trihedron.estimate.reference.refusals import refuse_still, refuse_strangers
 from trihedron.estimate.reference.remarks import remarks
 from trihedron.estimate.reference.replay import held_out
 from trihedron.estimate.reference.settled import plateaus
+from trihedron.estimate.reference.smoothed import bias_over_time, frame_covariance, without_slow_error
 from trihedron.estimate.reference.together import Grid, Reference, grid_of
 from trihedron.estimate.reference.windows import Windows, windows_on
 from trihedron.estimate.reference.worth import error_of
@@ -56,6 +56,7 @@ class Prepared:
     """A log laid beside its reference: the start of the model, and what only windows tell."""
 
     recording: Recording
+    gravity_m_s2: float
     side: Beside
     gyro: GyroFit
     force: ForceFit | None
@@ -143,13 +144,12 @@ def _prepared(recording: Recording, motion: ReferenceMotion, gravity_m_s2: float
     refuse_units(recording, gyro, motion)
     refuse_still(motion, gyro.A.ravel(), gyro.solution.covariance[:9, :9])
     refuse_parts_elsewhere(grid, reference, gyro)
-    handedness = float(np.sign(np.linalg.det(gyro.A)))
     wide = windows_on(seen, grid.step_s, max(windows.spacing, round(FORCE_WINDOW_S / grid.step_s)))
-    force = fit_accelerometer(grid, reference, wide, gyro.offset_s, gyro.rate, gravity_m_s2, handedness)
+    force = fit_accelerometer(grid, reference, wide, gyro.offset_s, gyro.rate, gravity_m_s2, gyro.handedness)
     felt = None if force is None else force_along(grid, force, gyro.A, gravity_m_s2)
     has_truth = grid.is_valid if motion.attitude is not None else seen
     side = Beside(grid, reference, has_truth, Point(gyro.A, gyro.a, gyro.offset_s, gyro.rate), felt)
-    return Prepared(recording, side, gyro, force, windows, wide, found, seen, is_turned)
+    return Prepared(recording, gravity_m_s2, side, gyro, force, windows, wide, found, seen, is_turned)
 
 
 def _answer(
@@ -161,6 +161,14 @@ def _answer(
     has_clock = "clock" in found.places[k]
     clock = found.value(k, "clock") if has_clock else np.array([one.gyro.offset_s, 0.0])
     sigma = np.sqrt(np.diag(found.covariance(k, ("clock",)))) if has_clock else np.array([np.nan, np.nan])
+    frame = frame_covariance(found, k)
+    if force is not None and motion.attitude is not None:
+        point, known = found.points[k], without_slow_error(found, k)
+        force = fit_accelerometer(
+            side.grid, known, one.wide, point.offset_s, point.rate, one.gravity_m_s2, one.gyro.handedness
+        )
+    if force is not None:
+        force = force.within(frame)
     up = None if force is None or force.up_covariance is None else _estimate(force.up, force.up_covariance, "1")
     result = AgainstReference(
         kind=motion.kind,
@@ -180,6 +188,7 @@ def _answer(
         earth_rate=_earth(found, effects, k),
         effects=MappingProxyType(_estimates(found, k, effects)),
         replay=() if motion.attitude is None else held_out(one.side, one.seen, one.gyro, given, _windows),
+        frame_covariance=frame,
         error=error_of(found, k),
         bias=bias_over_time(found, k),
         residual_time_s=side.grid.time_s[one.windows.middle],

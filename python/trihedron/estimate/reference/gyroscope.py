@@ -34,6 +34,11 @@ class GyroFit:
     middle_s: float
     size: FloatArray
 
+    @property
+    def handedness(self) -> float:
+        """The sign of det A: -1 where log and reference have frames of opposite handedness."""
+        return float(np.sign(np.linalg.det(self.A)))
+
 
 def fit_gyroscope(
     grid: Grid, reference: Reference, windows: Windows, offset_s: float, rate: float, *, clock: int = 2

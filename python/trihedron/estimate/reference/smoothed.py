@@ -1,0 +1,81 @@
+"""What moves over a recording, smoothed: the gyro's bias, and the reference's own slow error."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from trihedron.arrays import FloatArray
+from trihedron.estimate.reference.accelerometer import turns
+from trihedron.estimate.reference.likelihood import FARTHEST, SPREAD, STRENGTHS, TYPICAL, Together, equations, together
+from trihedron.estimate.reference.motion import MotionFit
+from trihedron.estimate.reference.together import Reference
+from trihedron.records.reference import BiasOverTime
+
+BODY = STRENGTHS.index("body")
+
+
+def bias_over_time(found: MotionFit, k: int) -> BiasOverTime:
+    """Bias of recording k in every block, g-sensitivity at the recording's mean specific force included."""
+    side, own, problem = found.sides[k], found.places[k], found.problems[k]
+    all_of = _posterior(found, found.fitted.strengths)
+    mean, cov = all_of.mean[problem.index], all_of.covariance[np.ix_(problem.index, problem.index)]
+    columns, beside, _ = problem.blocks.smoothed(problem.table(), np.exp(found.fitted.strengths[k]).tolist())
+    m = len(beside)
+    columns = columns.reshape(m, 3, -1)
+    change = -columns[:, :, :-1]
+    change[:, :, problem.bias] += np.diag(problem.sigma[problem.bias])
+    value = found.points[k].b + columns[:, :, -1]
+    if side.force is not None and "gyro-g-sensitivity" in own:
+        # Bias and g-sensitivity hardly separate where the force keeps its direction; what both add up to is known.
+        force = side.force[side.seen].mean(axis=0)
+        at = np.flatnonzero(np.isin(problem.index, own["gyro-g-sensitivity"]))
+        for i in range(3):
+            change[:, i, at[3 * i : 3 * i + 3]] -= force * problem.sigma[at[3 * i : 3 * i + 3]]
+        value = value - found.points[k].g @ force
+    covariance = beside + change @ cov @ np.swapaxes(change, 1, 2)
+    sigma = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
+    return BiasOverTime(problem.blocks.time_s(), value + change @ mean, sigma)
+
+
+def without_slow_error(found: MotionFit, k: int) -> Reference:
+    """The reference of recording k, its attitudes turned back by its slow error: gyro and reference together know them
+    better than either, and what is left hardly tilts gravity."""
+    side, point, problem = found.sides[k], found.points[k], found.problems[k]
+    motion = side.reference.motion
+    if motion.attitude is None:
+        return side.reference
+    _, _, columns = problem.blocks.smoothed(problem.table(), np.exp(found.fitted.strengths[k]).tolist())
+    error = (columns @ np.append(-_posterior(found, found.fitted.strengths).mean[problem.index], 1.0)).reshape(-1, 3)
+    time = problem.blocks.time_s()
+    at = np.clip((motion.time_s - point.offset_s) / (1.0 + point.rate), time[0], time[-1])
+    back = Rotation.from_rotvec(-CubicSpline(time, error)(at)).as_matrix()
+    return Reference(replace(motion, attitude=np.ascontiguousarray(back @ motion.attitude)))
+
+
+def frame_covariance(found: MotionFit, k: int) -> FloatArray:
+    """(3, 3) [rad²] of the turn between the body and what recording k's reference shows of it on the whole.
+
+    The mean of a slow error in the body is a mounting like any other: no motion tells it, and it turns both sensors
+    alike. It is what the rotation of S is less well known by with that error in the fit.
+    """
+    side = found.sides[k]
+    if side.reference.motion.attitude is None:
+        return np.zeros((3, 3))
+    without = found.fitted.strengths.copy()
+    without[:, BODY] = (TYPICAL - FARTHEST * SPREAD)[BODY]
+    at = found.places[k]["S"]
+    sigma = found.wider.get("S", 1.0) * side.sigma("S")
+    alone = _posterior(found, without).covariance[np.ix_(at, at)] * np.outer(sigma, sigma)
+    # Turns of the body about each axis as changes of S, and back again by least squares.
+    turn = np.linalg.pinv(turns(found.value(k, "S").reshape(3, 3)))
+    values, vectors = np.linalg.eigh(turn @ (found.covariance(k, ("S",)) - alone) @ turn.T)
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
+
+
+def _posterior(found: MotionFit, strengths: FloatArray) -> Together:
+    """All parameters at given strengths, biases those at the start."""
+    return together(found.problems, [equations(p, s) for p, s in zip(found.problems, strengths, strict=True)])
