@@ -18,7 +18,9 @@ def z_of_bias(found, trial):
     return (found.gyroscope.b - b) / np.sqrt(np.diag(found.gyroscope.covariance)[9:])
 
 
-@pytest.mark.parametrize(("seed", "more"), [pytest.param(3, {"has_g_sensitivity": True}, marks=pytest.mark.slow), (6, {"has_path": True})])
+@pytest.mark.parametrize(
+    ("seed", "more"), [pytest.param(3, {"has_g_sensitivity": True}, marks=pytest.mark.slow), (6, {"has_path": True})]
+)
 def test_a_sound_truth_is_not_refused_for_the_filters_rounding(seed, more):
     # The strengths' search passes by a white error of nothing beside slow ones: rounding was all that was left of a
     # variance, and every third walk was refused.

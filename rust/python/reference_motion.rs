@@ -179,8 +179,8 @@ impl ReferenceBlocks {
     }
 
     /// The bias walk as a combination `(3 m, p)` of the columns, its covariance `(m, 3, 3)` beside them, and the
-    /// reference's slow error as such a combination.
-    #[allow(clippy::type_complexity, reason = "three arrays")]
+    /// reference's slow errors of world and body as such combinations.
+    #[allow(clippy::type_complexity, reason = "four arrays")]
     fn smoothed<'py>(
         &self,
         py: Python<'py>,
@@ -190,13 +190,15 @@ impl ReferenceBlocks {
         Bound<'py, PyArray2<f64>>,
         Bound<'py, PyArray3<f64>>,
         Bound<'py, PyArray2<f64>>,
+        Bound<'py, PyArray2<f64>>,
     )> {
         let columns = dmatrix(&columns);
         let found = super::run(py, || smoothed(&self.0, &columns, &named(strengths)))?;
         Ok((
             matrix(py, &found.bias)?,
             stack3(py, found.bias_cov.into_iter())?,
-            matrix(py, &found.error)?,
+            matrix(py, &found.slow[0])?,
+            matrix(py, &found.slow[1])?,
         ))
     }
 }

@@ -63,8 +63,8 @@ pub struct Smoothed {
     pub bias: DMatrix<f64>,
     /// Its covariance where the columns' coefficients are known.
     pub bias_cov: Vec<Matrix3<f64>>,
-    /// The reference's slow error, of world and body together, as a rotation of the world, rad.
-    pub error: DMatrix<f64>,
+    /// The reference's slow errors, of its world and of its body, rad.
+    pub slow: [DMatrix<f64>; 2],
 }
 
 /// One step of the filter, as the smoother wants it.
@@ -94,7 +94,7 @@ pub fn smoothed(blocks: &[Block], columns: &DMatrix<f64>, with: &Strengths) -> R
     let mut out = Smoothed {
         bias: DMatrix::zeros(3 * blocks.len(), p),
         bias_cov: vec![Matrix3::zeros(); blocks.len()],
-        error: DMatrix::zeros(3 * blocks.len(), p),
+        slow: [(); 2].map(|()| DMatrix::zeros(3 * blocks.len(), p)),
     };
     let slow = Slow::both(with, block_length(blocks));
     let step_s = block_length(blocks);
@@ -108,8 +108,10 @@ pub fn smoothed(blocks: &[Block], columns: &DMatrix<f64>, with: &Strengths) -> R
             information = left.transpose() * information * left + weight * seen;
         }
         let state = &step.predicted - step.cov * &adjoint;
-        let error = state.fixed_rows::<3>(WORLD) + blocks[k].attitude * state.fixed_rows::<3>(BODY);
-        out.error.fixed_rows_mut::<3>(3 * k).copy_from(&error);
+        for (slow, first) in out.slow.iter_mut().zip([WORLD, BODY]) {
+            slow.fixed_rows_mut::<3>(3 * k)
+                .copy_from(&state.fixed_rows::<3>(first));
+        }
         out.bias
             .fixed_rows_mut::<3>(3 * k)
             .copy_from(&state.fixed_rows::<3>(BIAS));

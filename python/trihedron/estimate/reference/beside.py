@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from trihedron._core import ReferenceLog, rotation_from_vector
@@ -37,9 +38,33 @@ OF_SCALE, CLOCK = 0.3, (0.1, 1e-3)
 
 
 @dataclass(frozen=True, eq=False)
+class SlowError:
+    """What a reference's attitudes are off by at times (m,) of the log: exp(world) C exp(body), both (m, 3) [rad]."""
+
+    time_s: FloatArray
+    world: FloatArray
+    body: FloatArray
+
+    def at(self, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """World's and body's error (n, 3) at other times; beyond the ends as there."""
+        inside = np.clip(time, self.time_s[0], self.time_s[-1])
+        both = CubicSpline(self.time_s, np.hstack([self.world, self.body]))(inside)
+        return both[:, :3], both[:, 3:]
+
+    def taken_off(self, time: FloatArray, attitude: FloatArray) -> FloatArray:
+        """Attitudes (n, 3, 3) without it."""
+        world, body = (Rotation.from_rotvec(-one).as_matrix() for one in self.at(time))
+        return np.ascontiguousarray(world @ attitude @ body)
+
+
+@dataclass(frozen=True, eq=False)
 class Point:
     """Where the model is linearised: ω = S w' + b - G f - bends in the reference's body turned by ``mounting``;
-    t_reference = t (1 + rate) + offset."""
+    t_reference = t (1 + rate) + offset; ``slow`` is what the reference's attitudes are off by.
+
+    About attitudes that are degrees off, a body's constant error and a turn of S are not quite one, and the evidence
+    would know them apart.
+    """
 
     S: FloatArray
     b: FloatArray
@@ -48,6 +73,7 @@ class Point:
     g: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
     bend: FloatArray = field(default_factory=lambda: np.zeros(6))
     mounting: FloatArray = field(default_factory=lambda: np.eye(3))
+    slow: SlowError | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +132,7 @@ class Beside:
             g=point.g + change.get("gyro-g-sensitivity", np.zeros(9)).reshape(3, 3),
             bend=point.bend + bend,
             mounting=point.mounting @ Rotation.from_rotvec(change.get("mounting", np.zeros(3))).as_matrix(),
+            slow=point.slow,
         )
 
     def _own(self, point: Point) -> tuple[FloatArray, FloatArray]:
@@ -151,13 +178,17 @@ class Beside:
             "gyro-g-sensitivity": -M[:, :, :, 10:].reshape(m, 3, -1),
             "mounting": -blocks.attitude(),
         }
+        observed = blocks.angle()
+        if point.slow is not None:
+            world, body = point.slow.at(blocks.time_s())
+            observed = observed + world + np.einsum("mij,mj->mi", blocks.attitude(), body)
         names = list(places)
         sigma = np.concatenate([wider.get(name, 1.0) * self.sigma(name) for name in names])
         about = np.concatenate([self._prior(name) - self.values(point, name) for name in names])
         first = sum(NUMBERS[name] for name in names[: names.index("b")])
         return Problem(
             blocks=blocks,
-            observed=blocks.angle().ravel(),
+            observed=observed.ravel(),
             columns=np.concatenate([columns[name] for name in names], axis=2).reshape(3 * m, -1) * sigma,
             sigma=sigma,
             centre=about / sigma,
@@ -173,7 +204,8 @@ class Beside:
         """The reference's attitudes (m, 3, 3) at times (m,) of the log; rates are summed to one."""
         motion = self.reference.motion
         if motion.attitude is not None:
-            return (motion.time_s - point.offset_s) / (1.0 + point.rate), motion.attitude @ point.mounting
+            time, attitude = (motion.time_s - point.offset_s) / (1.0 + point.rate), motion.attitude @ point.mounting
+            return time, attitude if point.slow is None else point.slow.taken_off(time, attitude)
         if motion.is_stepwise:
             time = self.grid.time_s
             rate = self.reference.rate(time * (1.0 + point.rate) + point.offset_s)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.estimate.reference.beside import BLOCK_S, Beside, Point, places
+from trihedron.estimate.reference.beside import BLOCK_S, Beside, Point, SlowError, places
 from trihedron.estimate.reference.likelihood import TYPICAL, Fitted, Problem, equations, fit, most_likely, together
 
 ALWAYS = ("S", "b", "clock", "earth", "gyro-g-sensitivity")
@@ -69,11 +69,21 @@ def fit_motion(
             strengths, _ = most_likely(problems, strengths)
         mean = together(problems, [equations(p, s) for p, s in zip(problems, strengths, strict=True)]).mean
         points = [
-            side.moved(point, {name: _si(side, name, wider) * mean[at] for name, at in own.items()})
-            for side, point, own in zip(sides, points, where, strict=True)
+            replace(
+                side.moved(point, {name: _si(side, name, wider) * mean[at] for name, at in own.items()}),
+                slow=None if side.reference.motion.attitude is None else slow_error(problem, s, mean),
+            )
+            for side, point, own, problem, s in zip(sides, points, where, problems, strengths, strict=True)
         ]
     problems = _problems(sides, points, where, wider, block_s)
     return MotionFit(sides, points, where, problems, fit(problems, strengths), wider)
+
+
+def slow_error(problem: Problem, strengths: FloatArray, mean: FloatArray) -> SlowError:
+    """The reference's slow error, smoothed under ``strengths`` (7,), of parameters (p,) with biases at the start."""
+    *_, world, body = problem.blocks.smoothed(problem.table(), np.exp(strengths).tolist())
+    theta = np.append(-mean[problem.index], 1.0)
+    return SlowError(problem.blocks.time_s(), *((one @ theta).reshape(-1, 3) for one in (world, body)))
 
 
 def _si(side: Beside, name: str, wider: Mapping[str, float]) -> FloatArray:

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.reference.accelerometer import turns
 from trihedron.estimate.reference.likelihood import FARTHEST, SPREAD, STRENGTHS, TYPICAL, Together, equations, together
-from trihedron.estimate.reference.motion import MotionFit
+from trihedron.estimate.reference.motion import MotionFit, slow_error
 from trihedron.estimate.reference.together import Reference
 from trihedron.records.reference import BiasOverTime
 
@@ -23,7 +21,7 @@ def bias_over_time(found: MotionFit, k: int) -> BiasOverTime:
     side, own, problem = found.sides[k], found.places[k], found.problems[k]
     all_of = _posterior(found, found.fitted.strengths)
     mean, cov = all_of.mean[problem.index], all_of.covariance[np.ix_(problem.index, problem.index)]
-    columns, beside, _ = problem.blocks.smoothed(problem.table(), np.exp(found.fitted.strengths[k]).tolist())
+    columns, beside, _, _ = problem.blocks.smoothed(problem.table(), np.exp(found.fitted.strengths[k]).tolist())
     m = len(beside)
     columns = columns.reshape(m, 3, -1)
     change = -columns[:, :, :-1]
@@ -48,12 +46,10 @@ def without_slow_error(found: MotionFit, k: int) -> Reference:
     motion = side.reference.motion
     if motion.attitude is None:
         return side.reference
-    _, _, columns = problem.blocks.smoothed(problem.table(), np.exp(found.fitted.strengths[k]).tolist())
-    error = (columns @ np.append(-_posterior(found, found.fitted.strengths).mean[problem.index], 1.0)).reshape(-1, 3)
-    time = problem.blocks.time_s()
-    at = np.clip((motion.time_s - point.offset_s) / (1.0 + point.rate), time[0], time[-1])
-    back = Rotation.from_rotvec(-CubicSpline(time, error)(at)).as_matrix()
-    return Reference(replace(motion, attitude=np.ascontiguousarray(back @ motion.attitude)))
+    slow = slow_error(problem, found.fitted.strengths[k], _posterior(found, found.fitted.strengths).mean)
+    time = (motion.time_s - point.offset_s) / (1.0 + point.rate)
+    own = slow.taken_off(time, motion.attitude @ point.mounting) @ point.mounting.T
+    return Reference(replace(motion, attitude=np.ascontiguousarray(own)))
 
 
 def frame_covariance(found: MotionFit, k: int) -> FloatArray:
