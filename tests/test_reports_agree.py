@@ -45,7 +45,25 @@ def test_a_pose_cut_where_it_was_bumped_keeps_its_number(made):
     obs = observe(recording, cut)
     assert cut.n_poses == segments.n_poses + 1
     assert obs.pose_names(range(3, 8)) == ("pose 4", "pose 5", "pose 5", "pose 6", "pose 7")
-    assert obs.move_names(range(3, 6)) == ("move 4", "a bump in pose 5", "move 5")
+    assert obs.move_names(range(3, 6)) == ("move 4", "a disturbance in pose 5", "move 5")
+
+
+def test_figures_of_a_diagnosis_count_poses_as_the_calibration_does_and_name_them_alike(made):
+    recording, result, _ = made
+    pose = result.segments.poses[4]
+    middle = (pose.start + pose.stop) // 2
+    bumped = replace(pose, disturbed=((middle, middle + 10),))
+    poses = (*result.segments.poses[:4], bumped, *result.segments.poses[5:])
+    found = trihedron.diagnose(recording, segments=replace(result.segments, poses=poses), gravity_m_s2=GRAVITY)
+    figures = next(s for s in diagnosis_report(found).sections if s.heading == "Figures").blocks
+    captions = {figure.name: figure.caption for figure in figures}
+    assert "14 poses in 15 intervals" in captions["static-accel"]
+    assert "13 moves and 1 disturbance inside poses" in captions["moves"]
+    names = {one.domain: one.names_before for one in found.residuals}
+    assert names["static-accel"][3:7] == ("pose 4", "pose 5", "pose 5", "pose 6")
+    (panel, *_) = figures[0].chart().panels
+    told = next(mark.said for mark in panel.marks if hasattr(mark, "said"))
+    assert told[6].startswith("pose 6")
 
 
 def test_no_report_of_a_diagnosis_names_a_domain_by_its_id(made):

@@ -146,10 +146,10 @@ class Segments(Presented):
         return f"pose {around[0] + 1}" if around else "a vibrating pose"
 
     def move_name(self, start: int, stop: int) -> str:
-        """The move of samples [start, stop), by its number from 1; a bump inside a pose by that pose."""
+        """The move of samples [start, stop), by its number from 1; a disturbance inside a pose by that pose."""
         middle = (start + stop) // 2
         around = [k for k, move in enumerate(self.moves) if move.start <= middle < move.stop]
-        return f"move {around[0] + 1}" if around else f"a bump in {self.pose_name(middle, middle)}"
+        return f"move {around[0] + 1}" if around else f"a disturbance in {self.pose_name(middle, middle)}"
 
     def __repr__(self) -> str:
         poses = f"{self.n_poses} pose{'' if self.n_poses == 1 else 's'}"

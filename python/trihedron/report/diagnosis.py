@@ -304,13 +304,21 @@ def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
     has_effects = bool(diagnosis.effects)
 
     draw = later("diagnosis_figures", "draw_before_after", residuals, has_effects=has_effects)
-    n = len(residuals.before)
-    caption = f"{_CAPTIONS[residuals.domain]} {how_many(n, 'pose' if residuals.kind == 'pose' else 'move')}; "
+    caption = f"{_CAPTIONS[residuals.domain]} {_counted(residuals)}; "
     caption += "error bars: ± 2 σ of the predicted noise."
     if residuals.domain == "dynamics":
         caption += " Velocity and angle of one move share most of their noise: χ² compares what is left of it."
     chart = partial(before_after_chart, residuals, has_effects=has_effects)
     return Picture(f"{residuals.domain}", caption, draw, chart)
+
+
+def _counted(residuals: DomainResiduals) -> str:
+    """Poses or moves as the calibration of this log counts them, and the further rows that a disturbance makes."""
+    n, n_rows = residuals.n_whole, len(residuals.before)
+    said = how_many(n, residuals.kind)
+    if residuals.kind == "move":
+        return said + (f" and {how_many(n_rows - n, 'disturbance')} inside poses" if n_rows > n else "")
+    return said + (f" in {n_rows} intervals, apart at disturbances" if n_rows > n else "")
 
 
 def _headlines(diagnosis: Diagnosis) -> list[Headline]:
