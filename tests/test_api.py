@@ -311,3 +311,8 @@ def test_every_result_says_what_it_holds():
     results = [name for name in trihedron.__all__ if name.endswith("Result") or name in ("Noise", "SensorCalibration")]
     assert len(results) >= 8
     assert [name for name in results if "Attributes\n" not in inspect.getdoc(getattr(trihedron, name))] == []
+
+
+def test_several_recordings_in_one_call_are_sent_to_the_verb_that_takes_them(recording):
+    with pytest.raises(ValueError, match=r"trihedron\.calibrate_sessions"):
+        trihedron.calibrate([recording, recording], gravity_m_s2=9.81)

@@ -146,10 +146,19 @@ def recording_of(given: AnyRecording) -> Recording:
     Raises
     ------
     ReadError
-        (a ``ValueError``) when it cannot be read, or is nothing of the kind.
+        (a ``ValueError``) when it cannot be read, is nothing of the kind, or is several recordings.
     """
     if isinstance(given, Recording):
         return given
+    if (
+        isinstance(given, list | tuple)
+        and given
+        and all(isinstance(one, Recording | str | os.PathLike) for one in given)
+    ):
+        raise ReadError(
+            f"one recording is taken here, and {len(given)} were given: several of one unit are for "
+            "trihedron.calibrate_sessions and trihedron.diagnose_sessions."
+        )
     return read(given)
 
 

@@ -179,7 +179,7 @@ def _axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
             "XYZ"[i],
             with_sigma(axes.sensitivity[i], axes.sigma_sensitivity[i]),
             " ".join(_relative(float(axes.sigma_sensitivity[i] / axes.sensitivity[i]))),
-            with_sigma(axes.zero[i], axes.sigma_bias[i]),
+            with_sigma(axes.bias[i], axes.sigma_bias[i]),
         )
         for i in range(3)
     ]

@@ -249,7 +249,7 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
     )
     if not rows:
         return (Paragraph("No effect was added, so there is no before and after."),)
-    head = ("effect", "residual", "rms before", "rms after", "χ²/dof before", "after")
+    head = ("effect", "residual", "rms before", "rms after", "χ²/dof before", "χ²/dof after")
     caption = "Poses and moves predicted by fits that did not see them (held out); noise alone gives χ²/dof 1"
     return (Table(head, rows, caption),)
 
@@ -271,7 +271,7 @@ def _candidates(diagnosis: Diagnosis) -> Block:
         for c in tried
     ]
     rows += [(c.id, "–", f"not applicable: {c.reason}") for c in diagnosis.candidates if not c.applicable]
-    return Table(("effect", "p against the linear model", ""), tuple(rows), "Every effect of the catalogue")
+    return Table(("effect", "p against the linear model", "outcome"), tuple(rows), "Every effect of the catalogue")
 
 
 def _traces(diagnosis: Diagnosis) -> tuple[Picture, ...]:

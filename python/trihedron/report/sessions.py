@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 from trihedron.records.sessions import Change, Repeated, Session, SessionsModel, Spread, ThermalModel
+from trihedron.report.axes import BIAS
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
@@ -102,9 +103,9 @@ def _repeatability(model: SessionsModel) -> list[Block]:
         Table(
             tuple(head),
             tuple(rows),
-            "Standard deviation from one recording to the next, beyond each one's own uncertainty. Biases are raw "
-            "readings at zero input (−S⁻¹ b) in SI units; scales are raw counts per unit, relative to the common "
-            "value; misalignments are departures from 90°.",
+            "Standard deviation from one recording to the next, beyond each one's own uncertainty. A bias is "
+            f"{BIAS}; scales are raw counts per unit, relative to the common value; misalignments are departures "
+            "from 90°.",
         )
     ]
 

@@ -23,7 +23,7 @@ _ROWS: tuple[tuple[str, str, str, str, tuple[str, ...]], ...] = (
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """One domain of one fit: ``value`` (n, k), predicted noise ``sigma`` (n,), at ``time_s`` (n,), of ``names`` (n,)."""
+    """One domain of one fit: ``value`` (n, k), predicted noise ``sigma`` (n,), ``time_s`` (n,), ``names`` (n,)."""
 
     time_s: FloatArray
     value: FloatArray
