@@ -229,7 +229,7 @@ class Recording(Presented):
     @cached_property
     def low_passes(self) -> dict[str, tuple[LowPass, ...]]:
         """The filter ahead of each channel by sensor, as white noise in the quietest stretches shows it: found when
-        asked for; none of a sensor that never rests for 32 readings."""
+        asked for; none of a sensor that is never static for 32 readings."""
         found: dict[str, tuple[LowPass, ...]] = ask("find_low_passes", self._readings(), self.rate_hz)
         return found
 

@@ -230,6 +230,6 @@ def _shown_from(ident: str, one: Estimate) -> str:
     if one.shown_from is None:
         return ""
     if not np.isfinite(one.shown_from):
-        return ": this reference wanders too much to show any"
+        return ": this reference drifts too much to show any"
     size, unit = _SHEET[ident]
     return f": beside this reference about {plain_number(size * one.shown_from, 2)} {unit} in every number"

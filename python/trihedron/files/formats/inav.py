@@ -32,7 +32,7 @@ def to_inav(calibration: Calibration, options: ExportOptions) -> str:
     """
     if calibration.accelerometer.raw_unit != "counts" and options.current_parameters.strip().lower() != "none":
         raise RefusedError(
-            "INAV logs readings that its own zeros and gains have corrected and its alignments have turned: calibrate "
+            "INAV logs readings that its own biases and gains have corrected and its alignments have turned: calibrate "
             "raw counts (debug_mode = ACC), or say --current-parameters none where the readings were raw."
         )
     own, sensors = composed(calibration, options, "INAV", lambda _: AxisCorrection(np.zeros(3), np.ones(3), np.eye(3)))
@@ -42,11 +42,11 @@ def to_inav(calibration: Calibration, options: ExportOptions) -> str:
         count = _size_of_a_count(name, options)
         half = np.full(3, 0.5 * count)
         if half[0] > HALF_WIDTH * float(sensor.sigma_b.max()):
-            lines.append(f"# Zeros are whole counts: up to {size_of_bias(name, half)} of bias of the {name} is lost.")
+            lines.append(f"# Biases are whole counts: up to {size_of_bias(name, half)} of bias of the {name} is lost.")
         lines += _lines(name, sensors[name], count)
         if name == "gyroscope":
             lines += [f"# {line}" for line in lost_gyro_scale(sensor, "INAV")]
-            lines += ["# Without this the gyro's zero is measured anew at every start:", "set init_gyro_cal = OFF"]
+            lines += ["# Without this the gyro's bias is measured anew at every start:", "set init_gyro_cal = OFF"]
     return "\n".join([*lines, "save", ""])
 
 
