@@ -118,10 +118,15 @@ def results():
         "diagnosis": trihedron.diagnose(recording, gravity_m_s2=float(G)),
         "check": trihedron.check(recording),
         "segments": trihedron.segment(recording),
+        "ranking": trihedron.rank([made, made], recording, gravity_m_s2=float(G)),
+        "plan": trihedron.plan(),
     }
 
 
-@pytest.mark.parametrize("kind", ["calibration", "verification", "diagnosis", "check", "segments"])
+KINDS = ["calibration", "verification", "diagnosis", "check", "segments", "ranking", "plan"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_no_report_uses_a_retired_word(results, kind, tmp_path):
     assert retired(trihedron.report(results[kind], tmp_path / "report.html")) == []
     page = re.sub(r"<(style|script)\b.*?</\1>", " ", (tmp_path / "report.html").read_text("utf-8"), flags=re.DOTALL)
@@ -228,8 +233,24 @@ def names() -> Iterator[str]:
 
 
 RETIRED_IN_NAMES = re.compile(
-    r"(?<![a-z])(zeros?|holds?|bars|stamps?|laws?|creeps?|told|scatter|converters?|hidden)(?![a-z])"
+    r"(?<![a-z])(zeros?|holds?|bars|stamps?|laws?|creeps?|told|scatter|converters?|hidden|wander)(?![a-z])"
 )
+
+
+def keys_of(node: object) -> Iterator[str]:
+    """Keys at every depth, the laid-out report apart: its drawings have the names of shapes."""
+    for key, child in node.items() if isinstance(node, dict) else ():
+        yield key
+        yield from keys_of(child) if key != "report" else ()
+    for child in node if isinstance(node, list) else ():
+        yield from keys_of(child)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_key_of_a_json_report_is_a_retired_word(results, kind, tmp_path):
+    trihedron.report(results[kind], tmp_path / "report.json")
+    written = json.loads((tmp_path / "report.json").read_text("utf-8"))
+    assert {key for key in keys_of(written) if RETIRED_IN_NAMES.search(key)} == set()
 
 
 def test_no_public_name_is_a_retired_word():

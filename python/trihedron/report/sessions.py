@@ -234,8 +234,10 @@ def sessions_columns(model: SessionsModel) -> Columns:
 
 
 def session_record(session: Session) -> dict[str, object]:
-    """One recording's numbers for machines."""
-    return {**vars(session), "temperature_range_degc": list(session.temperature_range_degc)}
+    """One recording's parameters for machines: ``values`` with their ``covariance``, the variance of the bias drift."""
+    named = {"numbers": "values", "wander": "bias_drift_variance"}
+    record = {named.get(name, name): value for name, value in vars(session).items()}
+    return {**record, "temperature_range_degc": list(session.temperature_range_degc)}
 
 
 def sessions_record(model: SessionsModel) -> dict[str, object]:
@@ -257,6 +259,6 @@ def sessions_record(model: SessionsModel) -> dict[str, object]:
             for one in model.repeated
         ],
         "changes": [vars(change) for change in model.changes],
-        "left_out": [{"source": source, "reason": why} for source, why in model.left_out],
+        "excluded": [{"source": source, "reason": why} for source, why in model.left_out],
         "findings": [finding.to_dict() for finding in model.findings],
     }
