@@ -86,6 +86,8 @@ class SensorCalibration(Frozen):
     covariance : (12, 12)
         In the order of :data:`PARAMETER_NAMES`; rows of parameters fixed by the choice of frame are zero. ``sigma_S``
         (3, 3) and ``sigma_b`` (3,) are its diagonal's roots.
+    raw_unit, si_unit, method : str
+        Units before and after, and how S and b were found.
     quality, observability : FitQuality, Observability or None
         Residuals pose by pose or move by move, and what the motion determined.
     """
@@ -132,9 +134,27 @@ class SensorCalibration(Frozen):
 class Calibration(Presented):
     """Both sensors in one body frame (instrument frame), with what they were determined from.
 
-    ``covariance`` (24, 24): accelerometer's 12 parameters, then the gyro's, with cross terms; (12, 12) without.
-    ``averaging``: 0 for a sensor that samples points, 1 for one that averages over its sample interval
-    (docs/model-session.md, 11.6d); between them as far as its rotations tell.
+    Attributes
+    ----------
+    accelerometer : SensorCalibration
+        ``f = S a' + b``, reading to m/s².
+    gyroscope : SensorCalibration or None
+        ``ω = S w' + b``, reading to rad/s; None without a gyro.
+    covariance : (24, 24)
+        Accelerometer's 12 parameters (S row by row, then b), then the gyro's, with cross terms; (12, 12) without.
+    frame : "lower", "symmetric" or "case"
+        The body frame of S and b.
+    gravity_m_s2, gravity_source : float, str
+        |g| at the place and where it is from.
+    recording_source, recording_sha256 : str
+        The log that it was made from.
+    findings : tuple of Finding
+        What was noticed; ``is_trustworthy`` where none is serious.
+    extensions : mapping
+        Effects and temperature models beside S and b (``calibrate --extended``).
+    averaging : float
+        0 for a sensor that samples points, 1 for one that averages over its sample interval (docs/model-session.md,
+        11.6d); between them as far as its rotations show.
     """
 
     accelerometer: SensorCalibration

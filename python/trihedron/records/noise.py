@@ -36,14 +36,26 @@ _PER_CHANNEL = ("deviation", "n_terms", "weight", "edf", "lower", "upper")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AllanCurve(Presented):
-    """Allan deviations of one or more channels against averaging time.
+    """Allan deviations of one or more channels against averaging time. Of a series alone all arrays are (k,).
 
-    ``clusters`` (k,) readings per cluster, ``tau_s`` (k,) the same in seconds; ``deviation`` (k, channels) in the unit
-    of the readings, NaN where missing readings leave no term; ``lower``, ``upper`` (k, channels) a chi-square interval
-    of ``confidence`` from ``edf`` (k, channels) equivalent degrees of freedom; ``n_terms`` (k, channels) terms summed,
-    ``weight`` (k, channels) the sum of their weights (equal to ``n_terms`` without missing readings). ``stride`` is the
-    distance of the starts of clusters too long for the memory: 1 unless the log was streamed. Of a series alone all
-    arrays are (k,).
+    Attributes
+    ----------
+    clusters, tau_s : (k,)
+        Readings per cluster, and the same in seconds.
+    deviation : (k, channels)
+        In the unit of the readings; NaN where missing readings leave no term.
+    lower, upper : (k, channels)
+        Chi-square interval of ``confidence`` (0 to 1) from ``edf`` degrees of freedom.
+    edf : (k, channels)
+        Equivalent degrees of freedom.
+    n_terms, weight : (k, channels)
+        Terms summed and the sum of their weights: equal without missing readings.
+    kind : AllanKind
+        The estimator: overlapping or not.
+    rate_hz, n_samples, names, units
+        Of the log; ``names`` and ``units`` by channel.
+    stride : int
+        Distance of the starts of clusters too long for the memory: 1 unless the log was streamed.
     """
 
     kind: AllanKind
@@ -314,7 +326,8 @@ class Noise(Presented):
         Stretches [s] that were left out.
     breaks_s : tuple of float
         Instants [s] where the level jumped and the fit starts anew.
-    findings : tuple of Finding
+    source, findings, extensions : str, tuple of Finding, mapping
+        The log, what was noticed in it, and what goes beyond the five terms.
     """
 
     axes: tuple[NoiseAxis, ...]

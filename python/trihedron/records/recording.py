@@ -92,6 +92,8 @@ class Recording(Presented):
         Auxiliary channels where the log has them.
     source, sha256 : str
         Where it came from, for people; and the hash of the bytes that were read (of the arrays when made in memory).
+    start_epoch_s : float
+        Unix time of the first sample where the log has it, else 0.
     findings : tuple of Finding
         The audit of the log.
     sampling : Sampling
