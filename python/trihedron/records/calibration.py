@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, numbers_of, said
 from trihedron.records.finding import Finding, Severity
@@ -19,7 +19,7 @@ from trihedron.sanitise import one_line
 Frame = Literal["lower", "symmetric", "case"]
 """Body frame Mz: ``lower`` (S_f lower triangular), ``symmetric`` (S_f symmetric), ``case`` (S_f full)."""
 
-PARAMETER_NAMES: tuple[str, ...] = (*(f"S_{i}{j}" for i in "xyz" for j in "xyz"), "b_x", "b_y", "b_z")
+PARAMETER_NAMES: tuple[str, ...] = (*(f"S_{i}{j}" for i in AXES for j in AXES), "b_x", "b_y", "b_z")
 """Order of a sensor's 12 parameters in every covariance: S row by row, then b."""
 
 

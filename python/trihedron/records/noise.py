@@ -42,20 +42,13 @@ class AllanCurve(Presented):
     ----------
     clusters, tau_s : (k,)
         Readings per cluster, and the same in seconds.
-    deviation : (k, channels)
-        In the unit of the readings; NaN where missing readings leave no term.
-    lower, upper : (k, channels)
-        Chi-square interval of ``confidence`` (0 to 1) from ``edf`` degrees of freedom.
-    edf : (k, channels)
-        Equivalent degrees of freedom.
-    n_terms, weight : (k, channels)
-        Terms summed and the sum of their weights: equal without missing readings.
-    kind : AllanKind
-        The estimator: overlapping or not.
-    rate_hz, n_samples, names, units
-        Of the log; ``names`` and ``units`` by channel.
-    stride : int
-        Distance of the starts of clusters too long for the memory: 1 unless the log was streamed.
+    deviation, lower, upper : (k, channels)
+        In the readings' unit, NaN where none remain, with the chi-square interval of ``confidence`` (0 to 1).
+    edf, n_terms, weight : (k, channels)
+        Equivalent degrees of freedom; terms summed, and the sum of their weights (equal without missing readings).
+    kind, rate_hz, n_samples, names, units
+        The estimator (overlapping or not) and the log; ``names`` and ``units`` by channel. ``stride`` is 1 unless the
+        log was streamed: the distance of the starts of clusters too long for the memory.
     """
 
     kind: AllanKind
@@ -98,13 +91,7 @@ class AllanCurve(Presented):
         return int(self.deviation.shape[1]) if self.deviation.ndim == 2 else 1
 
     def of_one_series(self) -> AllanCurve:
-        """The curve of one channel with arrays (k,) instead of (k, 1).
-
-        Raises
-        ------
-        ValueError
-            When it is of several channels.
-        """
+        """The curve of one channel with arrays (k,) instead of (k, 1); a ``ValueError`` where it is of several."""
         if self.n_channels > 1:
             raise RefusedError(f"this curve is of {self.n_channels} channels, not of one series")
         flat = {name: getattr(self, name).reshape(-1) for name in _PER_CHANNEL}
@@ -322,12 +309,10 @@ class Noise(Presented):
     axes : tuple of NoiseAxis
         Of each channel ``terms``: Q, N, B, K, R with σ and 95 % interval, SI (or the log's unit where none is known).
     curve : AllanCurve
-    excluded_s : tuple of (float, float)
-        Stretches [s] that were left out.
-    breaks_s : tuple of float
-        Instants [s] where the level jumped and the fit starts anew.
-    source, findings, extensions : str, tuple of Finding, mapping
-        The log, what was noticed in it, and what goes beyond the five terms.
+    excluded_s, breaks_s
+        Stretches [s] that were excluded; instants [s] where the level jumped and the fit starts anew.
+    source, findings, extensions
+        The log, what was noticed in it, what goes beyond the five terms.
     """
 
     axes: tuple[NoiseAxis, ...]

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from trihedron.arrays import XYZ
 from trihedron.records import Calibration, FitQuality, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST, counted_moves
 from trihedron.report.axes import BIAS, axes_of
@@ -43,7 +44,7 @@ def _bias(sensor: SensorCalibration) -> list[tuple[str, str]]:
     except ValueError:
         return []
     factor, unit = shown(sensor.si_unit)
-    values = zip(("X", "Y", "Z"), factor * axes.bias_si, factor * axes.sigma_bias_si, strict=True)
+    values = zip(XYZ, factor * axes.bias_si, factor * axes.sigma_bias_si, strict=True)
     return [("bias", ", ".join(f"{axis} {with_sigma(v, s)}" for axis, v, s in values) + f" {unit}; {BIAS}")]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, XYZ, FloatArray
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import AcceptedEffect
 from trihedron.records.domains import DomainResiduals
@@ -162,7 +162,7 @@ def _drivers(
         ]
     if effect_id in _FORCE and seen.kind == "pose" and recording.accelerometer is not None:
         force = force_at(seen.time_before_s, recording, calibration)
-        return [(f"f_{'xyz'[j]} [m/s²]", "m/s²", force[:, j]) for j in range(3)]
+        return [(f"f_{AXES[j]} [m/s²]", "m/s²", force[:, j]) for j in range(3)]
     return [("time [s]", "s", seen.time_before_s)]
 
 
@@ -232,13 +232,13 @@ def _bent(
     """The curve of every axis over force with its band, and on it what is left of gravity's error in every pose."""
     prefix, curve, name = BENT[effect.id]
     values = {p.name: (p.value, p.std) for p in effect.parameters}
-    if any(f"{prefix}_{j}" not in values for j in "xyz") or not len(seen.after) or recording.accelerometer is None:
+    if any(f"{prefix}_{j}" not in values for j in AXES) or not len(seen.after) or recording.accelerometer is None:
         return None
     force = force_at(seen.time_after_s, recording, calibration)
     part = force / np.linalg.norm(force, axis=1)[:, None]
     line, panels = np.linspace(-10.0, 10.0, 81), []
     for j, colour in enumerate(AXIS_COLOURS):
-        value, std = (mm_s2_from_m_s2(v) for v in values[f"{prefix}_{'xyz'[j]}"])
+        value, std = (mm_s2_from_m_s2(v) for v in values[f"{prefix}_{AXES[j]}"])
         shape, half = value * curve(line), 2.0 * std * np.abs(curve(line))
         picked = np.flatnonzero(np.abs(part[:, j]) >= LEAST_PART)
         f = force[picked, j]
@@ -250,8 +250,8 @@ def _bent(
             Line(line, shape, f"model: {name}", colour),
             Points(f, left, told, None, "model and what is left in a pose", colour),
         )
-        x = Scale(f"f_{'xyz'[j]} [m/s²]", "m/s²", limits=(-10.6, 10.6))
-        panels.append(Panel(x, Scale("error of the reading [mm/s²]", "mm/s²"), marks, title=f"along {'XYZ'[j]}"))
+        x = Scale(f"f_{AXES[j]} [m/s²]", "m/s²", limits=(-10.6, 10.6))
+        panels.append(Panel(x, Scale("error of the reading [mm/s²]", "mm/s²"), marks, title=f"along {XYZ[j]}"))
     return Chart(tuple(panels), columns=3)
 
 
@@ -260,7 +260,7 @@ def _g_sensitivity(
 ) -> Chart | None:
     """Rate at rest against each component of force, the other two components taken out, with the lines of G."""
     values = {p.name: (p.value, p.std) for p in effect.parameters}
-    names = [[f"G_{i}{j}" for j in "xyz"] for i in "xyz"]
+    names = [[f"G_{i}{j}" for j in AXES] for i in AXES]
     if recording.accelerometer is None or any(name not in values for row in names for name in row):
         return None
     G = np.array([[values[name][0] for name in row] for row in names])
@@ -278,12 +278,12 @@ def _g_sensitivity(
             slope = deg * G[i, j]
             half = 2.0 * deg * sigma[i, j] * np.abs(line)
             marks.append(Band(line, slope * line - half, slope * line + half, "2σ of the model"))
-            marks.append(Line(line, slope * line, f"{'xyz'[i]}: model", colour))
+            marks.append(Line(line, slope * line, f"{AXES[i]}: model", colour))
             told = [
-                f"{name}, gyro {'xyz'[i]}: {plain_number(float(v))} °/s at f{'xyz'[j]} {plain_number(float(f))} m/s²"
+                f"{name}, gyro {AXES[i]}: {plain_number(float(v))} °/s at f{AXES[j]} {plain_number(float(f))} m/s²"
                 for name, v, f in zip(seen.names_before, part[:, i], force[:, j], strict=True)
             ]
-            marks.append(Points(force[:, j], part[:, i], told, None, f"static gyro {'XYZ'[i]}", colour))
-        x = Scale(f"f_{'xyz'[j]} [m/s²]", "m/s²", limits=(-10.6, 10.6))
-        panels.append(Panel(x, Scale("gyro bias [°/s]", "°/s"), tuple(marks), title=f"along {'XYZ'[j]}", height_px=220))
+            marks.append(Points(force[:, j], part[:, i], told, None, f"static gyro {XYZ[i]}", colour))
+        x = Scale(f"f_{AXES[j]} [m/s²]", "m/s²", limits=(-10.6, 10.6))
+        panels.append(Panel(x, Scale("gyro bias [°/s]", "°/s"), tuple(marks), title=f"along {XYZ[j]}", height_px=220))
     return Chart(tuple(panels), columns=3)

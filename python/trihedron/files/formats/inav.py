@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import RefusedError
-from trihedron.files.formats.autopilot import AXES, AxisCorrection, Composed, composed
+from trihedron.files.formats.autopilot import AxisCorrection, Composed, composed
 from trihedron.files.formats.contract import ExportOptions, Format, heading, number
 from trihedron.files.formats.losses import HALF_WIDTH, lost_gyro_scale, lost_to_a_diagonal, size_of_bias
 from trihedron.files.plausible import named_sensors
@@ -73,7 +73,7 @@ def _settings(word: str, values: FloatArray, low: int, high: int) -> list[str]:
             f"{word} of INAV is from {low} to {high} and would be {number(float(whole[np.abs(whole).argmax()]))}: is "
             "the size of a count that of INAV's driver?"
         )
-    return [f"set {word}_{axis.lower()} = {value:.0f}" for axis, value in zip(AXES, whole, strict=True)]
+    return [f"set {word}_{axis.lower()} = {value:.0f}" for axis, value in zip(XYZ, whole, strict=True)]
 
 
 FORMAT = Format("inav", to_inav, in_si=True)
