@@ -203,6 +203,13 @@ def test_no_page_uses_a_retired_word(page):
     assert retired(re.sub(allowed, "", text) if allowed else text) == []
 
 
+@pytest.mark.parametrize("name", ["pyproject.toml", "Cargo.toml", "mkdocs.yml", "CITATION.cff"])
+def test_no_description_on_an_index_or_a_site_uses_a_retired_word(name):
+    text = (ROOT / name).read_text(encoding="utf-8")
+    said = re.findall(r"^(?:site_)?(?:description|title|message)\s*[=:]\s*(.+)$", text, re.MULTILINE)
+    assert [found for one in said for found in retired(one)] == []
+
+
 def docstrings() -> Iterator[tuple[str, str]]:
     """Of every public name, and of what a public class shows."""
     for name in filter(str.isidentifier, trihedron.__all__):
