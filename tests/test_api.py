@@ -1,6 +1,7 @@
 """The package as people call it from Python: names, arguments, results in notebooks and in other processes."""
 
 import copy
+import dataclasses
 import doctest
 import inspect
 import json
@@ -311,3 +312,21 @@ def test_every_result_says_what_it_holds():
     results = [name for name in trihedron.__all__ if name.endswith("Result") or name in ("Noise", "SensorCalibration")]
     assert len(results) >= 8
     assert [name for name in results if "Attributes\n" not in inspect.getdoc(getattr(trihedron, name))] == []
+
+
+def test_several_recordings_in_one_call_are_sent_to_the_verb_that_takes_them(recording):
+    with pytest.raises(ValueError, match=r"trihedron\.calibrate_sessions"):
+        trihedron.calibrate([recording, recording], gravity_m_s2=9.81)
+
+
+def test_every_public_record_says_what_each_of_its_fields_is():
+    unsaid = {}
+    for name in filter(str.isidentifier, trihedron.__all__):
+        public = getattr(trihedron, name)
+        if inspect.isclass(public) and dataclasses.is_dataclass(public):
+            text = inspect.getdoc(public)
+            assert re.search(r"^(Attributes|Parameters)\n-+$", text, re.MULTILINE), name
+            unsaid[name] = {f.name for f in dataclasses.fields(public) if not re.search(rf"\b{f.name}\b", text)}
+    # Results hold what their first class says already.
+    unsaid["DiagnosisResult"] -= {field.name for field in dataclasses.fields(trihedron.Diagnosis)}
+    assert {name: fields for name, fields in unsaid.items() if fields} == {}

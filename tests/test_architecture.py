@@ -180,6 +180,14 @@ def test_arrays_are_named_in_one_place():
     assert [str(p) for p in named if twice.search((PACKAGE / p).read_text())] == ["arrays.py"]
 
 
+def test_axes_are_named_in_one_place():
+    """`AXES` and `XYZ` of arrays.py; what a log or a device calls its columns is the matter of its reader."""
+    literal = re.compile(r"""(['"])(xyz|XYZ)\1|\(["'][xX]["'], ["'][yY]["'], ["'][zZ]["']\)""")
+    rooms = {"read", "capture"}
+    found = [p for p in PACKAGE.rglob("*.py") if p.name != "arrays.py" and p.relative_to(PACKAGE).parts[0] not in rooms]
+    assert not [str(p.relative_to(PACKAGE)) for p in found if literal.search(p.read_text(encoding="utf-8"))]
+
+
 def test_no_call_across_the_seam_takes_ten_arguments():
     """Arrays that belong together go as one object; one that is made by keywords may name as many as it has."""
     calls = [n for n in ast.walk(ast.parse((PACKAGE / "_core.pyi").read_text())) if isinstance(n, ast.FunctionDef)]
@@ -274,7 +282,9 @@ def test_the_documents_name_files_that_exist():
     """Of the package's own: paths with a file's ending, looked for where a reader would look."""
     roots = [ROOT, PACKAGE, ROOT / "rust", ROOT / "python", PACKAGE / "diagnose", ROOT / "docs"]
     for page in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]:
-        named = set(re.findall(r"`([\w./-]+/[\w.-]+\.(?:py|pyi|rs|md|schema\.json))`", page.read_text()))
+        text = page.read_text(encoding="utf-8")
+        named = set(re.findall(r"`([\w./-]+/[\w.-]+\.(?:py|pyi|rs|md|schema\.json))`", text))
+        named |= set(re.findall(r"\b(?:benches|tests)/[\w/]+\.py\b", text))
         missing = {name for name in named if not any((root / name).exists() for root in roots)}
         assert not missing, f"{page.name} names {sorted(missing)}"
 

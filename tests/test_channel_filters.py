@@ -86,6 +86,6 @@ def test_check_says_what_the_channels_are():
     assert "Hz (" in rows["accelerometer"][2]
     record = json.loads(json.dumps(trihedron.check(recording).to_dict()))["channels"]
     assert record["accelerometer"]["low_pass"][0]["corner_hz"] == pytest.approx(20.0, rel=0.15)
-    assert record["accelerometer"]["step"] == pytest.approx([0.004] * 3)
+    assert record["accelerometer"]["resolution"] == pytest.approx([0.004] * 3)
     # Rounding hides the gyro's noise: whatever is said of it is said of three axes.
     assert len(channels_record(recording)["gyroscope"]["low_pass"]) == len(record["gyroscope"]["low_pass"]) == 3

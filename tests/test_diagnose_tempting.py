@@ -147,7 +147,9 @@ def test_one_bad_pose_is_one_bad_pose():
     )
     assert_not_taken_in(found, "disturbed-pose")
     poses = [p.value for e in found.effects if e.id == "disturbed-pose" for p in e.parameters if p.name == "pose"]
-    assert poses == [9.0]
+    # The tenth, as reports count.
+    assert poses == [10.0]
+    assert "Pose 10 was disturbed" in trihedron.report(found)
 
 
 def test_a_pushed_pose_is_not_a_bent_sensor():

@@ -136,8 +136,8 @@ def row(serial, name, numbers, sigma=1e-4):
     """A calibrated log's row as a worker writes it."""
     return {
         **{"path": "", "name": name, "serial": serial, "status": "done", "is_trustworthy": True},
-        **{"accelerometer_unit": "m/s^2", "gyroscope_unit": "rad/s", "numbers": numbers.tolist()},
-        **{"covariance": (np.eye(21) * sigma**2).tolist(), "wander": [0.0] * 21},
+        **{"accelerometer_unit": "m/s^2", "gyroscope_unit": "rad/s", "parameters": numbers.tolist()},
+        **{"covariance": (np.eye(21) * sigma**2).tolist(), "bias_drift_variance": [0.0] * 21},
     }
 
 

@@ -3,6 +3,7 @@
 One word for one thing, the field's own: bias, pose, timestamp, uncertainty, resolution, range limit, X Y Z.
 """
 
+import ast
 import dataclasses
 import html
 import inspect
@@ -27,6 +28,7 @@ from written_session import G, simulated
 
 ROOT = Path(__file__).parents[1]
 SCHEMAS = sorted((ROOT / "python/trihedron/files/schema").glob("*.json"))
+PACKAGE = ROOT / "python/trihedron"
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 RETIRED = {
@@ -35,11 +37,13 @@ RETIRED = {
     r"\bzero[- ]scatter|\bzeros? (that )?(scatters?|wanders?|strays?|drifts?|walks?|differs?|jumps?|moved)\b": "bias",
     r"\b(gyro|gyroscope|accelerometer|sensor)s?(['’]s?)? zeros?\b": "bias",
     r"\b(one|its|their|whose|a) zeros? (per|for|of|is|are|from)\b": "bias",
-    r"\bhidden[- ]drift": "bias drift",
+    r"\bzeros (and|are)\b|\w['’]s zeros?\b|\bzero (from (rest|poses)|turns?|scatter)\b": "bias",
+    r"\bhidden[- ]drift|\bwander(s|ing|ed)?\b": "bias drift",
     # Only the noun: a log holds readings, and a hand holds still.
     r"\b(in|of|hold|from|to|before|after) hold \d": "pose",
     r"\b(each|every|between|inside|per|neighbouring|\d+) holds?\b(?! (the|a|still|up)\b)": "pose",
-    r"\bstill (poses?|stretch(es)?)\b": "pose",
+    r"\bstill (poses?|stretch(es)?)\b|\bhold [ij]\b|\b(knocked|no) hold\b": "pose",
+    r"\b(never|nothing) rests\b": "static",
     r"\bgravity at rest\b": "gravity error in static poses",
     r"\bgravity (is )?(carried through|after (a|the|every) moves?)\b": "tilt error after a rotation",
     r"\bvelocity over (a|the) move\b": "velocity error over a rotation",
@@ -49,7 +53,7 @@ RETIRED = {
     r"\b(scales?|angles?|term|time) known to\b|\bknown to (\d|\{)": "uncertainty ... (1 σ)",
     r"\bpa(id|ying) for the search\b|\bsearch(ed)? paid for\b": "corrected for multiple testing",
     r"\btime[- ]stamps?\b|(?<![\w_-])stamps?\b(?!_)|\bstamped\b": "timestamp",
-    r"\btold (apart|by)\b|\btells? (them |\w+ )?apart\b": "separate, identify",
+    r"\btold (apart|by|from)\b|\btells? (them |\w+ )?apart\b|\bnot told\b": "separate, identify",
     r"\bconverters?\b": "resolution (LSB), ADC",
     r"\bends? of (its|the|their|a) range\b|\bcut peaks\b|\bcrowded ends?\b|\bmet its limit\b": "range limit, clipping",
     r"\bhalf[- ]power\b": "-3 dB bandwidth",
@@ -84,9 +88,9 @@ def retired(text: str) -> list[str]:
 
 
 def prose(markdown: str) -> str:
-    """A page without fences, code and addresses."""
+    """A page without fences, code and addresses; equations with the words between them stay."""
     text = re.sub(r"^ *```.*?^ *```", "", markdown, flags=re.DOTALL | re.MULTILINE)
-    text = re.sub(r"^    .*$", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^ +(trihedron|from|import) .*$", "", text, flags=re.MULTILINE)
     return re.sub(r"`[^`\n]*`|\]\([^)]*\)|\$[^$\n]*\$", "", text)
 
 
@@ -114,10 +118,15 @@ def results():
         "diagnosis": trihedron.diagnose(recording, gravity_m_s2=float(G)),
         "check": trihedron.check(recording),
         "segments": trihedron.segment(recording),
+        "ranking": trihedron.rank([made, made], recording, gravity_m_s2=float(G)),
+        "plan": trihedron.plan(),
     }
 
 
-@pytest.mark.parametrize("kind", ["calibration", "verification", "diagnosis", "check", "segments"])
+KINDS = ["calibration", "verification", "diagnosis", "check", "segments", "ranking", "plan"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_no_report_uses_a_retired_word(results, kind, tmp_path):
     assert retired(trihedron.report(results[kind], tmp_path / "report.html")) == []
     page = re.sub(r"<(style|script)\b.*?</\1>", " ", (tmp_path / "report.html").read_text("utf-8"), flags=re.DOTALL)
@@ -143,6 +152,35 @@ def test_no_sentence_of_a_catalogue_uses_a_retired_word():
     assert {where: words for where, words in said.items() if words} == {}
 
 
+def written(path: Path) -> Iterator[str]:
+    """Texts of two words and more in a module, docstrings apart: errors, prompts, comments in exported files."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    inside = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        inside |= {id(one.value) for one in (body if isinstance(body, list) else ()) if isinstance(one, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            text = "".join(str(part.value) if isinstance(part, ast.Constant) else "{" for part in node.values)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in inside:
+            text = node.value
+        else:
+            continue
+        # A label of a random stream keeps its letters, or every seed would draw another series.
+        if " " in text.strip() and not text.startswith("{/"):
+            yield text
+
+
+def test_no_error_and_no_written_text_uses_a_retired_word():
+    said = {
+        f"{path.relative_to(PACKAGE)}: {found}"
+        for path in PACKAGE.rglob("*.py")
+        for text in written(path)
+        for found in retired(text)
+    }
+    assert said == set()
+
+
 @pytest.mark.parametrize("path", SCHEMAS, ids=lambda path: path.name)
 def test_no_schema_uses_a_retired_word(path):
     words: list[str] = []
@@ -165,10 +203,25 @@ def test_no_page_uses_a_retired_word(page):
     assert retired(re.sub(allowed, "", text) if allowed else text) == []
 
 
+@pytest.mark.parametrize("name", ["pyproject.toml", "Cargo.toml", "mkdocs.yml", "CITATION.cff"])
+def test_no_description_on_an_index_or_a_site_uses_a_retired_word(name):
+    text = (ROOT / name).read_text(encoding="utf-8")
+    said = re.findall(r"^(?:site_)?(?:description|title|message)\s*[=:]\s*(.+)$", text, re.MULTILINE)
+    assert [found for one in said for found in retired(one)] == []
+
+
+def docstrings() -> Iterator[tuple[str, str]]:
+    """Of every public name, and of what a public class shows."""
+    for name in filter(str.isidentifier, trihedron.__all__):
+        public = getattr(trihedron, name)
+        yield name, inspect.getdoc(public) or ""
+        for one, member in inspect.getmembers(public) if inspect.isclass(public) else ():
+            if not one.startswith("_"):
+                yield f"{name}.{one}", inspect.getdoc(member) or ""
+
+
 def test_public_docstrings_use_no_retired_word():
-    said = {
-        name: retired(inspect.getdoc(getattr(trihedron, name)) or "") for name in trihedron.__all__ if name[0] != "_"
-    }
+    said = {name: retired(text) for name, text in docstrings()}
     assert {name: words for name, words in said.items() if words} == {}
 
 
@@ -187,8 +240,24 @@ def names() -> Iterator[str]:
 
 
 RETIRED_IN_NAMES = re.compile(
-    r"(?<![a-z])(zeros?|holds?|bars|stamps?|laws?|creeps?|told|scatter|converters?|hidden)(?![a-z])"
+    r"(?<![a-z])(zeros?|holds?|bars|stamps?|laws?|creeps?|told|scatter|converters?|hidden|wander)(?![a-z])"
 )
+
+
+def keys_of(node: object) -> Iterator[str]:
+    """Keys at every depth, the laid-out report apart: its drawings have the names of shapes."""
+    for key, child in node.items() if isinstance(node, dict) else ():
+        yield key
+        yield from keys_of(child) if key != "report" else ()
+    for child in node if isinstance(node, list) else ():
+        yield from keys_of(child)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_key_of_a_json_report_is_a_retired_word(results, kind, tmp_path):
+    trihedron.report(results[kind], tmp_path / "report.json")
+    written = json.loads((tmp_path / "report.json").read_text("utf-8"))
+    assert {key for key in keys_of(written) if RETIRED_IN_NAMES.search(key)} == set()
 
 
 def test_no_public_name_is_a_retired_word():

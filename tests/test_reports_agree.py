@@ -45,7 +45,68 @@ def test_a_pose_cut_where_it_was_bumped_keeps_its_number(made):
     obs = observe(recording, cut)
     assert cut.n_poses == segments.n_poses + 1
     assert obs.pose_names(range(3, 8)) == ("pose 4", "pose 5", "pose 5", "pose 6", "pose 7")
-    assert obs.move_names(range(3, 6)) == ("move 4", "a bump in pose 5", "move 5")
+    assert obs.move_names(range(3, 6)) == ("move 4", "a disturbance in pose 5", "move 5")
+
+
+def test_figures_of_a_diagnosis_count_poses_as_the_calibration_does_and_name_them_alike(made):
+    recording, result, _ = made
+    pose = result.segments.poses[4]
+    middle = (pose.start + pose.stop) // 2
+    bumped = replace(pose, disturbed=((middle, middle + 10),))
+    poses = (*result.segments.poses[:4], bumped, *result.segments.poses[5:])
+    found = trihedron.diagnose(recording, segments=replace(result.segments, poses=poses), gravity_m_s2=GRAVITY)
+    figures = next(s for s in diagnosis_report(found).sections if s.heading == "Figures").blocks
+    captions = {figure.name: figure.caption for figure in figures}
+    assert "14 poses in 15 intervals" in captions["static-accel"]
+    assert "13 moves and 1 disturbance inside poses" in captions["moves"]
+    names = {one.domain: one.names_before for one in found.residuals}
+    assert names["static-accel"][3:7] == ("pose 4", "pose 5", "pose 5", "pose 6")
+    (panel, *_) = figures[0].chart().panels
+    told = next(mark.said for mark in panel.marks if hasattr(mark, "said"))
+    assert told[6].startswith("pose 6")
+
+
+def test_a_bias_has_one_sign_and_one_value_in_every_report(made):
+    recording, result, _ = made
+    text = trihedron.report(result)
+    expected = -np.linalg.solve(result.accelerometer.S, result.accelerometer.b)
+    expected /= np.linalg.norm(np.linalg.inv(result.accelerometer.S), axis=1)
+    line = re.search(r"^bias +X (\S+) ± (\S+?), Y", text, re.MULTILINE)
+    # The figure is printed to two digits of its uncertainty, in mm/s².
+    assert abs(float(line[1].replace("−", "-")) - 1000.0 * expected[0]) < float(line[2])
+    other = simulated(hand_session(n_poses=14, pose_s=2.0, move_s=1.0), seed=4)
+    several = trihedron.calibrate_sessions([recording, other], gravity_m_s2=GRAVITY)
+    common = next(
+        one for one in several.model.repeated if (one.parameter.id, one.parameter.name) == ("accel-bias", "x")
+    )
+    # Two sessions of one simulated unit: their common bias is that of the first within both uncertainties.
+    assert abs(common.value - expected[0]) < 5.0 * common.std
+    again = trihedron.diagnose(recording, calibration=result)
+    given = next(one for one in again.parameters if (one.id, one.name) == ("accel-bias", "x"))
+    assert given.model == pytest.approx(expected[0], abs=1e-9)
+    for one in (result, several, again):
+        assert "the reading at zero input, −S⁻¹ b" in re.sub(r"\s+", " ", trihedron.report(one))
+
+
+def test_a_disturbed_pose_is_named_by_its_number_in_the_recording(made):
+    recording, result, _ = made
+    pose = result.segments.poses[4]
+    middle = (pose.start + pose.stop) // 2
+    bumped = replace(pose, disturbed=((middle, middle + 10),))
+    poses = (*result.segments.poses[:4], bumped, *result.segments.poses[5:])
+    restless = result.segments.poses[6]
+    shaken = recording.accelerometer.copy()
+    rng = np.random.default_rng(6)
+    part = slice(restless.start, restless.stop)
+    # Five times the sensor's own noise in both halves of the pose.
+    shaken[part] += 5.0 * np.diff(shaken[part], axis=0).std(axis=0) * rng.standard_normal(shaken[part].shape)
+    found = trihedron.diagnose(
+        replace(recording, accelerometer=np.round(shaken)),
+        segments=replace(result.segments, poses=poses),
+        gravity_m_s2=GRAVITY,
+    )
+    said = [one.statement for one in found.effects if one.id == "disturbed-pose"]
+    assert any("not still: pose 7)" in one for one in said), said
 
 
 def test_no_report_of_a_diagnosis_names_a_domain_by_its_id(made):

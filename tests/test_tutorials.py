@@ -1,5 +1,8 @@
 """Every command and every line of Python that a tutorial shows is run, in order, in an empty folder."""
 
+import ast
+import contextlib
+import io
 import json
 import re
 import shlex
@@ -64,7 +67,27 @@ def test_the_notebook_runs_and_was_run(tmp_path, monkeypatch):
     names = {}
     for cell in cells:
         assert not any(given["output_type"] == "error" for given in cell["outputs"])
-        exec("".join(cell["source"]), names)
+        *body, last = ast.parse("".join(cell["source"])).body
+        shown, printed = None, io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            if isinstance(last, ast.Expr):
+                exec(compile(ast.Module(body, []), "cell", "exec"), names)
+                shown = eval(compile(ast.Expression(last.value), "cell", "eval"), names)
+            else:
+                exec(compile(ast.Module([*body, last], []), "cell", "exec"), names)
+        kept = {kind: "".join(one) for given in cell["outputs"] for kind, one in given.get("data", {}).items()}
+        assert words_of("".join("".join(given.get("text", ())) for given in cell["outputs"])) == words_of(
+            printed.getvalue()
+        )
+        if shown is not None:
+            assert words_of(kept["text/plain"]) == words_of(repr(shown))
+        if "text/html" in kept:
+            assert words_of(kept["text/html"]) == words_of(shown._repr_html_())
+
+
+def words_of(text):
+    """A text without its figures, whose last digits are another machine's, and without the layout of a page."""
+    return re.findall(r"[^\W\d_]{3,}", re.sub(r"<(style|script|svg)\b.*?</\1>|<[^>]*>", " ", text, flags=re.DOTALL))
 
 
 def test_every_kind_of_reader_has_a_tutorial():

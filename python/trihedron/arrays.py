@@ -13,3 +13,5 @@ CORE_MEMORY = type(_core.room(1, 1).base)
 """What holds the memory of an array that the core made; nobody reaches the numbers through it."""
 AXES = ("x", "y", "z")
 """The axes of a triad: columns of every (n, 3) array."""
+XYZ = ("X", "Y", "Z")
+"""The same as reports print them, and a silkscreen."""

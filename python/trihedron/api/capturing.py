@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.api.reading import read
+from trihedron.arrays import AXES
 from trihedron.capture import (
     Block,
     Found,
@@ -226,7 +227,7 @@ def _labels(columns: Columns, names: tuple[str, ...] | None, n: int, *, is_mappe
     if names is not None and not is_mapped:
         return tuple(labels)
     for letter, triad in (("a", columns.accelerometer), ("g", columns.gyroscope)):
-        for axis, column in zip("xyz", triad or (), strict=False):
+        for axis, column in zip(AXES, triad or (), strict=False):
             labels[column] = f"{letter}{axis}"
     for label, place in (("temperature", columns.temperature), ("supply", columns.supply)):
         if place is not None:

@@ -100,8 +100,8 @@ def filter_noise(
     else:
         if own is None:
             raise RefusedError(
-                f"{recording.source}: nothing rests in it for {SHORTEST_REST_S:.0f} s in units that are known; "
-                "give known motion beside it (--reference), or a log that begins at rest."
+                f"{recording.source}: the sensor is not static in it for {SHORTEST_REST_S:.0f} s, or its units are "
+                "unknown; give known motion beside it (--reference), or a log that begins static."
             )
         sensors = tuple(_at_rest(own, sensor, known) for sensor in UNITS if at_rest(own.axes, UNITS[sensor]))
         tilt = None if segments is None else _tilt(recording, segments, known)

@@ -21,7 +21,7 @@ from trihedron.api.planning_poses import (
 )
 from trihedron.api.reading import segment
 from trihedron.api.verifying import verify
-from trihedron.arrays import FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import REFUSALS
 from trihedron.estimate.accelerometer.poses import ENTRIES, design_rows, parameter_names, pose_in_words
 from trihedron.records import Calibration, FindingCode, Recording, Segments, Severity
@@ -45,9 +45,7 @@ _NOT_THE_FIT = (FindingCode.GRAVITY_DEFAULTED, FindingCode.UNIT_CONTRADICTED)
 POSES_PER_GOAL = 2.5
 """A pose's own error may be so many times the accuracy wanted: a dozen poses average the rest away."""
 
-GYRO_NAMES = tuple(
-    f"scale of {'XYZ'[i]}" if i == j else f"{'XYZ'[j]} into {'XYZ'[i]}" for i in range(3) for j in range(3)
-)
+GYRO_NAMES = tuple(f"scale of {XYZ[i]}" if i == j else f"{XYZ[j]} into {XYZ[i]}" for i in range(3) for j in range(3))
 
 
 def examine(

@@ -12,6 +12,7 @@ import numpy as np
 import tomllib
 
 from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, flicker_of_poses
+from trihedron.arrays import AXES
 from trihedron.comparison.moved import AIMED_AT
 from trihedron.comparison.noise import Sampled, sampled
 from trihedron.comparison.quantisation import white_and_quantisation
@@ -242,7 +243,7 @@ def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisR
         for n in differing:
             if n.term in ("N", "B", "K", "Q") and n.recording is not None:
                 values = terms.setdefault(n.term, [float(v) for v in getattr(had, n.term)])
-                for axis in range(3) if not n.axis else ["xyz".index(n.axis)]:
+                for axis in range(3) if not n.axis else [AXES.index(n.axis)]:
                     values[axis] = n.recording
             elif n.term == "resolution" and n.recording is not None:
                 tables[name].setdefault("adc", {})["lsb"] = n.recording

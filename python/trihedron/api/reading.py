@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy.typing as npt
 
+from trihedron.arrays import AXES
 from trihedron.errors import RefusedError
 from trihedron.read import ReadError, read_recording
 from trihedron.records import Recording, Segments
@@ -116,8 +117,8 @@ def of_arrays(
         array: Any = np.ma.asanyarray(readings)
         if array.ndim != 2 or array.shape[1] != 3:
             raise ReadError(f"{name} must have shape (n, 3), got {array.shape}.")
-        columns |= {f"{name} {axis}": array[:, k] for k, axis in enumerate("xyz")}
-        mapping += [f"{letter}{axis}={name} {axis}" for axis in "xyz"]
+        columns |= {f"{name} {axis}": array[:, k] for k, axis in enumerate(AXES)}
+        mapping += [f"{letter}{axis}={name} {axis}" for axis in AXES]
     for name, role, values in (("temperature", "temperature", temperature_degc), ("supply", "supply", supply_v)):
         if values is not None:
             columns[name] = values
@@ -146,10 +147,19 @@ def recording_of(given: AnyRecording) -> Recording:
     Raises
     ------
     ReadError
-        (a ``ValueError``) when it cannot be read, or is nothing of the kind.
+        (a ``ValueError``) when it cannot be read, is nothing of the kind, or is several recordings.
     """
     if isinstance(given, Recording):
         return given
+    if (
+        isinstance(given, list | tuple)
+        and given
+        and all(isinstance(one, Recording | str | os.PathLike) for one in given)
+    ):
+        raise ReadError(
+            f"one recording is taken here, and {len(given)} were given: several of one unit are for "
+            "trihedron.calibrate_sessions and trihedron.diagnose_sessions."
+        )
     return read(given)
 
 

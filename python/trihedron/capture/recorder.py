@@ -248,7 +248,7 @@ class Recorder:
         most = int(AWAY_MARGIN * rate_hz * (first.host_s - self._last_host_s)) + AWAY_FRAMES
         missing = before.missing_until(first.frame, most)
         if missing is None:
-            self._rows.say("how many frames were lost while it was away cannot be told from what the device sends")
+            self._rows.say("how many frames were lost while it was away is not known from what the device sends")
             return 0
         earlier = self._past[2]
         self._past = (*self._past[:2], replace(earlier, lost=earlier.lost + missing))

@@ -43,7 +43,7 @@ class AxisAtRest:
     def of(cls, x: FloatArray, rate_hz: float, poses: Sequence[tuple[int, int]], name: str) -> AxisAtRest:
         parts = [run for start, stop in poses for run in _unbroken(x[start:stop])]
         if not parts:
-            raise RefusedError(f"{name}: no hold has {SHORTEST} readings in a row; hold still for longer")
+            raise RefusedError(f"{name}: no pose has {SHORTEST} readings in a row; keep the sensor still for longer")
         step = converter_step(np.concatenate(parts))
         power = _Power.of(parts)
         keep = robust_poses(power.variance, power.dof)

@@ -169,7 +169,7 @@ def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -
         say(f"effect {effect_id} is not in the scenario: {why}.")
     for what, ratio in better.unlike.items():
         say(
-            f"{what} of the improved scenario miss gravity by {ratio:.2f} times what the log's do: "
+            f"the gravity error of {what} of the improved scenario is {ratio:.2f} times that of the log: "
             "this log does not separate all noise within poses from bias changes."
         )
     write_scenario(better.text, path, overwrite=force)

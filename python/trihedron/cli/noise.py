@@ -25,7 +25,7 @@ FIRST_SCREEN = 2
 
 Static = Annotated[
     Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
-    typer.Option("--static", metavar="REST", help="The sensor at rest: a static log, or the JSON of trihedron allan."),
+    typer.Option("--static", metavar="STATIC", help="A static log of the unit, or the JSON of trihedron allan."),
 ]
 Reference = Annotated[
     Optional[Path],  # noqa: UP045

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from trihedron.arrays import AXES
 from trihedron.diagnose.against.mechanisms import CODE, FRAME_TOLERANCE
 from trihedron.records import Recording
 from trihedron.records.diagnosis import AcceptedEffect
@@ -35,7 +36,7 @@ def _states(scenario: Scenario, effect: AcceptedEffect, recording: Recording) ->
     codes = {p.name: p.value for p in effect.parameters if p.name.startswith(CODE)}
     limits = [p for p in effect.parameters if p.name.startswith("limit_")]
     for p in limits:
-        axis, is_high = "xyz".index(p.name[-2]), p.name.endswith("+")
+        axis, is_high = AXES.index(p.name[-2]), p.name.endswith("+")
         end = part.adc.high if is_high else part.adc.low
         if is_same_unit and abs(end - codes.get(CODE + p.name, np.inf)) <= part.adc.lsb:
             continue

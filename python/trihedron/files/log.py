@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.files.output import OutputError, write_whole
 from trihedron.records.recording import Recording
 from trihedron.subprocesses import check_tables
@@ -70,7 +70,7 @@ def _columns(recording: Recording) -> dict[str, FloatArray]:
         ("g", recording.gyroscope, recording.gyroscope_unit),
     ):
         if sensor is not None:
-            columns |= {f"{letter}{axis} [{unit.value}]": sensor[:, k] for k, axis in enumerate("xyz")}
+            columns |= {f"{letter}{axis} [{unit.value}]": sensor[:, k] for k, axis in enumerate(AXES)}
     if recording.temperature_degc is not None:
         columns["temperature [degC]"] = recording.temperature_degc
     if recording.supply_v is not None:
@@ -82,7 +82,7 @@ def _corrected_columns(recording: Recording) -> dict[str, FloatArray]:
     columns: dict[str, FloatArray] = {"time_s": recording.time_s}
     for name, readings in (("acc", recording.accelerometer), ("gyr", recording.gyroscope)):
         if readings is not None:
-            columns |= {f"{name}_{axis}": readings[:, k] for k, axis in enumerate("xyz")}
+            columns |= {f"{name}_{axis}": readings[:, k] for k, axis in enumerate(AXES)}
     return columns
 
 

@@ -87,7 +87,7 @@ def summarise(rows: Sequence[dict[str, Any]], folder: Path, n_before: int = 0) -
 
 def _log(row: dict[str, Any]) -> FleetLog:
     diagnosis = row.get("diagnosis") or {}
-    numbers = None if row.get("numbers") is None else np.array(row["numbers"], dtype=np.float64)
+    numbers = None if row.get("parameters") is None else np.array(row["parameters"], dtype=np.float64)
     std = None
     if row.get("covariance") is not None:
         std = np.sqrt(np.maximum(np.diag(np.array(row["covariance"], dtype=np.float64)), 0.0))
@@ -111,11 +111,13 @@ def _log(row: dict[str, Any]) -> FleetLog:
 def _comparable(rows: Sequence[dict[str, Any]]) -> tuple[list[dict[str, Any]], str]:
     """Trustworthy calibrations in the commonest units and sensors, in their order in time, and who is missing."""
     sound = [row for row in rows if row["status"] == "done" and row.get("is_trustworthy")]
-    kind = Counter((row["accelerometer_unit"], row["gyroscope_unit"], len(row["numbers"])) for row in sound)
+    kind = Counter((row["accelerometer_unit"], row["gyroscope_unit"], len(row["parameters"])) for row in sound)
     if not kind:
         return [], ""
     chosen = kind.most_common(1)[0][0]
-    taken = [row for row in sound if (row["accelerometer_unit"], row["gyroscope_unit"], len(row["numbers"])) == chosen]
+    taken = [
+        row for row in sound if (row["accelerometer_unit"], row["gyroscope_unit"], len(row["parameters"])) == chosen
+    ]
     doubtful = sum(row["status"] == "done" for row in rows) - len(sound)
     words = []
     if doubtful:
@@ -127,13 +129,13 @@ def _comparable(rows: Sequence[dict[str, Any]]) -> tuple[list[dict[str, Any]], s
 
 
 def _session(row: dict[str, Any]) -> Session:
-    numbers = np.array(row["numbers"], dtype=np.float64)
+    numbers = np.array(row["parameters"], dtype=np.float64)
     return Session(
         row["name"],
         row["serial"],
         numbers,
         np.array(row["covariance"], dtype=np.float64),
-        np.array(row["wander"], dtype=np.float64),
+        np.array(row["bias_drift_variance"], dtype=np.float64),
         row.get("start_epoch_s") or 0.0,
     )
 

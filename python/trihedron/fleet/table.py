@@ -72,7 +72,7 @@ def _cell(row: dict[str, Any], name: str) -> Any:
 
 
 def _number(row: dict[str, Any], k: int) -> float | None:
-    numbers = row.get("numbers") or ()
+    numbers = row.get("parameters") or ()
     return float(numbers[k]) if k < len(numbers) else None
 
 

@@ -105,8 +105,8 @@ def _row(result: Any) -> Row:
         "temperature_degc": session.temperature_degc if np.isfinite(session.temperature_degc) else None,
         "accelerometer": {"S": accel.S.tolist(), "b": accel.b.tolist()},
         "gyroscope": None if gyro is None else {"S": gyro.S.tolist(), "b": gyro.b.tolist()},
-        "numbers": session.numbers.tolist(),
+        "parameters": session.numbers.tolist(),
         "covariance": session.covariance.tolist(),
-        "wander": session.wander.tolist(),
+        "bias_drift_variance": session.wander.tolist(),
         "calibration": calibration_document(result.calibration),
     }

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, numbers_of, said
 from trihedron.records.finding import Finding, Severity
@@ -19,7 +19,7 @@ from trihedron.sanitise import one_line
 Frame = Literal["lower", "symmetric", "case"]
 """Body frame Mz: ``lower`` (S_f lower triangular), ``symmetric`` (S_f symmetric), ``case`` (S_f full)."""
 
-PARAMETER_NAMES: tuple[str, ...] = (*(f"S_{i}{j}" for i in "xyz" for j in "xyz"), "b_x", "b_y", "b_z")
+PARAMETER_NAMES: tuple[str, ...] = (*(f"S_{i}{j}" for i in AXES for j in AXES), "b_x", "b_y", "b_z")
 """Order of a sensor's 12 parameters in every covariance: S row by row, then b."""
 
 
@@ -86,6 +86,8 @@ class SensorCalibration(Frozen):
     covariance : (12, 12)
         In the order of :data:`PARAMETER_NAMES`; rows of parameters fixed by the choice of frame are zero. ``sigma_S``
         (3, 3) and ``sigma_b`` (3,) are its diagonal's roots.
+    raw_unit, si_unit, method : str
+        Units before and after, and how S and b were found.
     quality, observability : FitQuality, Observability or None
         Residuals pose by pose or move by move, and what the motion determined.
     """
@@ -132,9 +134,27 @@ class SensorCalibration(Frozen):
 class Calibration(Presented):
     """Both sensors in one body frame (instrument frame), with what they were determined from.
 
-    ``covariance`` (24, 24): accelerometer's 12 parameters, then the gyro's, with cross terms; (12, 12) without.
-    ``averaging``: 0 for a sensor that samples points, 1 for one that averages over its sample interval
-    (docs/model-session.md, 11.6d); between them as far as its rotations tell.
+    Attributes
+    ----------
+    accelerometer : SensorCalibration
+        ``f = S a' + b``, reading to m/s².
+    gyroscope : SensorCalibration or None
+        ``ω = S w' + b``, reading to rad/s; None without a gyro.
+    covariance : (24, 24)
+        Accelerometer's 12 parameters (S row by row, then b), then the gyro's, with cross terms; (12, 12) without.
+    frame : "lower", "symmetric" or "case"
+        The body frame of S and b.
+    gravity_m_s2, gravity_source : float, str
+        |g| at the place and where it is from.
+    recording_source, recording_sha256 : str
+        The log that it was made from.
+    findings : tuple of Finding
+        What was noticed; ``is_trustworthy`` where none is serious.
+    extensions : mapping
+        Effects and temperature models beside S and b (``calibrate --extended``).
+    averaging : float
+        0 for a sensor that samples points, 1 for one that averages over its sample interval (docs/model-session.md,
+        11.6d); between them as far as its rotations show.
     """
 
     accelerometer: SensorCalibration

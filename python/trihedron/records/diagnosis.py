@@ -180,7 +180,33 @@ class LinearModel(Frozen, Plain):
 
 @dataclass(frozen=True)
 class Diagnosis(Frozen, Plain):
-    """Where a recording and its model differ, which effects are missing, and what is unexplained (schema version 3)."""
+    """Where a recording and its model differ, which effects are missing, and what is unexplained (schema version 3).
+
+    Attributes
+    ----------
+    verdict : str
+        ``consistent``, ``parameters-differ``, ``missing-physics``, ``unexplained`` or ``not-testable``.
+    domains, remaining : tuple of DomainTest
+        χ² of every kind of residual with the linear model, and with the effects.
+    effects, candidates : tuple of AcceptedEffect, tuple of Candidate
+        Accepted, largest share of the misfit first; and every effect that was tried, with why it was not accepted.
+    baseline, extended : LinearModel
+        S and b with uncertainties, without and with the effects.
+    noise : mapping
+        Noise densities and bias changes that the model took, by sensor.
+    gravity_m_s2, alpha : float
+        |g|, and the chance that a healthy log is called anything but consistent.
+    recording_source, recording_sha256 : str
+        The log.
+    references : mapping of name to float
+        Figures of known motion beside the log.
+    residuals : tuple of DomainResiduals
+        Pose by pose and move by move, without and with the effects.
+    parameters, noise_compared : tuple of ParameterDifference, tuple of NoiseDifference
+        A given model's parameters and noise beside the recording's; empty without one.
+    relations, stages : tuple of Relation, tuple of Stage
+        Empirical relations of what no effect explains; residuals stage by stage.
+    """
 
     verdict: Verdict
     domains: tuple[DomainTest, ...]

@@ -44,6 +44,8 @@ class DomainResiduals(Frozen, Plain):
     ``before`` (n, k) and ``after`` (m, k) at ``time_before_s`` (n,), ``time_after_s`` (m,) (middle of pose or move),
     with ``sigma_before`` (n,), ``sigma_after`` (m,) the noise predicted for one number. An effect that leaves moves
     out or splits poses makes n and m differ. ``channels`` (k,) names the columns, ``kind`` is ``pose`` or ``move``.
+    ``names_before`` (n,) and ``names_after`` (m,) say which pose or move of the recording a row is: a pose that was
+    disturbed has an interval on each side, both with its name.
     """
 
     domain: Domain
@@ -57,6 +59,13 @@ class DomainResiduals(Frozen, Plain):
     time_after_s: FloatArray
     after: FloatArray
     sigma_after: FloatArray
+    names_before: tuple[str, ...]
+    names_after: tuple[str, ...]
+
+    @property
+    def n_whole(self) -> int:
+        """Poses or moves of the recording among the rows, each counted once."""
+        return len({name for name in self.names_before if name.startswith(self.kind)})
 
 
 @dataclass(frozen=True)

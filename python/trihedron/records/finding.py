@@ -158,8 +158,16 @@ class FindingCode(str, Enum):
 class Finding(Frozen, Plain):
     """One thing noticed.
 
-    ``seen`` is one sentence with the number and the place; ``cause`` the likely reason; ``action`` what to do next.
-    ``numbers`` repeats the figures of the sentence for machines (SI units, the unit ends the key: ``gap_s``).
+    Attributes
+    ----------
+    code : FindingCode
+        Keeps its meaning from version to version.
+    severity : Severity
+        ``note``, ``warning`` or ``serious`` (not to be trusted).
+    seen, cause, action : str
+        One sentence with the number and the place; the likely reason; what to do next.
+    numbers : mapping of name to float
+        The figures of the sentence for machines (SI units, the unit ends the key: ``gap_s``).
     """
 
     code: FindingCode

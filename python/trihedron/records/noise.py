@@ -36,14 +36,19 @@ _PER_CHANNEL = ("deviation", "n_terms", "weight", "edf", "lower", "upper")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AllanCurve(Presented):
-    """Allan deviations of one or more channels against averaging time.
+    """Allan deviations of one or more channels against averaging time. Of a series alone all arrays are (k,).
 
-    ``clusters`` (k,) readings per cluster, ``tau_s`` (k,) the same in seconds; ``deviation`` (k, channels) in the unit
-    of the readings, NaN where missing readings leave no term; ``lower``, ``upper`` (k, channels) a chi-square interval
-    of ``confidence`` from ``edf`` (k, channels) equivalent degrees of freedom; ``n_terms`` (k, channels) terms summed,
-    ``weight`` (k, channels) the sum of their weights (equal to ``n_terms`` without missing readings). ``stride`` is the
-    distance of the starts of clusters too long for the memory: 1 unless the log was streamed. Of a series alone all
-    arrays are (k,).
+    Attributes
+    ----------
+    clusters, tau_s : (k,)
+        Readings per cluster, and the same in seconds.
+    deviation, lower, upper : (k, channels)
+        In the readings' unit, NaN where none remain, with the chi-square interval of ``confidence`` (0 to 1).
+    edf, n_terms, weight : (k, channels)
+        Equivalent degrees of freedom; terms summed, and the sum of their weights (equal without missing readings).
+    kind, rate_hz, n_samples, names, units
+        The estimator (overlapping or not) and the log; ``names`` and ``units`` by channel. ``stride`` is 1 unless the
+        log was streamed: the distance of the starts of clusters too long for the memory.
     """
 
     kind: AllanKind
@@ -86,13 +91,7 @@ class AllanCurve(Presented):
         return int(self.deviation.shape[1]) if self.deviation.ndim == 2 else 1
 
     def of_one_series(self) -> AllanCurve:
-        """The curve of one channel with arrays (k,) instead of (k, 1).
-
-        Raises
-        ------
-        ValueError
-            When it is of several channels.
-        """
+        """The curve of one channel with arrays (k,) instead of (k, 1); a ``ValueError`` where it is of several."""
         if self.n_channels > 1:
             raise RefusedError(f"this curve is of {self.n_channels} channels, not of one series")
         flat = {name: getattr(self, name).reshape(-1) for name in _PER_CHANNEL}
@@ -310,11 +309,10 @@ class Noise(Presented):
     axes : tuple of NoiseAxis
         Of each channel ``terms``: Q, N, B, K, R with σ and 95 % interval, SI (or the log's unit where none is known).
     curve : AllanCurve
-    excluded_s : tuple of (float, float)
-        Stretches [s] that were left out.
-    breaks_s : tuple of float
-        Instants [s] where the level jumped and the fit starts anew.
-    findings : tuple of Finding
+    excluded_s, breaks_s
+        Stretches [s] that were excluded; instants [s] where the level jumped and the fit starts anew.
+    source, findings, extensions
+        The log, what was noticed in it, what goes beyond the five terms.
     """
 
     axes: tuple[NoiseAxis, ...]

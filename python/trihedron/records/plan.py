@@ -9,17 +9,17 @@ from trihedron.records.presented import Presented
 
 @dataclass(frozen=True)
 class TurnPlan:
-    """Standard errors from known turns: relative ``scale`` of each turned axis, ``zero`` [rad/s]; all rows at once
-    (least squares), and the bias from the zero turn first. ``n_turns`` about every axis."""
+    """Standard errors from known turns: relative ``scale`` of each turned axis, ``bias`` [rad/s]; all rows at once
+    (least squares), and the bias from static stretches of ``static_s`` first. ``n_turns`` about every axis."""
 
     n_turns: int
     angles_deg: tuple[float, ...]
     duration_s: float
-    zero_s: float
+    static_s: float
     scale: float
-    zero: float
-    scale_zero_first: float
-    zero_zero_first: float
+    bias: float
+    scale_bias_first: float
+    bias_bias_first: float
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class PoseWorth:
 
 @dataclass(frozen=True)
 class PosePlan:
-    """Standard errors of a set of poses by method 2: relative ``scale``, ``angle`` between axes [rad], ``zero`` [m/s²],
+    """Standard errors of a set of poses by method 2: relative ``scale``, ``angle`` between axes [rad], ``bias`` [m/s²],
     the largest of three each; ``rank`` of nine; ``worth`` the poses by what they are worth, most first."""
 
     name: str
@@ -41,7 +41,7 @@ class PosePlan:
     rank: int
     scale: float
     angle: float
-    zero: float
+    bias: float
     worth: tuple[PoseWorth, ...]
 
 

@@ -92,6 +92,8 @@ class Recording(Presented):
         Auxiliary channels where the log has them.
     source, sha256 : str
         Where it came from, for people; and the hash of the bytes that were read (of the arrays when made in memory).
+    start_epoch_s : float
+        Unix time of the first sample where the log has it, else 0.
     findings : tuple of Finding
         The audit of the log.
     sampling : Sampling
@@ -229,7 +231,7 @@ class Recording(Presented):
     @cached_property
     def low_passes(self) -> dict[str, tuple[LowPass, ...]]:
         """The filter ahead of each channel by sensor, as white noise in the quietest stretches shows it: found when
-        asked for; none of a sensor that never rests for 32 readings."""
+        asked for; none of a sensor that is never static for 32 readings."""
         found: dict[str, tuple[LowPass, ...]] = ask("find_low_passes", self._readings(), self.rate_hz)
         return found
 

@@ -173,6 +173,8 @@ class DiagnosisResult(Diagnosis, Presented):
         What a given scenario reads, moved as the recording was.
     own_effects : tuple of AcceptedEffect
         Every effect that the recording has, those that the given model has too included.
+    findings, gravity_source : tuple of Finding, str
+        What was noticed, and where |g| is from.
 
     Examples
     --------

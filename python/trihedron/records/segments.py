@@ -71,17 +71,30 @@ class Move:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Segments(Presented):
-    """Poses and moves of one recording, and the sensor noise that decided them.
+    """Poses and moves of one recording, and the sensor noise that decided them. Without a sensor its arrays are None.
 
-    ``accelerometer_sigma`` and ``gyroscope_sigma`` (3,) are the white noise of one sample in raw units, measured inside
-    the poses; ``accelerometer_mean`` / ``gyroscope_mean`` (n_poses, 3) the mean raw reading of each pose, with
-    ``accelerometer_sigma_mean`` / ``gyroscope_sigma_mean`` (n_poses, 3) the standard error of each mean (not assuming
-    whiteness: slow noise inside a pose raises it). ``n_averaged`` (n_poses,) counts the samples behind each mean,
-    ``time_mid_s`` (n_poses,) and ``duration_s`` (n_poses,) say when and how long. ``whole`` are the poses before they
-    were cut at bumps, each averaged over all of its samples; ``None`` where nothing was cut.
-    ``accelerometer_up`` (n_poses, 3) is the vertical in raw units (unit vectors, by whose direction |f| grows fastest)
-    and ``accelerometer_sigma_up`` (n_poses,) the standard error of the mean along it, NaN where only those of the axes
-    are known: a body that settles turns gravity across itself, its length stays; ``None`` where no vertical is known.
+    Attributes
+    ----------
+    poses, moves : tuple of Pose, tuple of Move
+        Static intervals, and the motion between two of them, as ranges of samples.
+    accelerometer_sigma, gyroscope_sigma : (3,)
+        White noise of one sample, raw units, measured inside the poses.
+    accelerometer_mean, gyroscope_mean : (n_poses, 3)
+        Mean reading of each pose, raw units.
+    accelerometer_sigma_mean, gyroscope_sigma_mean : (n_poses, 3)
+        Standard error of each mean, without assuming whiteness: slow noise inside a pose raises it.
+    n_averaged : (n_poses,) of int
+        Samples behind each mean.
+    time_mid_s, duration_s : (n_poses,)
+        When and how long, seconds.
+    findings : tuple of Finding
+        What was noticed in poses and moves.
+    whole : Segments or None
+        The poses before they were cut at disturbances, each over all of its samples; None where nothing was cut.
+    accelerometer_up, accelerometer_sigma_up : (n_poses, 3), (n_poses,)
+        The vertical in raw units (unit vectors, by whose direction |f| grows fastest) and the standard error of the
+        mean along it, NaN where only those of the axes are known: a body that settles turns gravity across itself, its
+        length stays. None where no vertical is known.
     """
 
     poses: tuple[Pose, ...]
@@ -146,10 +159,10 @@ class Segments(Presented):
         return f"pose {around[0] + 1}" if around else "a vibrating pose"
 
     def move_name(self, start: int, stop: int) -> str:
-        """The move of samples [start, stop), by its number from 1; a bump inside a pose by that pose."""
+        """The move of samples [start, stop), by its number from 1; a disturbance inside a pose by that pose."""
         middle = (start + stop) // 2
         around = [k for k, move in enumerate(self.moves) if move.start <= middle < move.stop]
-        return f"move {around[0] + 1}" if around else f"a bump in {self.pose_name(middle, middle)}"
+        return f"move {around[0] + 1}" if around else f"a disturbance in {self.pose_name(middle, middle)}"
 
     def __repr__(self) -> str:
         poses = f"{self.n_poses} pose{'' if self.n_poses == 1 else 's'}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.records.calibration import Calibration
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen
@@ -30,14 +30,14 @@ class Parameter:
     sensor: Literal["accelerometer", "gyroscope", "both"]
 
 
-_AXES, _PAIRS = ("x", "y", "z"), ("xy", "xz", "yz")
+_PAIRS = ("xy", "xz", "yz")
 
 
 def _of(prefix: Literal["accel", "gyro"], unit: str) -> tuple[Parameter, ...]:
     sensor: Literal["accelerometer", "gyroscope"] = "accelerometer" if prefix == "accel" else "gyroscope"
     return (
-        *(Parameter(f"{prefix}-bias", axis, unit, sensor) for axis in _AXES),
-        *(Parameter(f"{prefix}-scale", axis, "1", sensor) for axis in _AXES),
+        *(Parameter(f"{prefix}-bias", axis, unit, sensor) for axis in AXES),
+        *(Parameter(f"{prefix}-scale", axis, "1", sensor) for axis in AXES),
         *(Parameter(f"{prefix}-misalignment", pair, "rad", sensor) for pair in _PAIRS),
     )
 
@@ -45,7 +45,7 @@ def _of(prefix: Literal["accel", "gyro"], unit: str) -> tuple[Parameter, ...]:
 PARAMETERS: tuple[Parameter, ...] = (
     *_of("accel", "m/s^2"),
     *_of("gyro", "rad/s"),
-    *(Parameter("triad-alignment", axis, "rad", "both") for axis in _AXES),
+    *(Parameter("triad-alignment", axis, "rad", "both") for axis in AXES),
 )
 """Order of every vector of numbers: 9 of the accelerometer, 9 of the gyro, 3 of the rotation between them. A scale is
 the natural logarithm of raw units per SI unit: differences of it are relative."""

@@ -58,6 +58,8 @@ class Truth(Frozen):
         Terms per sensor: name to three values.
     temperature_degc, supply_v : (n,) or None
         True values, whether or not they were logged.
+    scenario, seed : str, int
+        What was simulated; the same again makes the same log.
     kept : (n,) of int
         For every row the index of the sample instant it came from: gaps are lost samples.
     """

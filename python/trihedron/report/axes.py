@@ -14,33 +14,42 @@ from trihedron.arrays import FloatArray
 from trihedron.records import SensorCalibration
 from trihedron.sensor_model import other_form, other_form_jacobian
 
+BIAS = "the reading at zero input, −S⁻¹ b: its sign is opposite to that of b"
+"""What a bias is in every report; b is what a corrected reading adds."""
+
 
 @dataclass(frozen=True, eq=False)
 class Axes:
     """What the numbers of one sensor say about its axes.
 
-    ``sensitivity`` (3,) in raw unit per SI unit, ``zero`` (3,) raw reading at true bias, ``skew_rad`` (3,) by which the
-    angles between axes 1-2, 1-3, 2-3 exceed a right angle; each with its standard error.
+    ``sensitivity`` (3,) in raw unit per SI unit, ``bias`` (3,) reading at zero input, raw, and ``bias_si`` (3,) the
+    same over the sensitivity, ``skew_rad`` (3,) by which the angles X-Y, X-Z, Y-Z exceed a right angle; each with its
+    standard error.
     """
 
     sensitivity: FloatArray
     sigma_sensitivity: FloatArray
-    zero: FloatArray
+    bias: FloatArray
     sigma_bias: FloatArray
+    bias_si: FloatArray
+    sigma_bias_si: FloatArray
     skew_rad: FloatArray
     sigma_skew_rad: FloatArray
 
 
 def axes_of(sensor: SensorCalibration) -> Axes:
-    """From the rows r of ``S⁻¹``: sensitivity ``|r_i|``, zero ``-S⁻¹ b``, skew ``-asin(r_i·r_j / |r_i||r_j|)``."""
-    inverse, zero = other_form(sensor.S, sensor.b)
+    """From the rows r of ``S⁻¹``: sensitivity ``|r_i|``, bias ``-S⁻¹ b``, skew ``-asin(r_i·r_j / |r_i||r_j|)``."""
+    inverse, bias = other_form(sensor.S, sensor.b)
     jacobian = other_form_jacobian(sensor.S, sensor.b)
     covariance = jacobian @ sensor.covariance @ jacobian.T
     sensitivity = np.linalg.norm(inverse, axis=1)
     unit = inverse / sensitivity[:, None]
-    wrt = np.zeros((6, 12))
+    wrt = np.zeros((9, 12))
     for i in range(3):
-        wrt[i, 3 * i : 3 * i + 3] = unit[i]
+        own = slice(3 * i, 3 * i + 3)
+        wrt[i, own] = unit[i]
+        wrt[6 + i, own] = -bias[i] / sensitivity[i] ** 2 * unit[i]
+        wrt[6 + i, 9 + i] = 1.0 / sensitivity[i]
     skew = np.zeros(3)
     for k, (i, j) in enumerate(combinations(range(3), 2)):
         cosine = float(unit[i] @ unit[j])
@@ -50,4 +59,4 @@ def axes_of(sensor: SensorCalibration) -> Axes:
         wrt[3 + k, 3 * j : 3 * j + 3] = slope * (unit[i] - cosine * unit[j]) / sensitivity[j]
     sigma = np.sqrt(np.maximum(np.diag(wrt @ covariance @ wrt.T), 0.0))
     sigma_bias = np.sqrt(np.maximum(np.diag(covariance)[9:], 0.0))
-    return Axes(sensitivity, sigma[:3], zero, sigma_bias, skew, sigma[3:])
+    return Axes(sensitivity, sigma[:3], bias, sigma_bias, bias / sensitivity, sigma[6:], skew, sigma[3:6])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import AXES, XYZ
 from trihedron.records import Calibration, Recording, Segments, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST
 from trihedron.report.axes import Axes, axes_of
@@ -131,14 +132,14 @@ def parameter_table(name: str, sensor: SensorCalibration) -> Table:
     exponent = engineering_exponent(float(np.abs(sensor.S).max()))
     scale = 10.0**-exponent
     times = f" × {power_of_ten(exponent)}" if exponent else ""
-    head = ("", *(f"{raw}′_{j}{times}" for j in "xyz"), f"b [{unit}]")
+    head = ("", *(f"{raw}′_{j}{times}" for j in AXES), f"b [{unit}]")
     value = np.column_stack([scale * sensor.S, sensor.b])
     sigma = np.column_stack([scale * sensor.sigma_S, sensor.sigma_b])
     rows = tuple(
         row
         for i in range(3)
         for row in (
-            (f"{true}_{'xyz'[i]} =", *(with_sigma(v, s) for v, s in zip(value[i], sigma[i], strict=True))),
+            (f"{true}_{AXES[i]} =", *(with_sigma(v, s) for v, s in zip(value[i], sigma[i], strict=True))),
             ("", *(_percent(v, s) for v, s in zip(value[i], sigma[i], strict=True))),
         )
     )
@@ -176,10 +177,10 @@ def _axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
     unit = "" if raw == si else f" [{raw} per {si}]"
     rows = [
         (
-            "XYZ"[i],
+            XYZ[i],
             with_sigma(axes.sensitivity[i], axes.sigma_sensitivity[i]),
             " ".join(_relative(float(axes.sigma_sensitivity[i] / axes.sensitivity[i]))),
-            with_sigma(axes.zero[i], axes.sigma_bias[i]),
+            with_sigma(axes.bias[i], axes.sigma_bias[i]),
         )
         for i in range(3)
     ]

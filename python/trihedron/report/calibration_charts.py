@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import PARAMETER_NAMES, Calibration, FitQuality, Segments, SensorCalibration
 from trihedron.report.chart import Band, Bars, Chart, Disc, Level, Panel, Points, Scale
 from trihedron.report.disc import equal_area
@@ -124,7 +124,7 @@ def direction_in_words(words: str) -> FloatArray | None:
         return None
     up = np.zeros(3)
     for side, axis in re.findall(r"([+-])([XYZ])", words.partition(" ")[0]):
-        up["XYZ".index(axis)] = 1.0 if side == "+" else -1.0
+        up[XYZ.index(axis)] = 1.0 if side == "+" else -1.0
     out: FloatArray = up / np.linalg.norm(up)
     return out
 

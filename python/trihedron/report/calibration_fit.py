@@ -6,11 +6,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from trihedron.arrays import XYZ
 from trihedron.records import Calibration, FitQuality, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST, counted_moves
+from trihedron.report.axes import BIAS, axes_of
 from trihedron.report.calibration_charts import move_noise_deg
 from trihedron.report.document import Table
-from trihedron.report.numbers import how_many, plain_number
+from trihedron.report.many_charts import shown
+from trihedron.report.numbers import how_many, plain_number, with_sigma
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2
 
 METHODS = {
@@ -21,7 +24,7 @@ METHODS = {
 
 
 def fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]:
-    rows = [("method", METHODS.get(sensor.method, sensor.method))]
+    rows = [*_bias(sensor), ("method", METHODS.get(sensor.method, sensor.method))]
     quality = sensor.quality
     if quality is None:
         return rows
@@ -32,6 +35,17 @@ def fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]:
     else:
         rows.append(("residual", _angle_words(quality)))
     return rows
+
+
+def _bias(sensor: SensorCalibration) -> list[tuple[str, str]]:
+    """The bias as many recordings and a diagnosis compare it; nothing where S is singular."""
+    try:
+        axes = axes_of(sensor)
+    except ValueError:
+        return []
+    factor, unit = shown(sensor.si_unit)
+    values = zip(XYZ, factor * axes.bias_si, factor * axes.sigma_bias_si, strict=True)
+    return [("bias", ", ".join(f"{axis} {with_sigma(v, s)}" for axis, v, s in values) + f" {unit}; {BIAS}")]
 
 
 def _norm_words(quality: FitQuality) -> str:

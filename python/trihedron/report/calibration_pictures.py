@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.report.calibration_charts import (
     LIMIT_SIGMAS,
@@ -179,7 +179,7 @@ def time_chart(calibration: Calibration, segments: Segments, recording: Recordin
         )
         sigma = np.sqrt(np.mean(moved.sigma**2, axis=1))
         y = Scale("gravity after a rotation, predicted − measured  [mm/s²]", "mm/s²")
-        panels.append((y, _over_time(middle, moved.residual, sigma, "move", ("X", "Y", "Z"))))
+        panels.append((y, _over_time(middle, moved.residual, sigma, "move", XYZ)))
     if not panels:
         return None
     x = Scale("time [s]", "s", limits=limits)

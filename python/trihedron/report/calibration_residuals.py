@@ -79,5 +79,12 @@ def _move_table(quality: FitQuality, segments: Segments | None) -> Table:
             "excluded" if is_out else "",
         ]
         rows.append(tuple(row))
-    head = ("move", *(("poses",) if moves is not None else ()), "in sample [°]", "held out [°]", "noise alone [°]", "")
+    head = (
+        "move",
+        *(("poses",) if moves is not None else ()),
+        "in sample [°]",
+        "held out [°]",
+        "noise alone [°]",
+        "used",
+    )
     return Table(head, tuple(rows), "Gyroscope: tilt error after every rotation, predicted against measured gravity")

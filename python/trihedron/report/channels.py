@@ -35,13 +35,13 @@ def channels_table(recording: Recording) -> Table:
 
 
 def channels_record(recording: Recording) -> dict[str, Any]:
-    """The same for programs: ``step`` (3,), ``limits`` and ``low_pass`` of every axis, raw units and Hz."""
+    """The same for programs: ``resolution`` (3,), ``range_limits`` and ``low_pass`` of every axis, raw units and Hz."""
     out: dict[str, Any] = {}
     for name in _sensors(recording):
         facts, filters = recording.facts.of(name), recording.low_passes.get(name)
         out[name] = {
-            "step": facts.step,
-            "limits": [{"axis": AXES[one.axis], "value": one.value, "count": one.count} for one in facts.limits],
+            "resolution": facts.step,
+            "range_limits": [{"axis": AXES[one.axis], "value": one.value, "count": one.count} for one in facts.limits],
             "low_pass": None if filters is None else [_filter_record(one) for one in filters],
         }
     return out

@@ -249,7 +249,7 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
     )
     if not rows:
         return (Paragraph("No effect was added, so there is no before and after."),)
-    head = ("effect", "residual", "rms before", "rms after", "χ²/dof before", "after")
+    head = ("effect", "residual", "rms before", "rms after", "χ²/dof before", "χ²/dof after")
     caption = "Poses and moves predicted by fits that did not see them (held out); noise alone gives χ²/dof 1"
     return (Table(head, rows, caption),)
 
@@ -271,7 +271,7 @@ def _candidates(diagnosis: Diagnosis) -> Block:
         for c in tried
     ]
     rows += [(c.id, "–", f"not applicable: {c.reason}") for c in diagnosis.candidates if not c.applicable]
-    return Table(("effect", "p against the linear model", ""), tuple(rows), "Every effect of the catalogue")
+    return Table(("effect", "p against the linear model", "outcome"), tuple(rows), "Every effect of the catalogue")
 
 
 def _traces(diagnosis: Diagnosis) -> tuple[Picture, ...]:
@@ -304,13 +304,21 @@ def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
     has_effects = bool(diagnosis.effects)
 
     draw = later("diagnosis_figures", "draw_before_after", residuals, has_effects=has_effects)
-    n = len(residuals.before)
-    caption = f"{_CAPTIONS[residuals.domain]} {how_many(n, 'pose' if residuals.kind == 'pose' else 'move')}; "
+    caption = f"{_CAPTIONS[residuals.domain]} {_counted(residuals)}; "
     caption += "error bars: ± 2 σ of the predicted noise."
     if residuals.domain == "dynamics":
         caption += " Velocity and angle of one move share most of their noise: χ² compares what is left of it."
     chart = partial(before_after_chart, residuals, has_effects=has_effects)
     return Picture(f"{residuals.domain}", caption, draw, chart)
+
+
+def _counted(residuals: DomainResiduals) -> str:
+    """Poses or moves as the calibration of this log counts them, and the further rows that a disturbance makes."""
+    n, n_rows = residuals.n_whole, len(residuals.before)
+    said = how_many(n, residuals.kind)
+    if residuals.kind == "move":
+        return said + (f" and {how_many(n_rows - n, 'disturbance')} inside poses" if n_rows > n else "")
+    return said + (f" in {n_rows} intervals, apart at disturbances" if n_rows > n else "")
 
 
 def _headlines(diagnosis: Diagnosis) -> list[Headline]:

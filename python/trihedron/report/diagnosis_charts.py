@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, XYZ, FloatArray
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import AcceptedEffect
 from trihedron.records.domains import DomainResiduals
@@ -34,14 +34,21 @@ def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Char
             residuals.time_before_s,
             residuals.before,
             residuals.sigma_before,
+            residuals.names_before,
         ),
-        ("with the effects", residuals.time_after_s, residuals.after, residuals.sigma_after),
+        (
+            "with the effects",
+            residuals.time_after_s,
+            residuals.after,
+            residuals.sigma_after,
+            residuals.names_after,
+        ),
     ][: 2 if has_effects else 1]
     low, high = _limits(sides, factor, is_angle=residuals.domain == "moves")
-    end = max((float(t.max()) for _, t, _, _ in sides if t.size), default=1.0)
+    end = max((float(t.max()) for _, t, *_ in sides if t.size), default=1.0)
     panels = []
-    for title, time_s, value, sigma in sides:
-        marks = _domain_marks(residuals, time_s, factor * value, factor * sigma, unit)
+    for title, time_s, value, sigma, names in sides:
+        marks = _domain_marks(residuals, (time_s, factor * value, factor * sigma), names, unit)
         panels.append(
             Panel(
                 Scale("time [s]", "s", limits=(-0.02 * end, 1.02 * end)),
@@ -54,12 +61,12 @@ def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Char
     return Chart(tuple(panels), columns=len(panels))
 
 
-Side = tuple[str, FloatArray, FloatArray, FloatArray]
+Side = tuple[str, FloatArray, FloatArray, FloatArray, tuple[str, ...]]
 
 
 def _limits(sides: Sequence[Side], factor: float, *, is_angle: bool) -> tuple[float, float]:
-    seen = np.concatenate([np.abs(factor * value).ravel() for _, _, value, _ in sides])
-    bars = np.concatenate([2.0 * factor * sigma for _, _, _, sigma in sides])
+    seen = np.concatenate([np.abs(factor * value).ravel() for _, _, value, *_ in sides])
+    bars = np.concatenate([2.0 * factor * sigma for _, _, _, sigma, _ in sides])
     top = float(np.nanmax(seen, initial=0.0))
     # Bars of a pose that hardly anything is known of may leave the picture; what was measured may not.
     top = 1.08 * max(top, float(np.nanmedian(bars)) if bars.size else 0.0) or 1.0
@@ -67,14 +74,14 @@ def _limits(sides: Sequence[Side], factor: float, *, is_angle: bool) -> tuple[fl
 
 
 def _domain_marks(
-    residuals: DomainResiduals, time_s: FloatArray, value: FloatArray, sigma: FloatArray, unit: str
+    residuals: DomainResiduals, seen: tuple[FloatArray, FloatArray, FloatArray], names: Sequence[str], unit: str
 ) -> tuple[Mark, ...]:
+    time_s, value, sigma = seen
     is_angle = residuals.channels == ("angle",)
-    kind = "pose" if residuals.kind == "pose" else "move"
     marks: list[Mark] = [Level(y=0.0), _bars_of_noise(time_s, sigma, is_angle=is_angle)]
     for k, channel in enumerate(residuals.channels):
         colour: Colour = AXIS_COLOURS[k] if len(residuals.channels) > 1 else "accent"
-        told = [said(f"{kind} {n}, {channel}", "", float(v), unit) for n, v in enumerate(value[:, k], start=1)]
+        told = [said(f"{name}, {channel}", "", float(v), unit) for name, v in zip(names, value[:, k], strict=True)]
         marks.append(Points(time_s, value[:, k], told, None, channel, colour))
     return tuple(marks)
 
@@ -155,7 +162,7 @@ def _drivers(
         ]
     if effect_id in _FORCE and seen.kind == "pose" and recording.accelerometer is not None:
         force = force_at(seen.time_before_s, recording, calibration)
-        return [(f"f_{'xyz'[j]} [m/s²]", "m/s²", force[:, j]) for j in range(3)]
+        return [(f"f_{AXES[j]} [m/s²]", "m/s²", force[:, j]) for j in range(3)]
     return [("time [s]", "s", seen.time_before_s)]
 
 
@@ -192,29 +199,29 @@ def fastest_rate(time_s: FloatArray, recording: Recording, segments: Segments, c
 def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> Panel:
     """Residuals without the effects as dots; explained by the effects as circles, where poses are the same."""
     factor, unit = PRINTED[seen.unit]
-    kind = "pose" if seen.kind == "pose" else "move"
+    names = seen.names_before
     marks: list[Mark] = [Level(y=0.0)]
     is_same = seen.before.shape == seen.after.shape and np.allclose(seen.time_before_s, seen.time_after_s, atol=1e-6)
     for k, channel in enumerate(seen.channels):
         colour: Colour = AXIS_COLOURS[k] if len(seen.channels) > 1 else "c1"
         data = factor * seen.before[:, k]
         told = [
-            f"{said(f'{kind} {n}, {channel}', '', float(v), unit)}, "
+            f"{said(f'{name}, {channel}', '', float(v), unit)}, "
             f"{label.split(' [')[0]} {plain_number(float(a))} {unit_x}"
-            for n, (a, v) in enumerate(zip(x, data, strict=True), start=1)
+            for name, a, v in zip(names, x, data, strict=True)
         ]
         marks.append(Points(x, data, told, None, f"{channel}: without the effects", colour))
         # An angle between vectors is not a difference: the part explained would be no physics.
         after = factor * seen.after[:, k]
         if is_same and seen.domain == "moves":
-            told = [said(f"{kind} {n}, with the effects", "", float(v), unit) for n, v in enumerate(after, 1)]
+            told = [said(f"{name}, with the effects", "", float(v), unit) for name, v in zip(names, after, strict=True)]
             marks.append(Points(x, after, told, None, f"{channel}: with the effects", "accent", True))
         elif is_same:
             if seen.domain == "static-gyro" and unit_x in ("s", "°C"):
                 order = np.argsort(x)
                 marks.append(Line(x[order], (data - after)[order], f"{channel}: model", colour))
                 continue
-            told = [said(f"{kind} {n}, model", "", float(v), unit) for n, v in enumerate(data - after, 1)]
+            told = [said(f"{name}, model", "", float(v), unit) for name, v in zip(names, data - after, strict=True)]
             marks.append(Points(x, data - after, told, None, f"{channel}: explained by the effects", colour, True))
     return Panel(Scale(label, unit_x), Scale(f"{seen.quantity} [{unit}]", unit), tuple(marks), height_px=220)
 
@@ -225,26 +232,26 @@ def _bent(
     """The curve of every axis over force with its band, and on it what is left of gravity's error in every pose."""
     prefix, curve, name = BENT[effect.id]
     values = {p.name: (p.value, p.std) for p in effect.parameters}
-    if any(f"{prefix}_{j}" not in values for j in "xyz") or not len(seen.after) or recording.accelerometer is None:
+    if any(f"{prefix}_{j}" not in values for j in AXES) or not len(seen.after) or recording.accelerometer is None:
         return None
     force = force_at(seen.time_after_s, recording, calibration)
     part = force / np.linalg.norm(force, axis=1)[:, None]
     line, panels = np.linspace(-10.0, 10.0, 81), []
     for j, colour in enumerate(AXIS_COLOURS):
-        value, std = (mm_s2_from_m_s2(v) for v in values[f"{prefix}_{'xyz'[j]}"])
+        value, std = (mm_s2_from_m_s2(v) for v in values[f"{prefix}_{AXES[j]}"])
         shape, half = value * curve(line), 2.0 * std * np.abs(curve(line))
         picked = np.flatnonzero(np.abs(part[:, j]) >= LEAST_PART)
         f = force[picked, j]
         left = value * curve(f) + mm_s2_from_m_s2(1.0) * seen.after[picked, 0] / part[picked, j]
-        told = [f"pose {k + 1}: {plain_number(float(v))} mm/s²" for k, v in zip(picked, left, strict=True)]
+        told = [f"{seen.names_after[k]}: {plain_number(float(v))} mm/s²" for k, v in zip(picked, left, strict=True)]
         marks: tuple[Mark, ...] = (
             Band(line, shape - half, shape + half, "2σ of the model"),
             Level(y=0.0),
             Line(line, shape, f"model: {name}", colour),
             Points(f, left, told, None, "model and what is left in a pose", colour),
         )
-        x = Scale(f"f_{'xyz'[j]} [m/s²]", "m/s²", limits=(-10.6, 10.6))
-        panels.append(Panel(x, Scale("error of the reading [mm/s²]", "mm/s²"), marks, title=f"along {'XYZ'[j]}"))
+        x = Scale(f"f_{AXES[j]} [m/s²]", "m/s²", limits=(-10.6, 10.6))
+        panels.append(Panel(x, Scale("error of the reading [mm/s²]", "mm/s²"), marks, title=f"along {XYZ[j]}"))
     return Chart(tuple(panels), columns=3)
 
 
@@ -253,7 +260,7 @@ def _g_sensitivity(
 ) -> Chart | None:
     """Rate at rest against each component of force, the other two components taken out, with the lines of G."""
     values = {p.name: (p.value, p.std) for p in effect.parameters}
-    names = [[f"G_{i}{j}" for j in "xyz"] for i in "xyz"]
+    names = [[f"G_{i}{j}" for j in AXES] for i in AXES]
     if recording.accelerometer is None or any(name not in values for row in names for name in row):
         return None
     G = np.array([[values[name][0] for name in row] for row in names])
@@ -271,12 +278,12 @@ def _g_sensitivity(
             slope = deg * G[i, j]
             half = 2.0 * deg * sigma[i, j] * np.abs(line)
             marks.append(Band(line, slope * line - half, slope * line + half, "2σ of the model"))
-            marks.append(Line(line, slope * line, f"{'xyz'[i]}: model", colour))
+            marks.append(Line(line, slope * line, f"{AXES[i]}: model", colour))
             told = [
-                f"pose {n}, gyro {'xyz'[i]}: {plain_number(float(v))} °/s at f{'xyz'[j]} {plain_number(float(f))} m/s²"
-                for n, (v, f) in enumerate(zip(part[:, i], force[:, j], strict=True), start=1)
+                f"{name}, gyro {AXES[i]}: {plain_number(float(v))} °/s at f{AXES[j]} {plain_number(float(f))} m/s²"
+                for name, v, f in zip(seen.names_before, part[:, i], force[:, j], strict=True)
             ]
-            marks.append(Points(force[:, j], part[:, i], told, None, f"static gyro {'XYZ'[i]}", colour))
-        x = Scale(f"f_{'xyz'[j]} [m/s²]", "m/s²", limits=(-10.6, 10.6))
-        panels.append(Panel(x, Scale("gyro bias [°/s]", "°/s"), tuple(marks), title=f"along {'XYZ'[j]}", height_px=220))
+            marks.append(Points(force[:, j], part[:, i], told, None, f"static gyro {XYZ[i]}", colour))
+        x = Scale(f"f_{AXES[j]} [m/s²]", "m/s²", limits=(-10.6, 10.6))
+        panels.append(Panel(x, Scale("gyro bias [°/s]", "°/s"), tuple(marks), title=f"along {XYZ[j]}", height_px=220))
     return Chart(tuple(panels), columns=3)

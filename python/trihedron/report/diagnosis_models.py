@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from trihedron.arrays import AXES
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.report.diagnosis_words import (
     size_in_words,
@@ -23,12 +24,12 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         if before is None or after is None or before["raw_unit"] == "none":
             continue
         rows = [
-            (f"S_{'xyz'[i]}{'xyz'[j]}", _both(before, "S", (i, j)), _both(after, "S", (i, j)))
+            (f"S_{AXES[i]}{AXES[j]}", _both(before, "S", (i, j)), _both(after, "S", (i, j)))
             for i in range(3)
             for j in range(3)
             if before["sigma_S"][i][j] > 0.0
         ]
-        rows += [(f"b_{'xyz'[i]}", _both(before, "b", (i,)), _both(after, "b", (i,))) for i in range(3)]
+        rows += [(f"b_{AXES[i]}", _both(before, "b", (i,)), _both(after, "b", (i,))) for i in range(3)]
         unit = before["raw_unit"]
         blocks.append(
             Table(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference, Stage
+from trihedron.report.axes import BIAS
 from trihedron.report.document import Block, Facts, Paragraph, Table
 from trihedron.report.numbers import MINUS, decimals_of, plain_number, unit_in_print, with_sigma
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_radians
@@ -69,7 +70,7 @@ def differing_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     blocks: list[Block] = []
     if rows:
         head = ("parameter", "model", "recording", "recording − model")
-        blocks.append(Table(head, rows, "Parameters of the groups that differ"))
+        blocks.append(Table(head, rows, f"Parameters of the groups that differ; a bias is {BIAS}"))
     if sentences:
         blocks.append(Facts(tuple(("", one) for one in sentences)))
     return tuple(blocks)
@@ -145,8 +146,8 @@ def numbers_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         (p.id, p.name, _value(p, p.model), _value(p, p.recording), _difference(p), plain_number(p.p_value, 2), _mark(p))
         for p in shown
     )
-    head = ("parameter", "", "model", "recording", "recording − model", "p of the group", "")
-    return (Table(head, rows, "Parameters of the given model and of the recording"),)
+    head = ("parameter", "axis", "model", "recording", "recording − model", "p of the group", "judged")
+    return (Table(head, rows, f"Parameters of the given model and of the recording; a bias is {BIAS}"),)
 
 
 def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -163,7 +164,7 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         )
         for n in diagnosis.noise_compared
     )
-    head = ("", "term", "model", "recording", "ratio (interval)", "unit", "")
+    head = ("sensor", "term", "model", "recording", "ratio (interval)", "unit", "judged")
     blocks: list[Block] = [Table(head, rows, "Noise and sampling of the model and of the recording")]
     remarks = tuple(("", n.remark) for n in diagnosis.noise_compared if n.remark and n.significant)
     if remarks:

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
 from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
@@ -182,7 +182,7 @@ def traces_chart(recording: Recording, simulated: Recording, segments: Segments)
             Line(*envelope(time_s[window], theirs[window, axis]), "simulation", "ink", is_dashed=True),
         )
         x = Scale("time [s]", "s", limits=(float(time_s[window[0]]), float(time_s[window[-1]])))
-        title = f"{sensor} {'XYZ'[axis]}, about {name}"
+        title = f"{sensor} {XYZ[axis]}, about {name}"
         panels.append(Panel(x, Scale(f"reading [{unit}]", unit), lines, title=title, height_px=190))
     return Chart(tuple(panels), columns=len(panels), is_linked=True)
 

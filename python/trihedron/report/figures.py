@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import FitQuality, Recording, Segments, SensorCalibration, Verification
 from trihedron.report.numbers import unit_in_print
 from trihedron.units import mm_s2_from_m_s2
@@ -38,7 +38,7 @@ def draw_signals(recording: Recording, segments: Segments | None = None) -> Figu
             _shade_poses(axis, recording, segments)
         for k in range(3):
             time, values = _envelope(recording.time_s, readings[:, k])
-            axis.plot(time, values, color=AXIS_COLOURS[k], linewidth=0.7, label="XYZ"[k])
+            axis.plot(time, values, color=AXIS_COLOURS[k], linewidth=0.7, label=XYZ[k])
         axis.set_ylabel(label)
         axis.margins(x=0.0)
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
@@ -55,7 +55,7 @@ def draw_pose_means(segments: Segments) -> Figure:
     figure, axes = panels(len(present), 1, (9.5, 1.0 + 1.9 * len(present)), share_x=True)
     for axis, (name, means) in zip(axes, present, strict=True):
         for k in range(3):
-            axis.plot(segments.time_mid_s, means[:, k], "o", color=AXIS_COLOURS[k], markersize=4, label="XYZ"[k])
+            axis.plot(segments.time_mid_s, means[:, k], "o", color=AXIS_COLOURS[k], markersize=4, label=XYZ[k])
         axis.set_ylabel(name)
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
     axes[-1].set_xlabel("time [s]")

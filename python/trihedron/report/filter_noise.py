@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+from trihedron.arrays import XYZ
 from trihedron.records.filter_noise import Bounded, FilterNoise, SensorFilterNoise, StaticNoise
 from trihedron.records.plain import as_plain
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
@@ -78,7 +79,7 @@ def values_table(found: FilterNoise) -> Table:
             )  # fmt: skip
         rows += [
             (f"{one.sensor} N, {axis} [{unit}/√Hz]", _number(n), _interval(n), "–", "–")
-            for axis, n in zip("XYZ", one.axes_N, strict=False)
+            for axis, n in zip(XYZ, one.axes_N, strict=False)
         ]
     return Table(
         ("", "for the filter", "95 % interval", "static", "factor"), tuple(rows), "White density N, random walk K"

@@ -74,8 +74,8 @@ def fleet_report(summary: FleetSummary) -> Document:
 
 
 def _lead(summary: FleetSummary) -> Picture:
-    caption = "The numbers in which devices differ most beside their own errors: one point a log with its error, about "
-    caption += "the median of devices."
+    caption = "The parameters in which devices differ most beside their uncertainties: a point a log, its uncertainty, "
+    caption += "about the median of devices."
     return _picture("differ", caption, partial(fleet_chart, summary, MOST_LEADING))
 
 

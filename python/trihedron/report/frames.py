@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import AXES
 from trihedron.errors import RefusedError
 from trihedron.records import (
     PARAMETER_NAMES,
@@ -62,7 +63,7 @@ def recording_columns(recording: Recording) -> Columns:
         ("gyroscope", recording.gyroscope, recording.gyroscope_unit.value),
     ):
         if readings is not None:
-            columns |= {f"{name}_{axis} [{unit}]": readings[:, k] for k, axis in enumerate("xyz")}
+            columns |= {f"{name}_{axis} [{unit}]": readings[:, k] for k, axis in enumerate(AXES)}
     if recording.temperature_degc is not None:
         columns["temperature_degc"] = recording.temperature_degc
     if recording.supply_v is not None:
@@ -84,7 +85,7 @@ def segments_columns(segments: Segments) -> Columns:
     for name in ("accelerometer_mean", "accelerometer_sigma_mean", "gyroscope_mean", "gyroscope_sigma_mean"):
         values = getattr(segments, name)
         if values is not None:
-            columns |= {f"{name}_{axis}": values[:, k] for k, axis in enumerate("xyz")}
+            columns |= {f"{name}_{axis}": values[:, k] for k, axis in enumerate(AXES)}
     return columns
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import stats
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, XYZ, FloatArray
 from trihedron.records import CONSTANT_NAMES, AxisKalmanResult, NormKalmanCalibration
 from trihedron.report.calibration_charts import mm_s2
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Colour, Level, Line, Panel, Points, Scale
@@ -52,7 +52,7 @@ def norm_convergence_chart(outcome: NormKalmanCalibration) -> Chart:
     pose = np.arange(1, n + 1, dtype=np.float64)
     panels = []
     for k in range(12):
-        name = f"S_{'xyz'[k // 3]}{'xyz'[k % 3]}" if k < 9 else f"b_{'xyz'[k - 9]}"
+        name = f"S_{AXES[k // 3]}{AXES[k % 3]}" if k < 9 else f"b_{AXES[k - 9]}"
         value, sigma = outcome.parameters[:, k], outcome.sigma[:, k]
         if sigma[-1] == 0.0:
             continue
@@ -88,7 +88,7 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
         window = max(1, min(WINDOW, len(pose) // 2))
         n = max(n, len(result.is_settled))
         mean = np.convolve(nis, np.ones(window) / window, mode="valid")
-        name = "XYZ"[result.axis] if isinstance(result, AxisKalmanResult) else "norm of gravity"
+        name = XYZ[result.axis] if isinstance(result, AxisKalmanResult) else "norm of gravity"
         told = [
             said(f"pose {p:.0f}, {name}", "", float(v), "times its predicted variance")
             for p, v in zip(pose, nis, strict=True)
@@ -114,7 +114,7 @@ def drift_chart(results: Sequence[AxisKalmanResult], raw_unit: str) -> Chart:
             Line(pose, smooth, "smoothed", "c1"),
         )
         unit = unit_in_print(raw_unit)
-        y = Scale(f"{'XYZ'[result.axis]} [{unit}]", unit)
+        y = Scale(f"{XYZ[result.axis]} [{unit}]", unit)
         panels.append(Panel(Scale("pose", whole=True, limits=(1, max(2, len(pose)))), y, marks, height_px=140))
     return Chart(tuple(panels), is_linked=True)
 
@@ -124,7 +124,7 @@ def residual_chart(residual: FloatArray) -> Chart:
     pose = np.arange(1, len(residual) + 1, dtype=np.float64)
     marks: list[Level | Points] = [Level(y=0.0)]
     for k in range(residual.shape[1]):
-        name = f"f{'xyz'[k]}" if residual.shape[1] == 3 else "|f| − |g|"
+        name = f"f{AXES[k]}" if residual.shape[1] == 3 else "|f| − |g|"
         values = mm_s2(residual[:, k])
         told = [said(f"pose {p}, {name}", "", float(v), "mm/s²") for p, v in enumerate(values, start=1)]
         marks.append(Points(pose, values, told, None, name, AXIS_COLOURS[k]))

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import stats
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, XYZ, FloatArray
 from trihedron.records import CONSTANT_NAMES, AxisKalmanResult, NormKalmanCalibration
 from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, mm_s2, panels
 
@@ -67,7 +67,7 @@ def draw_innovations(results: Sequence[AxisKalmanResult | NormKalmanCalibration]
         pose = np.flatnonzero(np.isfinite(nis))
         window = max(1, min(WINDOW, len(pose) // 2))
         mean = np.convolve(nis[pose], np.ones(window) / window, mode="valid")
-        name = "XYZ"[result.axis] if isinstance(result, AxisKalmanResult) else "norm of gravity"
+        name = XYZ[result.axis] if isinstance(result, AxisKalmanResult) else "norm of gravity"
         panel.plot(pose[window - 1 :] + 1, mean, color=AXIS_COLOURS[k], linewidth=1.1, label=name)
     low, high = (float(stats.chi2.ppf(p, window)) / window for p in (0.005, 0.995))
     panel.axhspan(low, high, color=SHADE, zorder=0)
@@ -92,7 +92,7 @@ def draw_drift(results: Sequence[AxisKalmanResult]) -> Figure:
             result.smoothed_drift + result.smoothed_drift_sigma,
         )
         panel.fill_between(pose, low, high, color=SHADE, zorder=0)
-        panel.set_ylabel(f"{'xyz'[result.axis]} [raw]")
+        panel.set_ylabel(f"{AXES[result.axis]} [raw]")
         panel.set_xlim(1, max(2, len(pose)))
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     axes[-1].set_xlabel("poses")
@@ -104,7 +104,7 @@ def draw_residual(residual: FloatArray) -> Figure:
     figure, (panel,) = panels(1, 1, (9.5, 3.2))
     pose = np.arange(1, len(residual) + 1)
     for k in range(residual.shape[1]):
-        name = "xyz"[k] if residual.shape[1] == 3 else "|f| − |g|"
+        name = AXES[k] if residual.shape[1] == 3 else "|f| − |g|"
         panel.plot(pose, mm_s2(residual[:, k]), ".", markersize=4, color=AXIS_COLOURS[k], label=name)
     panel.axhline(0.0, color=INK, linewidth=0.6)
     panel.set_xlabel("poses")
@@ -122,7 +122,7 @@ def draw_norm_convergence(outcome: NormKalmanCalibration) -> Figure:
         for column in range(4):
             panel = axes[4 * row + column]
             k = 3 * row + column if column < 3 else 9 + row
-            name = f"S_{'xyz'[row]}{'xyz'[column]}" if column < 3 else f"b_{'xyz'[row]}"
+            name = f"S_{AXES[row]}{AXES[column]}" if column < 3 else f"b_{AXES[row]}"
             panel.set_title(name, fontsize=9)
             value, sigma = outcome.parameters[:, k], outcome.sigma[:, k]
             if sigma[-1] == 0.0:

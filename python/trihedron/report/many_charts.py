@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from trihedron.arrays import XYZ
 from trihedron.records.fleet import FleetSummary
 from trihedron.records.reference import AgainstReference
 from trihedron.records.sessions import PARAMETERS, SessionsModel
@@ -61,7 +62,7 @@ def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int 
             if thermal is None and spread is not None:
                 reach = np.full(2, spread.sd * factor)
                 marks.insert(0, Band(np.array([0.5, len(place) + 0.5]), -reach, reach))
-            axis = "XYZ"[k - picked[0]]
+            axis = XYZ[k - picked[0]]
             marks.append(Points(place + (k - picked[0] - 1) * step, values, told, error, axis, colour))
         x = Scale("temperature [°C]", "°C") if thermal is not None else Scale("recording", whole=True, names=names)
         panels.append(Panel(x, Scale(f"{name}  [{unit}]", unit), tuple(marks), height_px=170))
@@ -111,6 +112,6 @@ def residual_chart(found: AgainstReference) -> Chart:
     panels = []
     for k in range(3):
         marks = (Level(y=0.0), Line(*envelope(found.residual_time_s, left[:, k]), "", AXIS_COLOURS[k], is_thin=True))
-        y = Scale(f"{'XYZ'[k]}  [°/s]", "°/s", limits=(-reach, reach))
+        y = Scale(f"{XYZ[k]}  [°/s]", "°/s", limits=(-reach, reach))
         panels.append(Panel(Scale("time [s]", "s"), y, marks, height_px=110))
     return Chart(tuple(panels), is_linked=True, legend=False)

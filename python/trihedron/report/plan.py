@@ -92,7 +92,7 @@ def poses_chart(poses: tuple[PosePlan, ...]) -> Chart:
     for name, unit, values in (
         ("scale", "%", [100.0 * pose.scale for pose in known]),
         ("angle between axes", "mrad", [mrad_from_radians(pose.angle) for pose in known]),
-        ("bias", "mm/s²", [mm_s2_from_m_s2(pose.zero) for pose in known]),
+        ("bias", "mm/s²", [mm_s2_from_m_s2(pose.bias) for pose in known]),
     ):
         y = np.array(values)
         told = [f"{pose.name}: {plain_number(v, 2)} {unit}" for pose, v in zip(known, values, strict=True)]
@@ -119,13 +119,13 @@ def _plain(value: Any) -> Any:
 def _turns(plan: ExperimentPlan) -> Table:
     turns = plan.turns
     rows = (
-        ("turns and bias together", turns.scale, turns.zero),
-        ("bias first, then the turns", turns.scale_zero_first, turns.zero_zero_first),
+        ("turns and bias together", turns.scale, turns.bias),
+        ("bias first, then the turns", turns.scale_bias_first, turns.bias_bias_first),
     )
     return Table(
         ("standard uncertainty (1 σ)", "gyro scale", "gyro bias"),
         tuple(
-            (name, _percent(scale), f"{plain_number(degrees_from_radians(zero), 2)} °/s") for name, scale, zero in rows
+            (name, _percent(scale), f"{plain_number(degrees_from_radians(bias), 2)} °/s") for name, scale, bias in rows
         ),
     )
 
@@ -142,7 +142,7 @@ def _poses(poses: tuple[PosePlan, ...]) -> Table:
                 f"{pose.rank}",
                 _percent(pose.scale),
                 f"{plain_number(mrad_from_radians(pose.angle), 2)} mrad",
-                f"{plain_number(mm_s2_from_m_s2(pose.zero), 2)} mm/s²",
+                f"{plain_number(mm_s2_from_m_s2(pose.bias), 2)} mm/s²",
             )
         )
     return Table(

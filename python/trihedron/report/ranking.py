@@ -34,7 +34,7 @@ def ranking_report(ranking: Ranking) -> Document:
     )
     sections = [
         Section("Ranking", (Facts(facts), _order(ranking))),
-        Section("What is wrong", (Facts(tuple((one.name, said_of(one)) for one in ranking.candidates)),)),
+        Section("What is wrong with each", (Facts(tuple((one.name, said_of(one)) for one in ranking.candidates)),)),
         Section("Parameters of the best", (parameters_table(best.verification),)),
     ]
     return Document(
@@ -52,8 +52,8 @@ def said_of(one: Ranked) -> str:
     if not said:
         said = [f.seen for f in one.verification.findings if f.severity.value == "serious"][:2]
     if not said and one.behind > 2.0 * one.behind_sigma:
-        said = ["it fits, and another fits better"]
-    said = said or ["nothing"]
+        said = ["nothing found, but another fits better"]
+    said = said or ["nothing found"]
     if one.without_bias:
         said.append(f"its file holds no bias of the {' and the '.join(one.without_bias)}: that of this log was taken")
     return "; ".join(said)
@@ -65,7 +65,7 @@ def _mistake(found: Suspicion) -> str:
         words += f" ({found.factor:.5f} times that of this place)"
     elif found.kind == "unit":
         words += f" (by a factor of {_factor(found.factor)})"
-    return f"{words}: undone, the error is {plain_number(found.rms_undone / found.rms, 2)} times as large"
+    return f"{words}; corrected, its error falls to {plain_number(100.0 * found.rms_undone / found.rms, 2)} % of this"
 
 
 def _factor(factor: float) -> str:
@@ -81,21 +81,26 @@ def _judged_on(one: Ranked) -> str:
 
 
 def _order(ranking: Ranking) -> Table:
-    head = ("", "file", "of", "gravity error [mm/s²]", "tilt error [°]", "static rate [°/s]", "behind the best", "")
+    head = (
+        "file", "made by", "gravity error [mm/s²]", "tilt error [°]", "static rate [°/s]", "behind the best", "judged",
+    )  # fmt: skip
     rows = tuple(
         (
-            str(k + 1),
-            one.name,
+            f"{k + 1}. {one.name}",
             one.maker,
             _with_interval(one.verification.norm_rms, one.norm_interval, mm_s2_from_m_s2(1.0)),
             _with_interval(one.verification.angle_rms_deg, one.angle_interval, 1.0),
             plain_number(degrees_from_radians(one.rest_rms), 2),
             with_sigma(one.behind, one.behind_sigma) if one.behind_sigma > 0.0 else plain_number(one.behind, 3),
-            "rejected" if one.is_rejected else "",
+            "rejected" if one.is_rejected else "fits",
         )
         for k, one in enumerate(ranking.candidates)
     )
-    return Table(head, rows, "RMS with 95 % intervals; behind: log predictive density, with its standard error")
+    caption = (
+        "Best first. Errors: RMS with their 95 % interval. Behind the best: logarithm of how many times less probable "
+        "the log is by this calibration, ± 1 σ; beyond 2 σ the best is clearly better"
+    )
+    return Table(head, rows, caption)
 
 
 def _with_interval(rms: float, interval: tuple[float, float], factor: float) -> str:
@@ -116,13 +121,13 @@ def ranking_record(ranking: Ranking) -> dict[str, object]:
                 "name": one.name,
                 "maker": one.maker,
                 "is_rejected": one.is_rejected,
-                "behind": one.behind,
-                "behind_sigma": one.behind_sigma,
-                "norm_rms_m_s2": one.verification.norm_rms,
-                "norm_interval_m_s2": list(one.norm_interval),
-                "angle_rms_deg": one.verification.angle_rms_deg,
-                "angle_interval_deg": list(one.angle_interval),
-                "rest_rms_rad_s": one.rest_rms,
+                "log_density_behind_best": one.behind,
+                "log_density_sigma": one.behind_sigma,
+                "gravity_error_rms_m_s2": one.verification.norm_rms,
+                "gravity_error_interval_m_s2": list(one.norm_interval),
+                "tilt_error_rms_deg": one.verification.angle_rms_deg,
+                "tilt_error_interval_deg": list(one.angle_interval),
+                "static_rate_rms_rad_s": one.rest_rms,
                 "mistakes": [vars(found) for found in one.suspicions],
                 "without_bias": list(one.without_bias),
                 "findings": [finding.to_dict() for finding in one.verification.findings],

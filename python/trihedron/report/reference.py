@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from trihedron.arrays import AXES
 from trihedron.records import Calibration
 from trihedron.records.reference import AgainstReference, Estimate, FitToReference, ReferenceError
 from trihedron.report.calibration import calibration_report
@@ -193,14 +194,14 @@ def _matrix(name: str, symbol: str, unit: str, fit: FitToReference) -> Table:
     raw = "w" if symbol == "ω" else "a"
     rows = tuple(
         (
-            f"{symbol}_{'xyz'[i]} =",
+            f"{symbol}_{AXES[i]} =",
             *(with_sigma(scale * fit.S[i, j], scale * sigma[3 * i + j]) for j in range(3)),
             with_sigma(fit.b[i], sigma[9 + i]),
         )
         for i in range(3)
     )
     return Table(
-        ("", *(f"{raw}′_{j}{times}" for j in "xyz"), f"b [{unit}]"), rows,
+        ("", *(f"{raw}′_{j}{times}" for j in AXES), f"b [{unit}]"), rows,
         f"{name} in the reference's body   {symbol} = S {raw}′ + b",
     )  # fmt: skip
 
@@ -230,6 +231,6 @@ def _shown_from(ident: str, one: Estimate) -> str:
     if one.shown_from is None:
         return ""
     if not np.isfinite(one.shown_from):
-        return ": this reference wanders too much to show any"
+        return ": this reference drifts too much to show any"
     size, unit = _SHEET[ident]
     return f": beside this reference about {plain_number(size * one.shown_from, 2)} {unit} in every number"

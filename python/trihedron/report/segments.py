@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from trihedron.arrays import AXES
 from trihedron.records import Recording, Segments
 from trihedron.report.document import Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawing import later
@@ -82,7 +83,7 @@ def pose_table(recording: Recording, segments: Segments) -> Table:
                 with_sigma(float(mean[k, axis]), float("nan") if sigma is None else float(sigma[k, axis]))
                 for k in range(segments.n_poses)
             ]
-            columns.append((cells, f"{label}_{'xyz'[axis]} [{unit_in_print(unit)}]"))
+            columns.append((cells, f"{label}_{AXES[axis]} [{unit_in_print(unit)}]"))
     head += [title for _, title in columns]
     rows = tuple(
         (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import XYZ
 from trihedron.records import Recording, Segments, Truth, Verification
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import AXIS_COLOURS, Band, Bars, Chart, Level, Line, Panel, Points, Scale, Span
@@ -41,7 +42,7 @@ def _signals(recording: Recording, spans: tuple[Span, ...]) -> Chart:
         if readings is None:
             continue
         lines = [
-            Line(*envelope(recording.time_s, readings[:, k]), "XYZ"[k], AXIS_COLOURS[k], is_thin=True) for k in range(3)
+            Line(*envelope(recording.time_s, readings[:, k]), XYZ[k], AXIS_COLOURS[k], is_thin=True) for k in range(3)
         ]
         printed = unit_in_print(unit)
         y = Scale(f"{name}  [{printed}]", printed)

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 from trihedron.records.sessions import Change, Repeated, Session, SessionsModel, Spread, ThermalModel
+from trihedron.report.axes import BIAS
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
@@ -102,9 +103,9 @@ def _repeatability(model: SessionsModel) -> list[Block]:
         Table(
             tuple(head),
             tuple(rows),
-            "Standard deviation from one recording to the next, beyond each one's own uncertainty. Biases are raw "
-            "readings at zero input (−S⁻¹ b) in SI units; scales are raw counts per unit, relative to the common "
-            "value; misalignments are departures from 90°.",
+            "Standard deviation from one recording to the next, beyond each one's own uncertainty. A bias is "
+            f"{BIAS}; scales are raw counts per unit, relative to the common value; misalignments are departures "
+            "from 90°.",
         )
     ]
 
@@ -233,8 +234,10 @@ def sessions_columns(model: SessionsModel) -> Columns:
 
 
 def session_record(session: Session) -> dict[str, object]:
-    """One recording's numbers for machines."""
-    return {**vars(session), "temperature_range_degc": list(session.temperature_range_degc)}
+    """One recording's parameters for machines: ``values`` with their ``covariance``, the variance of the bias drift."""
+    named = {"numbers": "values", "wander": "bias_drift_variance"}
+    record = {named.get(name, name): value for name, value in vars(session).items()}
+    return {**record, "temperature_range_degc": list(session.temperature_range_degc)}
 
 
 def sessions_record(model: SessionsModel) -> dict[str, object]:
@@ -256,6 +259,6 @@ def sessions_record(model: SessionsModel) -> dict[str, object]:
             for one in model.repeated
         ],
         "changes": [vars(change) for change in model.changes],
-        "left_out": [{"source": source, "reason": why} for source, why in model.left_out],
+        "excluded": [{"source": source, "reason": why} for source, why in model.left_out],
         "findings": [finding.to_dict() for finding in model.findings],
     }

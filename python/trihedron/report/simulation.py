@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from trihedron.arrays import AXES
 from trihedron.records import Recording, TermName, Truth
 from trihedron.report.calibration import SYMBOLS
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
@@ -80,10 +81,10 @@ def _linear(recording: Recording, truth: Truth) -> tuple[Table, ...]:
         true, read = SYMBOLS[name]
         rows = tuple(
             (f"{true}_{axis} =", *(plain_number(float(v), 6) for v in S[i]), plain_number(float(b[i]), 6))
-            for i, axis in enumerate("xyz")
+            for i, axis in enumerate(AXES)
         )
         of_S = "S dimensionless" if unit_in_print(raw) == unit else f"S in {unit} per {one_of(raw)}"
-        head = ("", *(f"{read}′_{axis}" for axis in "xyz"), f"b [{unit}]")
+        head = ("", *(f"{read}′_{axis}" for axis in AXES), f"b [{unit}]")
         caption = f"{name.capitalize()}: {true} = S {read}′ + b, {of_S}; its further effects stand above"
         out.append(Table(head, rows, caption))
     return tuple(out)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import AXES
 from trihedron.records import AllanCurve, Recording, Segments, Severity
 from trihedron.report.document import Document, Facts, Picture, Section, Table
 from trihedron.report.drawing import later
@@ -63,7 +64,7 @@ def _poses(segments: Segments) -> Table:
         ("w", segments.gyroscope_mean, segments.gyroscope_sigma_mean),
     ):
         if mean is not None and sigma is not None:
-            head += [f"{letter}′_{axis}" for axis in "xyz"]
+            head += [f"{letter}′_{axis}" for axis in AXES]
             columns += [
                 [with_sigma(float(m), float(s)) for m, s in zip(mean[:, k], sigma[:, k], strict=True)] for k in range(3)
             ]

@@ -92,7 +92,7 @@ def segment_blocks(
     activity = measure_activity(channels, ends)
     if activity.is_wandering(channels):
         return _nothing_found(recording, channels)
-    report(0.4, "still stretches")
+    report(0.4, "static stretches")
     quiet = widen(close_gaps(activity.is_quiet, channels.is_valid), channels.is_valid)
     gravity = _gravity_reading(recording, channels)
     scale = None

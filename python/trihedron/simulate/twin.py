@@ -39,9 +39,9 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
         When the recording lacks a sensor, was never still, or the calibration has no gyro.
     """
     if recording.accelerometer is None or recording.gyroscope is None or calibration.gyroscope is None:
-        raise RefusedError("a twin needs both sensors in the recording and in the calibration")
+        raise RefusedError("a digital twin needs both sensors in the recording and in the calibration")
     if not segments.poses:
-        raise RefusedError("a twin needs at least one pose; the recording has none")
+        raise RefusedError("a digital twin needs at least one pose; the recording has none")
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     time_s = recording.time_s
     readings = (_filled(recording.accelerometer), _filled(recording.gyroscope))
@@ -71,7 +71,7 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
         )
     return Scenario(
         motion=motion,
-        name=f"twin of {recording.source}",
+        name=f"digital twin of {recording.source}",
         accelerometer=replace(Accelerometer(unit=recording.accelerometer_unit), **parts[0]),  # type: ignore[arg-type]
         gyroscope=replace(Gyroscope(unit=recording.gyroscope_unit), **parts[1]),  # type: ignore[arg-type]
         clock=Clock(recording.rate_hz, instants_s=tuple(float(t) for t in time_s)),

@@ -178,9 +178,10 @@ class DisturbedPose(DirectEffect):
         spans = tuple(bumped) + tuple((float(t[holds[i].start]), float(t[holds[i].stop - 1])) for i in restless)
         # A nuisance that the twin has already cut out: it ranks behind whatever the fit gains by.
         strength = 10.0 * (len(bumped) + len(restless))
+        names = list(dict.fromkeys(obs.pose_names(restless)))
         told = self.told(
             "not-still", is_bumped=bool(bumped), bumped_s=[(0.5 * (a + b),) for a, b in bumped[:MOST_NAMED]],
-            is_restless=bool(restless), restless=restless[:MOST_NAMED], are_both=bool(bumped and restless),
+            is_restless=bool(restless), restless=names[:MOST_NAMED], are_both=bool(bumped and restless),
         )  # fmt: skip
         parameters = tuple(EffectParameter("pose_at", 0.5 * (a + b), 0.5 * max(b - a, 0.1), "s") for a, b in spans[:6])
         return Evidence(
@@ -193,11 +194,13 @@ class DisturbedPose(DirectEffect):
         for i in np.flatnonzero(_shows_itself(context)):
             columns = np.zeros((context.n_points, 3, 3))
             columns[i] = np.eye(3)
-            shape, (name,) = {"pose": (float(i), "index")}, context.obs.pose_names([int(i)])
+            (name,) = context.obs.pose_names([int(i)])
+            # By its number in the recording, from 1: a pose before it may have been cut at a disturbance.
+            shape = {"pose": (float(name.removeprefix("pose ")) if name.startswith("pose ") else i + 1.0, "number")}
             out.append(Variant(force_only(columns), per_axis("push"), ("m/s^2",) * 3, shape, name))
         return out
 
     def statement(self, parameters: tuple[EffectParameter, ...]) -> Words:
         pose = next(p.value for p in parameters if p.name == "pose")
         size = float(np.sqrt(sum(p.value**2 for p in parameters if p.name.startswith("push"))))
-        return self.told("pushed", pose=pose + 1.0, off=size)
+        return self.told("pushed", pose=pose, off=size)

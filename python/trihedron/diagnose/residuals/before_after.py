@@ -23,11 +23,12 @@ _ROWS: tuple[tuple[str, str, str, str, tuple[str, ...]], ...] = (
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """One domain of one fit: ``value`` (n, k) and predicted noise ``sigma`` (n,) at ``time_s`` (n,)."""
+    """One domain of one fit: ``value`` (n, k), predicted noise ``sigma`` (n,), ``time_s`` (n,), ``names`` (n,)."""
 
     time_s: FloatArray
     value: FloatArray
     sigma: FloatArray
+    names: tuple[str, ...]
 
 
 def residuals_before_after(before: Fit, after: Fit, named: Collection[int] = ()) -> tuple[DomainResiduals, ...]:
@@ -44,7 +45,7 @@ def residuals_before_after(before: Fit, after: Fit, named: Collection[int] = ())
             out.append(
                 DomainResiduals(
                     domain, words(quantity), unit, kind, channels,  # type: ignore[arg-type]
-                    x.time_s, x.value, x.sigma, y.time_s, y.value, y.sigma,
+                    x.time_s, x.value, x.sigma, y.time_s, y.value, y.sigma, x.names, y.names,
                 )
             )  # fmt: skip
     return tuple(out)
@@ -53,6 +54,7 @@ def residuals_before_after(before: Fit, after: Fit, named: Collection[int] = ())
 def _shown(fitted: Fit, named: Collection[int] = ()) -> dict[str, _Shown]:
     line, twin, obs = fitted.line, fitted.twin, fitted.line.obs
     h = obs.n_poses
+    poses = obs.pose_names(range(h))
     out: dict[str, _Shown] = {}
     force = obs.pose_force @ twin.accel_S.T + (
         line.core.force_bias - twin.accel_bias if 0 in named else line.core.session_force_bias
@@ -62,22 +64,23 @@ def _shown(fitted: Fit, named: Collection[int] = ()) -> dict[str, _Shown]:
     size = np.linalg.norm(force, axis=1)
     along = (force / size[:, None]) @ twin.accel_S
     sigma = obs.norm_sigma(along)
-    out["static-accel"] = _Shown(obs.pose_time_s, (size - twin.gravity)[:, None], sigma)
+    out["static-accel"] = _Shown(obs.pose_time_s, (size - twin.gravity)[:, None], sigma, poses)
     if obs.pose_rate is not None and obs.pose_rate_sigma is not None:
         rate = obs.pose_rate @ twin.gyro_S.T
         if line.distortion.rate is not None:
             rate = rate - line.distortion.rate[:h] @ twin.effect
         spread = np.sqrt((obs.pose_rate_sigma**2 @ (twin.gyro_S**2).T).mean(axis=1))
         bias = twin.gyro_bias if 1 in named else rate.mean(axis=0)
-        out["static-gyro"] = _Shown(obs.pose_time_s, rate - bias, spread)
+        out["static-gyro"] = _Shown(obs.pose_time_s, rate - bias, spread, poses)
     if obs.n_moves:
         residual, noise = line.move_errors
         variance = np.einsum("mii->mi", noise)
+        moves = obs.move_names(range(obs.n_moves))
         middle = np.array([0.5 * (obs.time_s[a] + obs.time_s[b - 1]) for a, b in obs.move_ranges])
         angle = np.degrees(np.hypot(residual[:, 0], residual[:, 1]) / twin.gravity)
         expected = np.degrees(np.sqrt(variance[:, :2].sum(axis=1)) / twin.gravity)
-        out["moves"] = _Shown(middle, angle[:, None], expected)
-        out["dynamics"] = _Shown(middle, residual[:, 2:], np.sqrt(variance[:, 2:].mean(axis=1)))
+        out["moves"] = _Shown(middle, angle[:, None], expected, moves)
+        out["dynamics"] = _Shown(middle, residual[:, 2:], np.sqrt(variance[:, 2:].mean(axis=1)), moves)
     return out
 
 

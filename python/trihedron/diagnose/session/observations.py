@@ -182,7 +182,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         raise RefusedError("a diagnosis needs accelerometer readings: this recording has none")
     if segments.n_poses < 2:
         raise RefusedError(
-            f"a diagnosis needs still poses to hold the model against: {segments.n_poses} found, at least 2 are needed"
+            f"a diagnosis compares the model with static poses: {segments.n_poses} found, at least 2 are needed"
         )
     t = recording.time_s
     whole = segments if segments.whole is None else segments.whole

@@ -155,7 +155,7 @@ def align_screened(
     """
     used = ~measured.is_lost
     if not np.any(used):
-        raise RefusedError("the gyro met its limit in every move: turn more slowly or set a wider range")
+        raise RefusedError("the gyro clipped in every move: turn more slowly or set a wider range")
     outliers: tuple[int, ...] = ()
     is_near = False
     n_parameters = 9 + (3 if options.is_offset_free else 0)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import RefusedError
 
 
@@ -87,7 +87,7 @@ def _sums(
     q = np.array([float(np.sum((weight * angle**2)[which == axis])) for axis in range(3)])
     p = np.array([float(np.sum((weight * angle * time)[which == axis])) for axis in range(3)])
     if np.any(q <= 0.0):
-        missing = " and ".join("XYZ"[axis] for axis in np.flatnonzero(q <= 0.0))
+        missing = " and ".join(XYZ[axis] for axis in np.flatnonzero(q <= 0.0))
         raise RefusedError(f"no turn about {missing}: each axis needs one of its own")
     return q, p, float(np.sum(weight * time**2))
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.turn_angles import (
     AMBIGUOUS,
@@ -183,7 +183,7 @@ def _require_every_axis(known: Sequence[KnownTurn], used: npt.NDArray[np.bool_],
     if missing and recording_is_counts and any(turn.is_ambiguous for turn in known):
         raise RefusedError(AMBIGUOUS)
     if missing:
-        names = " and ".join("XYZ"[axis] for axis in missing)
+        names = " and ".join(XYZ[axis] for axis in missing)
         raise RefusedError(
             f"no usable turn about {names} was found among {len(known)}: turn the sensor about it by a known "
             "angle, there and back, or give the angle of each turn"

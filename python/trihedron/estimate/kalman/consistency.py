@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import Consistency
 
@@ -49,7 +49,7 @@ def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray) -> C
 def consistency_findings(axis: int | None, seen: Consistency) -> list[Finding]:
     """What an inconsistent filter tells about the noise it was given; ``axis`` None stands for all three."""
     out: list[Finding] = []
-    name = "" if axis is None else "xyz"[axis]
+    name = "" if axis is None else AXES[axis]
     if seen.n and seen.nis_mean > seen.nis_high:
         out.append(
             Finding.of(

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from trihedron.arrays import AXES
 from trihedron.errors import RefusedError
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.kalman import AxisNoise
@@ -167,7 +168,7 @@ def check_same_converter(
         Naming the axis, both figures and the remedy.
     """
     remedy = "record the static log with the range, rate and output of the session"
-    for axis, noise, step, seen in zip("xyz", given, steps, octaves, strict=True):
+    for axis, noise, step, seen in zip(AXES, given, steps, octaves, strict=True):
         fast = noise.sample_sigma
         if step > COARSER * noise.resolution and step > fast > 0.0:
             raise RefusedError(

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.kalman.consistency import check_innovations, consistency_findings, is_settled
 from trihedron.estimate.kalman.guide import Goal, Guide
@@ -310,7 +310,7 @@ def _observability(live: LiveNormCalibration) -> tuple[Observability, list[Findi
     singular = 1.0 / np.sqrt(np.maximum(values, 1e-300))
     condition = float(singular[0] / singular[-1])
     direction = np.linalg.eigh(scale[:, None] * covariance * scale)[1][:, -1]
-    names = (*(f"S_{'xyz'[i]}{'xyz'[j]}" for i, j in ENTRIES), "b_x", "b_y", "b_z")
+    names = (*(f"S_{AXES[i]}{AXES[j]}" for i, j in ENTRIES), "b_x", "b_y", "b_z")
     weakest = names[int(np.argmax(np.abs(direction)))]
     findings: list[Finding] = []
     if condition > 100.0:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import RefusedError
 
 
@@ -54,6 +54,6 @@ class NormStart:
         a = np.asarray(readings, dtype=np.float64)
         half = (a.max(axis=0) - a.min(axis=0)) / 2.0
         if np.any(half <= 0):
-            raise RefusedError(f"{'XYZ'[int(np.argmin(half))]} never changed: turn it both ways up, or give a start")
+            raise RefusedError(f"{XYZ[int(np.argmin(half))]} never changed: turn it both ways up, or give a start")
         zero = (a.max(axis=0) + a.min(axis=0)) / 2.0
         return cls(np.diag(gravity_m_s2 / half), zero, sigma_relative=0.3, sigma_bias_m_s2=3.0)

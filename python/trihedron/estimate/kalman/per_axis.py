@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.kalman.consistency import check_innovations, consistency_findings, is_settled
 from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
@@ -263,7 +263,7 @@ def _observability(f: FloatArray) -> tuple[Observability, list[Finding]]:
     values, directions = singular[1], singular[2]
     condition = float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
     weakest = int(np.argmax(np.abs(directions[-1])))
-    axis = "" if weakest == 3 else "xyz"[weakest]
+    axis = "" if weakest == 3 else AXES[weakest]
     name = words("sensitivity-to", axis=axis) if axis else words("zero-reading")
     advice = words("tilt-towards-vertical", axis=axis) if axis else words("zero-both-ways")
     rank = int(np.sum(values > 1e-9 * values[0]))

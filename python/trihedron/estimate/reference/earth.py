@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import AXES
 from trihedron.estimate.reference.motion import MotionFit
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.records.reference import Estimate
@@ -29,7 +30,7 @@ def earth_of(found: MotionFit, k: int) -> Estimate | None:
     along = value / length
     gain = covariance @ along / float(along @ covariance @ along)
     return Estimate(
-        ("x", "y", "z"),
+        AXES,
         value + gain * (EARTH_RATE_RAD_S - length),
         covariance - np.outer(gain, covariance @ along),
         "rad/s",

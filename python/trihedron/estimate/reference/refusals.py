@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.reference.gyroscope import GyroFit
 from trihedron.records import Recording
@@ -61,7 +61,7 @@ def refuse_still(motion: ReferenceMotion, S: FloatArray, covariance: FloatArray)
     """Raise ``RefusedError`` for axes of S (9,) that its covariance (9, 9) leaves open."""
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3)
     size = np.linalg.norm(S.reshape(3, 3), axis=0)
-    weak = ["XYZ"[j] for j in range(3) if not np.linalg.norm(sigma[:, j]) < 0.5 * size[j]]
+    weak = [XYZ[j] for j in range(3) if not np.linalg.norm(sigma[:, j]) < 0.5 * size[j]]
     if weak:
         raise RefusedError(
             f"{motion.source}: the log's gyro axis {' and '.join(weak)} hardly turns while the reference is there, and "

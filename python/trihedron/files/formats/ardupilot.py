@@ -10,9 +10,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.files.formats.autopilot import (
-    AXES,
     AxisCorrection,
     Composed,
     board_of,
@@ -48,7 +47,7 @@ def to_ardupilot(calibration: Calibration, options: ExportOptions) -> str:
         if known is not None:
             lines.append(f"INS_{letters}{suffix}_ID,{known:.0f}")
         constant, thermal = _thermal_lines(board, name, one)
-        for k, axis in enumerate(AXES):
+        for k, axis in enumerate(XYZ):
             lines.append(f"INS_{letters}{suffix}OFFS_{axis},{number(float(one.offset[k] + constant[k]))}")
             if name == "accelerometer":
                 lines.append(f"INS_{letters}{suffix}SCAL_{axis},{number(float(one.scale[k]))}")
@@ -139,7 +138,7 @@ def _thermal_lines(board: Onboard, name: str, one: Composed) -> tuple[FloatArray
     for order in range(3):
         lines += [
             f"{root}{letters}{order + 1}_{a},{number(float(v) / _SCALE)}"
-            for a, v in zip(AXES, total[order], strict=True)
+            for a, v in zip(XYZ, total[order], strict=True)
         ]
     lines += [f"# {line}" for line in said_of_misfit(new, name)]
     return constant, lines

@@ -13,13 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import polynomial
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.files.formats.contract import ExportOptions, Thermal, of_si_readings, thermal_of
 from trihedron.records import Calibration, Onboard, SensorCalibration
 from trihedron.records.plain import from_plain
 
-AXES = ("X", "Y", "Z")
 _DEG_ROLL_PITCH_YAW = (
     (0, 0, 0), (0, 0, 45), (0, 0, 90), (0, 0, 135), (0, 0, 180), (0, 0, 225), (0, 0, 270), (0, 0, 315), (180, 0, 0),
     (180, 0, 45), (180, 0, 90), (180, 0, 135), (0, 180, 0), (180, 0, 225), (180, 0, 270), (180, 0, 315), (90, 0, 0),
@@ -190,7 +189,7 @@ def _turned(covariance: FloatArray, own: AxisCorrection) -> FloatArray:
 
 def triple(parameters: Mapping[str, float], name: str, default: float = 0.0) -> FloatArray:
     """(3,) of ``name`` with X, Y and Z for ``{}``."""
-    return np.array([parameters.get(name.format(axis), default) for axis in AXES])
+    return np.array([parameters.get(name.format(axis), default) for axis in XYZ])
 
 
 def relative(held: Callable[[str], AxisCorrection], known: Callable[[str], AxisCorrection]) -> dict[str, _Pair]:

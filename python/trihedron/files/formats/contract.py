@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.files.plausible import LARGEST_SI_FACTOR, has_one_handedness, named_sensors
 from trihedron.records import Calibration, SensorCalibration
@@ -184,7 +184,7 @@ def thermal_of(calibration: Calibration, name: str) -> Thermal | None:
     reference = float(references.get("temperature_degc", 25.0)) if isinstance(references, Mapping) else 25.0
     coefficients = np.zeros((3, 3))
     for order, symbol in enumerate(("bias_per_kelvin", "bias_per_kelvin2", "bias_per_kelvin3")):
-        coefficients[order] = [values.get(f"{symbol}_{axis}", 0.0) for axis in "xyz"]
+        coefficients[order] = [values.get(f"{symbol}_{axis}", 0.0) for axis in AXES]
     return Thermal(reference, coefficients * np.linalg.norm(np.linalg.inv(sensor.S), axis=1), range_degc)
 
 
@@ -278,7 +278,7 @@ def given(
         extensions["without_bias"] = tuple(without_bias)
     if g_sensitivity is not None and np.any(g_sensitivity):
         values = [float(v) for v in g_sensitivity.ravel()]
-        names = [f"G_{i}{j}" for i in "xyz" for j in "xyz"]
+        names = [f"G_{i}{j}" for i in AXES for j in AXES]
         parameters = [{"name": name, "value": value} for name, value in zip(names, values, strict=True)]
         model = {"variant": "", "values": values}
         extensions["effects"] = [{"id": "gyro-g-sensitivity", "parameters": parameters, "model": model}]

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 
+from trihedron.arrays import AXES
 from trihedron.files.formats.contract import ExportOptions, Format, number
 from trihedron.files.formats.simulated import distortion, said_of
 from trihedron.records import Calibration
@@ -31,7 +32,7 @@ def to_gazebo(calibration: Calibration, options: ExportOptions) -> str:
         ("linear_acceleration", "accelerometer", figures.accel_N, figures.accel_K),
     ):
         lines.append(f"    <{element}>")
-        for axis, bias in zip("xyz", pairs[name][1], strict=True):
+        for axis, bias in zip(AXES, pairs[name][1], strict=True):
             lines += [
                 f'      <{axis}><noise type="gaussian">',
                 f"        <mean>{number(float(bias))}</mean>",

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import RefusedError
-from trihedron.files.formats.autopilot import AXES, AxisCorrection, Composed, composed
+from trihedron.files.formats.autopilot import AxisCorrection, Composed, composed
 from trihedron.files.formats.contract import ExportOptions, Format, heading, number
 from trihedron.files.formats.losses import HALF_WIDTH, lost_gyro_scale, lost_to_a_diagonal, size_of_bias
 from trihedron.files.plausible import named_sensors
@@ -32,7 +32,7 @@ def to_inav(calibration: Calibration, options: ExportOptions) -> str:
     """
     if calibration.accelerometer.raw_unit != "counts" and options.current_parameters.strip().lower() != "none":
         raise RefusedError(
-            "INAV logs readings that its own zeros and gains have corrected and its alignments have turned: calibrate "
+            "INAV logs readings that its own biases and gains have corrected and its alignments have turned: calibrate "
             "raw counts (debug_mode = ACC), or say --current-parameters none where the readings were raw."
         )
     own, sensors = composed(calibration, options, "INAV", lambda _: AxisCorrection(np.zeros(3), np.ones(3), np.eye(3)))
@@ -42,11 +42,11 @@ def to_inav(calibration: Calibration, options: ExportOptions) -> str:
         count = _size_of_a_count(name, options)
         half = np.full(3, 0.5 * count)
         if half[0] > HALF_WIDTH * float(sensor.sigma_b.max()):
-            lines.append(f"# Zeros are whole counts: up to {size_of_bias(name, half)} of bias of the {name} is lost.")
+            lines.append(f"# Biases are whole counts: up to {size_of_bias(name, half)} of bias of the {name} is lost.")
         lines += _lines(name, sensors[name], count)
         if name == "gyroscope":
             lines += [f"# {line}" for line in lost_gyro_scale(sensor, "INAV")]
-            lines += ["# Without this the gyro's zero is measured anew at every start:", "set init_gyro_cal = OFF"]
+            lines += ["# Without this the gyro's bias is measured anew at every start:", "set init_gyro_cal = OFF"]
     return "\n".join([*lines, "save", ""])
 
 
@@ -73,7 +73,7 @@ def _settings(word: str, values: FloatArray, low: int, high: int) -> list[str]:
             f"{word} of INAV is from {low} to {high} and would be {number(float(whole[np.abs(whole).argmax()]))}: is "
             "the size of a count that of INAV's driver?"
         )
-    return [f"set {word}_{axis.lower()} = {value:.0f}" for axis, value in zip(AXES, whole, strict=True)]
+    return [f"set {word}_{axis.lower()} = {value:.0f}" for axis, value in zip(XYZ, whole, strict=True)]
 
 
 FORMAT = Format("inav", to_inav, in_si=True)

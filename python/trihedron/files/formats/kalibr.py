@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import AXES
 from trihedron.files.formats.contract import (
     NO_GYRO,
     ExportOptions,
@@ -93,7 +94,7 @@ def from_kalibr(text: str) -> Calibration | None:
 def g_sensitivity(calibration: Calibration) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     """(3, 3) rate read per specific force in the instrument frame; zero where the calibration does not have it."""
     values = effect_parameters(calibration, "gyro-g-sensitivity")
-    return np.array([[values.get(f"G_{i}{j}", 0.0) for j in "xyz"] for i in "xyz"])
+    return np.array([[values.get(f"G_{i}{j}", 0.0) for j in AXES] for i in AXES])
 
 
 FORMAT = Format("kalibr", to_kalibr, from_kalibr, in_si=True)

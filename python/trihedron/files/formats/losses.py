@@ -78,12 +78,10 @@ def lost_without_intrinsics(calibration: Calibration) -> list[str]:
             sizes.append(
                 f"{100.0 * share:.2g} % of rate"
                 if name == "gyroscope"
-                else f"{share * calibration.gravity_m_s2:.2g} m/s^2 of scale and misalignment at 1 g"
+                else f"{mm_s2_from_m_s2(share * calibration.gravity_m_s2):.3g} mm/s^2 of scale and misalignment at 1 g"
             )
         if has_bias(sensor):
-            length = float(np.linalg.norm(sensor.b))
-            unit = f"{degrees_from_radians(length):.2g} deg/s" if name == "gyroscope" else f"{length:.2g} m/s^2"
-            sizes.append(f"{unit} of bias")
+            sizes.append(f"{size_of_bias(name, sensor.b)} of bias")
     if not sizes:
         return []
     return [f"Apply S and b to the readings before they get there; without them this is lost: {', '.join(sizes)}."]

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.files.formats.ardupilot import said_of_misfit
 from trihedron.files.formats.autopilot import (
-    AXES,
     AxisCorrection,
     Composed,
     board_of,
@@ -53,7 +52,7 @@ def to_px4(calibration: Calibration, options: ExportOptions) -> str:
             )
         else:
             lines.append(_line(f"{root}_ID", device, _INTEGER))
-        for k, axis in enumerate(AXES):
+        for k, axis in enumerate(XYZ):
             lines.append(_line(f"{root}_{axis}OFF", one.offset[k]))
             if name == "accelerometer" or has_scale:
                 lines.append(_line(f"{root}_{axis}SCALE", one.scale[k]))
@@ -92,7 +91,7 @@ def correction_of(board: Onboard, name: str) -> AxisCorrection:
     turn = np.eye(3)
     if board.stage == "body":
         own = p.get(f"{root}_ROT", -1.0)
-        offsets = [p.get(f"SENS_BOARD_{axis}_OFF", 0.0) for axis in AXES]
+        offsets = [p.get(f"SENS_BOARD_{axis}_OFF", 0.0) for axis in XYZ]
         inside = euler(*offsets) @ orientation(p.get("SENS_BOARD_ROT", 0.0))
         turn = inside if own < 0.0 else orientation(own)
     scale = triple(p, f"{root}_{{}}SCALE", 1.0)
@@ -163,7 +162,7 @@ def _about(board: Onboard) -> list[str]:
         return ["The readings were raw: these values replace those of the board, in the sensor's axes as logged."]
     p = board.parameters
     turn = f"SENS_BOARD_ROT {p.get('SENS_BOARD_ROT', 0.0):g}" + "".join(
-        f", SENS_BOARD_{axis}_OFF {p.get(f'SENS_BOARD_{axis}_OFF', 0.0):g}" for axis in AXES
+        f", SENS_BOARD_{axis}_OFF {p.get(f'SENS_BOARD_{axis}_OFF', 0.0):g}" for axis in XYZ
     )
     return [
         "The log's readings had been corrected on board; these values include that correction and replace it.",

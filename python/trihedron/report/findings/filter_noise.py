@@ -13,9 +13,8 @@ ENTRIES = (
         Code.FILTER_NOISE_AT_REST,
         "",
         WARNING,
-        "There is no reference: N and K are those of this log's rest. What vibration and motion add to them is not in "
-        "them.",
-        "Rests and gravity show neither the heading nor what happens during motion.",
+        "No reference: N and K are those of this log's static stretches, without what vibration and motion add.",
+        "Static stretches and gravity show neither the heading nor what happens during motion.",
         "Give the filter's own result, a tracker or a second unit with --reference MOTION.",
     ),
     Entry(
@@ -24,8 +23,8 @@ ENTRIES = (
         NOTE,
         "Nothing is known of the {sensor} at rest: noise at rest and vibration are separable only where the vibration "
         "changes.",
-        "No static log was given, and the log does not rest for 20 s.",
-        "Give a static log of the unit with --static REST.",
+        "No static log was given, and the sensor is not static for 20 s in this log.",
+        "Give a static log of the unit with --static STATIC.",
     ),
     Entry(
         Code.FILTER_NOISE_NOT_SEPARATED,

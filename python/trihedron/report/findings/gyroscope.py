@@ -175,8 +175,8 @@ _MOVES = (
         Code.CLIPPING,
         "moves",
         WARNING,
-        "the gyro clipped in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.0f ms} at most; "
-        "{bridged} of them are interpolated and weigh less, {left_out} excluded.",
+        "the gyro clipped in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.3g} s at most; "
+        "interpolated with less weight: {bridged}, excluded: {left_out}.",
         "the sensor was turned faster than its range limit",
         "Turn more slowly, or set a wider range.",
     ),

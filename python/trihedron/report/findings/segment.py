@@ -35,7 +35,7 @@ ENTRIES = (
         "{poses:# pose} never {poses:?comes|come} down to the sensor's own noise (pose {which:first 8}; first at "
         "{first_s:.1f} s).",
         "The sensor was held in the hand or stood on a support that shakes.",
-        "Their means weigh less, by their own scatter; put the case on a firm support for a better result.",
+        "Such a mean weighs less, by its own scatter; put the case on a firm support for a better result.",
     ),
     Entry(
         Code.POSE_AT_RANGE_LIMIT,

@@ -27,6 +27,7 @@ from collections.abc import Callable, Mapping
 from string import Formatter
 from typing import Any
 
+from trihedron.arrays import XYZ
 from trihedron.report.numbers import listed
 from trihedron.units import cm_from_m, degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, ms_from_s
 
@@ -126,7 +127,7 @@ def _in_words(value: Any, how: str, line: str) -> str:
 
 def axis_name(axis: int | str) -> str:
     """``X``, as printed on the board, of X or ``x``."""
-    return axis.upper() if isinstance(axis, str) else "XYZ"[int(axis) - 1]
+    return axis.upper() if isinstance(axis, str) else XYZ[int(axis) - 1]
 
 
 def _number(value: float, how: str) -> str:
