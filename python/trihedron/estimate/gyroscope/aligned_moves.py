@@ -16,6 +16,7 @@ from trihedron.estimate.gyroscope.alignment import (
     align_screened,
     finished,
     widened,
+    within_step,
 )
 from trihedron.estimate.gyroscope.lost_turns import is_asked_for_losses
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
@@ -100,7 +101,8 @@ class _Session:
 
         An offset fitted to whole moves is too small by the part of their time in which nothing turned.
         """
-        readings, quantum, rest, axes = coarse = self._coarse(measured)
+        coarse = self._coarse(measured)
+        quantum = coarse[1]
         is_still = resting_ends(*coarse, measured.edges) | resting_axes(*coarse)
         still = np.mean(np.concatenate([is_still[a:b] for a, b in measured.edges.tolist()]), axis=0)
         rate = measured.rate
@@ -143,11 +145,12 @@ class _Session:
         return measured, replace(aligned, excess=before.inflation)
 
     def with_shared_rounding(self, measured: MoveMeasurements, aligned: Aligned) -> Aligned:
-        """The covariance with what rounding does to all moves alike."""
+        """The covariance with what rounding does to all moves alike, the bias somewhere in its step."""
         if not np.any(measured.is_undithered):
             return aligned
         followed = self._followed(measured, aligned, shared_errors(*self._coarse(measured)))
-        return widened(aligned, measured, self.part, followed)
+        wide = widened(aligned, measured, self.part, followed)
+        return within_step(wide, measured, self.part, self._coarse(measured)[1])
 
     def _still_response(self, measured: MoveMeasurements, aligned: Aligned, is_still: BoolArray) -> FloatArray:
         """(p, p) by which errors grow: the offset that is fitted is in the readings at rest, which it was fitted to."""

@@ -193,9 +193,8 @@ def _hidden(first_step: int, second_step: int) -> int:
 
 
 def shared_errors(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> Iterator[FloatArray]:
-    """Errors (n, 3) of one standard deviation each, by axis, that all moves share: what an axis turns inside the step
-    of its bias while another one leads. Misalignment makes it, the other way in turns the other way, and the place of
-    the bias, the same way in all: neither is a scatter from move to move.
+    """Errors (n, 3) of one standard deviation each that all moves share: what an axis turns inside the step of its bias
+    while another one leads. Their misalignment makes it, against it in turns the other way: no scatter from move to move.
     """
     away = (readings - rest) / np.where(quantum > 0.0, quantum, np.inf)
     size = np.abs(away)
@@ -206,16 +205,9 @@ def shared_errors(readings: FloatArray, quantum: FloatArray, rest: FloatArray, a
         for other in range(3):
             way = np.where(is_inside & (lead == other), np.sign(away[:, other]), 0.0)
             if np.any(way):
-                yield _along(axis, way * quantum[axis])
-        if np.any(is_inside):
-            yield _along(axis, np.where(is_inside, quantum[axis], 0.0))
-
-
-def _along(axis: int, steps: FloatArray) -> FloatArray:
-    """(n, 3) of a uniform error of ``steps`` (n,) along an axis."""
-    out = np.zeros((len(steps), 3))
-    out[:, axis] = steps / math.sqrt(12.0)
-    return out
+                out = np.zeros(readings.shape)
+                out[:, axis] = way * quantum[axis] / math.sqrt(12.0)
+                yield out
 
 
 def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: float, axes: BoolArray) -> FloatArray:
