@@ -15,9 +15,8 @@ from trihedron.estimate.gyroscope.alignment import (
     align,
     align_screened,
     finished,
-    widened,
-    within_step,
 )
+from trihedron.estimate.gyroscope.common_errors import widened, within_step
 from trihedron.estimate.gyroscope.lost_turns import is_asked_for_losses
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.gyroscope.resting_ends import resting_ends
@@ -150,7 +149,7 @@ class _Session:
             return aligned
         followed = self._followed(measured, aligned, shared_errors(*self._coarse(measured)))
         wide = widened(aligned, measured, self.part, followed)
-        return within_step(wide, measured, self.part, self._coarse(measured)[1])
+        return within_step(wide, measured, self._coarse(measured)[1])
 
     def _still_response(self, measured: MoveMeasurements, aligned: Aligned, is_still: BoolArray) -> FloatArray:
         """(p, p) by which errors grow: the offset that is fitted is in the readings at rest, which it was fitted to."""

@@ -194,7 +194,8 @@ def _hidden(first_step: int, second_step: int) -> int:
 
 def shared_errors(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> Iterator[FloatArray]:
     """Errors (n, 3) of one standard deviation each that all moves share: what an axis turns inside the step of its bias
-    while another one leads. Their misalignment makes it, against it in turns the other way: no scatter from move to move.
+    while another one leads. Their misalignment makes it, the other way in turns the other way: it does not scatter from
+    move to move.
     """
     away = (readings - rest) / np.where(quantum > 0.0, quantum, np.inf)
     size = np.abs(away)
