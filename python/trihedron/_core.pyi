@@ -485,6 +485,7 @@ class Moves:
         used: npt.NDArray[np.bool_],
         starts: FloatArray,
         is_offset_free: bool,
+        offset_white: FloatArray,
         loss_scale: float | None,
         is_near: bool = False,
     ) -> AlignmentFit: ...

@@ -213,8 +213,8 @@ impl Moves {
         durations.to_pyarray(py)
     }
 
-    #[pyo3(signature = (*, poses, noise, accelerometer, gravity_m_s2, used, starts, is_offset_free, loss_scale,
-        is_near=false))]
+    #[pyo3(signature = (*, poses, noise, accelerometer, gravity_m_s2, used, starts, is_offset_free, offset_white,
+        loss_scale, is_near=false))]
     #[allow(clippy::too_many_arguments)]
     fn align(
         &self,
@@ -226,6 +226,7 @@ impl Moves {
         used: PyReadonlyArray1<'_, bool>,
         starts: PyReadonlyArray3<'_, f64>,
         is_offset_free: bool,
+        offset_white: PyReadonlyArray2<'_, f64>,
         loss_scale: Option<f64>,
         is_near: bool,
     ) -> PyResult<AlignmentFit> {
@@ -246,6 +247,7 @@ impl Moves {
             accelerometer_basis: accelerometer.basis.clone(),
             is_accelerometer_given: accelerometer.is_given,
             is_offset_free,
+            offset_white: dmatrix(&offset_white),
         };
         let base = Model {
             accelerometer_scale: accelerometer.scale,

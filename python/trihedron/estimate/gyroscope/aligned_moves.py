@@ -16,7 +16,7 @@ from trihedron.estimate.gyroscope.alignment import (
     align_screened,
     finished,
 )
-from trihedron.estimate.gyroscope.common_errors import widened, within_step
+from trihedron.estimate.gyroscope.common_errors import widened
 from trihedron.estimate.gyroscope.lost_turns import is_asked_for_losses
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.gyroscope.resting_ends import resting_ends
@@ -144,12 +144,11 @@ class _Session:
         return measured, replace(aligned, excess=before.inflation)
 
     def with_shared_rounding(self, measured: MoveMeasurements, aligned: Aligned) -> Aligned:
-        """The covariance with what rounding does to all moves alike, the bias somewhere in its step."""
+        """The covariance with what rounding does to all moves alike."""
         if not np.any(measured.is_undithered):
             return aligned
         followed = self._followed(measured, aligned, shared_errors(*self._coarse(measured)))
-        wide = widened(aligned, measured, self.part, followed)
-        return within_step(wide, measured, self._coarse(measured)[1])
+        return widened(aligned, measured, self.part, followed)
 
     def _still_response(self, measured: MoveMeasurements, aligned: Aligned, is_still: BoolArray) -> FloatArray:
         """(p, p) by which errors grow: the offset that is fitted is in the readings at rest, which it was fitted to."""

@@ -230,9 +230,20 @@ def _core_align(
         used=used,
         starts=starts,
         is_offset_free=options.is_offset_free,
+        offset_white=_place_white(measured, starts[0]),
         loss_scale=loss_scale,
         is_near=is_near,
     )
+
+
+def _place_white(measured: MoveMeasurements, S: FloatArray) -> FloatArray:
+    """Rows (m, 3) that make of the rate offset the place of every undithered bias inside its step, in standard errors.
+
+    At rest it reads the middle of the step, and lies anywhere in it: ``q²/12``.
+    """
+    axes = measured.is_undithered
+    out: FloatArray = np.linalg.pinv(S)[axes] / (measured.quantum[axes, None] / np.sqrt(12.0))
+    return np.ascontiguousarray(out)
 
 
 def assemble(
