@@ -272,7 +272,7 @@ def assemble(
     follows[p + 3 :, 3:] = given
     own = _positive(inflation * (of_fit + _unseen(fit, S, k)) - follows[:p] @ follows[:p].T)
     narrower = np.ones(p)
-    narrower[k:] = _narrowing(fit, measured)
+    narrower[k : k + 9] = _narrowing(fit, measured)
     joint = follows @ follows.T
     joint[:p, :p] += own * np.outer(narrower, narrower)
     if measured.still_response is not None:
