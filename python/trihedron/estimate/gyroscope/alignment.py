@@ -229,10 +229,9 @@ def _core_align(
         gravity_m_s2=gravity_m_s2,
         used=used,
         starts=starts,
-        is_offset_free=options.is_offset_free,
-        offset_white=_place_white(measured, starts[0]),
         loss_scale=loss_scale,
         is_near=is_near,
+        offset_white=_place_white(measured, starts[0]) if options.is_offset_free else None,
     )
 
 
