@@ -86,6 +86,8 @@ pub struct Alignment {
     pub is_accelerometer_given: bool,
     /// Whether the rate offset is free.
     pub is_offset_free: bool,
+    /// What is known of it beforehand: rows `(m, 3)` whose product with it has mean zero and variance one.
+    pub offset_white: DMatrix<f64>,
 }
 
 /// 3 × 12 derivative of `f` with respect to `(S_f row by row, b_f)`.
@@ -171,7 +173,21 @@ impl Alignment {
                 "the accelerometer basis must have 12 rows",
             ));
         }
+        if self.offset_white.ncols() != 3 {
+            return Err(Error::bad_input(
+                "what is known of the rate offset must have 3 columns",
+            ));
+        }
         Ok(())
+    }
+
+    /// Number of rows about the rate offset.
+    fn n_offset_rows(&self) -> usize {
+        if self.is_offset_free {
+            self.offset_white.nrows()
+        } else {
+            0
+        }
     }
 
     /// Number of free accelerometer parameters.
@@ -302,6 +318,8 @@ impl Alignment {
 enum Rows {
     /// A given accelerometer direction, in its standard errors: one row.
     Given(usize),
+    /// What is known of the rate offset beforehand: one row.
+    Offset(usize),
     /// `|f| − |g|` of a pose: one row.
     Norm(usize),
     /// A move, with the plane it is seen in: two rows.
@@ -311,7 +329,7 @@ enum Rows {
 impl Rows {
     fn len(&self) -> usize {
         match self {
-            Self::Given(_) | Self::Norm(_) => 1,
+            Self::Given(_) | Self::Offset(_) | Self::Norm(_) => 1,
             Self::Move(..) => 2,
         }
     }

@@ -16,6 +16,11 @@ const MAD_TO_SIGMA: f64 = 1.4826;
 /// What a Gaussian exceeds once in a hundred, either side, in sigmas.
 const TWO_SIDED_HUNDREDTH: f64 = 2.5758;
 
+/// Events that are no tail yet.
+const FEW: usize = 2;
+/// Part of the limit from which on a difference lies closely below it.
+const CLOSELY: f64 = 0.7;
+
 /// One scale at which the log is searched.
 #[derive(Debug, Clone, Copy)]
 pub struct Scale {
@@ -129,11 +134,26 @@ fn at_scale(sums: &[f64], scale: Scale) -> Vec<Jump> {
         last = i;
     }
     // Events are rare. Where every thousandth mean is one, the noise at this scale is not Gaussian, and no judge.
-    if out.len() > 10 + sums.len() / size / 1000 {
+    let is_common = out.len() > 10 + sums.len() / size / 1000;
+    if is_common || (out.len() > FEW && is_a_tail((0..count).map(difference), limit, spread)) {
         Vec::new()
     } else {
         out
     }
+}
+
+/// Whether as many differences, beyond a Gaussian's, lie closely below the limit as above it: events have any size, a tail
+/// that falls off falls through the limit.
+fn is_a_tail(differences: impl Iterator<Item = f64>, limit: f64, spread: f64) -> bool {
+    let (mut below, mut above, mut all) = (0_usize, 0_usize, 0_usize);
+    for d in differences {
+        let z = d.abs() / spread;
+        all += 1;
+        above += usize::from(z > limit);
+        below += usize::from(z > CLOSELY * limit && z <= limit);
+    }
+    let gaussian = all as f64 * (-0.5 * (CLOSELY * limit).powi(2)).exp();
+    below as f64 - gaussian > above as f64
 }
 
 /// Largest absolute second difference with lag `m` over the first `n` starts.

@@ -8,7 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
-from confidence.design import session
+from confidence.design import drawn, session
 from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import table
@@ -157,3 +157,51 @@ def test_slow_moves_of_a_hand_onto_a_support_that_settles_are_no_reason_for_doub
         assert result.is_trustworthy
         assert largest(z)["S_w"] < 4.0
         assert result.segments.n_poses <= 14
+
+
+QUICK = {"bits": 10, "move_s": 0.6, "tremor_deg_s": 0.0}
+
+
+def scores_of_gyro(seeds, **levels):
+    """Errors of S and b of the gyro in their standard errors, of all seeds together."""
+    found = [calibrated(seed, **levels)[1] for seed in seeds]
+    return np.concatenate([np.concatenate([z["S_w"], z["b_w"]]) for z in found])
+
+
+@pytest.mark.parametrize("rate_hz", [25.0, 100.0])
+def test_what_misalignment_turns_inside_a_step_is_an_error_that_all_moves_share(rate_hz):
+    # Charged as if it scattered from move to move, S_w was off by up to 7, b_w by up to 10 standard errors.
+    scores = scores_of_gyro(range(7000, 7006), path="axis by axis", rate_hz=rate_hz, **QUICK)
+    # 72 numbers, of which those of a session share its readings.
+    assert np.abs(scores).max() < 4.0
+    assert np.sqrt(np.mean(np.square(scores))) < 1.45
+
+
+def test_what_a_support_turns_inside_a_step_is_as_large_in_every_move():
+    # As a factor on rounding, it left the moves right that rounding reaches least: b_w was off by up to 5.7.
+    scores = scores_of_gyro((7003, 7007, 7010), support="settling", **QUICK)
+    assert np.abs(scores).max() < 4.0
+
+
+def test_timestamps_that_come_late_do_not_drive_a_bias_out_of_its_step():
+    # Free between the moves, the bias followed the jitter of the timestamps by many of its steps.
+    levels = {"grade": "industrial", "bits": 16, "path": "axis by axis", "timestamps": "late"}
+    for seed in (7200, 7201, 7202):
+        result, z = calibrated(seed, move_s=0.6, tremor_deg_s=0.0, **levels)
+        assert largest(z)["b_w"] < 4.0
+        assert np.all(result.gyroscope.sigma_b < np.linalg.norm(result.gyroscope.S, axis=0))
+
+
+def test_the_middle_of_a_slow_turn_about_the_vertical_is_no_pose():
+    levels = {"path": "axis by axis", "move_s": 25.0, "grade": "industrial", "bits": 14, "tremor_deg_s": 0.0}
+    for seed in (7002, 7006):
+        # At its steady top speed it was a pose that shakes, and b_w followed by up to ten standard errors.
+        result, z = calibrated(seed, **levels)
+        assert result.segments.n_poses == 18
+        assert largest(z)["b_w"] < 4.0
+
+
+def test_a_slow_turn_is_seen_by_a_coarse_gyro_that_its_noise_dithers():
+    # Half a step of its ADC stood for the scatter of its mean readings, and pauses that turned lost 1.3 % of S_w.
+    _, z = calibrated(510002, **drawn(510002))
+    assert largest(z)["S_w"] < 4.0

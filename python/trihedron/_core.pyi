@@ -484,9 +484,9 @@ class Moves:
         gravity_m_s2: float,
         used: npt.NDArray[np.bool_],
         starts: FloatArray,
-        is_offset_free: bool,
         loss_scale: float | None,
         is_near: bool = False,
+        offset_white: FloatArray | None = None,
     ) -> AlignmentFit: ...
 
 @final

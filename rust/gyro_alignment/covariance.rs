@@ -34,6 +34,7 @@ impl Layout {
         if problem.is_accelerometer_given {
             rows.extend((0..problem.n_accelerometer()).map(Rows::Given));
         }
+        rows.extend((0..problem.n_offset_rows()).map(Rows::Offset));
         for (hold, moves) in moves_from.iter().enumerate() {
             if problem.n_accelerometer() > 0 && !problem.is_accelerometer_given {
                 rows.push(Rows::Norm(hold));
@@ -61,6 +62,13 @@ impl Layout {
                 Rows::Given(direction) => {
                     residual[offset] = at.model.followed[*direction];
                     jacobian[(offset, *direction)] = 1.0;
+                }
+                Rows::Offset(known) => {
+                    let white = problem.offset_white.row(*known);
+                    residual[offset] = (white * at.model.rate_offset)[0];
+                    jacobian
+                        .view_mut((offset, problem.n_accelerometer() + 9), (1, 3))
+                        .copy_from(&white);
                 }
                 Rows::Norm(hold) => {
                     let force = at.forces[*hold];
@@ -119,7 +127,7 @@ impl Layout {
         let finest = (FINEST_RELATIVE * problem.gravity).powi(2);
         let mut mahalanobis = vec![0.0; problem.links.len()];
         for (row, &offset) in self.rows.iter().zip(&self.offsets) {
-            let floor = if matches!(row, Rows::Given(_)) {
+            let floor = if matches!(row, Rows::Given(_) | Rows::Offset(_)) {
                 1.0
             } else {
                 finest
@@ -188,7 +196,7 @@ impl Layout {
         let scale = at.model.accelerometer_scale;
         for (block, row) in self.rows.iter().enumerate() {
             match row {
-                Rows::Given(_) => {}
+                Rows::Given(_) | Rows::Offset(_) => {}
                 Rows::Norm(hold) => readings[*hold].touched.push((
                     block,
                     dynamic(&(at.forces[*hold].normalize().transpose() * scale)),

@@ -213,8 +213,8 @@ impl Moves {
         durations.to_pyarray(py)
     }
 
-    #[pyo3(signature = (*, poses, noise, accelerometer, gravity_m_s2, used, starts, is_offset_free, loss_scale,
-        is_near=false))]
+    #[pyo3(signature = (*, poses, noise, accelerometer, gravity_m_s2, used, starts, loss_scale, is_near=false,
+        offset_white=None))]
     #[allow(clippy::too_many_arguments)]
     fn align(
         &self,
@@ -225,9 +225,9 @@ impl Moves {
         gravity_m_s2: f64,
         used: PyReadonlyArray1<'_, bool>,
         starts: PyReadonlyArray3<'_, f64>,
-        is_offset_free: bool,
         loss_scale: Option<f64>,
         is_near: bool,
+        offset_white: Option<PyReadonlyArray2<'_, f64>>,
     ) -> PyResult<AlignmentFit> {
         if starts.shape()[1..] != [3, 3] {
             return Err(PyValueError::new_err(format!(
@@ -245,7 +245,8 @@ impl Moves {
             var_bias_walk: poses.var_bias_walk,
             accelerometer_basis: accelerometer.basis.clone(),
             is_accelerometer_given: accelerometer.is_given,
-            is_offset_free,
+            is_offset_free: offset_white.is_some(),
+            offset_white: offset_white.map_or_else(|| DMatrix::zeros(0, 3), |rows| dmatrix(&rows)),
         };
         let base = Model {
             accelerometer_scale: accelerometer.scale,

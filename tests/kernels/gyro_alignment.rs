@@ -62,6 +62,7 @@ fn session(turns: &[Vector3<f64>], start: Vector3<f64>) -> Alignment {
         accelerometer_basis: DMatrix::zeros(12, 0),
         is_accelerometer_given: true,
         is_offset_free: false,
+        offset_white: DMatrix::zeros(0, 3),
     }
 }
 

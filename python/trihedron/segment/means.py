@@ -183,6 +183,15 @@ def _mean_bias(seen: FloatArray) -> float:
     return float(NORMAL_WEIGHT @ np.interp(noise, NOISE_TRIED, BIAS_VARIANCE))
 
 
+def left_by_rounding(noise: FloatArray, q2: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    """Variance (c,) of what rounding to steps of ``q2`` squared leaves in a mean, in steps squared, and where the
+    variance ``noise`` (c,) of the readings does not show how large their noise is.
+    """
+    # Readings that only toggle between two neighbours have a variance up to q²/4.
+    is_hidden = noise < q2 / 4.0
+    return np.interp(np.sqrt(np.where(is_hidden, 0.0, noise) / q2), NOISE_TRIED, BIAS_VARIANCE), is_hidden
+
+
 def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
     """(c,) variance of what rounding leaves in a mean however long, where the noise is too small to dither.
 
@@ -196,10 +205,7 @@ def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
     mean = means_of(channels.mean, parts)
     pooled = means_of(channels.variance, [[r for part in parts for r in part]])[0]
     q2 = np.where(channels.quantum > 0.0, channels.quantum**2, 1.0)
-    noise = np.maximum(pooled - channels.quantisation_variance, 0.0)
-    # Readings that only toggle between two neighbours (variance up to q²/4) do not show how large the noise is.
-    is_hidden = noise < q2 / 4.0
-    left = np.interp(np.sqrt(np.where(is_hidden, 0.0, noise) / q2), NOISE_TRIED, BIAS_VARIANCE)
+    left, is_hidden = left_by_rounding(pooled - channels.quantisation_variance, q2)
     if len(runs) >= FEWEST_PHASES:
         by_pose = means_of(channels.variance, parts) / q2
         for axis in np.flatnonzero(is_hidden & (mean.var(axis=0) > q2)):

@@ -13,7 +13,18 @@ from trihedron.records import Recording
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.floor import Activity, quiet_channels
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
-from trihedron.segment.runs import BUMP_S, SEEN_S, SWAY_RAD, EdgeNoise, Run, close_gaps, trim_edges, turns_on, widen
+from trihedron.segment.runs import (
+    BUMP_S,
+    SEEN_S,
+    SWAY_RAD,
+    EdgeNoise,
+    Run,
+    close_gaps,
+    run_mean,
+    trim_edges,
+    turns_on,
+    widen,
+)
 
 SMOOTH_S = 1.0
 """Raised cosine over which a shaking of some hertz and more averages out of the attitude, and a carried body's way
@@ -71,7 +82,7 @@ def find_shaken(
     white = (activity.white_variance[~gyro], activity.white_variance[gyro])
     settled = [run for run in taken if not run.is_unsteady]
     seen_calm = _poses(channels, seen, calm & free & channels.is_valid, settled, SEEN_S)
-    seen_calm = [run for run in seen_calm if not turns_on(channels, run.first, run.last, usual)]
+    seen_calm = [run for run in seen_calm if not _turns(channels, run, settled)]
     spans = [(run.first * channels.length, run.last * channels.length) for run in seen_calm]
     lines = [run for run, span in zip(seen_calm, spans, strict=True) if is_shaken_by_a_support(recording, span, white)]
     # Where a line beats, a part of the pose is calm enough to be an unsteady pose of its own.
@@ -79,7 +90,8 @@ def find_shaken(
     kept = [run for run in taken if run not in parts]
     lines = [run for run in lines if not any(run.first < one.last and one.first < run.last for one in kept)]
     still = _poses(channels, seen, quiet & free, [*kept, *lines], SEEN_S)
-    return [*kept, *lines, *(run for run in still if _shakes(channels, activity, run))]
+    shaken = (run for run in still if _shakes(channels, activity, run) and not _turns(channels, run, settled))
+    return [*kept, *lines, *shaken]
 
 
 def _is_part(run: Run, whole: Run) -> bool:
@@ -144,6 +156,12 @@ def _shakes(channels: Channels, activity: Activity, run: Run) -> bool:
     force = ~channels.is_gyroscope
     inside = channels.variance[run.first : run.last, force].mean(axis=0)
     return bool(np.any(inside > ABOVE_NOISE * activity.white_variance[force]))
+
+
+def _turns(channels: Channels, run: Run, settled: list[Run]) -> bool:
+    """Whether the gyro reads on one way beside the nearest ``settled`` pose: the middle of a slow turn is as quiet."""
+    near = min(settled, key=lambda other: max(other.first - run.last, run.first - other.last))
+    return turns_on(channels, run.first, run.last, run_mean(channels, near)[0])
 
 
 def _stays(seen: _Seen, stretch: Range) -> bool:

@@ -9,6 +9,7 @@ from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.quantiles import medians
 from trihedron.ranges import Range, ranges_of
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
+from trihedron.segment.means import left_by_rounding
 from trihedron.segment.runs import CREEP_PART, MIN_POSE_S, SAME_POSE, SWAY_RAD, speed_of_moves
 
 TURN_SIGMAS = 6.0
@@ -48,7 +49,9 @@ def turning_blocks(
         squares = np.add.reduceat(np.diff(reading[: inner[-1] + 1], axis=0) ** 2, inner[:-1], axis=0)[::2]
         variance = squares / (2.0 * np.diff(inner)[::2, None])
         scatter = np.maximum(scatter, np.sqrt(medians(variance) / channels.blocks(1.0)))
-    scatter = np.maximum(scatter, channels.quantum[gyro] / np.sqrt(12.0))
+    step2 = np.where(channels.quantum[gyro] > 0.0, channels.quantum[gyro] ** 2, np.finfo(np.float64).tiny)
+    noise = medians(channels.variance[quiet][:, gyro]) - channels.quantisation_variance[gyro]
+    scatter = np.maximum(scatter, np.sqrt(left_by_rounding(noise, step2)[0] * step2))
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = np.nan_to_num(np.abs(second - zero) / scatter, nan=0.0)
     top = speed_of_moves(channels, quiet)

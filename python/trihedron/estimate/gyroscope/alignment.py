@@ -100,7 +100,8 @@ class Aligned:
 
     ``parameters_covariance`` (p, p) of (free accelerometer, ``S_ω``, offset) with everything in it; ``covariance``
     (24, 24) of (``S_f``, ``b_f``, ``S_ω``, ``b_ω``); ``used`` (m,) the moves behind it, ``outliers`` those screened
-    out; ``inflation`` the factor χ²/dof by which the covariance was widened, one when the residual is within the noise.
+    out; ``inflation`` the factor χ²/dof by which the covariance was widened, one when the residual is within the noise,
+    and ``excess`` what it would be without turns that a step hides.
     """
 
     fit: AlignmentFit
@@ -111,6 +112,7 @@ class Aligned:
     outliers: tuple[int, ...]
     inflation: float
     n_gyroscope: int
+    excess: float = 1.0
 
     @property
     def parameters(self) -> FloatArray:
@@ -227,10 +229,20 @@ def _core_align(
         gravity_m_s2=gravity_m_s2,
         used=used,
         starts=starts,
-        is_offset_free=options.is_offset_free,
         loss_scale=loss_scale,
         is_near=is_near,
+        offset_white=_place_white(measured, starts[0]) if options.is_offset_free else None,
     )
+
+
+def _place_white(measured: MoveMeasurements, S: FloatArray) -> FloatArray:
+    """Rows (m, 3) that make of the rate offset the place of every undithered bias inside its step, in standard errors.
+
+    At rest it reads the middle of the step, and lies anywhere in it: ``q²/12``.
+    """
+    axes = measured.is_undithered
+    out: FloatArray = np.linalg.pinv(S)[axes] / (measured.quantum[axes, None] / np.sqrt(12.0))
+    return np.ascontiguousarray(out)
 
 
 def assemble(
@@ -260,21 +272,17 @@ def assemble(
     own = _positive(inflation * (of_fit + _unseen(fit, S, k)) - follows[:p] @ follows[:p].T)
     narrower = np.ones(p)
     narrower[k : k + 9] = _narrowing(fit, measured)
-    # The core's offset acts on whole moves.
-    narrower[k + 9 :] = _narrowing(fit, measured) / (1.0 - min(0.5, float(measured.still.max())))
     joint = follows @ follows.T
     joint[:p, :p] += own * np.outer(narrower, narrower)
+    if measured.still_response is not None:
+        joint[:p] = measured.still_response @ joint[:p]
+        joint[:, :p] = joint[:, :p] @ measured.still_response.T
     to_all = np.zeros((24, p + 15))
+    to_all[:, :p] = from_fit(p, measured, accelerometer)
     if accelerometer.is_given:
+        to_all[:12, :k] = 0.0
         to_all[:12, p + 3 :] = np.eye(12)
-    else:
-        to_all[:12, :k] = accelerometer.basis
-    to_all[12:21, k : k + 9] = np.eye(9)
-    for i in range(3):
-        to_all[21 + i, k + 3 * i : k + 3 * i + 3] = -measured.bias_mean
     to_all[21:, p : p + 3] = -S
-    if p > k + 9:
-        to_all[21:, k + 9 : k + 12] = np.eye(3)
     covariance = to_all @ joint @ to_all.T
     return Aligned(
         fit=fit,
@@ -286,6 +294,18 @@ def assemble(
         inflation=inflation,
         n_gyroscope=p - k,
     )
+
+
+def from_fit(p: int, measured: MoveMeasurements, accelerometer: AccelerometerPart) -> FloatArray:
+    """How (S_f, b_f, S_ω, b_ω) follow the ``p`` parameters of the fit, (24, p); ``b_ω = −S_ω z̄ + offset``."""
+    k = accelerometer.basis.shape[1]
+    out = np.zeros((24, p))
+    out[:12, :k] = accelerometer.basis
+    out[12:21, k : k + 9] = np.eye(9)
+    out[21:, k : k + 9] = -np.kron(np.eye(3), measured.bias_mean)
+    if p > k + 9:
+        out[21:, k + 9 :] = np.eye(3)
+    return out
 
 
 def _positive(covariance: FloatArray) -> FloatArray:

@@ -29,14 +29,15 @@ def findings_of(aligned: Aligned, measured: MoveMeasurements, held: Prediction |
     if not fit.is_converged:
         found.append(Finding.of(FindingCode.NOT_CONVERGED, "gyro", stopped_because=words(fit.stopped_because)))
     found += _outlier_findings(aligned, measured)
-    if aligned.inflation > 1.0:
+    excess = max(aligned.inflation, aligned.excess)
+    if excess > 1.0:
         # Bars that are widened in proportion say nothing about a minimum elsewhere.
         found.append(
             Finding.of(
                 FindingCode.RESIDUAL_ABOVE_NOISE,
                 "moves",
                 severity=Severity.SERIOUS if is_astray(aligned, measured) else Severity.WARNING,
-                chi2_per_dof=aligned.inflation,
+                chi2_per_dof=excess,
                 dof=fit.dof,
             )
         )

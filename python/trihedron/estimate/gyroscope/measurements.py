@@ -46,10 +46,10 @@ class MoveMeasurements:
     its limit. ``attitude`` is the dependence of the bias on specific force where it was removed: ``rate``
     (samples, 3) are the raw gyro readings without it, and so are the biases. ``bias_weights`` (n, 3) make the
     session's bias ``bias_mean`` (3,) of variance ``var_bias_mean`` (3,). ``is_undithered`` (3,) are the axes
-    whose zero lies hidden inside an LSB. ``bias_read``, ``var_bias_read`` (n, 3) are the biases as each
-    hold alone shows them, ``var_reading_noise`` (n, 3) the variance of the pose means by noise alone,
-    ``reading_variance`` (samples, 3) that of gyro readings which were bridged or rounded; ``still`` (3,) the part of
-    the moves' samples in which an axis stands at its bias, so that an offset fitted to moves does not act there;
+    whose zero lies hidden inside an LSB, ``quantum`` (3,) the LSB. ``bias_read``, ``var_bias_read`` (n, 3) are the
+    biases as each hold alone shows them, ``var_reading_noise`` (n, 3) the variance of the pose means by noise alone,
+    ``reading_variance`` (samples, 3) that of gyro readings which were bridged or rounded; ``still_response`` (p, p) how
+    the fit's parameters follow errors of their own once readings at rest are told from the offset that they fit;
     ``averaging`` by how much ``rate`` was sharpened, the readings being means over their interval.
     """
 
@@ -78,7 +78,8 @@ class MoveMeasurements:
     var_bias_read: FloatArray
     var_reading_noise: FloatArray
     reading_variance: FloatArray | None
-    still: FloatArray = field(default_factory=lambda: np.zeros(3))
+    quantum: FloatArray
+    still_response: FloatArray | None = None
     averaging: Averaging = field(default_factory=Averaging)
 
     def of_rate(
@@ -204,6 +205,7 @@ def measure_moves(
         var_bias_read=var_bias_read,
         var_reading_noise=var_reading,
         reading_variance=extra,
+        quantum=quantum,
     )
 
 

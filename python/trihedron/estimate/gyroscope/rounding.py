@@ -192,6 +192,25 @@ def _hidden(first_step: int, second_step: int) -> int:
     return math.ceil(first_step * float(np.interp(ratio, *SETTLING)))
 
 
+def shared_errors(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> Iterator[FloatArray]:
+    """Errors (n, 3) of one standard deviation each that all moves share: what an axis turns inside the step of its bias
+    while another one leads. Their misalignment makes it, the other way in turns the other way: it does not scatter from
+    move to move.
+    """
+    away = (readings - rest) / np.where(quantum > 0.0, quantum, np.inf)
+    size = np.abs(away)
+    lead = np.argmax(size, axis=1)
+    turns = np.max(size, axis=1) > 1.75
+    for axis in np.flatnonzero(axes).tolist():
+        is_inside = turns & (size[:, axis] < 0.75) & (lead != axis)
+        for other in range(3):
+            way = np.where(is_inside & (lead == other), np.sign(away[:, other]), 0.0)
+            if np.any(way):
+                out = np.zeros(readings.shape)
+                out[:, axis] = way * quantum[axis] / math.sqrt(12.0)
+                yield out
+
+
 def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: float, axes: BoolArray) -> FloatArray:
     """Rate noise (3,) [raw·√s], on undithered axes without the rounding that :func:`rounding_variance` adds."""
     rounding = quantum**2 / 12.0 * step_s

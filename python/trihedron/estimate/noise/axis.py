@@ -8,8 +8,9 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from trihedron.estimate.noise import remarks
+from trihedron.estimate.noise.bend import straightened
 from trihedron.estimate.noise.lines import find_lines, misfit_groups, white_limit
-from trihedron.estimate.noise.rounded import with_level
+from trihedron.estimate.noise.rounded import widened, with_level
 from trihedron.estimate.noise.screening import Event, Readout
 from trihedron.estimate.noise.selection import Selection, select
 from trihedron.estimate.noise.spectrum import Ordinates
@@ -23,8 +24,13 @@ TOLERANCE = 0.02
 """Where a filter colours the upper spectrum it bends the rest by up to this: no half octave is believed to better."""
 
 
-def identify_axis(bands: Sequence[Ordinates], blank: NoiseAxis, curve: AllanCurve, channel: int) -> NoiseAxis:
-    """``blank`` with the terms that its spectrum shows, its lines, and what was noticed on the way."""
+def identify_axis(
+    bands: Sequence[Ordinates], blank: NoiseAxis, curve: AllanCurve, channel: int, tails: float = 0.0
+) -> NoiseAxis:
+    """``blank`` with the terms that its spectrum shows, its lines, and what was noticed on the way.
+
+    ``tails`` is what readings far out add to the relative error of N, which a spectrum of Gaussian noise does not show.
+    """
     # Thinned readings of slow noise show themselves as means only, and end where these do.
     nyquist = min(blank.rate_hz / 2.0, max(float(band.frequency_hz[-1]) for band in bands) * (1.0 + 1e-9))
     findings: list[Finding] = []
@@ -37,6 +43,9 @@ def identify_axis(bands: Sequence[Ordinates], blank: NoiseAxis, curve: AllanCurv
         selection = select(bands, highest, masks, tolerance=TOLERANCE if highest < nyquist else 0.0)
     if highest < nyquist or math.isnan(at_nyquist):
         findings.append(remarks.coloured(highest, nyquist, at_nyquist))
+    bend = 0.0
+    if highest < nyquist:
+        selection, bend = straightened(selection)
     selection, scale, worst = _tempered(selection)
     if worst is not None:
         findings.append(remarks.unexplained(*worst))
@@ -44,7 +53,8 @@ def identify_axis(bands: Sequence[Ordinates], blank: NoiseAxis, curve: AllanCurv
     found = invert(selection)
     pair = slow_pair_of(found)
     terms = terms_of(found, pair)
-    terms[TermName.WHITE] = with_level(terms[TermName.WHITE], blank.sample_sigma, blank.resolution)
+    white = with_level(terms[TermName.WHITE], blank.sample_sigma, blank.resolution)
+    terms[TermName.WHITE] = widened(white, math.hypot(bend, tails) * white.estimate)
     axis = replace(
         blank,
         terms=MappingProxyType(terms),

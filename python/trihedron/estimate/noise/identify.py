@@ -17,8 +17,9 @@ from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import as_readings, check_question, curve_of_columns
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
 from trihedron.estimate.noise.gaps import bridged
-from trihedron.estimate.noise.screening import Event, readout, repeated_rows, shaken, steps_and_knocks
+from trihedron.estimate.noise.screening import Event, readout, repeated_rows, shaken, steps_and_knocks, tail_error
 from trihedron.estimate.noise.spectrum import ordinates
+from trihedron.estimate.noise.warm_up import warm_up
 from trihedron.records.finding import Finding
 from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
 
@@ -153,6 +154,10 @@ def _screen(
             steps, cuts = [], []
         for start, stop in cuts:
             column[start:stop] = np.nan
+        warm = None if steps else warm_up(column, rate_hz)
+        if warm is not None:
+            findings.append(remarks.warmed_up(warm, unit))
+            column -= warm.at(np.arange(len(column)) / rate_hz)
     present = np.isfinite(column)
     n = int(np.count_nonzero(present))
     mean = float(np.sum(column, where=present)) / max(n, 1)
@@ -164,7 +169,7 @@ def _identified(seen: _Screened, rate_hz: float, curve: AllanCurve, channel: int
     if seen.blank.sample_sigma == 0.0:
         return seen.blank
     bands = ordinates(seen.column, rate_hz, stretches_between(len(seen.column), seen.steps))
-    return identify_axis(bands, seen.blank, curve, channel)
+    return identify_axis(bands, seen.blank, curve, channel, tail_error(seen.column))
 
 
 def merged(stretches: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:

@@ -11,6 +11,7 @@ from trihedron.records.noise import NoiseAxis, SpectralLine, TermName
 
 if TYPE_CHECKING:
     from trihedron.estimate.noise.screening import Event, Readout
+    from trihedron.estimate.noise.warm_up import WarmUp
 
 NAMED = 4
 """So many lines are told one by one."""
@@ -149,6 +150,11 @@ def _slow_noise_unresolved(axis: NoiseAxis) -> Finding:
         walk_lower=walk.lower,
         walk_upper=walk.upper,
     )
+
+
+def warmed_up(warm: WarmUp, unit: str) -> Finding:
+    """An exponential approach that was taken out of the readings."""
+    return Finding.of(FindingCode.LOG_DRIFT, "warm-up", drift=abs(warm.size), time_s=warm.time_s, unit=unit)
 
 
 def about_terms(axis: NoiseAxis) -> list[Finding]:

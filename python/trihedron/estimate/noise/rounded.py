@@ -25,7 +25,11 @@ def level_share(sigma: float, resolution: float) -> float:
 
 def with_level(term: NoiseTerm, sigma: float, resolution: float) -> NoiseTerm:
     """N with bars that hold whatever the level: N is that of noise and rounding, not of one level."""
-    own = level_share(sigma, resolution) * term.estimate
+    return widened(term, level_share(sigma, resolution) * term.estimate)
+
+
+def widened(term: NoiseTerm, own: float) -> NoiseTerm:
+    """A term with another independent error of standard deviation ``own``."""
     if own <= 0.0 or not math.isfinite(term.upper):
         return term
     reach = NORMAL_95 * own

@@ -26,6 +26,8 @@ MOST_EVENTS = 500
 """Events of one axis that are looked at, the strongest first."""
 STEP_REACHES = (4, 16, 64)
 """Over how many of its own widths a step must hold its level on either side."""
+FEW, CLOSELY = 2, 0.7
+"""Events that are no tail, and the part of the limit that is closely below it."""
 _MAD_TO_SIGMA = 1.4826
 
 
@@ -91,7 +93,11 @@ def shaken(x: FloatArray, rate_hz: float) -> list[Event]:
     centre = np.nanmedian(level)
     # Counts that rarely change have a scatter of their own: never believe less than the chi-square's.
     spread = max(_MAD_TO_SIGMA * float(np.nanmedian(np.abs(level - centre))), math.sqrt(2.0 / size))
-    hit = (level - centre > _limit(n, n) * spread) & (level - centre > math.log(1.5))
+    distance, limit = (level - centre) / spread, _limit(n, n)
+    hit = (distance > limit) & (level - centre > math.log(1.5))
+    # As many closely below the limit as above it are the tail of one law, as in `find_jumps`: readings far out make it.
+    if FEW < np.count_nonzero(hit) < np.count_nonzero((distance > CLOSELY * limit) & (distance <= limit)):
+        return []
     out: list[Event] = []
     for i in np.flatnonzero(hit).tolist():
         size_here = float(math.exp(0.5 * (level[i] - centre)))
@@ -145,6 +151,21 @@ def readout(x: FloatArray) -> Readout:
     sigma = float(np.sqrt(0.5 * np.mean(np.square(change))))
     clipped = share_at_limits(values, sigma, resolution)
     return Readout(resolution, sigma, float(np.mean(change == 0.0)), clipped)
+
+
+def tail_error(x: FloatArray) -> float:
+    """What the tails of readings ``x`` (n,) add to the relative standard error of their white noise's density.
+
+    The variance of n independent readings of excess kurtosis κ is known to (2 + κ)/n, where a spectrum knows only of 2;
+    the differences of neighbours, which slow noise leaves alone, have half their κ.
+    """
+    change = np.diff(x)
+    change = change[np.isfinite(change)]
+    square = float(np.mean(np.square(change))) if len(change) else 0.0
+    if square == 0.0:
+        return 0.0
+    excess = 2.0 * (float(np.mean(change**4)) / square**2 - 3.0)
+    return 0.5 * math.sqrt(max(excess, 0.0) / len(change))
 
 
 def repeated_rows(x: npt.NDArray[np.float64]) -> float:

@@ -21,7 +21,7 @@ from trihedron.estimate.noise.allan import (
     streamed_curve,
 )
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
-from trihedron.estimate.noise.screening import readout, steps_and_knocks
+from trihedron.estimate.noise.screening import readout, steps_and_knocks, tail_error
 from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM, ordinates_of_means
 from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
 
@@ -125,4 +125,4 @@ def _axis(
     steps, _ = steps_and_knocks(means)
     blank = replace(blank, findings=(*remarks.events(steps, [], [], rate_hz / size, unit), *blank.findings))
     bands = ordinates_of_means(means, size, rate_hz, stretches_between(len(means), steps), head)
-    return identify_axis(bands, blank, curve, channel)
+    return identify_axis(bands, blank, curve, channel, tail_error(head))

@@ -181,6 +181,14 @@ _TERMS = (
         "R describes this log, not the sensor; let it warm up, or log the temperature.",
     ),
     Entry(
+        Code.LOG_DRIFT,
+        "warm-up",
+        WARNING,
+        "The level changes by {drift:.3g} {unit} with a time constant of {time_s:.3g} s; that was taken out.",
+        "warming up",
+        "The terms are those of the sensor once warm; leave off the first minutes, or log the temperature.",
+    ),
+    Entry(
         Code.LOG_TOO_SHORT,
         "",
         NOTE,
