@@ -15,7 +15,7 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.simulate import Scenario, hand_session, read_scenario, simulate
 from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.readout import Adc
-from trihedron.simulate.unclipped import unclipped
+from trihedron.simulate.twin import unclipped
 
 G = 9.80665
 LIMIT_DEG_S = 150.0

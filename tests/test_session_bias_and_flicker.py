@@ -15,7 +15,7 @@ from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.gyroscope import MoveOptions
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.records import Recording
-from trihedron.session.flicker import expected_scatter
+from trihedron.session.noise import expected_scatter
 from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
 from true_segments import segments_from_truth
 
