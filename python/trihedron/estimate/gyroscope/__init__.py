@@ -5,7 +5,7 @@ from trihedron.estimate.gyroscope.gravity_scale import GravityScale, scale_by_gr
 from trihedron.estimate.gyroscope.moves import calibrate_moves
 from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turn_axes import shared_errors, stated_turns
-from trihedron.estimate.gyroscope.turns import calibrate_turns, turns_from_segments
+from trihedron.estimate.gyroscope.turns import calibrate_turns
 
 __all__ = [
     "GravityScale",
@@ -16,5 +16,4 @@ __all__ = [
     "scale_by_gravity",
     "shared_errors",
     "stated_turns",
-    "turns_from_segments",
 ]
