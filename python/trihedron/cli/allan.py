@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,15 +19,13 @@ FIRST_SCREEN = 2
 
 
 GyroLsb = Annotated[
-    Optional[str],  # noqa: UP045 -- typer evaluates it at run time
-    typer.Option("--gyro-lsb", metavar="SIZE", help="Size of the gyro's count, as in '0.05 deg/s'."),
+    str | None, typer.Option("--gyro-lsb", metavar="SIZE", help="Size of the gyro's count, as in '0.05 deg/s'.")
 ]
 AccelLsb = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--accel-lsb", metavar="SIZE", help="Size of the accelerometer's count, as in '3.33 mg'."),
+    str | None, typer.Option("--accel-lsb", metavar="SIZE", help="Size of the accelerometer's count, as in '3.33 mg'.")
 ]
 Exclude = Annotated[
-    Optional[list[str]],  # noqa: UP045
+    list[str] | None,
     typer.Option(
         "--exclude",
         metavar="FROM:TO",
@@ -42,13 +40,10 @@ Accuracy = Annotated[
     typer.Option("--accuracy", metavar="PERCENT", help="How long to record for this uncertainty of each term; --full."),
 ]
 Plot = Annotated[
-    Optional[Path],  # noqa: UP045
+    Path | None,
     typer.Option("--plot", metavar="FILE.png", help="Draw the Allan curves (the report holds them as well)."),
 ]
-Csv = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--csv", metavar="FILE", help="Write the Allan curve as a table."),
-]
+Csv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write the Allan curve as a table.")]
 Curve = Annotated[
     bool,
     typer.Option(
@@ -56,7 +51,7 @@ Curve = Annotated[
     ),
 ]
 Samples = Annotated[
-    Optional[int],  # noqa: UP045
+    int | None,
     typer.Option("--samples", metavar="N", help="Readings of the log behind --curve, where the table is silent."),
 ]
 Stream = Annotated[

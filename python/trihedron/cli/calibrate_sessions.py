@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from trihedron.records import Recording
 
 By = Annotated[
-    Optional[str],  # noqa: UP045 -- typer evaluates it at run time
+    str | None,
     typer.Option(
         "--by",
         metavar="HOW",
@@ -25,7 +25,7 @@ By = Annotated[
     ),
 ]
 Labels = Annotated[
-    Optional[str],  # noqa: UP045
+    str | None,
     typer.Option("--labels", metavar="LIST", help="Several logs: day or device of each, with commas between."),
 ]
 FIRST_SCREEN = 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Optional
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from trihedron.api import DiagnosisResult
 
 Calibration = Annotated[
-    Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+    Path | None,
     typer.Option(
         "--calibration", metavar="FILE", help="Calibration to hold against the log; otherwise one is fitted to it."
     ),
 ]
 Against = Annotated[
-    Optional[Path],  # noqa: UP045
+    Path | None,
     typer.Option(
         "--against",
         metavar="SIM",
@@ -37,16 +37,14 @@ Against = Annotated[
     ),
 ]
 Reference = Annotated[
-    Optional[Path],  # noqa: UP045
+    Path | None,
     typer.Option("--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log."),
 ]
 Improved = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--improved", metavar="FILE.toml", help="Write the scenario with what the log says."),
+    Path | None, typer.Option("--improved", metavar="FILE.toml", help="Write the scenario with what the log says.")
 ]
 Updated = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--updated", metavar="FILE", help="Write the calibration that this log itself gives."),
+    Path | None, typer.Option("--updated", metavar="FILE", help="Write the calibration that this log itself gives.")
 ]
 Alpha = Annotated[float, typer.Option(metavar="P", help="Chance that a healthy log is called anything but consistent.")]
 Full = Annotated[bool, typer.Option("--full", help="Print the whole report, with every candidate.")]

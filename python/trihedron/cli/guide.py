@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -33,16 +33,12 @@ def guide(
         str, typer.Option("--accuracy", metavar="TEXT", help='When to stop: "accel 0.05 %, gyro 0.1 %".')
     ] = DEFAULT_ACCURACY,
     gravity: Annotated[
-        Optional[float],  # noqa: UP045 -- typer evaluates it at run time
-        typer.Option("--gravity", metavar="M/S2", help="|g| where it was recorded."),
+        float | None, typer.Option("--gravity", metavar="M/S2", help="|g| where it was recorded.")
     ] = None,
     every: Annotated[
         bool, typer.Option("--every", help="Print the screen after every pose, not only the last.")
     ] = False,
-    output: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--output", "-o", metavar="FILE", help="Calibration to write."),
-    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="Calibration to write.")] = None,
     force: Force = False,
 ) -> None:
     """Replay a log through the guide: what it would have said pose by pose, then calibrate and verify."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Optional
+from typing import Annotated, Any
 
 import typer
 
@@ -18,7 +18,7 @@ def kalman(
     source: LogSource,
     place: GravitySource,
     reference: Annotated[
-        Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+        Path | None,
         typer.Option(
             metavar="FILE",
             help="Pose table with header: pitch,roll in degrees or fx,fy,fz; also pose, or start,stop. "
@@ -29,7 +29,7 @@ def kalman(
         float, typer.Option(metavar="DEG", help="Standard error of the angles in the pose table.")
     ] = 0.0,
     noise: Annotated[
-        Optional[Path],  # noqa: UP045
+        Path | None,
         typer.Option(
             metavar="FILE",
             help="A static log to identify the noise from, or its terms (JSON).",
@@ -37,8 +37,7 @@ def kalman(
     ] = None,
     frame: Annotated[str, typer.Option(help="Body frame without a pose table: lower or symmetric.")] = "lower",
     output: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("-o", "--output", metavar="FILE", help="Write the calibration file (JSON)."),
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Write the calibration file (JSON).")
     ] = None,
     json: Json = None,
     report: Report = None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -24,15 +24,14 @@ FIRST_SCREEN = 2
 
 
 Static = Annotated[
-    Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+    Path | None,
     typer.Option("--static", metavar="REST", help="The sensor at rest: a static log, or the JSON of trihedron allan."),
 ]
 Reference = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--reference", metavar="MOTION", help="Known motion beside the log: attitude, or pose."),
+    Path | None, typer.Option("--reference", metavar="MOTION", help="Known motion beside the log: attitude, or pose.")
 ]
 Band = Annotated[
-    Optional[float],  # noqa: UP045
+    float | None,
     typer.Option(
         "--band", metavar="HZ", help="Look for vibration above this; a quarter of the sampling rate if not said."
     ),
@@ -41,7 +40,7 @@ Horizon = Annotated[
     str, typer.Option("--horizon", metavar="LIST", help="Seconds over which the filter carries on alone: '1,10,60'.")
 ]
 To = Annotated[
-    Optional[str],  # noqa: UP045
+    str | None,
     typer.Option(
         "--to",
         metavar="TARGET",

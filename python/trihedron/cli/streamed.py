@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -24,7 +24,7 @@ Stream = Annotated[
 ]
 
 Kept = Annotated[
-    Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+    Path | None,
     typer.Option(
         "--checkpoint",
         metavar="FILE",

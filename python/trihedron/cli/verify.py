@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -22,15 +22,14 @@ def verify(
     source: LogsSource,
     place: GravitySource,
     limit_mg: Annotated[
-        Optional[float],  # noqa: UP045 -- typer evaluates it at run time
+        float | None,
         typer.Option(
             metavar="MG",
             help="Largest rms gravity error in static poses that you accept; beyond it the exit status is 2.",
         ),
     ] = None,
     limit_deg: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option(metavar="DEG", help="The same for the tilt error after a rotation."),
+        float | None, typer.Option(metavar="DEG", help="The same for the tilt error after a rotation.")
     ] = None,
     json: Json = None,
     report: Report = None,

@@ -92,7 +92,7 @@ def suspicions_of(
     gyro, own_gyro = calibration.gyroscope, own.gyroscope
     if gyro is None or own_gyro is None or segments.gyroscope_mean is None or not segments.moves:
         return tuple(out)
-    measured = measure_moves(recording, segments, own.accelerometer, 3)
+    measured = measure_moves(recording, segments, own.accelerometer)
     # A wrong accelerometer would be seen in the tilt as well.
     base = calibration if found is None else own
     tilt = _Tilt(recording, segments, measured)
