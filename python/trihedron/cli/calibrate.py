@@ -123,9 +123,7 @@ def calibrate(
     with progress("calibrating") as tell:
         result = api.calibrate(
             recording,
-            gravity_m_s2=place.gravity,
-            latitude_deg=place.latitude,
-            height_m=place.height,
+            **place.said,
             gyroscope_nominal=gyro_nominal,
             reference=_only(reference),
             reference_columns=reference_columns,

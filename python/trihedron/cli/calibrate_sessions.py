@@ -53,9 +53,7 @@ def calibrate_beside(
             references,
             reference_columns=columns,
             frame=frame,
-            gravity_m_s2=place.gravity,
-            latitude_deg=place.latitude,
-            height_m=place.height,
+            **place.said,
         )
     document = references_report(result.calibration, result.references)
 
@@ -83,11 +81,6 @@ def calibrate_many(
     from trihedron.report.sessions import sessions_record
 
     words = None if labels is None else [word.strip() for word in labels.split(",")]
-    place_said: dict[str, Any] = {
-        "gravity_m_s2": place.gravity,
-        "latitude_deg": place.latitude,
-        "height_m": place.height,
-    }
     given = sources.each()
     with progress("calibrating") as tell:
         # A log that cannot be read stops at once: a wrong name is not a bad recording.
@@ -100,7 +93,7 @@ def calibrate_many(
             labels=words,
             frame=frame or "lower",
             progress=tell,
-            **place_said,
+            **place.said,
         )
     document = sessions_report(result.model)
     more = "What changed and every recording: --full, or --report FILE.html with figures."

@@ -17,7 +17,7 @@ from trihedron.cli.options import (
     progress,
     with_options,
 )
-from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
+from trihedron.cli.output import check_outputs, leave, say, tell_all
 
 if TYPE_CHECKING:
     from trihedron.api import DiagnosisResult
@@ -98,9 +98,7 @@ def diagnose(
     with progress("diagnosing") as tell:
         result = api.diagnose(
             recording,
-            gravity_m_s2=place.gravity,
-            latitude_deg=place.latitude,
-            height_m=place.height,
+            **place.said,
             calibration=known,
             against=against,
             reference=reference,
@@ -110,9 +108,7 @@ def diagnose(
         )
     document = diagnosis_report(result)
     machine = diagnosis_document(result)
-    show(document, json, sections=None if full else first_screen(result))
-    write_json(machine, json, force=force, document=document)
-    write_report(document, machine, report, force=force)
+    tell_all(document, machine, json, report, force=force, sections=None if full else first_screen(result))
     if improved is not None and against is not None:
         _improve(against, result, improved, force=force)
     if updated is not None:
@@ -143,16 +139,12 @@ def _diagnose_many(
     with progress("diagnosing") as tell:
         found = api.diagnose_sessions(
             recordings,
-            gravity_m_s2=place.gravity,
-            latitude_deg=place.latitude,
-            height_m=place.height,
+            **place.said,
             alpha=alpha,
             progress=tell,
         )
     document, machine = shared_diagnosis_report(found), shared_diagnosis_record(found)
-    show(document, json, sections=None)
-    write_json(machine, json, force=force, document=document)
-    write_report(document, machine, report, force=force)
+    tell_all(document, machine, json, report, force=force)
 
 
 def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -> None:

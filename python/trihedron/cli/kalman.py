@@ -54,8 +54,7 @@ def kalman(
     from trihedron.report import kalman_report
     from trihedron.report.kalman import kalman_record
 
-    options: dict[str, Any] = {"frame": frame, "noise": noise, "sigma_angle_deg": angle_sigma}
-    options |= {"gravity_m_s2": place.gravity, "latitude_deg": place.latitude, "height_m": place.height}
+    options: dict[str, Any] = {"frame": frame, "noise": noise, "sigma_angle_deg": angle_sigma, **place.said}
     with progress("filtering") as tell:
         result = api.kalman(recording, reference, **options, progress=tell)
     document = kalman_report(result.outcome, result.calibration)

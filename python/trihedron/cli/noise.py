@@ -86,9 +86,7 @@ def noise(
             reference_columns=reference_columns,
             band_hz=band,
             horizons_s=horizons,
-            gravity_m_s2=place.gravity,
-            latitude_deg=place.latitude,
-            height_m=place.height,
+            **place.said,
         )
     text = None if to is None else filter_noise_text(found, to)
     document, machine = filter_noise_report(found), filter_noise_record(found)

@@ -188,6 +188,11 @@ class GravitySource:
         float | None, typer.Option("--height", metavar="M", help="Height above sea level, with --latitude.")
     ] = None
 
+    @property
+    def said(self) -> dict[str, Any]:
+        """As the verbs of ``api`` take it."""
+        return {"gravity_m_s2": self.gravity, "latitude_deg": self.latitude, "height_m": self.height}
+
 
 def with_options(**groups: type) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Give a command the fields of option groups as its own options: ``source=LogSource`` fills argument ``source``.

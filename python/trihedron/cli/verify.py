@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from trihedron.cli.options import Force, GravitySource, Json, LogSource, LogsSource, Report, progress, with_options
-from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
+from trihedron.cli.output import check_outputs, leave, say, tell_all
 
 if TYPE_CHECKING:
     from trihedron.records import Calibration
@@ -50,26 +50,20 @@ def verify(
     paths, log = _parted(source)
     known = _calibrations(paths)
     recording = log.read()
-    place_of: dict[str, Any] = {
-        "gravity_m_s2": place.gravity, "latitude_deg": place.latitude, "height_m": place.height,
-    }  # fmt: skip
     if len(known) > 1:
         with progress("ranking") as tell:
-            ranking = api.rank(paths, recording, progress=tell, **place_of)
-        show(ranking_report(ranking), json, sections=None if full else FIRST_SCREEN)
-        write_json(ranking_record(ranking), json, force=force, document=ranking_report(ranking))
-        write_report(ranking_report(ranking), ranking_record(ranking), report, force=force)
+            ranking = api.rank(paths, recording, progress=tell, **place.said)
+        document, machine = ranking_report(ranking), ranking_record(ranking)
+        tell_all(document, machine, json, report, force=force, sections=None if full else FIRST_SCREEN)
         leave(ranking.best.verification.findings)
         return
     from trihedron.report import verification_report
 
     with progress("verifying") as tell:
-        result = api.verify(known[0], recording, limit_mg=limit_mg, limit_deg=limit_deg, progress=tell, **place_of)
+        result = api.verify(known[0], recording, limit_mg=limit_mg, limit_deg=limit_deg, progress=tell, **place.said)
     document = verification_report(result.verification, result.segments, recording)
     machine = verification_record(result.verification)
-    show(document, json, sections=None if full else FIRST_SCREEN)
-    write_json(machine, json, force=force, document=document)
-    write_report(document, machine, report, force=force)
+    tell_all(document, machine, json, report, force=force, sections=None if full else FIRST_SCREEN)
     if not full and report is None:
         say("Every pose and move: --full, or --report FILE.html with figures.")
     leave(result.findings)
