@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trihedron.estimate.accelerometer import calibrate_faces
+from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.records import FindingCode
 from trihedron.sensor_model import other_form, other_form_jacobian
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from trihedron import _core
-from trihedron.estimate.accelerometer import calibrate_norm, ellipsoid
+from trihedron.estimate.accelerometer.ellipsoid import ellipsoid
+from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.records import FindingCode, Severity
 from trihedron.sensor_model import distort
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trihedron.estimate.gyroscope import MoveOptions, calibrate_moves
+from trihedron.estimate.gyroscope.alignment import MoveOptions
 from trihedron.estimate.gyroscope.measurements import measure_moves
+from trihedron.estimate.gyroscope.moves import calibrate_moves
 from trihedron.records import FindingCode, SensorCalibration
 from trihedron.segment import segment_recording
 from trihedron.simulate import Accelerometer, Gyroscope, Motion, MoveTo, NoiseTerms, Scenario, hand_session, simulate

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trihedron.estimate.gyroscope import Turn, calibrate_turns
-from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns
+from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns, Turn
 from trihedron.estimate.gyroscope.turn_system import TurnSystem, solve
+from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.records import FindingCode, Recording
 from trihedron.simulate import Gyroscope, NoiseTerms, Scenario, simulate, table_turns
 from true_segments import segments_from_truth

@@ -88,7 +88,7 @@ if TYPE_CHECKING:
     )
     from trihedron.errors import RefusedError
     from trihedron.estimate.attitude import integrate_rate
-    from trihedron.estimate.noise import identify_noise
+    from trihedron.estimate.noise.identify import identify_noise
     from trihedron.files.calibration import read_calibration
     from trihedron.fleet import fleet
     from trihedron.records import (
@@ -161,7 +161,7 @@ _HOME = {"Diagnosis": "trihedron.records.diagnosis", "Truth": "trihedron.records
 _HOME |= {"RefusedError": "trihedron.errors"}
 _HOME |= {"integrate_rate": "trihedron.estimate.attitude"}
 _HOME |= {"fleet": "trihedron.fleet"}
-_HOME |= {"identify_noise": "trihedron.estimate.noise", "read_calibration": "trihedron.files.calibration"}
+_HOME |= {"identify_noise": "trihedron.estimate.noise.identify", "read_calibration": "trihedron.files.calibration"}
 _RECORDS = ("AllanCurve", "Calibration", "Finding", "Noise", "Recording", "Segments", "SensorCalibration")
 _HOME |= dict.fromkeys(_RECORDS, "trihedron.records")
 # The others are verbs, and what they return.

@@ -16,7 +16,7 @@ from trihedron.cli.guide import DEFAULT_ACCURACY
 from trihedron.cli.options import Force
 
 if TYPE_CHECKING:
-    from trihedron.capture import Block, Recorder
+    from trihedron.capture.recorder import Block, Recorder
 
 SAY_EVERY_S = 1.0
 LOSSES_NOT_TRUSTED = 0.05
@@ -81,7 +81,8 @@ def capture(
     force: Force = False,
 ) -> None:
     """Record what a board sends into a log: nothing lost silently, on disk as it comes."""
-    from trihedron.capture import PROTOCOLS, Recorder
+    from trihedron.capture.protocols import PROTOCOLS
+    from trihedron.capture.recorder import Recorder
 
     if list_them:
         for name, sentence in PROTOCOLS.items():
@@ -144,7 +145,7 @@ def record(recorder: Recorder, output: Path, seconds: float | None) -> None:
 @contextmanager
 def full_disk_is_status_2() -> Iterator[None]:
     """A recording that a disk ended has saved something: not what was wanted, and not nothing."""
-    from trihedron.capture import DiskError
+    from trihedron.capture.errors import DiskError
 
     try:
         yield

@@ -15,7 +15,7 @@ import typer
 from trihedron.cli.options import Force, LogSource, with_options
 
 if TYPE_CHECKING:
-    from trihedron.capture import Block, Recorder
+    from trihedron.capture.recorder import Block, Recorder
     from trihedron.records import Recording
     from trihedron.records.guiding import GuideView
 

@@ -21,7 +21,8 @@ from trihedron.records.channel_facts import ChannelFacts
 from trihedron.sensor_model import correct
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.gyroscope import Gyroscope
-from trihedron.simulate.motion import Motion, Pose, Quaternion, Replay, Step, attitude_with_up, shortest_turn
+from trihedron.simulate.motion.attitude import attitude_with_up, shortest_turn
+from trihedron.simulate.motion.steps import Motion, Pose, Quaternion, Replay, Step
 from trihedron.simulate.readout import Adc, Matrix, Triple, sense_axes
 from trihedron.simulate.scenario import Clock, Environment, Scenario
 from trihedron.simulate.twin_noise import noise_of_poses

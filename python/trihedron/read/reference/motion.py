@@ -11,7 +11,8 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from trihedron.arrays import FloatArray
-from trihedron.read.clock import build_clock, settle_clock
+from trihedron.read.clock.base import build_clock
+from trihedron.read.clock.settle import settle_clock
 from trihedron.read.devices import Choice
 from trihedron.read.digest import hexdigest
 from trihedron.read.errors import ReadError
