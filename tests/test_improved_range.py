@@ -8,7 +8,8 @@ import pytest
 import tomllib
 
 import trihedron
-from trihedron.api import driving, improve
+from trihedron.api import driving
+from trihedron.api.improving import improve
 from trihedron.comparison.ranges import stated_ranges
 from trihedron.records.channel_facts import ChannelFacts, Limit
 from trihedron.records.diagnosis import EffectParameter

@@ -104,7 +104,7 @@ def allan(
             checkpoint=checkpoint,
             options=options | {"gyroscope_lsb": gyro_lsb, "accelerometer_lsb": accel_lsb},
         )
-    from trihedron.api import recording_lengths
+    from trihedron.api.identifying import recording_lengths
     from trihedron.report.noise import all_findings, noise_report
     from trihedron.report.noise_files import curve_csv, noise_record
 
@@ -130,16 +130,16 @@ def allan(
 
 
 def _of_log(source: LogSource, *, stream: bool, checkpoint: Path | None, options: dict[str, Any]) -> Noise:
-    from trihedron import api
+    from trihedron.api import identifying
 
     if not stream:
         recording = source.read()
         with progress("identifying"):
-            return api.allan(recording, **options)
+            return identifying.allan(recording, **options)
     if source.log is None or source.columns is None or source.rate is None:
         raise typer.BadParameter("--stream needs LOG, --columns (as in gx,gy,gz,ax,ay,az) and --rate")
     with progress("identifying"):
-        return api.noise_of_file(
+        return identifying.noise_of_file(
             source.log,
             columns=source.columns,
             rate_hz=source.rate,
@@ -151,14 +151,14 @@ def _of_log(source: LogSource, *, stream: bool, checkpoint: Path | None, options
 
 
 def _of_curve(source: LogSource, samples: int | None, gyro_lsb: str | None, accel_lsb: str | None) -> Noise:
-    from trihedron import api
+    from trihedron.api import identifying
 
     if source.log is None:
         raise typer.BadParameter("--curve needs the table in the place of LOG")
     if gyro_lsb or accel_lsb:
         raise typer.BadParameter("--curve has no counts: say the unit of the deviations with --gyro-unit, --accel-unit")
     with progress("identifying"):
-        return api.noise_of_curve(
+        return identifying.noise_of_curve(
             source.log,
             rate_hz=source.rate,
             n_samples=samples,

@@ -117,11 +117,11 @@ def calibrate(
     if labels is not None:
         raise typer.BadParameter("--labels belong to several logs")
     recording = sources.one().read()
-    from trihedron import api
+    from trihedron.api import calibrating
     from trihedron.report import calibration_report
 
     with progress("calibrating") as tell:
-        result = api.calibrate(
+        result = calibrating.calibrate(
             recording,
             **place.said,
             gyroscope_nominal=gyro_nominal,
@@ -131,7 +131,9 @@ def calibrate(
             **choices,
         )
         if extended:
-            result = api.extend(result, progress=tell)
+            from trihedron.api import extending
+
+            result = extending.extend(result, progress=tell)
     document = calibration_report(result.calibration, result.segments, recording)
     more = "Every pose and move: --full, or --report FILE.html with figures."
 

@@ -43,12 +43,12 @@ def calibrate_beside(
     given = sources.each()
     if len(given) != len(references):
         raise typer.BadParameter(f"{len(given)} logs need as many references, not {len(references)}")
-    from trihedron import api
+    from trihedron.api.references import calibrate_references
     from trihedron.files.calibration import calibration_document
     from trihedron.report.reference import references_report
 
     with progress("calibrating"):
-        result = api.calibrate_references(
+        result = calibrate_references(
             [source.read() for source in given],
             references,
             reference_columns=columns,
@@ -76,7 +76,7 @@ def calibrate_many(
     how = by or "session"
     if how not in ("session", "date", "device", "temperature"):
         raise typer.BadParameter(f"--by is one of session, date, device, temperature, not {how!r}")
-    from trihedron import api
+    from trihedron.api import sessions
     from trihedron.report import sessions_report
     from trihedron.report.sessions import sessions_record
 
@@ -87,7 +87,7 @@ def calibrate_many(
         recordings = list(_recordings(given, how))
         if words is not None and len(words) == len(given) < len(recordings):
             raise typer.BadParameter("--labels name logs; the devices of an archive have their own names")
-        result = api.calibrate_sessions(
+        result = sessions.calibrate_sessions(
             recordings,
             by=how,  # type: ignore[arg-type]
             labels=words,

@@ -110,7 +110,7 @@ def capture(
     if not (guide or browser):
         record(recorder, output, seconds)
         return
-    from trihedron.api import read
+    from trihedron.api.reading import read
     from trihedron.cli.guide import finish, run_guided
 
     stop_on_signals(recorder)

@@ -11,12 +11,12 @@ def check(source: LogSource, report: Report = None, json: Json = None, force: Fo
     """Is a log fit for calibration? Its faults, its poses, and the uncertainties to expect."""
     check_outputs(json, force=force, report=report, inputs=source.files)
     recording = source.read()
-    from trihedron import api
+    from trihedron.api import checking
     from trihedron.report import check_report
     from trihedron.report.machine import check_record
 
     with progress("checking") as tell:
-        result = api.check(recording, progress=tell)
+        result = checking.check(recording, progress=tell)
     document = check_report(recording, result.segments, result.calibration, result.findings)
     machine = check_record(recording, result.segments, result.calibration, result.findings)
     tell_all(document, machine, json, report, force=force)

@@ -20,7 +20,7 @@ from trihedron.cli.options import (
 from trihedron.cli.output import check_outputs, leave, say, tell_all
 
 if TYPE_CHECKING:
-    from trihedron.api import DiagnosisResult
+    from trihedron.records.results import DiagnosisResult
 
 Calibration = Annotated[
     Path | None,
@@ -90,13 +90,13 @@ def diagnose(
 
     known = None if calibration is None else read_calibration(calibration)
     recording = sources.one().read()
-    from trihedron import api
+    from trihedron.api import diagnosing
     from trihedron.files.diagnosis import diagnosis_document
     from trihedron.report import diagnosis_report
     from trihedron.report.diagnosis import first_screen
 
     with progress("diagnosing") as tell:
-        result = api.diagnose(
+        result = diagnosing.diagnose(
             recording,
             **place.said,
             calibration=known,
@@ -132,12 +132,12 @@ def _diagnose_many(
     sources: LogsSource, place: GravitySource, alpha: float, json: Path | None, report: Path | None, *, force: bool
 ) -> None:
     """Every log by itself, and what all of one unit share."""
-    from trihedron import api
+    from trihedron.api import diagnosing_sessions
     from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
 
     recordings = [source.read() for source in sources.each()]
     with progress("diagnosing") as tell:
-        found = api.diagnose_sessions(
+        found = diagnosing_sessions.diagnose_sessions(
             recordings,
             **place.said,
             alpha=alpha,
@@ -149,12 +149,12 @@ def _diagnose_many(
 
 def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -> None:
     """The scenario with what the log says, and what could not be put into it."""
-    from trihedron import api
+    from trihedron.api import improving
     from trihedron.files.scenario import write_scenario
 
     with progress("improving the scenario") as tell:
         tell(0.1, "moving the improved scenario as the log was")
-        better = api.improve(given, result)
+        better = improving.improve(given, result)
     for effect_id, why in better.left_out.items():
         say(f"effect {effect_id} is not in the scenario: {why}.")
     for what, ratio in better.unlike.items():

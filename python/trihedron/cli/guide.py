@@ -115,8 +115,8 @@ def run_guided(
     seconds: float | None,
 ) -> Any:
     """Capture with the guide beside it; returns the guide, which knows where the check begins."""
-    from trihedron.api import read
     from trihedron.api.guiding import examine
+    from trihedron.api.reading import read
     from trihedron.records.guiding import Accuracy
     from trihedron.units import STANDARD_GRAVITY_M_S2
 

@@ -49,14 +49,14 @@ def kalman(
         raise typer.BadParameter(f"--frame is one of lower, symmetric, not {frame!r}")
     check_outputs(output, json, force=force, report=report, inputs=(*source.files, reference, noise))
     recording = source.read()
-    from trihedron import api
+    from trihedron.api import filtering
     from trihedron.files.calibration import write_calibration
     from trihedron.report import kalman_report
     from trihedron.report.kalman import kalman_record
 
     options: dict[str, Any] = {"frame": frame, "noise": noise, "sigma_angle_deg": angle_sigma, **place.said}
     with progress("filtering") as tell:
-        result = api.kalman(recording, reference, **options, progress=tell)
+        result = filtering.kalman(recording, reference, **options, progress=tell)
     document = kalman_report(result.outcome, result.calibration)
     machine = kalman_record(result.outcome, result.calibration)
     show(document, json, sections=None if full else FIRST_SCREEN)

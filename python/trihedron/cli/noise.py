@@ -74,12 +74,12 @@ def noise(
     inputs = (*source.files, static, reference)
     check_outputs(json, None if to is None else output, force=force, report=report, inputs=inputs)
     recording = source.read()
-    from trihedron import api
+    from trihedron.api import filter_noising
     from trihedron.files.formats.filter_noise import filter_noise_text
     from trihedron.report.filter_noise import filter_noise_record, filter_noise_report
 
     with progress("estimating"):
-        found = api.filter_noise(
+        found = filter_noising.filter_noise(
             recording,
             static=static,
             reference=reference,

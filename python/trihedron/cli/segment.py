@@ -23,12 +23,12 @@ def segment(
         segment_stream(source, report, json, checkpoint, force=force)
         return
     recording = source.read()
-    from trihedron import api
+    from trihedron.api import reading
     from trihedron.report import segments_report
     from trihedron.report.machine import segments_record
 
     with progress("segmenting") as tell:
-        segments = api.segment(recording, progress=tell)
+        segments = reading.segment(recording, progress=tell)
     document, machine = segments_report(recording, segments), segments_record(recording, segments)
     tell_all(document, machine, json, report, force=force)
     leave((*recording.findings, *segments.findings))

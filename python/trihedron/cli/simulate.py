@@ -85,8 +85,9 @@ def simulate(
         raise typer.BadParameter("--with-effects belongs to a SCENARIO; a digital twin repeats its recording as it is")
     if output is None and serve is None:
         raise typer.BadParameter("say where the log goes with -o LOG, or send it with --serve PTY")
-    from trihedron.api import read, twin
-    from trihedron.api import simulate as run
+    from trihedron.api.reading import read
+    from trihedron.api.simulating import simulate as run
+    from trihedron.api.simulating import twin
     from trihedron.files.log import LOG_SUFFIXES, write_recording
     from trihedron.files.output import OutputError
     from trihedron.files.truth import write_truth
@@ -133,7 +134,7 @@ def simulate(
 def _scenario(name: str, diagnosis: Path | None) -> Any:
     if diagnosis is None:
         return name
-    from trihedron.api import with_effects
+    from trihedron.api.simulating import with_effects
     from trihedron.files.diagnosis import read_diagnosis
 
     made = with_effects(name, read_diagnosis(diagnosis)["effects"])

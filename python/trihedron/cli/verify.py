@@ -43,7 +43,8 @@ def verify(
     best does not fit.
     """
     check_outputs(json, force=force, report=report, inputs=source.files)
-    from trihedron import api
+    from trihedron.api import verifying
+    from trihedron.api.ranking import rank
     from trihedron.report.machine import verification_record
     from trihedron.report.ranking import ranking_record, ranking_report
 
@@ -52,7 +53,7 @@ def verify(
     recording = log.read()
     if len(known) > 1:
         with progress("ranking") as tell:
-            ranking = api.rank(paths, recording, progress=tell, **place.said)
+            ranking = rank(paths, recording, progress=tell, **place.said)
         document, machine = ranking_report(ranking), ranking_record(ranking)
         tell_all(document, machine, json, report, force=force, sections=None if full else FIRST_SCREEN)
         leave(ranking.best.verification.findings)
@@ -60,7 +61,9 @@ def verify(
     from trihedron.report import verification_report
 
     with progress("verifying") as tell:
-        result = api.verify(known[0], recording, limit_mg=limit_mg, limit_deg=limit_deg, progress=tell, **place.said)
+        result = verifying.verify(
+            known[0], recording, limit_mg=limit_mg, limit_deg=limit_deg, progress=tell, **place.said
+        )
     document = verification_report(result.verification, result.segments, recording)
     machine = verification_record(result.verification)
     tell_all(document, machine, json, report, force=force, sections=None if full else FIRST_SCREEN)
