@@ -26,10 +26,14 @@ import numpy as np
 
 import trihedron
 from trihedron.api.capturing import column_namer
-from trihedron.capture import Recorder, decoder_factory, open_source
+from trihedron.capture.protocols import decoder_factory
+from trihedron.capture.recorder import Recorder
+from trihedron.capture.sources import open_source
 from trihedron.files.frame_declaration import read_frame_declaration
 from trihedron.records import Recording
-from trihedron.simulate.device import Device, Faults, PseudoTerminal, Scales, Sent, parse_faults, serve
+from trihedron.simulate.device.encoders import Scales
+from trihedron.simulate.device.faults import Faults, Sent, parse_faults
+from trihedron.simulate.device.serving import Device, PseudoTerminal, serve
 
 DECLARED = """
 sync = "AA 55"

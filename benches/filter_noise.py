@@ -17,7 +17,7 @@ import numpy as np
 from filter_noise_trial.generator import KINDS, G, drawn
 from trihedron import read
 from trihedron.api.referring import motion_of
-from trihedron.estimate.filter_noise import Asked, beside_reference
+from trihedron.estimate.filter_noise.beside_reference import Asked, beside_reference
 from trihedron.records import Recording
 from trihedron.records.filter_noise import CAUSES, Bounded, StaticNoise
 from trihedron.records.reference import ReferenceMotion

@@ -13,7 +13,7 @@ import time
 import numpy as np
 from scipy.signal import lfilter
 
-from trihedron.estimate.noise import identify_noise
+from trihedron.estimate.noise.identify import identify_noise
 from trihedron.records.noise import TermName
 
 LENGTHS = ((65_536, 100.0), (131_072, 20.0), (360_000, 10.0))

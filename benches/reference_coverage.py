@@ -21,7 +21,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from reference_rig import G, commanded_table, measured_table, tracked
 from reference_truths import truth
-from trihedron.estimate.reference import ACCEPTED, fit_reference
+from trihedron.estimate.reference.fit import fit_reference
+from trihedron.estimate.reference.motion import ACCEPTED
 
 KINDS = {
     "tracked": tracked,

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron import read
-from trihedron.estimate.reference import fit_references
-from trihedron.read.reference import read_reference
+from trihedron.estimate.reference.fit import fit_references
+from trihedron.read.reference.motion import read_reference
 
 SIZE = np.radians(0.1) / 9.807
 

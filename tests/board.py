@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from trihedron.records import Recording
-from trihedron.simulate.device import Device, Faults, PseudoTerminal, Sent, TcpServer, serve
+from trihedron.simulate.device.faults import Faults, Sent
+from trihedron.simulate.device.serving import Device, PseudoTerminal, TcpServer, serve
 
 DECLARED = """
 name = "my-board"

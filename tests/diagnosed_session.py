@@ -1,7 +1,7 @@
 """A simulated session of a named part, as short as a diagnosis allows."""
 
 from trihedron.diagnose import diagnose_recording
-from trihedron.estimate.accelerometer import calibrate_norm
+from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import hand_session, simulate

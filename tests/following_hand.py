@@ -8,7 +8,8 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records import Recording, Truth
-from trihedron.simulate.motion import Motion, MoveTo, Pose, Step, attitude_with_up
+from trihedron.simulate.motion.attitude import attitude_with_up
+from trihedron.simulate.motion.steps import Motion, MoveTo, Pose, Step
 from trihedron.simulate.noise import stream
 from trihedron.simulate.run import simulate
 from trihedron.simulate.scenario import Scenario

@@ -1,9 +1,9 @@
-"""Method 1: six faces, in closed form and by least squares, with the errors that a table adds."""
+"""Method 1: six faces by least squares, with the errors that a table adds."""
 
 import numpy as np
 import pytest
 
-from trihedron.estimate.accelerometer import calibrate_faces
+from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.records import FindingCode
 from trihedron.sensor_model import other_form, other_form_jacobian
 
@@ -29,10 +29,9 @@ def codes(findings):
     return {finding.code for finding in findings}
 
 
-@pytest.mark.parametrize("method", ["least-squares", "closed-form"])
-def test_exact_faces_give_the_exact_model_in_any_order(method):
+def test_exact_faces_give_the_exact_model_in_any_order():
     faces = np.array([3, -1, 2, 1, -3, -2])
-    sensor, findings = calibrate_faces(face_readings(faces, 0.0, 0), 1e-3, G, raw_unit="m/s^2", method=method)
+    sensor, findings = calibrate_faces(face_readings(faces, 0.0, 0), 1e-3, G, raw_unit="m/s^2")
     S_a, b_a = other_form(sensor.S, sensor.b)
     # Linear algebra on numbers of order ten.
     np.testing.assert_allclose(S_a, S_A, atol=1e-13)
@@ -40,15 +39,14 @@ def test_exact_faces_give_the_exact_model_in_any_order(method):
     assert not findings
 
 
-@pytest.mark.parametrize(("method", "bias_variance"), [("least-squares", 1 / 6), ("closed-form", 1 / 6)])
-def test_reported_variances_are_those_of_the_formula(method, bias_variance):
+def test_reported_variances_are_those_of_the_formula():
     sigma = 2e-3
-    sensor, _ = calibrate_faces(face_readings(SIX, 0.0, 0), sigma, G, raw_unit="m/s^2", method=method)
+    sensor, _ = calibrate_faces(face_readings(SIX, 0.0, 0), sigma, G, raw_unit="m/s^2")
     # Back to the inverse form, in which the formula is stated: var S_a = σ²/2g², var b_a = σ²/6.
     jacobian = other_form_jacobian(sensor.S, sensor.b)
     variance = np.diag(jacobian @ sensor.covariance @ jacobian.T)
     np.testing.assert_allclose(variance[:9], sigma**2 / (2 * G**2), rtol=1e-9)
-    np.testing.assert_allclose(variance[9:], sigma**2 * bias_variance, rtol=1e-9)
+    np.testing.assert_allclose(variance[9:], sigma**2 / 6.0, rtol=1e-9)
 
 
 def test_repeats_and_missing_faces_are_taken_as_they_come():
@@ -62,12 +60,6 @@ def test_repeats_and_missing_faces_are_taken_as_they_come():
 def test_faces_that_leave_parameters_free_are_refused_by_name(faces):
     with pytest.raises(ValueError, match=r"missing: .*[+-]Z up"):
         calibrate_faces(face_readings(faces, 1e-3, 1), 1e-3, G, raw_unit="m/s^2", up=faces)
-
-
-def test_the_closed_form_wants_all_six():
-    faces = [1, -1, 2, -2, 3]
-    with pytest.raises(ValueError, match="all six faces; missing: -Z up"):
-        calibrate_faces(face_readings(faces, 1e-3, 1), 1e-3, G, raw_unit="m/s^2", method="closed-form")
 
 
 def test_faces_are_recognised_in_counts_with_a_large_zero():

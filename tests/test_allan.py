@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from trihedron import _core
-from trihedron.estimate.noise import allan_deviation, default_clusters, degrees_of_freedom, stream_allan_deviation
+from trihedron.estimate.noise.allan import allan_deviation, default_clusters, stream_allan_deviation
+from trihedron.estimate.noise.degrees import degrees_of_freedom
 from twins_noise import overlapping_variance, running_sum_in_long_double, weighted_hadamard, weighted_variance
 
 NINE = [892.0, 809.0, 823.0, 798.0, 671.0, 644.0, 883.0, 903.0, 677.0]

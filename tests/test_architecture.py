@@ -322,7 +322,7 @@ def test_a_refusal_is_told_from_a_defect():
 
 # Calls that a handler of ValueError may stand round; api/asking.py says what it catches in Python's words.
 CONVERSIONS = {
-    "api/temperature.py: float",
+    "api/applying.py: float",
     "api/capturing.py: float",
     "api/streaming.py: json.loads",
     "api/streaming.py: note.read_text",
@@ -358,7 +358,7 @@ def test_no_handler_takes_a_defect_of_a_whole_fit_for_a_refusal():
 # Arrows between the rooms of the diagnosis, each once: what stands in a row may import what stands before it.
 ROOMS_OF_THE_DIAGNOSIS = (
     "session", "context", "residuals", "effects", "hypothesis", "candidates", "relations", "search", "shared",
-    "sample_evidence", "bias_strengths", "accepted", "relation_records", "verdict", "application", "diagnosis",
+    "sample_evidence", "bias_strengths", "accepted", "relation_records", "application", "diagnosis",
     "against", "rest",
 )  # fmt: skip
 

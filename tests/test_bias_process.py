@@ -5,9 +5,8 @@ import pytest
 
 from bias_sessions import Session, draw, readings_of
 from trihedron import _core
-from trihedron.diagnose.rest.curve import smooth_curve
+from trihedron.diagnose.rest.curve import slow_change, smooth_curve
 from trihedron.diagnose.rest.process import BiasProcess
-from trihedron.diagnose.rest.slow_change import slow_change
 
 ALL = [0, 1, 2, 3, 4]
 

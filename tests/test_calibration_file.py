@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from trihedron import calibrate
-from trihedron.api import apply
+from trihedron.api.applying import apply
 from trihedron.files.calibration import (
     CalibrationFileError,
     calibration_document,

@@ -8,11 +8,13 @@ import pytest
 
 from board import DECLARED, counts_recording
 from trihedron.api.capturing import column_namer
-from trihedron.capture import Sequence, decoder_factory
+from trihedron.capture.protocols import decoder_factory
 from trihedron.capture.protocols.checksums import CHECKSUM_OF
 from trihedron.capture.protocols.contract import Frame
+from trihedron.capture.sequence import Sequence
 from trihedron.files.frame_declaration import read_frame_declaration
-from trihedron.simulate.device import Device, Faults, Sent, parse_faults
+from trihedron.simulate.device.faults import Faults, Sent, parse_faults
+from trihedron.simulate.device.serving import Device
 
 COUNTED = [
     *(("xsens-mtdata2",) * 2, ("xio",) * 2, ("xio-text", "xio"), ("sparkfun-6dof",) * 2, ("sparkfun-6dof-text",) * 2),

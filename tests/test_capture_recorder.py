@@ -13,18 +13,16 @@ import pytest
 import trihedron
 from board import Board, counts_recording
 from trihedron.api.capturing import column_namer, open_device
-from trihedron.arrivals import paced
-from trihedron.capture import (
-    CaptureError,
-    ClockFit,
-    GrowingLog,
-    Recorder,
-    decoder_factory,
-    find_protocol,
-    open_source,
-)
+from trihedron.arrivals import ClockFit, paced
+from trihedron.capture.detection import find_protocol
+from trihedron.capture.errors import CaptureError
+from trihedron.capture.log import GrowingLog
+from trihedron.capture.protocols import decoder_factory
+from trihedron.capture.recorder import Recorder
+from trihedron.capture.sources import open_source
 from trihedron.cli import main
-from trihedron.simulate.device import Device, Faults, Sent, parse_faults
+from trihedron.simulate.device.faults import Faults, Sent, parse_faults
+from trihedron.simulate.device.serving import Device
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
 

@@ -26,7 +26,7 @@ def measured_session(noise=1e-3):
     known = SensorCalibration(
         truth.accelerometer_S, truth.accelerometer_b, np.zeros((12, 12)), "m/s^2", "m/s^2", "given"
     )
-    return recording, segments, measure_moves(recording, segments, known, 3), truth
+    return recording, segments, measure_moves(recording, segments, known), truth
 
 
 def seen(recording, segments, measured, truth, covariance=None):

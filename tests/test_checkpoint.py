@@ -11,7 +11,7 @@ from hand_made_sessions import Instrument, recorded
 from trihedron import _core
 from trihedron.api import identifying, streaming
 from trihedron.cli import main
-from trihedron.estimate.noise import stream_noise
+from trihedron.estimate.noise.streamed import stream_noise
 from trihedron.files import checkpoint as kept_file
 from trihedron.files.checkpoint import Checkpoint
 

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from trihedron.estimate.accelerometer import calibrate_faces
 from trihedron.estimate.accelerometer.face_placements import placements
-from trihedron.estimate.gyroscope import Turn, calibrate_turns
+from trihedron.estimate.accelerometer.faces import calibrate_faces
+from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turn_rounding import hidden_angles
+from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.records import Recording
 from trihedron.segment.means import BIAS_VARIANCE, NOISE_TRIED
 

@@ -13,7 +13,7 @@ from trihedron.comparison.noise import Sampled
 from trihedron.comparison.noise import sampled as sampled_of
 from trihedron.comparison.quantisation import quantisation_noise, white_and_quantisation
 from trihedron.diagnose.against.fitted import model_of_calibration
-from trihedron.estimate.noise import noise_of_poses
+from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.simulate import NoiseTerms, Scenario, hand_session, make_noise, simulate
 from trihedron.simulate.profiles import profile_by_name
 

@@ -7,7 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trihedron
-from trihedron.diagnose.against import FittedModel, compare_numbers
+from trihedron.diagnose.against.fitted import FittedModel
+from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.invariants import invariants, jacobian, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.records.diagnosis import AcceptedEffect, EffectParameter
 from trihedron.simulate import Scenario, hand_session, simulate

@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trihedron
-from trihedron.comparison.frames import sign_of_gravity
-from trihedron.diagnose.against import FittedModel, compare_numbers
-from trihedron.estimate.gyroscope.world_rates import carried_gravity
+from trihedron.comparison.frames import carried_gravity, sign_of_gravity
+from trihedron.diagnose.against.fitted import FittedModel
+from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.estimate.noise.of_biases import PoseBiases, compare_slow
 from trihedron.records import Pose
 from trihedron.records.sampling import Sampling, TimestampKind

@@ -8,7 +8,8 @@ from scipy.signal import lfilter
 
 from trihedron.comparison.correlation import correlation_times
 from trihedron.comparison.noise import compare_noise, sampled
-from trihedron.diagnose.against import FittedModel, compare_numbers
+from trihedron.diagnose.against.fitted import FittedModel
+from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.records import Pose, Recording
 from trihedron.records.channel_facts import LowPass
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 import trihedron
-from trihedron.diagnose.against import compare_effects
+from trihedron.diagnose.against.mechanisms import compare_effects
 from trihedron.records.diagnosis import (
     AcceptedEffect,
     Candidate,

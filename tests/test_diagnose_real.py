@@ -10,7 +10,7 @@ from trihedron import calibrate, diagnose
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.effects.timestamp_errors import timestamp_errors
 from trihedron.diagnose.session.observations import observe
-from trihedron.estimate.accelerometer import calibrate_norm
+from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
 from trihedron.records import FindingCode

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 import trihedron
-from trihedron.diagnose import verdict
+from trihedron.diagnose.diagnosis import verdict_of
 from trihedron.diagnose.effects.table_tilt import _error_of_mean
 from trihedron.diagnose.residuals import goodness_of_fit
 from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
@@ -75,10 +75,10 @@ def test_the_error_of_a_mean_of_few_turns_covers_it():
 def test_footnotes_are_no_answer_while_something_else_disagrees():
     left = DomainTest("static-gyro", 9.0, 30.0, 1e-9, True)
     footnote = SimpleNamespace(ids={"disturbed-pose"}, are_footnotes=True, are_spread=False)
-    assert verdict.verdict_of(footnote, (left,), (left,)) == "unexplained"
-    assert verdict.verdict_of(footnote, (left,), ()) == "missing-physics"
+    assert verdict_of(footnote, (left,), (left,)) == "unexplained"
+    assert verdict_of(footnote, (left,), ()) == "missing-physics"
     answer = SimpleNamespace(ids={"accel-cubic"}, are_footnotes=False, are_spread=False)
-    assert verdict.verdict_of(answer, (left,), (left,)) == "missing-physics"
+    assert verdict_of(answer, (left,), (left,)) == "missing-physics"
 
 
 def test_restless_poses_hide_neither_a_scatter_nor_the_g_sensitivity_beside_it():

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from trihedron.estimate.accelerometer import calibrate_faces
 from trihedron.estimate.accelerometer.face_tilt import widened
+from trihedron.estimate.accelerometer.faces import calibrate_faces
 
 G = 9.81
 SIGMA = 0.0003

@@ -14,10 +14,17 @@ import trihedron
 from reference_rig import FINE_HZ, G, forces, hand, rates_of
 from trihedron.cli import main
 from trihedron.estimate.filter_noise.angle import bias_steps
-from trihedron.estimate.filter_noise.axes import _of_axes, _without_noise, unlike_axes_beside
-from trihedron.estimate.filter_noise.beside_reference import ANGLE, independent_or_not, informed
+from trihedron.estimate.filter_noise.beside_reference import (
+    ANGLE,
+    _of_axes,
+    _without_noise,
+    bounded,
+    independent_or_not,
+    informed,
+    parts_of,
+    unlike_axes_beside,
+)
 from trihedron.estimate.filter_noise.held_out import errors_over
-from trihedron.estimate.filter_noise.shares import bounded, parts_of
 from trihedron.estimate.filter_noise.strengths import Fitted, Prior, fit
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, accumulated, matern, walked
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
@@ -330,7 +337,7 @@ def test_the_command_on_a_log_at_rest(tmp_path, capsys):
 def test_most_of_what_looks_like_noise_in_a_recorded_flight_is_its_truth():
     static = StaticNoise(Bounded(1.7e-4, 1.55e-4, 1.87e-4), Bounded(1.94e-5, 1.94e-5, 1.94e-5))
     from trihedron.api.referring import motion_of
-    from trihedron.estimate.filter_noise import Asked, beside_reference
+    from trihedron.estimate.filter_noise.beside_reference import Asked, beside_reference
 
     log = trihedron.read(EUROC / "V1_02_medium.log.csv.gz")
     gyro, accelerometer = beside_reference(

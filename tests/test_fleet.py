@@ -107,11 +107,11 @@ def test_a_defect_of_the_program_is_a_row_and_is_tried_again(logs, tmp_path, mon
     def defect(*_args, **_options):
         raise ZeroDivisionError("by nothing")
 
-    from trihedron import api
+    from trihedron.api import calibrating
 
     path = logs / "unit_0" / "log_0.csv"
     with monkeypatch.context() as patch:
-        patch.setattr(api, "calibrate", defect)
+        patch.setattr(calibrating, "calibrate", defect)
         first = trihedron.fleet(path, tmp_path, workers=0, diagnose=False, gravity_m_s2=G)
     assert first.rows[0]["status"] == "crashed"
     assert "ZeroDivisionError" in first.rows[0]["reason"]

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from trihedron.channel_facts.held import new_readings
-from trihedron.channel_facts.limits import find_limits
+from trihedron.channel_facts.limits import find_limits, new_readings
 
 STEP = np.ones(3)
 NOISE = np.full(3, 3.0)

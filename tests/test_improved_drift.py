@@ -5,7 +5,8 @@ import pytest
 import tomllib
 
 import trihedron
-from trihedron.api import driving, improve
+from trihedron.api import driving
+from trihedron.api.improving import improve
 from trihedron.simulate import Scenario, diagnosed_sizes, hand_session, simulate, with_effect
 from trihedron.simulate.profiles import profile_by_name
 

@@ -9,8 +9,9 @@ import pytest
 import trihedron
 from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, driven, flicker_of_poses
 from trihedron.api.improving import _unlike
+from trihedron.channel_facts.low_pass import gain_of
 from trihedron.comparison.noise import _are_even
-from trihedron.estimate.noise import gain_of, noise_of_poses
+from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.records.pose_noise import Measured
 from trihedron.simulate import (
     NoiseTerms,

@@ -8,14 +8,15 @@ import pytest
 import tomllib
 
 import trihedron
-from trihedron.api import driving, improve
+from trihedron.api import driving
+from trihedron.api.improving import improve
 from trihedron.comparison.ranges import stated_ranges
 from trihedron.records.channel_facts import ChannelFacts, Limit
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.simulate import Scenario, hand_session, read_scenario, simulate
 from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.readout import Adc
-from trihedron.simulate.unclipped import unclipped
+from trihedron.simulate.twin import unclipped
 
 G = 9.80665
 LIMIT_DEG_S = 150.0

@@ -6,14 +6,10 @@ from scipy import stats
 from scipy.optimize import least_squares
 
 from trihedron import _core
-from trihedron.estimate.kalman import (
-    Goal,
-    LiveNormCalibration,
-    NormStart,
-    ShapingOptions,
-    calibrate_without_references,
-)
-from trihedron.estimate.kalman.shaping import shaping_model
+from trihedron.estimate.kalman.guide import Goal
+from trihedron.estimate.kalman.norm_invariant import LiveNormCalibration, calibrate_without_references
+from trihedron.estimate.kalman.norm_start import NormStart
+from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode
 from twins_kalman import normalised_error_squared
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.estimate.accelerometer import calibrate_norm
-from trihedron.estimate.kalman import (
+from trihedron.estimate.accelerometer.norm import calibrate_norm
+from trihedron.estimate.kalman.identified import noise_from_identified
+from trihedron.estimate.kalman.norm_invariant import calibrate_without_references
+from trihedron.estimate.kalman.session import (
     calibrate_session,
     calibrate_session_without_references,
-    calibrate_without_references,
-    noise_from_identified,
     noise_from_poses,
     pose_readings,
 )

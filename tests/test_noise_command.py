@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from noise_series import series
-from trihedron.api import allan as noise_of
+from trihedron.api.identifying import allan as noise_of
 from trihedron.cli import main
 from trihedron.records import Recording
 from trihedron.report.noise import noise_report

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from noise_series import series
-from trihedron.estimate.noise import allan_deviation, identify_curve
+from trihedron.estimate.noise.allan import allan_deviation
 from trihedron.estimate.noise.curve_covariance import CurveCovariance
+from trihedron.estimate.noise.from_curve import identify_curve
 from trihedron.records.finding import FindingCode
 from trihedron.records.noise import TermName
 

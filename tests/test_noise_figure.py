@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from noise_series import series
-from trihedron.estimate.noise import identify_noise
+from trihedron.estimate.noise.identify import identify_noise
 from trihedron.report.chart import Line, Note
 from trihedron.report.noise_charts import allan_chart
 from trihedron.report.noise_figures import draw_allan

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import binom, chi2
 
 from noise_series import fractional, series
-from trihedron.estimate.noise import identify_noise
+from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.records.finding import FindingCode, Severity
 from trihedron.records.noise import TermName

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from trihedron.estimate.noise import noise_of_poses, ratio_of
+from trihedron.channel_facts.pooled import ratio_of
 from trihedron.estimate.noise.correlation_time import correlation_time
+from trihedron.estimate.noise.poses import noise_of_poses
 
 RATE = 100.0
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.api import allan, noise_of_curve
+from trihedron.api.identifying import allan, noise_of_curve
 from trihedron.records.finding import FindingCode
 from trihedron.records.noise import TermName
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trihedron.estimate.noise.rounded import level_share
+from trihedron.estimate.noise.axis import level_share
 
 
 @pytest.mark.parametrize("noise", [0.42, 0.5, 0.6, 1.0])

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 from noise_coverage import in_time
 from noise_series import series
 from trihedron import _core
-from trihedron.estimate.noise import identify_noise
+from trihedron.estimate.noise.identify import identify_noise
 from trihedron.records.finding import FindingCode
 from trihedron.records.noise import TermName
 

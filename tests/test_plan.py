@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from trihedron.cli import main
-from trihedron.estimate.gyroscope import Turn, calibrate_turns
+from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turn_design import (
     PlannedMove,
     design_least_squares,
     design_moves,
     design_zero_first,
 )
+from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.records import Recording
 
 N = math.radians(0.005)

@@ -6,7 +6,7 @@ import pytest
 from test_read import HEADER, codes, finding, write
 from trihedron.channel_facts.limits import find_limits
 from trihedron.read import read_recording
-from trihedron.read.audit import audit_counter
+from trihedron.read.audit.timing import audit_counter
 from trihedron.records import FindingCode, Severity
 
 N = 4000

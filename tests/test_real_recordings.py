@@ -12,7 +12,8 @@ from scipy import stats
 import trihedron
 from trihedron.api.demonstrating import compare_with_truth, truth_of_the_day
 from trihedron.cli import main
-from trihedron.estimate.gyroscope import Turn, calibrate_turns
+from trihedron.estimate.gyroscope.turn_angles import Turn
+from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.records import Calibration, FindingCode, Pose, Recording, Segments, SensorCalibration
 from trihedron.sensor_model import other_form
 from trihedron.simulate import scenario_by_name, simulate

@@ -9,7 +9,7 @@ import trihedron
 from reference_rig import G, commanded_table, forces, hand, measured_table, rates_of, times, tracked, unit
 from trihedron._core import rotation_from_vector
 from trihedron.api.beside import shared_log
-from trihedron.estimate.reference import fit_reference
+from trihedron.estimate.reference.fit import fit_reference
 from trihedron.files.diagnosis import diagnosis_document
 from trihedron.records import FindingCode
 from trihedron.records.reference import ReferenceMotion

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reference_rig import turn
-from trihedron.read.reference import read_reference
+from trihedron.read.reference.motion import read_reference
 
 T = np.arange(0, 4, 0.02)
 A, B, C = 0.3 * np.sin(T), 0.2 * np.sin(1.7 * T), 0.4 * np.sin(0.9 * T)

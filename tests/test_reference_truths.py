@@ -8,7 +8,8 @@ import pytest
 import trihedron
 from reference_rig import G, turn
 from reference_truths import truth
-from trihedron.estimate.reference import ACCEPTED, fit_reference
+from trihedron.estimate.reference.fit import fit_reference
+from trihedron.estimate.reference.motion import ACCEPTED
 from trihedron.records.reference import ReferenceMotion
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from trihedron.api import diagnose
+from trihedron.api.diagnosing import diagnose
 from trihedron.diagnose.relations.written import effect_file
 from trihedron.records.diagnosis import EffectParameter, Relation
 from trihedron.report.diagnosis import diagnosis_report

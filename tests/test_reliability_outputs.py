@@ -121,7 +121,7 @@ def test_a_pipe_is_written_to_however_slowly_it_is_read(tmp_path, force):
 
 
 def test_a_pipe_that_nobody_reads_ends_in_a_sentence(tmp_path, monkeypatch):
-    monkeypatch.setattr("trihedron.files.special._READER_WAIT_S", 0.1)
+    monkeypatch.setattr("trihedron.files.output._READER_WAIT_S", 0.1)
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     with pytest.raises(OutputError, match="nobody reads"):

@@ -21,8 +21,7 @@ from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.starting_point import start_twin
 from trihedron.diagnose.session.twin import contiguous, core_model, core_state
 from trihedron.segment import resegment, segment_recording
-from trihedron.session.coloured_noise import coloured_variance
-from trihedron.session.noise import ANYTHING
+from trihedron.session.noise import ANYTHING, coloured_variance
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.named import _of

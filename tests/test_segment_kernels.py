@@ -9,8 +9,8 @@ from trihedron import _core
 from trihedron.ranges import ranges_of
 from trihedron.segment.channels import Channels
 from trihedron.segment.noise import MeanNoise
+from trihedron.segment.recording import LEAST_TURN_RAD, USUAL, radians_per_reading
 from trihedron.segment.runs import EDGE_BLOCKS, EdgeNoise, Run, trim_edges
-from trihedron.segment.turn_scale import LEAST_TURN_RAD, USUAL, radians_per_reading
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
 
 NOISE = MeanNoise(np.array([0.1, 0.2, 0.0]), np.array([1e-3, 0.0, 0.0]), np.array([1e-4, 0.0, 0.0]))

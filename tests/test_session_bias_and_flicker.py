@@ -11,11 +11,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 from confidence.motion import G
 from confidence.sessions import hand
 from trihedron import _core, diagnose
-from trihedron.estimate.accelerometer import calibrate_norm
-from trihedron.estimate.gyroscope import MoveOptions
+from trihedron.estimate.accelerometer.norm import calibrate_norm
+from trihedron.estimate.gyroscope.alignment import MoveOptions
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.records import Recording
-from trihedron.session.flicker import expected_scatter
+from trihedron.session.noise import expected_scatter
 from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
 from true_segments import segments_from_truth
 

@@ -12,7 +12,7 @@ from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import folds_of, leverage, predict_held_out, tune_noise
 from trihedron.diagnose.session.starting_point import start_twin
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, NO_DISTORTION, core_model, core_state
-from trihedron.estimate.accelerometer import calibrate_norm
+from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
 from trihedron.records.published import published_figures

@@ -25,7 +25,7 @@ from trihedron.simulate import (
     with_effect,
 )
 from trihedron.simulate.bias_repeatability import bias_of_poses
-from trihedron.simulate.motion import attitude_with_up
+from trihedron.simulate.motion.attitude import attitude_with_up
 from trihedron.simulate.motion.plan import Label
 
 IDEAL = Scenario(hand_session(8, pose_s=1.0, first_pose_s=2.0, arm_m=0.1), "ideal")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trihedron.api import read
+from trihedron.api.reading import read
 from trihedron.cli import main
 from trihedron.files.log import write_recording
 from trihedron.files.output import OutputError

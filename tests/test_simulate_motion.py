@@ -7,7 +7,8 @@ import pytest
 
 from trihedron import _core
 from trihedron.simulate import Disturb, Motion, MoveTo, Oscillate, Pose, Turn, Vibrate, hand_session
-from trihedron.simulate.motion import attitude_with_up, plan_motion, up_in_body
+from trihedron.simulate.motion.attitude import attitude_with_up, up_in_body
+from trihedron.simulate.motion.plan import plan_motion
 
 G = 9.81
 EARTH = (0.0, 4.2e-5, 5.9e-5)

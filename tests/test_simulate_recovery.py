@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trihedron.estimate.accelerometer import calibrate_norm
-from trihedron.estimate.gyroscope import calibrate_moves
+from trihedron.estimate.accelerometer.norm import calibrate_norm
+from trihedron.estimate.gyroscope.moves import calibrate_moves
 from trihedron.simulate import Clock, scenario_by_name, simulate
 from true_segments import segments_from_truth
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trihedron.api import calibrate, read, segment
+from trihedron.api.calibrating import calibrate
+from trihedron.api.reading import read, segment
 from trihedron.records import Segments
 from trihedron.sensor_model import correct
 from trihedron.simulate import scenario_by_name, simulate, twin_scenario

@@ -5,7 +5,7 @@ import pytest
 
 import trihedron
 from trihedron import _core
-from trihedron.segment.vertical import upright
+from trihedron.segment.means import upright
 from trihedron.session.noise import along_gradient
 
 G = 9.81

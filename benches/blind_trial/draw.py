@@ -14,7 +14,7 @@ from blind_trial.sizes import ON_A_TABLE, SIZES, Session
 from trihedron.records import Recording
 from trihedron.simulate import Scenario, hand_session, simulate
 from trihedron.simulate.effects import with_effect
-from trihedron.simulate.motion import Motion, MoveTo, Pose, Turn
+from trihedron.simulate.motion.steps import Motion, MoveTo, Pose, Turn
 from trihedron.simulate.profiles import Profile, profile_by_name
 
 GRADES = ("mpu", "adis", "tactical")

@@ -6,7 +6,7 @@
 from pathlib import Path
 
 import trihedron
-from trihedron.api import improve
+from trihedron.api.improving import improve
 from trihedron.simulate import read_scenario, simulate
 
 LATITUDE_DEG = 59.94

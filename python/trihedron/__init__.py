@@ -50,45 +50,31 @@ from trihedron.answers import answered_by
 from trihedron.threads import cap_threads
 
 if TYPE_CHECKING:
-    from trihedron.api import (
-        CalibrationResult,
-        CheckResult,
-        DiagnosisResult,
-        KalmanResult,
-        SessionsResult,
-        VerificationResult,
-        allan,
-        allan_deviation,
-        apply,
-        calibrate,
-        calibrate_references,
-        calibrate_sessions,
-        capture,
-        check,
-        convert,
-        demo,
-        diagnose,
-        diagnose_sessions,
-        export,
-        extend,
-        filter_noise,
-        guide,
-        kalman,
-        plan,
-        plot,
-        ports,
-        rank,
-        read,
-        report,
-        segment,
-        simulate,
-        twin,
-        verify,
-        write_calibration,
-    )
+    from trihedron.api.applying import apply, write_calibration
+    from trihedron.api.calibrating import calibrate
+    from trihedron.api.capturing import capture, ports
+    from trihedron.api.checking import check
+    from trihedron.api.converting import convert
+    from trihedron.api.demonstrating import demo
+    from trihedron.api.diagnosing import diagnose
+    from trihedron.api.diagnosing_sessions import diagnose_sessions
+    from trihedron.api.exporting import export
+    from trihedron.api.extending import extend
+    from trihedron.api.filter_noising import filter_noise
+    from trihedron.api.filtering import kalman
+    from trihedron.api.identifying import allan
+    from trihedron.api.planning import plan
+    from trihedron.api.ranking import rank
+    from trihedron.api.reading import read, segment
+    from trihedron.api.references import calibrate_references
+    from trihedron.api.replaying import guide
+    from trihedron.api.sessions import calibrate_sessions
+    from trihedron.api.simulating import simulate, twin
+    from trihedron.api.verifying import verify
     from trihedron.errors import RefusedError
     from trihedron.estimate.attitude import integrate_rate
-    from trihedron.estimate.noise import identify_noise
+    from trihedron.estimate.noise.allan import allan_deviation
+    from trihedron.estimate.noise.identify import identify_noise
     from trihedron.files.calibration import read_calibration
     from trihedron.fleet import fleet
     from trihedron.records import (
@@ -101,7 +87,16 @@ if TYPE_CHECKING:
         SensorCalibration,
     )
     from trihedron.records.diagnosis import Diagnosis
+    from trihedron.records.results import (
+        CalibrationResult,
+        CheckResult,
+        DiagnosisResult,
+        KalmanResult,
+        SessionsResult,
+        VerificationResult,
+    )
     from trihedron.records.truth import Truth
+    from trihedron.report.presenting import plot, report
 
     __version__: str
 
@@ -157,15 +152,42 @@ __all__ = [
     "write_calibration",
 ]
 
-_HOME = {"Diagnosis": "trihedron.records.diagnosis", "Truth": "trihedron.records.truth"}
-_HOME |= {"RefusedError": "trihedron.errors"}
-_HOME |= {"integrate_rate": "trihedron.estimate.attitude"}
-_HOME |= {"fleet": "trihedron.fleet"}
-_HOME |= {"identify_noise": "trihedron.estimate.noise", "read_calibration": "trihedron.files.calibration"}
-_RECORDS = ("AllanCurve", "Calibration", "Finding", "Noise", "Recording", "Segments", "SensorCalibration")
-_HOME |= dict.fromkeys(_RECORDS, "trihedron.records")
-# The others are verbs, and what they return.
-_HOME |= {name: "trihedron.api" for name in __all__ if name not in _HOME and not name.startswith("_")}
+_OF_ROOM = {
+    "api.applying": "apply write_calibration",
+    "api.calibrating": "calibrate",
+    "api.capturing": "capture ports",
+    "api.checking": "check",
+    "api.converting": "convert",
+    "api.demonstrating": "demo",
+    "api.diagnosing": "diagnose",
+    "api.diagnosing_sessions": "diagnose_sessions",
+    "api.exporting": "export",
+    "api.extending": "extend",
+    "api.filter_noising": "filter_noise",
+    "api.filtering": "kalman",
+    "api.identifying": "allan",
+    "api.planning": "plan",
+    "api.ranking": "rank",
+    "api.reading": "read segment",
+    "api.references": "calibrate_references",
+    "api.replaying": "guide",
+    "api.sessions": "calibrate_sessions",
+    "api.simulating": "simulate twin",
+    "api.verifying": "verify",
+    "errors": "RefusedError",
+    "estimate.attitude": "integrate_rate",
+    "estimate.noise.allan": "allan_deviation",
+    "estimate.noise.identify": "identify_noise",
+    "files.calibration": "read_calibration",
+    "fleet": "fleet",
+    "records": "AllanCurve Calibration Finding Noise Recording Segments SensorCalibration",
+    "records.diagnosis": "Diagnosis",
+    "records.results": "CalibrationResult CheckResult DiagnosisResult KalmanResult SessionsResult VerificationResult",
+    "records.truth": "Truth",
+    "report.presenting": "plot report",
+}
+_HOME = {name: f"trihedron.{room}" for room, names in _OF_ROOM.items() for name in names.split()}
+"""Where each name stands."""
 
 
 class _Front(ModuleType):

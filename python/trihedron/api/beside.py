@@ -19,8 +19,9 @@ from trihedron.api.referring import (
     held_against,
 )
 from trihedron.errors import REFUSALS, RefusedError
-from trihedron.estimate.reference import moves_along, poses_at_rest
-from trihedron.read.reference import of_recording
+from trihedron.estimate.reference.fit import moves_along
+from trihedron.estimate.reference.gyroscope import poses_at_rest
+from trihedron.read.reference.motion import of_recording
 from trihedron.records import Calibration, Finding, FindingCode, Recording
 from trihedron.records.reference import AgainstReference
 from trihedron.records.results import DiagnosisResult

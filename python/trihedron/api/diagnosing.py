@@ -27,7 +27,7 @@ from trihedron.comparison.ranges import stated_ranges
 from trihedron.comparison.slow import slow_noise
 from trihedron.comparison.stages import with_noise_stage
 from trihedron.diagnose import diagnose_recording
-from trihedron.diagnose.against import model_of_diagnosis
+from trihedron.diagnose.against.fitted import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open
 from trihedron.errors import REFUSALS, RefusedError
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments

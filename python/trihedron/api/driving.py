@@ -5,20 +5,22 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from trihedron.api.calibrating import calibrate
-from trihedron.api.carried_misses import CarriedMisses, carried_misses
 from trihedron.api.reading import read
 from trihedron.arrays import FloatArray
 from trihedron.errors import REFUSALS
+from trihedron.estimate.verification import verify_calibration
 from trihedron.files.log import write_recording
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, simulate, twin_scenario
+from trihedron.units import radians_from_degrees
 
 FEWEST_MOVES = 6
 """Moves from which their rms, the worst left out, is known to a third."""
@@ -233,3 +235,28 @@ def _of_moves(carried: CarriedMisses) -> float | None:
 def _spared(misses: FloatArray) -> float:
     """Mean square of all but the largest."""
     return float(np.mean(np.sort(misses**2)[:-1]))
+
+
+# What a recording's own calibration leaves of its moves: gravity carried through each by the gyro.
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedMisses:
+    """Angle (m,) [rad] by which gravity carried through each move misses the pose after it, and the moves' length.
+
+    Moves beyond the gyro's range are none of them: what was cut off there is no zero that strays.
+    """
+
+    angle_rad: FloatArray
+    duration_s: FloatArray
+
+
+def carried_misses(own: Calibration, recording: Recording, segments: Segments) -> CarriedMisses:
+    """What a recording's own calibration leaves of its moves."""
+    checked = verify_calibration(own, recording, segments, own.gravity_m_s2, own.gravity_source)
+    t = recording.time_s
+    cut = np.asarray(recording.facts.of("gyroscope").at_limits(len(t)).any(axis=1))
+    sound = np.array([not cut[a.stop : b.start].any() for a, b in pairwise(segments.poses)], dtype=np.bool_)
+    lasts = [float(t[min(b.start, len(t) - 1)] - t[a.stop - 1]) for a, b in pairwise(segments.poses)]
+    told = sound[checked.moves]
+    return CarriedMisses(radians_from_degrees(1.0) * checked.angle_deg[told], np.array(lasts)[checked.moves][told])

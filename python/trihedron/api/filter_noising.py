@@ -13,7 +13,8 @@ from trihedron.api.identifying import allan
 from trihedron.api.reading import AnyRecording, read, recording_of, segment
 from trihedron.api.referring import AnyReference, motion_of
 from trihedron.errors import REFUSALS, RefusedError
-from trihedron.estimate.filter_noise import Asked, at_rest, beside_reference, tilt_over_moves, unlike_axes
+from trihedron.estimate.filter_noise.beside_reference import Asked, beside_reference
+from trihedron.estimate.filter_noise.rests import at_rest, tilt_over_moves, unlike_axes
 from trihedron.files.formats.contract import NoiseFigure
 from trihedron.files.noise import read_noise
 from trihedron.records import Finding, FindingCode, Noise, Recording, Segments

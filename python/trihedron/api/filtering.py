@@ -11,15 +11,11 @@ from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
 from trihedron.channel_facts.at_rest import SHORTEST as SHORTEST_POSE
 from trihedron.errors import RefusedError
-from trihedron.estimate.kalman import (
-    NormFrame,
-    calibrate_session,
-    calibrate_session_without_references,
-    check_same_converter,
-    check_same_gravity,
-    noise_from_identified,
-)
-from trihedron.estimate.noise import identify_noise, noise_of_poses
+from trihedron.estimate.kalman.identified import check_same_converter, check_same_gravity, noise_from_identified
+from trihedron.estimate.kalman.norm_invariant import NormFrame
+from trihedron.estimate.kalman.session import calibrate_session, calibrate_session_without_references
+from trihedron.estimate.noise.identify import identify_noise
+from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.read import read_axis_noise, read_pose_table, read_recording
 from trihedron.records import (
     AxisNoise,

@@ -13,12 +13,12 @@ import tomllib
 
 from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, flicker_of_poses
 from trihedron.arrays import AXES
+from trihedron.channel_facts.low_pass import gain_of
 from trihedron.comparison.moved import AIMED_AT
 from trihedron.comparison.noise import Sampled, sampled
 from trihedron.comparison.quantisation import white_and_quantisation
 from trihedron.comparison.ranges import SENSOR
-from trihedron.diagnose.against import model_of_diagnosis
-from trihedron.estimate.noise import gain_of
+from trihedron.diagnose.against.fitted import model_of_diagnosis
 from trihedron.files.scenario import improved_scenario
 from trihedron.records.diagnosis import AcceptedEffect
 from trihedron.records.pose_noise import PoseNoise

@@ -11,11 +11,12 @@ import numpy as np
 
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import read
-from trihedron.diagnose.against import FittedModel, compare_numbers, model_of_calibration
+from trihedron.diagnose.against.fitted import FittedModel, model_of_calibration
+from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.errors import RefusedError
 from trihedron.estimate.reference import ACCEPTED, fit_reference, turns_of_frame
 from trihedron.read import ReadError
-from trihedron.read.reference import of_recording, read_reference
+from trihedron.read.reference.motion import of_recording, read_reference
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, SensorCalibration
 from trihedron.records.diagnosis import (
     AcceptedEffect,

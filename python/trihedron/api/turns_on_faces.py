@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron.errors import RefusedError
-from trihedron.estimate.accelerometer import OppositeHeadings, opposite_headings
-from trihedron.estimate.gyroscope import Turn
+from trihedron.estimate.accelerometer.whole_turns import OppositeHeadings, opposite_headings
+from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.records import Recording, Segments
 from trihedron.records.segments import Move
 

@@ -12,54 +12,9 @@
 
 from __future__ import annotations
 
-from trihedron.arrivals import ClockFit, ClockLine
-from trihedron.capture.account import Count, clock_sentence
-from trihedron.capture.detection import Found, find_protocol
-from trihedron.capture.errors import CaptureError, DiskError, SourceEndedError, SourceLostError
+from trihedron.capture.detection import find_protocol
 from trihedron.capture.guide import Guide
-from trihedron.capture.log import GrowingLog
-from trihedron.capture.ports import Port, list_ports
-from trihedron.capture.protocols import (
-    PROTOCOLS,
-    Decoder,
-    Frame,
-    LineColumns,
-    NameColumns,
-    decoder_factory,
-    name_by_position,
-)
-from trihedron.capture.recorder import Block, Recorder
-from trihedron.capture.sequence import Sequence, Tally
-from trihedron.capture.sources import Source, open_source
-from trihedron.capture.timeline import Timeline
+from trihedron.capture.recorder import Recorder
+from trihedron.capture.sources import open_source
 
-__all__ = [
-    "PROTOCOLS",
-    "Block",
-    "CaptureError",
-    "ClockFit",
-    "ClockLine",
-    "Count",
-    "Decoder",
-    "DiskError",
-    "Found",
-    "Frame",
-    "GrowingLog",
-    "Guide",
-    "LineColumns",
-    "NameColumns",
-    "Port",
-    "Recorder",
-    "Sequence",
-    "Source",
-    "SourceEndedError",
-    "SourceLostError",
-    "Tally",
-    "Timeline",
-    "clock_sentence",
-    "decoder_factory",
-    "find_protocol",
-    "list_ports",
-    "name_by_position",
-    "open_source",
-]
+__all__ = ["Guide", "Recorder", "find_protocol", "open_source"]

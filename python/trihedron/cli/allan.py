@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,15 +19,13 @@ FIRST_SCREEN = 2
 
 
 GyroLsb = Annotated[
-    Optional[str],  # noqa: UP045 -- typer evaluates it at run time
-    typer.Option("--gyro-lsb", metavar="SIZE", help="Size of the gyro's count, as in '0.05 deg/s'."),
+    str | None, typer.Option("--gyro-lsb", metavar="SIZE", help="Size of the gyro's count, as in '0.05 deg/s'.")
 ]
 AccelLsb = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--accel-lsb", metavar="SIZE", help="Size of the accelerometer's count, as in '3.33 mg'."),
+    str | None, typer.Option("--accel-lsb", metavar="SIZE", help="Size of the accelerometer's count, as in '3.33 mg'.")
 ]
 Exclude = Annotated[
-    Optional[list[str]],  # noqa: UP045
+    list[str] | None,
     typer.Option(
         "--exclude",
         metavar="FROM:TO",
@@ -42,13 +40,10 @@ Accuracy = Annotated[
     typer.Option("--accuracy", metavar="PERCENT", help="How long to record for this uncertainty of each term; --full."),
 ]
 Plot = Annotated[
-    Optional[Path],  # noqa: UP045
+    Path | None,
     typer.Option("--plot", metavar="FILE.png", help="Draw the Allan curves (the report holds them as well)."),
 ]
-Csv = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--csv", metavar="FILE", help="Write the Allan curve as a table."),
-]
+Csv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write the Allan curve as a table.")]
 Curve = Annotated[
     bool,
     typer.Option(
@@ -56,7 +51,7 @@ Curve = Annotated[
     ),
 ]
 Samples = Annotated[
-    Optional[int],  # noqa: UP045
+    int | None,
     typer.Option("--samples", metavar="N", help="Readings of the log behind --curve, where the table is silent."),
 ]
 Stream = Annotated[
@@ -109,7 +104,7 @@ def allan(
             checkpoint=checkpoint,
             options=options | {"gyroscope_lsb": gyro_lsb, "accelerometer_lsb": accel_lsb},
         )
-    from trihedron.api import recording_lengths
+    from trihedron.api.identifying import recording_lengths
     from trihedron.report.noise import all_findings, noise_report
     from trihedron.report.noise_files import curve_csv, noise_record
 
@@ -135,16 +130,16 @@ def allan(
 
 
 def _of_log(source: LogSource, *, stream: bool, checkpoint: Path | None, options: dict[str, Any]) -> Noise:
-    from trihedron import api
+    from trihedron.api import identifying
 
     if not stream:
         recording = source.read()
         with progress("identifying"):
-            return api.allan(recording, **options)
+            return identifying.allan(recording, **options)
     if source.log is None or source.columns is None or source.rate is None:
         raise typer.BadParameter("--stream needs LOG, --columns (as in gx,gy,gz,ax,ay,az) and --rate")
     with progress("identifying"):
-        return api.noise_of_file(
+        return identifying.noise_of_file(
             source.log,
             columns=source.columns,
             rate_hz=source.rate,
@@ -156,14 +151,14 @@ def _of_log(source: LogSource, *, stream: bool, checkpoint: Path | None, options
 
 
 def _of_curve(source: LogSource, samples: int | None, gyro_lsb: str | None, accel_lsb: str | None) -> Noise:
-    from trihedron import api
+    from trihedron.api import identifying
 
     if source.log is None:
         raise typer.BadParameter("--curve needs the table in the place of LOG")
     if gyro_lsb or accel_lsb:
         raise typer.BadParameter("--curve has no counts: say the unit of the deviations with --gyro-unit, --accel-unit")
     with progress("identifying"):
-        return api.noise_of_curve(
+        return identifying.noise_of_curve(
             source.log,
             rate_hz=source.rate,
             n_samples=samples,

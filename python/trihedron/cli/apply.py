@@ -42,10 +42,10 @@ def apply(
     check_format(output)
     known = read_calibration(calibration)
     recording = source.read()
-    from trihedron import api
+    from trihedron.api import applying
     from trihedron.report.machine import recording_record
 
-    done = api.apply(known, recording)
+    done = applying.apply(known, recording)
     write_recording(done, output, is_corrected=True, overwrite=force)
     if str(output) != "-":
         say(f"{done.n_samples} samples: {output}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Optional
+from typing import Annotated, Any
 
 import typer
 
@@ -28,32 +28,29 @@ Method = Annotated[
     str,
     typer.Option(help="joint: any poses, both sensors in one fit. separate: one after the other. faces: six faces."),
 ]
-Frame = Annotated[
-    Optional[str],  # noqa: UP045 -- typer evaluates it at run time
-    typer.Option(help="Body frame: lower, symmetric, or case (with --method faces)."),
-]
+Frame = Annotated[str | None, typer.Option(help="Body frame: lower, symmetric, or case (with --method faces).")]
 Faces = Annotated[
-    Optional[str],  # noqa: UP045
+    str | None,
     typer.Option(metavar="LIST", help="With --method faces: axis up in each pose, '1,-1,2,-2,3,-3'; 0 leaves one out."),
 ]
 Turns = Annotated[
-    Optional[str],  # noqa: UP045
+    str | None,
     typer.Option(
         metavar="LIST",
         help="Angle of each turn on a table in degrees, '90,-90,360', in any pose; 0 leaves one out.",
     ),
 ]
 AxisSigns = Annotated[
-    Optional[str],  # noqa: UP045
+    str | None,
     typer.Option(metavar="+++", help="Sign with which each raw axis follows its documented direction, e.g. '-++'."),
 ]
 Loss = Annotated[str, typer.Option(help="How far outlying poses count: linear, huber, soft_l1, cauchy.")]
 GyroNominal = Annotated[
-    Optional[float],  # noqa: UP045
+    float | None,
     typer.Option(metavar="X", help="Nominal rad/s per gyro unit, where counts and few moves do not determine it."),
 ]
 Reference = Annotated[
-    Optional[list[Path]],  # noqa: UP045
+    list[Path] | None,
     typer.Option(
         "--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log; one a log."
     ),
@@ -62,8 +59,7 @@ Extended = Annotated[
     bool, typer.Option("--extended", help="Diagnose the log too, and store the effects it demands; for apply.")
 ]
 Output = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("-o", "--output", metavar="FILE", help="Write the calibration file (JSON)."),
+    Path | None, typer.Option("-o", "--output", metavar="FILE", help="Write the calibration file (JSON).")
 ]
 Full = Annotated[bool, typer.Option("--full", help="Print the whole report, with every pose and move.")]
 
@@ -121,15 +117,13 @@ def calibrate(
     if labels is not None:
         raise typer.BadParameter("--labels belong to several logs")
     recording = sources.one().read()
-    from trihedron import api
+    from trihedron.api import calibrating
     from trihedron.report import calibration_report
 
     with progress("calibrating") as tell:
-        result = api.calibrate(
+        result = calibrating.calibrate(
             recording,
-            gravity_m_s2=place.gravity,
-            latitude_deg=place.latitude,
-            height_m=place.height,
+            **place.said,
             gyroscope_nominal=gyro_nominal,
             reference=_only(reference),
             reference_columns=reference_columns,
@@ -137,7 +131,9 @@ def calibrate(
             **choices,
         )
         if extended:
-            result = api.extend(result, progress=tell)
+            from trihedron.api import extending
+
+            result = extending.extend(result, progress=tell)
     document = calibration_report(result.calibration, result.segments, recording)
     more = "Every pose and move: --full, or --report FILE.html with figures."
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from trihedron.records import Recording
 
 By = Annotated[
-    Optional[str],  # noqa: UP045 -- typer evaluates it at run time
+    str | None,
     typer.Option(
         "--by",
         metavar="HOW",
@@ -25,7 +25,7 @@ By = Annotated[
     ),
 ]
 Labels = Annotated[
-    Optional[str],  # noqa: UP045
+    str | None,
     typer.Option("--labels", metavar="LIST", help="Several logs: day or device of each, with commas between."),
 ]
 FIRST_SCREEN = 2
@@ -43,19 +43,17 @@ def calibrate_beside(
     given = sources.each()
     if len(given) != len(references):
         raise typer.BadParameter(f"{len(given)} logs need as many references, not {len(references)}")
-    from trihedron import api
+    from trihedron.api.references import calibrate_references
     from trihedron.files.calibration import calibration_document
     from trihedron.report.reference import references_report
 
     with progress("calibrating"):
-        result = api.calibrate_references(
+        result = calibrate_references(
             [source.read() for source in given],
             references,
             reference_columns=columns,
             frame=frame,
-            gravity_m_s2=place.gravity,
-            latitude_deg=place.latitude,
-            height_m=place.height,
+            **place.said,
         )
     document = references_report(result.calibration, result.references)
 
@@ -78,29 +76,24 @@ def calibrate_many(
     how = by or "session"
     if how not in ("session", "date", "device", "temperature"):
         raise typer.BadParameter(f"--by is one of session, date, device, temperature, not {how!r}")
-    from trihedron import api
+    from trihedron.api import sessions
     from trihedron.report import sessions_report
     from trihedron.report.sessions import sessions_record
 
     words = None if labels is None else [word.strip() for word in labels.split(",")]
-    place_said: dict[str, Any] = {
-        "gravity_m_s2": place.gravity,
-        "latitude_deg": place.latitude,
-        "height_m": place.height,
-    }
     given = sources.each()
     with progress("calibrating") as tell:
         # A log that cannot be read stops at once: a wrong name is not a bad recording.
         recordings = list(_recordings(given, how))
         if words is not None and len(words) == len(given) < len(recordings):
             raise typer.BadParameter("--labels name logs; the devices of an archive have their own names")
-        result = api.calibrate_sessions(
+        result = sessions.calibrate_sessions(
             recordings,
             by=how,  # type: ignore[arg-type]
             labels=words,
             frame=frame or "lower",
             progress=tell,
-            **place_said,
+            **place.said,
         )
     document = sessions_report(result.model)
     more = "What changed and every recording: --full, or --report FILE.html with figures."

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,7 +16,7 @@ from trihedron.cli.guide import DEFAULT_ACCURACY
 from trihedron.cli.options import Force
 
 if TYPE_CHECKING:
-    from trihedron.capture import Block, Recorder
+    from trihedron.capture.recorder import Block, Recorder
 
 SAY_EVERY_S = 1.0
 LOSSES_NOT_TRUSTED = 0.05
@@ -24,35 +24,24 @@ LOSSES_NOT_TRUSTED = 0.05
 
 
 Port = Annotated[
-    Optional[str],  # noqa: UP045 -- typer evaluates it at run time
-    typer.Argument(metavar="PORT", help="Port, tcp://host:port, a file of bytes, or - (stdin)."),
+    str | None, typer.Argument(metavar="PORT", help="Port, tcp://host:port, a file of bytes, or - (stdin).")
 ]
 Output = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--output", "-o", metavar="LOG", help="Log to write (text; every command reads it)."),
+    Path | None, typer.Option("--output", "-o", metavar="LOG", help="Log to write (text; every command reads it).")
 ]
 Protocol = Annotated[
     str, typer.Option("--protocol", metavar="NAME", help="Protocol, or a .toml that declares a frame; else found.")
 ]
-Baud = Annotated[
-    Optional[int],  # noqa: UP045
-    typer.Option("--baud", metavar="N", min=1, help="Baud rate; found by trying otherwise."),
-]
+Baud = Annotated[int | None, typer.Option("--baud", metavar="N", min=1, help="Baud rate; found by trying otherwise.")]
 Seconds = Annotated[
-    Optional[float],  # noqa: UP045
-    typer.Option("--seconds", metavar="S", min=0.0, help="Stop after so long; Ctrl-C stops any time."),
+    float | None, typer.Option("--seconds", metavar="S", min=0.0, help="Stop after so long; Ctrl-C stops any time.")
 ]
-Rate = Annotated[
-    Optional[float],  # noqa: UP045
-    typer.Option("--rate", metavar="HZ", help="Rate of a board that sends no time."),
-]
+Rate = Annotated[float | None, typer.Option("--rate", metavar="HZ", help="Rate of a board that sends no time.")]
 Columns = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--columns", metavar="LIST", help="Columns of text lines, as in the other commands."),
+    str | None, typer.Option("--columns", metavar="LIST", help="Columns of text lines, as in the other commands.")
 ]
 TimeUnit = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--time-unit", metavar="UNIT", help="Unit of the board's time: s, ms, us or ns."),
+    str | None, typer.Option("--time-unit", metavar="UNIT", help="Unit of the board's time: s, ms, us or ns.")
 ]
 Wait = Annotated[
     float, typer.Option("--wait", metavar="S", min=0.0, help="How long to wait for a board that was unplugged.")
@@ -62,12 +51,10 @@ Browser = Annotated[bool, typer.Option("--browser", help="The guide as a page in
 NoOpen = Annotated[bool, typer.Option("--no-open", help="With --browser: print the link, open nothing.")]
 Accuracy = Annotated[str, typer.Option("--accuracy", metavar="TEXT", help='Of the guide: "accel 0.05 %, gyro 0.1 %".')]
 Gravity = Annotated[
-    Optional[float],  # noqa: UP045
-    typer.Option("--gravity", metavar="M/S2", help="|g| where the board is, for the guide's calibration."),
+    float | None, typer.Option("--gravity", metavar="M/S2", help="|g| where the board is, for the guide's calibration.")
 ]
 Calibration = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--calibration", metavar="FILE", help="Of the guide: calibration to write at the end."),
+    Path | None, typer.Option("--calibration", metavar="FILE", help="Of the guide: calibration to write at the end.")
 ]
 Bell = Annotated[bool, typer.Option("--bell", help="Of the guide: ring when a pose is taken.")]
 ListThem = Annotated[bool, typer.Option("--list", help="List the protocols and stop.")]
@@ -94,7 +81,8 @@ def capture(
     force: Force = False,
 ) -> None:
     """Record what a board sends into a log: nothing lost silently, on disk as it comes."""
-    from trihedron.capture import PROTOCOLS, Recorder
+    from trihedron.capture.protocols import PROTOCOLS
+    from trihedron.capture.recorder import Recorder
 
     if list_them:
         for name, sentence in PROTOCOLS.items():
@@ -122,7 +110,7 @@ def capture(
     if not (guide or browser):
         record(recorder, output, seconds)
         return
-    from trihedron.api import read
+    from trihedron.api.reading import read
     from trihedron.cli.guide import finish, run_guided
 
     stop_on_signals(recorder)
@@ -157,7 +145,7 @@ def record(recorder: Recorder, output: Path, seconds: float | None) -> None:
 @contextmanager
 def full_disk_is_status_2() -> Iterator[None]:
     """A recording that a disk ended has saved something: not what was wanted, and not nothing."""
-    from trihedron.capture import DiskError
+    from trihedron.capture.errors import DiskError
 
     try:
         yield

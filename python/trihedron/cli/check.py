@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from trihedron.cli.options import Force, Json, LogSource, Report, progress, with_options
-from trihedron.cli.output import check_outputs, leave, show, write_json, write_report
+from trihedron.cli.output import check_outputs, leave, tell_all
 
 
 @with_options(source=LogSource)
@@ -11,15 +11,13 @@ def check(source: LogSource, report: Report = None, json: Json = None, force: Fo
     """Is a log fit for calibration? Its faults, its poses, and the uncertainties to expect."""
     check_outputs(json, force=force, report=report, inputs=source.files)
     recording = source.read()
-    from trihedron import api
+    from trihedron.api import checking
     from trihedron.report import check_report
     from trihedron.report.machine import check_record
 
     with progress("checking") as tell:
-        result = api.check(recording, progress=tell)
+        result = checking.check(recording, progress=tell)
     document = check_report(recording, result.segments, result.calibration, result.findings)
     machine = check_record(recording, result.segments, result.calibration, result.findings)
-    show(document, json, sections=None)
-    write_json(machine, json, force=force, document=document)
-    write_report(document, machine, report, force=force)
+    tell_all(document, machine, json, report, force=force)
     leave(result.findings)

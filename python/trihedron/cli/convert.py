@@ -28,10 +28,10 @@ def convert(
     if output.suffix.lower() not in LOG_SUFFIXES:
         raise OutputError(f"{output}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
     recording = source.read()
-    from trihedron import api
+    from trihedron.api import converting
     from trihedron.report.machine import recording_record
 
-    api.convert(recording, output, overwrite=force)
+    converting.convert(recording, output, overwrite=force)
     for finding in recording.findings:
         if finding.severity.value != "note" or finding.code.value in {"rows-left-out", "device-chosen"}:
             say(str(finding))

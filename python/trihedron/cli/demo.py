@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 from itertools import count
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -18,11 +18,11 @@ FOLDER = "trihedron-demo"
 
 def demo(
     folder: Annotated[
-        Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+        Path | None,
         typer.Argument(metavar="FOLDER", help=f"Where to write; {FOLDER} when not said, or the next free name."),
     ] = None,
     seed: Annotated[
-        Optional[int],  # noqa: UP045
+        int | None,
         typer.Option("--seed", metavar="N", min=0, help="Unit and flaw of the second act; drawn if not said."),
     ] = None,
     force: Force = False,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Optional
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,19 +17,19 @@ from trihedron.cli.options import (
     progress,
     with_options,
 )
-from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
+from trihedron.cli.output import check_outputs, leave, say, tell_all
 
 if TYPE_CHECKING:
-    from trihedron.api import DiagnosisResult
+    from trihedron.records.results import DiagnosisResult
 
 Calibration = Annotated[
-    Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+    Path | None,
     typer.Option(
         "--calibration", metavar="FILE", help="Calibration to hold against the log; otherwise one is fitted to it."
     ),
 ]
 Against = Annotated[
-    Optional[Path],  # noqa: UP045
+    Path | None,
     typer.Option(
         "--against",
         metavar="SIM",
@@ -37,16 +37,14 @@ Against = Annotated[
     ),
 ]
 Reference = Annotated[
-    Optional[Path],  # noqa: UP045
+    Path | None,
     typer.Option("--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log."),
 ]
 Improved = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--improved", metavar="FILE.toml", help="Write the scenario with what the log says."),
+    Path | None, typer.Option("--improved", metavar="FILE.toml", help="Write the scenario with what the log says.")
 ]
 Updated = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--updated", metavar="FILE", help="Write the calibration that this log itself gives."),
+    Path | None, typer.Option("--updated", metavar="FILE", help="Write the calibration that this log itself gives.")
 ]
 Alpha = Annotated[float, typer.Option(metavar="P", help="Chance that a healthy log is called anything but consistent.")]
 Full = Annotated[bool, typer.Option("--full", help="Print the whole report, with every candidate.")]
@@ -92,17 +90,15 @@ def diagnose(
 
     known = None if calibration is None else read_calibration(calibration)
     recording = sources.one().read()
-    from trihedron import api
+    from trihedron.api import diagnosing
     from trihedron.files.diagnosis import diagnosis_document
     from trihedron.report import diagnosis_report
     from trihedron.report.diagnosis import first_screen
 
     with progress("diagnosing") as tell:
-        result = api.diagnose(
+        result = diagnosing.diagnose(
             recording,
-            gravity_m_s2=place.gravity,
-            latitude_deg=place.latitude,
-            height_m=place.height,
+            **place.said,
             calibration=known,
             against=against,
             reference=reference,
@@ -112,9 +108,7 @@ def diagnose(
         )
     document = diagnosis_report(result)
     machine = diagnosis_document(result)
-    show(document, json, sections=None if full else first_screen(result))
-    write_json(machine, json, force=force, document=document)
-    write_report(document, machine, report, force=force)
+    tell_all(document, machine, json, report, force=force, sections=None if full else first_screen(result))
     if improved is not None and against is not None:
         _improve(against, result, improved, force=force)
     if updated is not None:
@@ -138,33 +132,29 @@ def _diagnose_many(
     sources: LogsSource, place: GravitySource, alpha: float, json: Path | None, report: Path | None, *, force: bool
 ) -> None:
     """Every log by itself, and what all of one unit share."""
-    from trihedron import api
+    from trihedron.api import diagnosing_sessions
     from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
 
     recordings = [source.read() for source in sources.each()]
     with progress("diagnosing") as tell:
-        found = api.diagnose_sessions(
+        found = diagnosing_sessions.diagnose_sessions(
             recordings,
-            gravity_m_s2=place.gravity,
-            latitude_deg=place.latitude,
-            height_m=place.height,
+            **place.said,
             alpha=alpha,
             progress=tell,
         )
     document, machine = shared_diagnosis_report(found), shared_diagnosis_record(found)
-    show(document, json, sections=None)
-    write_json(machine, json, force=force, document=document)
-    write_report(document, machine, report, force=force)
+    tell_all(document, machine, json, report, force=force)
 
 
 def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -> None:
     """The scenario with what the log says, and what could not be put into it."""
-    from trihedron import api
+    from trihedron.api import improving
     from trihedron.files.scenario import write_scenario
 
     with progress("improving the scenario") as tell:
         tell(0.1, "moving the improved scenario as the log was")
-        better = api.improve(given, result)
+        better = improving.improve(given, result)
     for effect_id, why in better.left_out.items():
         say(f"effect {effect_id} is not in the scenario: {why}.")
     for what, ratio in better.unlike.items():

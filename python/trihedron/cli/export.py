@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Optional
+from typing import Annotated, Any
 
 import typer
 
@@ -28,11 +28,10 @@ def export(
         typer.Option("-o", "--output", metavar="FILE", help="Where to write; '-' is stdout. A folder for several."),
     ] = Path("-"),
     noise: Annotated[
-        Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
-        typer.Option("--noise", metavar="FILE", help="Noise of a static log: the JSON of trihedron allan."),
+        Path | None, typer.Option("--noise", metavar="FILE", help="Noise of a static log: the JSON of trihedron allan.")
     ] = None,
     rate: Annotated[
-        Optional[float],  # noqa: UP045
+        float | None,
         typer.Option("--rate", metavar="HZ", help="Rate of the samples; that of the static log when not said."),
     ] = None,
     topic: Annotated[str, typer.Option("--topic", metavar="NAME", help="Where the samples are published.")] = "/imu0",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -24,15 +24,13 @@ def fleet(
         Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the results; done logs in it are not redone.")
     ],
     scheduler: Annotated[
-        Optional[str],  # noqa: UP045 -- typer evaluates it at run time
-        typer.Option(metavar="ADDRESS", help="Dask scheduler, tcp://host:8786; a local cluster otherwise."),
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler, tcp://host:8786; a local cluster otherwise.")
     ] = None,
     workers: Annotated[
-        Optional[int],  # noqa: UP045
-        typer.Option(metavar="N", min=0, help="Processes of the local cluster; 0 works here, without Dask."),
+        int | None, typer.Option(metavar="N", min=0, help="Processes of the local cluster; 0 works here, without Dask.")
     ] = None,
     serial: Annotated[
-        Optional[str],  # noqa: UP045
+        str | None,
         typer.Option(
             metavar="REGEX",
             help="Its group names the device in a log's path, 'unit_(\\d+)'; else the folder is the device.",
@@ -40,15 +38,13 @@ def fleet(
     ] = None,
     no_diagnose: Annotated[bool, typer.Option("--no-diagnose", help="Calibrate only: several times faster.")] = False,
     columns: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(metavar="LIST", help="As for the other commands, the same for all logs."),
+        str | None, typer.Option(metavar="LIST", help="As for the other commands, the same for all logs.")
     ] = None,
     rate: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option(metavar="HZ", help="Sampling rate of logs without a time column."),
+        float | None, typer.Option(metavar="HZ", help="Sampling rate of logs without a time column.")
     ] = None,
-    accel_unit: Annotated[Optional[str], typer.Option(metavar="UNIT", help="Unit of all accelerometers.")] = None,  # noqa: UP045
-    gyro_unit: Annotated[Optional[str], typer.Option(metavar="UNIT", help="Unit of all gyros.")] = None,  # noqa: UP045
+    accel_unit: Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of all accelerometers.")] = None,
+    gyro_unit: Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of all gyros.")] = None,
     json: Json = None,
     force: Annotated[bool, typer.Option("--force", help="Replace the --json file if it exists.")] = False,
 ) -> None:
@@ -66,9 +62,7 @@ def fleet(
             workers=workers,
             diagnose=not no_diagnose,
             serial=serial,
-            gravity_m_s2=place.gravity,
-            latitude_deg=place.latitude,
-            height_m=place.height,
+            **place.said,
             columns=columns,
             rate_hz=rate,
             accelerometer_unit=accel_unit,

@@ -8,14 +8,14 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from trihedron.cli.options import Force, LogSource, with_options
 
 if TYPE_CHECKING:
-    from trihedron.capture import Block, Recorder
+    from trihedron.capture.recorder import Block, Recorder
     from trihedron.records import Recording
     from trihedron.records.guiding import GuideView
 
@@ -33,16 +33,12 @@ def guide(
         str, typer.Option("--accuracy", metavar="TEXT", help='When to stop: "accel 0.05 %, gyro 0.1 %".')
     ] = DEFAULT_ACCURACY,
     gravity: Annotated[
-        Optional[float],  # noqa: UP045 -- typer evaluates it at run time
-        typer.Option("--gravity", metavar="M/S2", help="|g| where it was recorded."),
+        float | None, typer.Option("--gravity", metavar="M/S2", help="|g| where it was recorded.")
     ] = None,
     every: Annotated[
         bool, typer.Option("--every", help="Print the screen after every pose, not only the last.")
     ] = False,
-    output: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--output", "-o", metavar="FILE", help="Calibration to write."),
-    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="Calibration to write.")] = None,
     force: Force = False,
 ) -> None:
     """Replay a log through the guide: what it would have said pose by pose, then calibrate and verify."""
@@ -119,8 +115,8 @@ def run_guided(
     seconds: float | None,
 ) -> Any:
     """Capture with the guide beside it; returns the guide, which knows where the check begins."""
-    from trihedron.api import read
     from trihedron.api.guiding import examine
+    from trihedron.api.reading import read
     from trihedron.records.guiding import Accuracy
     from trihedron.units import STANDARD_GRAVITY_M_S2
 

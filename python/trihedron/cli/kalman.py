@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Optional
+from typing import Annotated, Any
 
 import typer
 
@@ -18,7 +18,7 @@ def kalman(
     source: LogSource,
     place: GravitySource,
     reference: Annotated[
-        Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+        Path | None,
         typer.Option(
             metavar="FILE",
             help="Pose table with header: pitch,roll in degrees or fx,fy,fz; also pose, or start,stop. "
@@ -29,7 +29,7 @@ def kalman(
         float, typer.Option(metavar="DEG", help="Standard error of the angles in the pose table.")
     ] = 0.0,
     noise: Annotated[
-        Optional[Path],  # noqa: UP045
+        Path | None,
         typer.Option(
             metavar="FILE",
             help="A static log to identify the noise from, or its terms (JSON).",
@@ -37,8 +37,7 @@ def kalman(
     ] = None,
     frame: Annotated[str, typer.Option(help="Body frame without a pose table: lower or symmetric.")] = "lower",
     output: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("-o", "--output", metavar="FILE", help="Write the calibration file (JSON)."),
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Write the calibration file (JSON).")
     ] = None,
     json: Json = None,
     report: Report = None,
@@ -50,15 +49,14 @@ def kalman(
         raise typer.BadParameter(f"--frame is one of lower, symmetric, not {frame!r}")
     check_outputs(output, json, force=force, report=report, inputs=(*source.files, reference, noise))
     recording = source.read()
-    from trihedron import api
+    from trihedron.api import filtering
     from trihedron.files.calibration import write_calibration
     from trihedron.report import kalman_report
     from trihedron.report.kalman import kalman_record
 
-    options: dict[str, Any] = {"frame": frame, "noise": noise, "sigma_angle_deg": angle_sigma}
-    options |= {"gravity_m_s2": place.gravity, "latitude_deg": place.latitude, "height_m": place.height}
+    options: dict[str, Any] = {"frame": frame, "noise": noise, "sigma_angle_deg": angle_sigma, **place.said}
     with progress("filtering") as tell:
-        result = api.kalman(recording, reference, **options, progress=tell)
+        result = filtering.kalman(recording, reference, **options, progress=tell)
     document = kalman_report(result.outcome, result.calibration)
     machine = kalman_record(result.outcome, result.calibration)
     show(document, json, sections=None if full else FIRST_SCREEN)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -24,15 +24,14 @@ FIRST_SCREEN = 2
 
 
 Static = Annotated[
-    Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+    Path | None,
     typer.Option("--static", metavar="STATIC", help="A static log of the unit, or the JSON of trihedron allan."),
 ]
 Reference = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--reference", metavar="MOTION", help="Known motion beside the log: attitude, or pose."),
+    Path | None, typer.Option("--reference", metavar="MOTION", help="Known motion beside the log: attitude, or pose.")
 ]
 Band = Annotated[
-    Optional[float],  # noqa: UP045
+    float | None,
     typer.Option(
         "--band", metavar="HZ", help="Look for vibration above this; a quarter of the sampling rate if not said."
     ),
@@ -41,7 +40,7 @@ Horizon = Annotated[
     str, typer.Option("--horizon", metavar="LIST", help="Seconds over which the filter carries on alone: '1,10,60'.")
 ]
 To = Annotated[
-    Optional[str],  # noqa: UP045
+    str | None,
     typer.Option(
         "--to",
         metavar="TARGET",
@@ -75,21 +74,19 @@ def noise(
     inputs = (*source.files, static, reference)
     check_outputs(json, None if to is None else output, force=force, report=report, inputs=inputs)
     recording = source.read()
-    from trihedron import api
+    from trihedron.api import filter_noising
     from trihedron.files.formats.filter_noise import filter_noise_text
     from trihedron.report.filter_noise import filter_noise_record, filter_noise_report
 
     with progress("estimating"):
-        found = api.filter_noise(
+        found = filter_noising.filter_noise(
             recording,
             static=static,
             reference=reference,
             reference_columns=reference_columns,
             band_hz=band,
             horizons_s=horizons,
-            gravity_m_s2=place.gravity,
-            latitude_deg=place.latitude,
-            height_m=place.height,
+            **place.said,
         )
     text = None if to is None else filter_noise_text(found, to)
     document, machine = filter_noise_report(found), filter_noise_record(found)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -20,19 +20,17 @@ if TYPE_CHECKING:
     from trihedron.records import Recording
 
 Json = Annotated[
-    Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
-    typer.Option("--json", metavar="FILE", help="Write the result as JSON; '-' (or no FILE) is stdout."),
+    Path | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; '-' (or no FILE) is stdout.")
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace output files that exist.")]
 ReferenceColumns = Annotated[
-    Optional[str],  # noqa: UP045
+    str | None,
     typer.Option(
         "--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz,px [m]', 't,wx [deg/s],...'."
     ),
 ]
 Report = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--report", metavar="FILE", help="Write a report: .html with figures, .txt or .json."),
+    Path | None, typer.Option("--report", metavar="FILE", help="Write a report: .html with figures, .txt or .json.")
 ]
 
 
@@ -41,36 +39,31 @@ class ReadingOptions:
     """How a log is to be understood, where it does not say so itself."""
 
     columns: Annotated[
-        Optional[str],  # noqa: UP045
+        str | None,
         typer.Option("--columns", metavar="LIST", help="'t,ax,ay,az,-,gx,gy,gz' in file order, or 'ax=3,ay=4,az=5'."),
     ] = None
     rate: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option("--rate", metavar="HZ", help="Sampling rate of a log without a time column."),
+        float | None, typer.Option("--rate", metavar="HZ", help="Sampling rate of a log without a time column.")
     ] = None
     accel_unit: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--accel-unit", metavar="UNIT", help="m/s^2, g, mg or counts; detected otherwise."),
+        str | None, typer.Option("--accel-unit", metavar="UNIT", help="m/s^2, g, mg or counts; detected otherwise.")
     ] = None
     gyro_unit: Annotated[
-        Optional[str],  # noqa: UP045
+        str | None,
         typer.Option("--gyro-unit", metavar="UNIT", help="rad/s, mrad/s, deg/s, mdeg/s or counts; detected otherwise."),
     ] = None
     time_unit: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--time-unit", metavar="UNIT", help="s, ms, us or ns; detected otherwise."),
+        str | None, typer.Option("--time-unit", metavar="UNIT", help="s, ms, us or ns; detected otherwise.")
     ] = None
     device: Annotated[
-        Optional[int],  # noqa: UP045
-        typer.Option("--device", metavar="N", help="Which device (from 1) of an archive of several."),
+        int | None, typer.Option("--device", metavar="N", help="Which device (from 1) of an archive of several.")
     ] = None
     topic: Annotated[
-        Optional[str],  # noqa: UP045
+        str | None,
         typer.Option("--topic", metavar="NAME", help="Which topic, dataset or member of a file that holds several."),
     ] = None
     instance: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--instance", metavar="N", help="Which of several IMUs whose readings one file holds."),
+        str | None, typer.Option("--instance", metavar="N", help="Which of several IMUs whose readings one file holds.")
     ] = None
 
 
@@ -79,18 +72,17 @@ class LogSource(ReadingOptions):
     """Where the readings come from, as said on the command line."""
 
     log: Annotated[
-        Optional[Path],  # noqa: UP045
+        Path | None,
         typer.Argument(
             metavar="LOG", help="Log: text of any layout, .npz, .npy, Parquet, zip; bags and others with extras."
         ),
     ] = None
     accel: Annotated[
-        Optional[Path],  # noqa: UP045
+        Path | None,
         typer.Option("--accel", metavar="F", help="Log of the accelerometer, where each sensor has its own."),
     ] = None
     gyro: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--gyro", metavar="F", help="Log of the gyroscope, where each sensor has its own."),
+        Path | None, typer.Option("--gyro", metavar="F", help="Log of the gyroscope, where each sensor has its own.")
     ] = None
 
     @property
@@ -129,17 +121,17 @@ class LogsSource(ReadingOptions):
     """One log or several, as said on the command line."""
 
     log: Annotated[
-        Optional[list[Path]],  # noqa: UP045
+        list[Path] | None,
         typer.Argument(metavar="LOG", help="Log, or several of one unit; files and archives as for `read`."),
     ] = None
     accel: Annotated[
-        Optional[list[Path]],  # noqa: UP045
+        list[Path] | None,
         typer.Option(
             "--accel", metavar="F", help="Log of the accelerometer, where each sensor has its own; once for each log."
         ),
     ] = None
     gyro: Annotated[
-        Optional[list[Path]],  # noqa: UP045
+        list[Path] | None,
         typer.Option(
             "--gyro", metavar="F", help="Log of the gyroscope, where each sensor has its own; once for each log."
         ),
@@ -187,17 +179,19 @@ class GravitySource:
     """|g| at the place of the recording, as said on the command line."""
 
     gravity: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option("--gravity", metavar="M_S2", help="Local gravity [m/s^2]. It goes into every scale."),
+        float | None, typer.Option("--gravity", metavar="M_S2", help="Local gravity [m/s^2]. It goes into every scale.")
     ] = None
     latitude: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option("--latitude", metavar="DEG", help="Latitude, from which gravity follows (WGS 84)."),
+        float | None, typer.Option("--latitude", metavar="DEG", help="Latitude, from which gravity follows (WGS 84).")
     ] = None
     height: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option("--height", metavar="M", help="Height above sea level, with --latitude."),
+        float | None, typer.Option("--height", metavar="M", help="Height above sea level, with --latitude.")
     ] = None
+
+    @property
+    def said(self) -> dict[str, Any]:
+        """As the verbs of ``api`` take it."""
+        return {"gravity_m_s2": self.gravity, "latitude_deg": self.latitude, "height_m": self.height}
 
 
 def with_options(**groups: type) -> Callable[[Callable[..., None]], Callable[..., None]]:

@@ -127,6 +127,21 @@ class Ending:
         leave(calibration.findings)
 
 
+def tell_all(
+    document: Document,
+    machine: dict[str, Any],
+    json: Path | None,
+    report: Path | None,
+    *,
+    force: bool,
+    sections: int | None = None,
+) -> None:
+    """A result on stdout (its first ``sections``), as JSON and as a report, where these are asked for."""
+    show(document, json, sections=sections)
+    write_json(machine, json, force=force, document=document)
+    write_report(document, machine, report, force=force)
+
+
 def show(document: Document, json_target: Path | None, *, sections: int | None) -> None:
     """The report on stdout, unless stdout carries JSON."""
     if json_target is None or str(json_target) != "-":

@@ -8,7 +8,7 @@ import typer
 
 from trihedron.cli.calibrate import numbers
 from trihedron.cli.options import Force, Json, Report
-from trihedron.cli.output import check_outputs, show, write_json, write_report
+from trihedron.cli.output import check_outputs, tell_all
 
 
 def plan(
@@ -42,6 +42,4 @@ def plan(
     )
     document = plan_report(planned)
     machine = plan_record(planned)
-    show(document, json, sections=None)
-    write_json(machine, json, force=force, document=document)
-    write_report(document, machine, report, force=force)
+    tell_all(document, machine, json, report, force=force)

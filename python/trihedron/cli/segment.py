@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from trihedron.cli.options import Force, Json, LogSource, Report, progress, with_options
-from trihedron.cli.output import check_outputs, leave, show, write_json, write_report
+from trihedron.cli.output import check_outputs, leave, tell_all
 from trihedron.cli.streamed import Kept, Stream, needs_stream, segment_stream
 
 
@@ -23,14 +23,12 @@ def segment(
         segment_stream(source, report, json, checkpoint, force=force)
         return
     recording = source.read()
-    from trihedron import api
+    from trihedron.api import reading
     from trihedron.report import segments_report
     from trihedron.report.machine import segments_record
 
     with progress("segmenting") as tell:
-        segments = api.segment(recording, progress=tell)
+        segments = reading.segment(recording, progress=tell)
     document, machine = segments_report(recording, segments), segments_record(recording, segments)
-    show(document, json, sections=None)
-    write_json(machine, json, force=force, document=document)
-    write_report(document, machine, report, force=force)
+    tell_all(document, machine, json, report, force=force)
     leave((*recording.findings, *segments.findings))

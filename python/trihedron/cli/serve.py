@@ -24,7 +24,8 @@ def serve_recording(
 ) -> None:
     """Send a recording over a pseudo-terminal or a socket until it ends; says where on stdout first."""
     from trihedron.api.capturing import protocol_of
-    from trihedron.simulate.device import Device, PseudoTerminal, Sent, TcpServer, parse_faults, scales_of, serve
+    from trihedron.simulate.device.faults import Sent, parse_faults
+    from trihedron.simulate.device.serving import Device, PseudoTerminal, TcpServer, scales_of, serve
 
     kind, _, port = where.partition(":")
     if kind.upper() not in ("PTY", "TCP") or (port and not port.isdigit()):

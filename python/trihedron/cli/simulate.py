@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Optional
+from typing import Annotated, Any
 
 import typer
 
@@ -11,32 +11,27 @@ from trihedron.cli.options import Force, Report
 from trihedron.cli.output import check_outputs, leave, say, write_report
 
 Scenario = Annotated[
-    Optional[str],  # noqa: UP045 -- typer evaluates it at run time
-    typer.Argument(metavar="SCENARIO", help="A .toml file, or the name of a ready-made scenario (--list)."),
+    str | None, typer.Argument(metavar="SCENARIO", help="A .toml file, or the name of a ready-made scenario (--list).")
 ]
 Output = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--output", "-o", metavar="LOG", help="Log to write: .csv, .npz or .parquet."),
+    Path | None, typer.Option("--output", "-o", metavar="LOG", help="Log to write: .csv, .npz or .parquet.")
 ]
 Truth = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--truth", metavar="FILE", help="Truth to write: .npz, or .json without the samples."),
+    Path | None, typer.Option("--truth", metavar="FILE", help="Truth to write: .npz, or .json without the samples.")
 ]
 Seed = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Which accident of noise.")]
 Like = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--like", metavar="LOG", help="Digital twin: repeat this recording, with --calibration."),
+    Path | None, typer.Option("--like", metavar="LOG", help="Digital twin: repeat this recording, with --calibration.")
 ]
 Calibration = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--calibration", metavar="FILE", help="Calibration of the recording to repeat."),
+    Path | None, typer.Option("--calibration", metavar="FILE", help="Calibration of the recording to repeat.")
 ]
 WithEffects = Annotated[
-    Optional[Path],  # noqa: UP045
+    Path | None,
     typer.Option("--with-effects", metavar="DIAGNOSIS", help="Add the effects that this diagnosis accepted."),
 ]
 Serve = Annotated[
-    Optional[str],  # noqa: UP045
+    str | None,
     typer.Option("--serve", metavar="PTY|TCP", help="Send it as a board would; prints what to open. TCP:PORT too."),
 ]
 Protocol = Annotated[
@@ -52,8 +47,7 @@ Baud = Annotated[
     int, typer.Option("--baud", metavar="N", min=0, help="With --serve PTY: garbage for readers at another baud.")
 ]
 Link = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--link", metavar="PATH", help="With --serve PTY: a name that outlives disconnections."),
+    Path | None, typer.Option("--link", metavar="PATH", help="With --serve PTY: a name that outlives disconnections.")
 ]
 ListThem = Annotated[bool, typer.Option("--list", help="List the ready-made scenarios.")]
 
@@ -91,8 +85,9 @@ def simulate(
         raise typer.BadParameter("--with-effects belongs to a SCENARIO; a digital twin repeats its recording as it is")
     if output is None and serve is None:
         raise typer.BadParameter("say where the log goes with -o LOG, or send it with --serve PTY")
-    from trihedron.api import read, twin
-    from trihedron.api import simulate as run
+    from trihedron.api.reading import read
+    from trihedron.api.simulating import simulate as run
+    from trihedron.api.simulating import twin
     from trihedron.files.log import LOG_SUFFIXES, write_recording
     from trihedron.files.output import OutputError
     from trihedron.files.truth import write_truth
@@ -139,7 +134,7 @@ def simulate(
 def _scenario(name: str, diagnosis: Path | None) -> Any:
     if diagnosis is None:
         return name
-    from trihedron.api import with_effects
+    from trihedron.api.simulating import with_effects
     from trihedron.files.diagnosis import read_diagnosis
 
     made = with_effects(name, read_diagnosis(diagnosis)["effects"])

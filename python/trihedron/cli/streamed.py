@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from trihedron.cli.options import GravitySource, LogSource, progress
-from trihedron.cli.output import Ending, leave, say, show, write_json, write_report
+from trihedron.cli.output import Ending, leave, say, tell_all
 
 if TYPE_CHECKING:
     from trihedron.api.streaming import LogOnDisk
@@ -24,7 +24,7 @@ Stream = Annotated[
 ]
 
 Kept = Annotated[
-    Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+    Path | None,
     typer.Option(
         "--checkpoint",
         metavar="FILE",
@@ -82,9 +82,7 @@ def segment_stream(
     # Figures and times come from the rows of moves and of the ends of poses.
     recording, shown = condensed(log, segments)
     document, machine = segments_report(recording, shown), segments_record(recording, shown)
-    show(document, json, sections=None)
-    write_json(machine, json, force=force, document=document)
-    write_report(document, machine, report, force=force)
+    tell_all(document, machine, json, report, force=force)
     leave(segments.findings)
 
 
@@ -101,9 +99,8 @@ def calibrate_stream(
     from trihedron.api.streaming import calibrate_file
     from trihedron.report import calibration_report
 
-    where = {"gravity_m_s2": place.gravity, "latitude_deg": place.latitude, "height_m": place.height}
     with progress("calibrating") as tell:
-        result = calibrate_file(log, checkpoint=checkpoint, progress=tell, **where, **options)
+        result = calibrate_file(log, checkpoint=checkpoint, progress=tell, **place.said, **options)
     document = calibration_report(result.calibration, result.segments, result.recording)
 
     def machine() -> dict[str, Any]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from trihedron.cli.options import Force, GravitySource, Json, LogSource, LogsSource, Report, progress, with_options
-from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
+from trihedron.cli.output import check_outputs, leave, say, tell_all
 
 if TYPE_CHECKING:
     from trihedron.records import Calibration
@@ -22,15 +22,14 @@ def verify(
     source: LogsSource,
     place: GravitySource,
     limit_mg: Annotated[
-        Optional[float],  # noqa: UP045 -- typer evaluates it at run time
+        float | None,
         typer.Option(
             metavar="MG",
             help="Largest rms gravity error in static poses that you accept; beyond it the exit status is 2.",
         ),
     ] = None,
     limit_deg: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option(metavar="DEG", help="The same for the tilt error after a rotation."),
+        float | None, typer.Option(metavar="DEG", help="The same for the tilt error after a rotation.")
     ] = None,
     json: Json = None,
     report: Report = None,
@@ -44,33 +43,30 @@ def verify(
     best does not fit.
     """
     check_outputs(json, force=force, report=report, inputs=source.files)
-    from trihedron import api
+    from trihedron.api import verifying
+    from trihedron.api.ranking import rank
     from trihedron.report.machine import verification_record
     from trihedron.report.ranking import ranking_record, ranking_report
 
     paths, log = _parted(source)
     known = _calibrations(paths)
     recording = log.read()
-    place_of: dict[str, Any] = {
-        "gravity_m_s2": place.gravity, "latitude_deg": place.latitude, "height_m": place.height,
-    }  # fmt: skip
     if len(known) > 1:
         with progress("ranking") as tell:
-            ranking = api.rank(paths, recording, progress=tell, **place_of)
-        show(ranking_report(ranking), json, sections=None if full else FIRST_SCREEN)
-        write_json(ranking_record(ranking), json, force=force, document=ranking_report(ranking))
-        write_report(ranking_report(ranking), ranking_record(ranking), report, force=force)
+            ranking = rank(paths, recording, progress=tell, **place.said)
+        document, machine = ranking_report(ranking), ranking_record(ranking)
+        tell_all(document, machine, json, report, force=force, sections=None if full else FIRST_SCREEN)
         leave(ranking.best.verification.findings)
         return
     from trihedron.report import verification_report
 
     with progress("verifying") as tell:
-        result = api.verify(known[0], recording, limit_mg=limit_mg, limit_deg=limit_deg, progress=tell, **place_of)
+        result = verifying.verify(
+            known[0], recording, limit_mg=limit_mg, limit_deg=limit_deg, progress=tell, **place.said
+        )
     document = verification_report(result.verification, result.segments, recording)
     machine = verification_record(result.verification)
-    show(document, json, sections=None if full else FIRST_SCREEN)
-    write_json(machine, json, force=force, document=document)
-    write_report(document, machine, report, force=force)
+    tell_all(document, machine, json, report, force=force, sections=None if full else FIRST_SCREEN)
     if not full and report is None:
         say("Every pose and move: --full, or --report FILE.html with figures.")
     leave(result.findings)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from trihedron.channel_facts.pooled import ratio_of
 from trihedron.comparison.noise import Sampled, Sensor
-from trihedron.estimate.noise import ratio_of
 from trihedron.estimate.noise.correlation_time import correlation_time
 from trihedron.records.diagnosis import NoiseDifference
 from trihedron.records.pose_noise import Measured

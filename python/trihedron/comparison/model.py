@@ -6,16 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.diagnose.against import (
-    FREE_CURVES,
-    as_read,
-    compare_effects,
-    compare_numbers,
-    left_open_by,
-    model_of_calibration,
-    model_of_diagnosis,
-)
-from trihedron.diagnose.against.numbers import SPREAD_DOF, CommonFactor
+from trihedron.diagnose.against.as_read import as_read
+from trihedron.diagnose.against.fitted import model_of_calibration, model_of_diagnosis
+from trihedron.diagnose.against.mechanisms import FREE_CURVES, compare_effects, left_open_by
+from trihedron.diagnose.against.numbers import SPREAD_DOF, CommonFactor, compare_numbers
 from trihedron.estimate.verification import verify_calibration
 from trihedron.probability import f_upper
 from trihedron.records import Calibration, Recording, Segments

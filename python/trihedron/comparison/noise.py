@@ -11,10 +11,11 @@ import numpy as np
 from scipy.stats import chi2
 
 from trihedron.arrays import AXES, FloatArray
+from trihedron.channel_facts.pooled import ratio_of
 from trihedron.comparison.draws import one_draw_for_all, uniform_for_normal
-from trihedron.diagnose.against import FittedModel
+from trihedron.diagnose.against.fitted import FittedModel
 from trihedron.errors import REFUSALS
-from trihedron.estimate.noise import noise_of_poses, ratio_of
+from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
 from trihedron.records.pose_noise import Measured, PoseNoise

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import AXES
+from trihedron.channel_facts.pooled import ratio_of
 from trihedron.comparison.noise import Sampled, Sensor
-from trihedron.estimate.noise import ratio_of
 from trihedron.records.diagnosis import NoiseDifference
 from trihedron.records.pose_noise import Measured, PoseNoise
 

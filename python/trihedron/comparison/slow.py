@@ -11,7 +11,7 @@ import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.comparison.noise import Sensor
-from trihedron.diagnose.against import FREE_CURVES
+from trihedron.diagnose.against.mechanisms import FREE_CURVES
 from trihedron.estimate.noise.of_biases import PoseBiases, SlowDifference, compare_slow
 from trihedron.estimate.noise.of_norms import PoseNorms, compare_slow_norms
 from trihedron.records import Recording, Segments

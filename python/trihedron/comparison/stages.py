@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from trihedron.comparison.noise import Sampled, Sensor, sampled
-from trihedron.diagnose.against import FittedModel
+from trihedron.diagnose.against.fitted import FittedModel
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import NoiseDifference, Stage, StageDomain
 from trihedron.records.pose_noise import PoseNoise

@@ -192,16 +192,16 @@ def _carried(
     def seen_in(measured: MoveMeasurements) -> Carried:
         if calibration.averaging:
             rate = sharpened(measured.rate, recording.time_s, calibration.averaging)
-            measured = measured.of_rate(recording, segments, rate, measured.reading_variance, 3)
+            measured = measured.of_rate(recording, segments, rate, measured.reading_variance)
         return carried(
             recording.time_s, measured, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b,
             gyroscope.S, gyroscope.covariance[:9, :9],
         )  # fmt: skip
 
-    measured = measure_moves(recording, segments, accelerometer, 3)
+    measured = measure_moves(recording, segments, accelerometer)
     seen = seen_in(measured)
     if np.any(measured.is_lost) and not any(limit.is_word for limit in recording.facts.of("gyroscope").limits):
-        plain = measure_moves(recording, segments, accelerometer, 3, is_bridged=False)
+        plain = measure_moves(recording, segments, accelerometer, is_bridged=False)
         as_read = seen_in(plain)
         if denies_cut(gyroscope.S, as_read.angle_deg, measured, plain):
             measured, seen = plain, as_read

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.sessions import changes_among, repeated_parameters
+from trihedron.estimate.sessions.changes import changes_among
+from trihedron.estimate.sessions.repeatability import repeated_parameters
 from trihedron.fleet.table import frame_of
 from trihedron.probability import betaincinv, fdtrc, ndtr
 from trihedron.records.fleet import FleetLog, FleetSummary, MixedLogs, Outlier, SharedEffect

@@ -42,20 +42,20 @@ def work(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
 
 def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
     # Imported by the worker: the process that only hands out logs needs none of it.
-    from trihedron import api
+    from trihedron.api import calibrating, diagnosing, reading
     from trihedron.records.results import CalibrationResult
 
-    reading: dict[str, Any] = {
+    told: dict[str, Any] = {
         key: options[key] for key in ("columns", "rate_hz", "accelerometer_unit", "gyroscope_unit") if options.get(key)
     }
     place: dict[str, Any] = {key: options.get(key) for key in ("gravity_m_s2", "latitude_deg", "height_m")}
     if os.path.exists(path) and not os.path.isfile(path):
         kind = "a folder without logs" if os.path.isdir(path) else "a pipe or a device"
         raise RefusedError(f"{path}: this is {kind}, not a file.")
-    recording = api.read(path, device=device, **reading)
+    recording = reading.read(path, device=device, **told)
     diagnosis = None
     if options.get("diagnose", True):
-        found = api.diagnose(recording, **place)
+        found = diagnosing.diagnose(recording, **place)
         if found.calibration is None:
             grave = [f.seen for f in found.findings if f.severity.value != "note"]
             why = grave[0] if grave else "its poses determine no calibration."
@@ -69,7 +69,7 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
         }
         findings = {f.code.value: f for f in (*found.findings, *result.findings)}.values()
     else:
-        result = api.calibrate(recording, **place)
+        result = calibrating.calibrate(recording, **place)
         findings = {f.code.value: f for f in result.findings}.values()
     return _row(result) | {
         "diagnosis": diagnosis,

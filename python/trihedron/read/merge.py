@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.read.clock import mean_rate_hz
+from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.errors import ReadError
 from trihedron.records import Finding, FindingCode, Severity
 

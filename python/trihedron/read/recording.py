@@ -15,9 +15,12 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts import facts_in
 from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, look
-from trihedron.read.audit import audit_counter, audit_readings, audit_steps, audit_timing
 from trihedron.read.audit.pace import audit_pace
-from trihedron.read.clock import mean_rate_hz, was_weighed, with_gyro
+from trihedron.read.audit.readings import audit_readings
+from trihedron.read.audit.steps import audit_steps
+from trihedron.read.audit.timing import audit_counter, audit_timing
+from trihedron.read.clock.rate import mean_rate_hz
+from trihedron.read.clock.unit import was_weighed, with_gyro
 from trihedron.read.columns import Sensor
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.digest import LateSha256, hexdigest

@@ -10,9 +10,12 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.read.captured import with_arrivals
-from trihedron.read.clock import TICKS, Clock, Witness, build_clock, counts_rows, mean_rate_hz, settle_clock
+from trihedron.read.clock.base import Clock, build_clock
 from trihedron.read.clock.order import in_order
+from trihedron.read.clock.rate import mean_rate_hz
+from trihedron.read.clock.settle import settle_clock
 from trihedron.read.clock.steps import steps_of
+from trihedron.read.clock.unit import TICKS, Witness, counts_rows
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
 from trihedron.read.constant import refuse_constant
 from trihedron.read.copies import copied_rows

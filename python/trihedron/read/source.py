@@ -64,7 +64,8 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
     if known is not None:
         return tuple(replace(table, is_chosen=True) for table in known)
     refuse_foreign(path, magic)
-    from trihedron.read.text import compression_of, read_text
+    from trihedron.read.text.blocks import compression_of
+    from trihedron.read.text.open import read_text
 
     tables = read_text(path, compression_of(magic), size, progress)
     return by_sensor(tables[0]) if len(tables) == 1 else tables

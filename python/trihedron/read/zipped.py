@@ -113,7 +113,7 @@ def _member(
 ) -> tuple[Table, ...]:
     # Parsing brings a large library with it, which a NumPy archive does not need.
     from trihedron.read.columns import sensor_of_file_name
-    from trihedron.read.text import read_text
+    from trihedron.read.text.open import read_text
 
     info = archive.getinfo(name)
     check_unpacked(path, info.compress_size, info.file_size, f"its member {name}")

@@ -11,7 +11,6 @@ from trihedron.records.calibration import (
     Observability,
     SensorCalibration,
 )
-from trihedron.records.comparison import Comparison
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.kalman import (
     CONSTANT_NAMES,
@@ -39,7 +38,7 @@ from trihedron.records.onboard import Onboard
 from trihedron.records.recording import Recording
 from trihedron.records.sampling import Sampling, TimestampKind
 from trihedron.records.segments import Move, Pose, Segments
-from trihedron.records.truth import TrueSegment, Truth
+from trihedron.records.truth import Comparison, TrueSegment, Truth
 from trihedron.records.verification import Verification
 
 __all__ = [

@@ -4,7 +4,7 @@ from trihedron.simulate.accelerometer import Accelerometer, Hysteresis, ProofMas
 from trihedron.simulate.diagnosed import diagnosed_sizes, with_diagnosed_effects
 from trihedron.simulate.effects import EFFECT_IDS, effects_of, with_effect
 from trihedron.simulate.gyroscope import Gyroscope, SenseMode
-from trihedron.simulate.motion import Disturb, Motion, MoveTo, Oscillate, Pose, Replay, Turn, Vibrate
+from trihedron.simulate.motion.steps import Disturb, Motion, MoveTo, Oscillate, Pose, Replay, Turn, Vibrate
 from trihedron.simulate.named import list_scenarios, scenario_by_name
 from trihedron.simulate.noise import NoiseTerms, make_noise
 from trihedron.simulate.profiles import PROFILES, Profile, profile_by_name

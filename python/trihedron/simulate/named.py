@@ -12,7 +12,7 @@ from trihedron.errors import RefusedError
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.gyroscope import Gyroscope
-from trihedron.simulate.motion import Motion, Pose, Turn
+from trihedron.simulate.motion.steps import Motion, Pose, Turn
 from trihedron.simulate.profiles import ADIS, ANALOG_6DOF, MPU, TACTICAL, Profile
 from trihedron.simulate.scenario import Environment, Scenario
 from trihedron.simulate.sessions import (

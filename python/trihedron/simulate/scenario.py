@@ -12,7 +12,7 @@ from trihedron.errors import RefusedError
 from trihedron.gravity import earth_rate_north_up, normal_gravity
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.gyroscope import Gyroscope
-from trihedron.simulate.motion import Motion
+from trihedron.simulate.motion.steps import Motion
 from trihedron.units import STANDARD_GRAVITY_M_S2, radians_from_degrees
 
 

@@ -18,7 +18,8 @@ from trihedron.sanitise import meant
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.gyroscope import Gyroscope
-from trihedron.simulate.motion import LEVEL, Disturb, Motion, MoveTo, Oscillate, Pose, Turn, Vibrate, attitude_with_up
+from trihedron.simulate.motion.attitude import attitude_with_up
+from trihedron.simulate.motion.steps import LEVEL, Disturb, Motion, MoveTo, Oscillate, Pose, Turn, Vibrate
 from trihedron.simulate.named import SESSIONS
 from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.scenario import Clock, Environment, Scenario

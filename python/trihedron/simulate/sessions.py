@@ -9,7 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron.errors import RefusedError
-from trihedron.simulate.motion import Motion, MoveTo, Pose, Step, Turn, attitude_with_up
+from trihedron.simulate.motion.attitude import attitude_with_up
+from trihedron.simulate.motion.steps import Motion, MoveTo, Pose, Step, Turn
 from trihedron.simulate.noise import stream
 
 FACES: tuple[tuple[float, float, float], ...] = (

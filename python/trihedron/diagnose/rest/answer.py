@@ -15,11 +15,10 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
-from trihedron.diagnose.rest.curve import DriftCurve, smooth_curve
+from trihedron.diagnose.rest.curve import DriftCurve, slow_change, smooth_curve
 from trihedron.diagnose.rest.heat import Curve, branch_gap, thermal_curve
 from trihedron.diagnose.rest.pieces import RestPieces, rest_pieces
 from trihedron.diagnose.rest.process import BiasReadings
-from trihedron.diagnose.rest.slow_change import slow_change
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.records import Pose, Recording

@@ -22,8 +22,6 @@ STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)
 """Labels of residual rows; ``PRIOR`` rows keep flat directions finite and belong to no domain."""
 
 _LOWER: tuple[tuple[int, int], ...] = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
-N_ACCEL, N_GYRO = 9, 9
-"""Unknowns that all poses share: accelerometer, gyro."""
 
 
 @dataclass(frozen=True, eq=False)

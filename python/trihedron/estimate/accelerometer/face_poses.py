@@ -92,8 +92,8 @@ def given(up: Sequence[int], n: int) -> IntArray:
     return faces.astype(np.int64)
 
 
-def check_sufficient(faces: IntArray, *, all_six: bool) -> None:
-    """Twelve parameters need four faces that are not in one plane; the closed form all six.
+def check_sufficient(faces: IntArray) -> None:
+    """Twelve parameters need four faces that are not in one plane.
 
     Raises
     ------
@@ -103,10 +103,6 @@ def check_sufficient(faces: IntArray, *, all_six: bool) -> None:
     present = {int(face) for face in faces if face}
     missing = [face for face in FACES if face not in present]
     axes = {abs(face) for face in present}
-    if all_six and missing:
-        raise RefusedError(
-            f"the closed form needs all six faces; missing: {', '.join(face_in_words(face) for face in missing)}"
-        )
     if len(axes) < 3 or len(present) < 4:
         raise RefusedError(
             "these faces do not determine the accelerometer's twelve parameters; missing: "

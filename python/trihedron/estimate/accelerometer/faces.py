@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.errors import REFUSALS, RefusedError
+from trihedron.errors import REFUSALS
 from trihedron.estimate.accelerometer import face_poses, face_tilt, inputs, verdict
 from trihedron.estimate.accelerometer.face_placements import placements
 from trihedron.estimate.accelerometer.norm import norm_residual
 from trihedron.estimate.accelerometer.whole_turns import OppositeHeadings, with_opposite
-from trihedron.records.calibration import FitQuality, Frame, Observability, SensorCalibration
+from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.words import words
-from trihedron.sensor_model import other_form, other_form_jacobian, reframing
+from trihedron.sensor_model import other_form, other_form_jacobian
 from trihedron.units import AccelerationUnit, degrees_from_radians
 
 METHOD = "method 1: faces of the case on a level table"
@@ -45,15 +44,13 @@ def calibrate_faces(
     *,
     up: Sequence[int] | None = None,
     raw_unit: AccelerationUnit | str = AccelerationUnit.COUNTS,
-    method: Literal["least-squares", "closed-form"] = "least-squares",
-    frame: Frame = "case",
     shared: FloatArray | None = None,
     opposite: OppositeHeadings | None = None,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Accelerometer triad from poses with one axis of the case along the vertical.
 
-    ``a'[i] = S_a (±|g| e) + b_a + δa[i]`` by weighted least squares over all poses (repeats and missing faces welcome),
-    or in closed form from the means of the six faces (eq. 7 and 8).
+    ``a'[i] = S_a (±|g| e) + b_a + δa[i]`` by weighted least squares over all poses, repeats and missing faces welcome
+    (eq. 7; of six faces it is eq. 8).
 
     Faces that contradict each other beyond their noise were not level: the tilt per pose that makes them consistent is
     estimated, reported (TABLE_TILT) and carried into weights and uncertainties as a horizontal error per pose. A tilt
@@ -72,10 +69,6 @@ def calibrate_faces(
         reading is taken, which also decides that a positive reading is up: handedness is then not tested.
     raw_unit : AccelerationUnit
         Unit of ``means``.
-    method : "least-squares" or "closed-form"
-        The latter weighs the six faces equally.
-    frame : "case", "lower" or "symmetric"
-        Of the answer.
     shared : (3,), optional
         Part of the means' variance, raw², that equal readings share (rounding).
     opposite : OppositeHeadings, optional
@@ -88,15 +81,12 @@ def calibrate_faces(
     """
     values, noise = inputs.pose_means(means, sigma_means)
     g, unit = inputs.gravity(gravity_m_s2), AccelerationUnit(raw_unit)
-    if method not in ("least-squares", "closed-form"):
-        raise RefusedError(f"method must be 'least-squares' or 'closed-form', got {method!r}")
     faces = face_poses.faces_up(values, unit, up)
     used = np.flatnonzero(faces)
-    closed = method == "closed-form"
-    face_poses.check_sufficient(faces[used], all_six=closed)
-    estimate = _estimate_placements(values, noise, faces, g, shared, opposite, closed=closed)
+    face_poses.check_sufficient(faces[used])
+    estimate = _estimate_placements(values, noise, faces, g, shared, opposite)
     S, b = other_form(estimate.S_a, estimate.b_a)
-    quality, apart = _quality(values, noise, faces, g, estimate, closed=closed)
+    quality, apart = _quality(values, noise, faces, g, estimate)
     findings = [
         *face_poses.left_out(faces, values),
         *_tilt_findings(estimate, S, faces[used], used),
@@ -104,15 +94,14 @@ def calibrate_faces(
         *verdict.held_out_findings(apart[:, 0], apart[:, 1], np.ones(len(values)), estimate.dof),
     ]
     observability = _observability(noise[used], faces[used], estimate, g)
-    change = reframing(S, b, frame)
-    jacobian = change.jacobian @ other_form_jacobian(estimate.S_a, estimate.b_a)
+    jacobian = other_form_jacobian(estimate.S_a, estimate.b_a)
     sensor = SensorCalibration(
-        S=change.rotation @ S,
-        b=change.rotation @ b,
+        S=S,
+        b=b,
         covariance=jacobian @ estimate.covariance @ jacobian.T,
         raw_unit=unit.value,
         si_unit="m/s^2",
-        method=METHOD + (", closed form" if closed else ", least squares"),
+        method=METHOD + ", least squares",
         quality=quality,
         observability=observability,
     )
@@ -126,15 +115,13 @@ def _estimate_placements(
     g: float,
     shared: FloatArray | None,
     opposite: OppositeHeadings | None,
-    *,
-    closed: bool,
 ) -> _Estimate:
     """Fit with one mean for each time that the case was set down: holds between turns on one face share their tilt."""
     used = np.flatnonzero(faces)
     seen = with_opposite(values, noise, faces, opposite)
     placed = placements(*seen, shared)
     if len(placed.means) == len(used):
-        return _estimate(values[used], noise[used], faces[used], g, closed=closed)
+        return _estimate(values[used], noise[used], faces[used], g)
     spread = placed.noise
     # Readings half a turn apart have opposite tilts: none is in their mean.
     is_cancelled = opposite is not None and len(opposite.pose) == len(placed.means)
@@ -144,7 +131,7 @@ def _estimate_placements(
         # Through the misalignments a tilt reaches the reading of the axis that is up as well.
         if not is_cancelled:
             spread = face_tilt.tilted(placed.noise, placed.faces, S_a, g, np.sqrt(tilt2 / placed.n_headings))
-    estimate = _estimate(placed.means, spread, placed.faces, g, closed=closed)
+    estimate = _estimate(placed.means, spread, placed.faces, g)
     if placed.scatter is not None:
         estimate = _with_doubt(estimate, tilt2, 0.0 if is_cancelled else g)
     residual = values[used] - g * face_poses.direction_of(faces[used]) @ estimate.S_a.T - estimate.b_a
@@ -163,10 +150,9 @@ def _with_doubt(estimate: _Estimate, tilt2: float, g: float) -> _Estimate:
     return replace(estimate, covariance=covariance, tilt_rad=float(np.sqrt(estimate.tilt_rad**2 + tilt2)))
 
 
-def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float, *, closed: bool) -> _Estimate:
+def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float) -> _Estimate:
     """Fit with the noise alone; if that is contradicted, with the rms tilt per pose that makes χ² equal its dof."""
-    fit = _closed_form if closed else _least_squares
-    S_a, b_a, covariance = fit(values, noise, faces, g)
+    S_a, b_a, covariance = _least_squares(values, noise, faces, g)
     dof = 3 * len(values) - 12
     residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
     chi2_noise = _chi2(values, noise, faces, g)
@@ -180,7 +166,7 @@ def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float, 
         else:
             high = tilt
     widened = face_tilt.tilted(noise, faces, S_a, g, high)
-    S_a, b_a, covariance = fit(values, widened, faces, g)
+    S_a, b_a, covariance = _least_squares(values, widened, faces, g)
     residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
     # A tilt estimated from few degrees of freedom has Student's tails: 1.96 standard errors shall hold in 95 %.
     covariance = covariance * face_tilt.widened(dof, len(values)) ** 2
@@ -221,37 +207,15 @@ def _least_squares(
     return solution[:9].reshape(3, 3), solution[9:] + centre, covariance
 
 
-def _closed_form(
-    values: FloatArray, noise: FloatArray, faces: IntArray, g: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """``S_a = [a'(+1)-a'(-1), ...]/2|g|`` and ``b_a`` the mean of the six faces; repeats are averaged by weight."""
-    S_a, b_a = np.zeros((3, 3)), np.zeros(3)
-    map_to_parameters = np.zeros((6, 12, 3))
-    covariance = np.zeros((12, 12))
-    for k, face in enumerate(face_poses.FACES):
-        of_face = faces == face
-        weights = _inverses(noise[of_face])
-        spread = np.linalg.inv(weights.sum(axis=0))
-        mean = spread @ np.einsum("nij,nj->i", weights, values[of_face])
-        sign, axis = np.sign(face), abs(face) - 1
-        S_a[:, axis] += sign * mean / (2.0 * g)
-        b_a += mean / 6.0
-        for row in range(3):
-            map_to_parameters[k, 3 * row + axis, row] = sign / (2.0 * g)
-            map_to_parameters[k, 9 + row, row] = 1.0 / 6.0
-        covariance += map_to_parameters[k] @ spread @ map_to_parameters[k].T
-    return S_a, b_a, covariance
-
-
 def _chi2(values: FloatArray, noise: FloatArray, faces: IntArray, g: float) -> float:
-    """χ² of the least-squares fit with these weights, which judges the closed form too: its own has no χ² law."""
+    """χ² of the least-squares fit with these weights."""
     S_a, b_a, _ = _least_squares(values, noise, faces, g)
     residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
     return float(np.einsum("ni,nij,nj->", residual, _inverses(noise), residual))
 
 
 def _quality(
-    values: FloatArray, noise: FloatArray, faces: IntArray, g: float, estimate: _Estimate, *, closed: bool
+    values: FloatArray, noise: FloatArray, faces: IntArray, g: float, estimate: _Estimate
 ) -> tuple[FitQuality, FloatArray]:
     """Norm residual per pose in sample and left out (NaN for poses that are no faces), and the vector residual's χ²."""
     used = np.flatnonzero(faces)
@@ -262,10 +226,10 @@ def _quality(
     for pose in map(int, used):
         others = used[used != pose]
         try:
-            face_poses.check_sufficient(faces[others], all_six=closed)
+            face_poses.check_sufficient(faces[others])
         except REFUSALS:
             continue
-        apart[pose] = _left_out_pose(values, noise, faces, g, pose, others, estimate.tilt_rad, closed=closed)
+        apart[pose] = _left_out_pose(values, noise, faces, g, pose, others, estimate.tilt_rad)
     seen = np.isfinite(apart[:, 0])
     in_m_s2 = estimate.residual @ S.T
     floor = np.einsum("ij,njk,ik->", S, noise[used], S) / (3 * len(used))
@@ -281,7 +245,7 @@ def _quality(
         held_out=apart[:, 0],
         held_out_sigma=apart[:, 1],
         held_out_rms=float(np.sqrt(np.mean(apart[seen, 0] ** 2))) if seen.any() else None,
-        stopped_because=words("closed-form" if closed else "linear-least-squares"),
+        stopped_because=words("linear-least-squares"),
     )
     return quality, apart
 
@@ -294,14 +258,11 @@ def _left_out_pose(
     pose: int,
     others: IntArray,
     tilt_rad: float,
-    *,
-    closed: bool,
 ) -> tuple[float, float]:
     """Norm error of one pose by the model of the others, and its standard error."""
-    fit = _closed_form if closed else _least_squares
-    S_a, _, _ = fit(values[others], noise[others], faces[others], g)
+    S_a, _, _ = _least_squares(values[others], noise[others], faces[others], g)
     widened = face_tilt.tilted(noise[others], faces[others], S_a, g, tilt_rad)
-    S_a, b_a, covariance = fit(values[others], widened, faces[others], g)
+    S_a, b_a, covariance = _least_squares(values[others], widened, faces[others], g)
     S, b = other_form(S_a, b_a)
     f = values[pose] @ S.T + b
     error, sigma = norm_residual(f[None], S, noise[pose][None], g)

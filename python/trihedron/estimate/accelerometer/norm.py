@@ -42,10 +42,7 @@ def calibrate_norm(
     raw_unit: AccelerationUnit | str = AccelerationUnit.COUNTS,
     frame: Frame = "lower",
     loss: Loss = "linear",
-    loss_scale: float | None = None,
-    objective: Literal["norm", "squared"] = "norm",
     axis_signs: npt.ArrayLike | None = None,
-    start: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Accelerometer triad from the mean readings of poses, whatever their orientation.
 
@@ -63,16 +60,12 @@ def calibrate_norm(
         Unit of ``means``; only kept in the result and used to question implausible scales.
     frame : "lower" or "symmetric"
         Body frame. (``case`` needs method 1: poses do not know the case.)
-    loss, loss_scale
-        Robust loss and its scale in standard errors; the default scales keep 95 % efficiency on Gaussian noise.
-    objective : "norm" or "squared"
-        ``squared`` is the manual's ``(|S a'+b|² - |g|²)²``; the norm is better conditioned.
+    loss : "linear", "huber", "soft_l1" or "cauchy"
+        Robust losses keep 95 % efficiency on Gaussian noise.
     axis_signs : (3,) of ±1, optional
         Sign with which each raw axis follows its axis of Mz, from the board's documentation or method 1: the signs of
         the diagonal of S. Gravity's magnitude cannot tell them; +1 without a statement. An odd number of minus signs
         is reported as a left-handed triad.
-    start : (S, b), optional
-        Starting model; an ellipsoid fit otherwise.
 
     Returns
     -------
@@ -89,71 +82,18 @@ def calibrate_norm(
     g = inputs.gravity(gravity_m_s2)
     signs = inputs.axis_signs(axis_signs)
     unit = AccelerationUnit(raw_unit)
-    settings = _settings(g, frame, loss, loss_scale, objective)
+    settings = _settings(g, frame, loss)
     _enough(values)
     # The core works on axes with positive signs; flipping a raw axis flips a column of S and nothing else.
     flip = np.outer(signs, signs)
     positive, turned = values * signs, noise * flip
-    fit = _core.fit_norm(positive, turned, settings, _positive_start(start, signs))
+    fit = _core.fit_norm(positive, turned, settings)
     folds = _folds(len(values))
     apart = _core.fit_norm_held_out(positive, turned, settings, fit, folds)
     return _assemble(fit, apart, values, noise, g, unit, signs, frame, signs_are_known=axis_signs is not None)
 
 
-def calibrate_norm_samples(
-    samples: npt.ArrayLike,
-    pose_of_sample: npt.ArrayLike,
-    sigma_means: npt.ArrayLike,
-    gravity_m_s2: float,
-    *,
-    raw_unit: AccelerationUnit | str = AccelerationUnit.COUNTS,
-    frame: Frame = "lower",
-    loss: Loss = "linear",
-    loss_scale: float | None = None,
-    axis_signs: npt.ArrayLike | None = None,
-) -> tuple[SensorCalibration, tuple[Finding, ...]]:
-    """The same from every raw sample of every pose, in one parallel pass (10⁶ samples in a fraction of a second).
-
-    Each sample is charged with ``n_pose`` times the variance of its pose's mean, so that slow noise inside a pose,
-    which averaging does not remove, is not mistaken for information. A robust loss rejects single samples, not poses.
-
-    Parameters
-    ----------
-    samples : (n, 3)
-        Raw readings of the poses.
-    pose_of_sample : (n,) of int
-        Index of the pose of each sample, 0 … n_poses - 1.
-    sigma_means : (3,), (n_poses, 3) or (n_poses, 3, 3)
-        Noise of the mean reading of each pose.
-
-    Other parameters, results and errors are those of :func:`calibrate_norm`.
-    """
-    raw = np.ascontiguousarray(samples, dtype=np.float64)
-    pose = np.asarray(pose_of_sample)
-    if raw.ndim != 2 or raw.shape[1] != 3 or pose.shape != (len(raw),) or len(raw) == 0:
-        raise RefusedError(f"samples must have shape (n, 3) with one pose index each, got {raw.shape} and {pose.shape}")
-    if not np.issubdtype(pose.dtype, np.integer) or pose.min() < 0:
-        raise RefusedError("pose indices must be non-negative integers")
-    count = np.bincount(pose)
-    if np.any(count == 0):
-        raise RefusedError(f"pose {int(np.flatnonzero(count == 0)[0])} has no samples")
-    sums = np.column_stack([np.bincount(pose, weights=raw[:, j]) for j in range(3)])
-    values, noise = inputs.pose_means(sums / count[:, None], sigma_means)
-    g = inputs.gravity(gravity_m_s2)
-    signs = inputs.axis_signs(axis_signs)
-    unit = AccelerationUnit(raw_unit)
-    settings = _settings(g, frame, loss, loss_scale, "norm")
-    _enough(values)
-    flip = np.outer(signs, signs)
-    per_pose = noise * flip * count[:, None, None]
-    start = _core.fit_norm(values * signs, noise * flip, settings)
-    owner = np.ascontiguousarray(pose, dtype=np.int64)
-    fit = _core.fit_norm(raw * signs, per_pose, settings, (start.S, start.b), owner)
-    apart = _core.fit_norm_held_out(values * signs, noise * flip, settings, start, _folds(len(values)))
-    return _assemble(fit, apart, values, noise, g, unit, signs, frame, signs_are_known=axis_signs is not None)
-
-
-def _settings(g: float, frame: str, loss: str, loss_scale: float | None, objective: str) -> _core.NormSettings:
+def _settings(g: float, frame: str, loss: str) -> _core.NormSettings:
     if frame not in ("lower", "symmetric"):
         raise RefusedError(
             f"poses of any orientation give the frame 'lower' or 'symmetric', not {frame!r}: "
@@ -161,16 +101,8 @@ def _settings(g: float, frame: str, loss: str, loss_scale: float | None, objecti
         )
     if loss not in _LOSSES:
         raise RefusedError(f"loss must be one of {', '.join(_LOSSES)}, got {loss!r}")
-    if objective not in ("norm", "squared"):
-        raise RefusedError(f"objective must be 'norm' or 'squared', got {objective!r}")
-    number, default = _LOSSES[loss]
-    return _core.NormSettings(
-        g,
-        symmetric=frame == "symmetric",
-        squared=objective == "squared",
-        loss=number,
-        loss_scale=default if loss_scale is None else float(loss_scale),
-    )
+    number, scale = _LOSSES[loss]
+    return _core.NormSettings(g, symmetric=frame == "symmetric", loss=number, loss_scale=scale)
 
 
 def _enough(values: FloatArray) -> None:
@@ -179,17 +111,6 @@ def _enough(values: FloatArray) -> None:
             f"{len(values)} poses are too few for an accelerometer: record at least nine different orientations, "
             "better eighteen (six faces and twelve edges of a cube)"
         )
-
-
-def _positive_start(
-    start: tuple[npt.ArrayLike, npt.ArrayLike] | None, signs: FloatArray
-) -> tuple[FloatArray, FloatArray] | None:
-    if start is None:
-        return None
-    S, b = (np.ascontiguousarray(part, dtype=np.float64) for part in start)
-    if S.shape != (3, 3) or b.shape != (3,) or not (np.all(np.isfinite(S)) and np.all(np.isfinite(b))):
-        raise RefusedError("a start is S of shape (3, 3) and b of shape (3,), finite")
-    return np.ascontiguousarray(S * signs), b
 
 
 def _folds(n: int) -> list[int]:
@@ -218,8 +139,8 @@ def _assemble(
     residual, sigma = norm_residual(f, S, noise, g)
     dof = len(values) - 9
     z2 = (residual / sigma) ** 2
-    # A robust loss also judges the noise without the poses it rejected; of single samples it says nothing about poses.
-    chi2 = fit.robust_chi2 if len(fit.weights) == len(values) else float(z2.sum())
+    # A robust loss also judges the noise without the poses it rejected.
+    chi2 = fit.robust_chi2
     scale = verdict.covariance_scale(chi2, dof)
     design = PoseDesign.of(up, sigma / g)
     relative_sigma = float(np.median(sigma)) / g
@@ -246,7 +167,7 @@ def _assemble(
         held_out=unseen,
         held_out_sigma=apart[:, 1],
         held_out_rms=float(np.sqrt(np.mean(unseen[predicted] ** 2))) if predicted.any() else None,
-        weights=fit.weights if len(fit.weights) == len(values) else None,
+        weights=fit.weights,
         n_iterations=fit.n_iterations,
         stopped_because=words(fit.stopped_because),
         covariance_scale=scale,

@@ -6,25 +6,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.integrate import trapezoid
+from scipy.optimize import minimize
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.filter_noise.angle import angle_stretches
-from trihedron.estimate.filter_noise.axes import unlike_axes_beside
 from trihedron.estimate.filter_noise.held_out import Errors, errors_over
 from trihedron.estimate.filter_noise.left_over import Left, left_over
-from trihedron.estimate.filter_noise.shares import bounded, parts_of, shares_over
-from trihedron.estimate.filter_noise.strengths import PREFERRED, Fitted, Prior, fit, forgetting
-from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
+from trihedron.estimate.filter_noise.strengths import ABSENT, PREFERRED, Fitted, Prior, fit, forgetting
+from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, matern
 from trihedron.estimate.filter_noise.velocity import velocity_stretches
 from trihedron.estimate.reference.fit import laid_beside
 from trihedron.estimate.reference.motion import fit_motion
 from trihedron.records import Recording
 from trihedron.records.filter_noise import (
+    CAUSES,
     BiasModel,
+    Bounded,
+    Cause,
     Consistency,
     ReferenceWorth,
     SensorFilterNoise,
+    Share,
     StaticNoise,
 )
 from trihedron.records.reference import ReferenceMotion
@@ -210,3 +214,104 @@ def consistency(
 def _worth(draws: FloatArray, follows: bool) -> ReferenceWorth:
     slow = np.hypot(draws[:, 4], draws[:, 5])
     return ReferenceWorth(bounded(draws[:, 3]), bounded(slow), float(np.median(draws[:, 6])), follows)
+
+
+# What the error over a horizon is made of (docs/filter-noise.md).
+
+
+def parts_of(draws: FloatArray, horizon_s: float, tilt_m_s2: float | None = None) -> dict[Cause, FloatArray]:
+    """Mean squares (k,) of all three axes together by cause, under strengths (k, 7), without the correction's.
+
+    Of an angle over h: 3 N² h, 3 V² h, K² h³, and of a reference the difference of two of its errors,
+    2 σ² (1 - k(h)) and white. ``tilt_m_s2`` makes it a velocity: a slow tilt adds g² over h, of two axes.
+    """
+    s = dict(zip(NAMES, draws.T, strict=True))
+    h = horizon_s
+    out: dict[Cause, FloatArray] = {"rest": 3.0 * s["noise"] ** 2 * h, "vibration": 3.0 * s["vibration"] ** 2 * h}
+    out["bias"] = s["bias_walk"] ** 2 * h**3
+    if tilt_m_s2 is None:
+        slow = 6.0 * (s["world"] ** 2 + s["body"] ** 2) * (1.0 - matern(h, s["slow_s"]))
+        out["reference"] = 6.0 * s["white"] ** 2 + slow
+    else:
+        out["reference"] = 12.0 * s["white"] ** 2 + 2.0 * (tilt_m_s2 * s["world"]) ** 2 * _twice_summed(h, s["slow_s"])
+    return out
+
+
+def shares_over(parts: dict[Cause, FloatArray], horizon_s: float) -> tuple[Share, ...]:
+    """Shares with 95 % intervals of causes' mean squares (k,); a cause without a part has no share."""
+    total = np.sum(list(parts.values()), axis=0)
+    return tuple(Share(name, horizon_s, bounded(parts[name] / total)) for name in CAUSES if name in parts)
+
+
+def bounded(values: Sequence[float] | FloatArray) -> Bounded:
+    """Median and 95 % interval of draws; only a limit where the interval reaches over a factor of ``ABSENT``."""
+    low, middle, high = (float(v) for v in np.quantile(values, [0.025, 0.5, 0.975]))
+    is_limit = high > 0.0 and low < high / ABSENT
+    return Bounded(middle, 0.0 if is_limit else low, high, is_limit)
+
+
+def _twice_summed(h: float, tau_s: FloatArray) -> FloatArray:
+    """Variance of the integral over h of a Matérn-3/2 process of variance one."""
+    lag = np.linspace(0.0, h, 101)
+    kernel = matern(lag[None, :], tau_s[:, None])
+    return np.asarray(2.0 * trapezoid((h - lag) * kernel, lag, axis=1))
+
+
+# White noise of X, Y and Z apart, in motion: what each turns into along the reference's axes differs.
+
+STEP = 0.05
+"""Step in the logarithm of an axis' density."""
+AXES_SIGMA = float(np.log(3.0))
+"""Prior σ of that logarithm about the mean of the axes: of one chip they differ by less than a factor of three."""
+
+
+def unlike_axes_beside(stretches: Sequence[Stretch], found: Fitted, N: Bounded) -> tuple[Bounded, ...]:
+    """N of each axis, noise at rest and vibration together, where two intervals do not meet; else nothing.
+
+    The other strengths stay as they are; the interval of N itself is in every axis'.
+    """
+    if N.is_limit or any(one.attitude is None for one in stretches):
+        return ()
+    pairs = [(_without_noise(one, found.mode), _of_axes(one, found.mode)) for one in stretches]
+
+    def low(x: FloatArray) -> float:
+        heights = [
+            one.evidence_under(rest + np.tensordot(np.exp(2.0 * x), axes, axes=1))
+            for one, (rest, axes) in zip(stretches, pairs, strict=True)
+        ]
+        return float(0.5 * x @ x / AXES_SIGMA**2 - sum(heights))
+
+    best = np.asarray(minimize(low, np.zeros(3), method="L-BFGS-B", options={"eps": 1e-4, "ftol": 1e-7}).x)
+    steps = STEP * np.eye(3)
+    here = low(best)
+    curved = np.array([(low(best + e) + low(best - e) - 2.0 * here) / STEP**2 for e in steps])
+    own = 1.0 / np.maximum(curved, 1.0 / AXES_SIGMA**2)
+    common = (0.25 * np.log(N.upper / max(N.lower, N.upper / ABSENT))) ** 2
+    each = []
+    for x, variance in zip(best, own, strict=True):
+        value, factor = N.value * float(np.exp(x)), float(np.exp(1.96 * np.sqrt(variance + common)))
+        each.append(Bounded(value, value / factor, value * factor))
+    return tuple(each) if max(one.lower for one in each) > min(one.upper for one in each) else ()
+
+
+def _without_noise(stretch: Stretch, strengths: FloatArray) -> FloatArray:
+    """Covariance (3 m, 3 m) of everything but noise and vibration."""
+    return stretch.covariance(np.where(np.isin(NAMES, ("noise", "vibration")), 0.0, strengths))
+
+
+def _of_axes(stretch: Stretch, strengths: FloatArray) -> FloatArray:
+    """(3, 3 m, 3 m) covariance of the noise and vibration of each axis, in the reference's world."""
+    assert stretch.attitude is not None
+    m = len(stretch.time_s)
+    h = float(np.median(np.diff(stretch.time_s)))
+    per_block = h * (strengths[0] ** 2 + strengths[1] ** 2 * stretch.power)
+    earlier = np.minimum.outer(np.arange(m), np.arange(m))
+    out = []
+    for axis in range(3):
+        along = stretch.attitude[:, :, axis]
+        added = per_block[:, None, None] * along[:, :, None] * along[:, None, :]
+        walk = (np.cumsum(added, axis=0) - 0.5 * added)[earlier]
+        # A mean over a block has a third of the block's variance, and not half.
+        walk[np.arange(m), np.arange(m)] -= added / 6.0
+        out.append(walk.transpose(0, 2, 1, 3).reshape(3 * m, 3 * m))
+    return np.array(out)

@@ -182,7 +182,7 @@ class _Session:
         return readings, self.recording.facts.of("gyroscope").step, medians(means), measured.is_undithered
 
     def _read_as(self, measured: MoveMeasurements, rate: FloatArray, variance: FloatArray | None) -> MoveMeasurements:
-        return measured.of_rate(self.recording, self.segments, rate, variance, self.options.rate_degree)
+        return measured.of_rate(self.recording, self.segments, rate, variance)
 
     def _again(self, measured: MoveMeasurements, aligned: Aligned) -> tuple[MoveMeasurements, Aligned]:
         """The same moves used as before, from where the fit was."""
@@ -191,10 +191,7 @@ class _Session:
         return measured, finished(fit, measured, self.part, aligned.used, aligned.outliers)
 
     def _measured(self, *, is_bridged: bool) -> MoveMeasurements:
-        return measure_moves(
-            self.recording, self.segments, self.part.model, self.options.rate_degree, self.options.is_attitude_removed,
-            is_bridged=is_bridged,
-        )  # fmt: skip
+        return measure_moves(self.recording, self.segments, self.part.model, is_bridged=is_bridged)
 
     def _aligned(self, measured: MoveMeasurements) -> Aligned:
         options, part, gravity = self.options.suited_to(measured), self.part, self.gravity_m_s2

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -15,9 +14,6 @@ from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.probability import MEDIAN_CHI2, chdtrc, chdtri
 from trihedron.quantiles import median
 from trihedron.records.calibration import SensorCalibration
-
-RateDegree = Literal[0, 1, 3]
-"""Degree of the rate polynomial over a sample: 0 constant, 1 linear, 3 coning-corrected."""
 
 CAUCHY_SCALE = 3.0
 """Of a move's Mahalanobis distance (two degrees of freedom) in the screening fit: at three the weight is one half."""
@@ -39,18 +35,12 @@ AT_LEAST = 0.84
 class MoveOptions:
     """How moves are fitted.
 
-    ``rate_degree`` of the rate polynomial over a sample (0 constant, 1 linear, 3 coning-corrected); ``is_robust``
-    screens moves whose residual is far beyond the others'; ``is_offset_free`` adds a constant rate inside the moves
-    that the poses do not show (3 parameters); ``is_attitude_removed``
-    subtracts a bias that follows specific force (``None``: where the poses show one); ``n_folds`` for
+    ``is_offset_free`` adds a constant rate inside the moves that the poses do not show (3 parameters); ``n_folds`` for
     held-out prediction, 0 for none; ``nominal_scale`` (3, 3) or a number, rad/s per raw unit, where the moves cannot
     tell it.
     """
 
-    rate_degree: RateDegree = 3
-    is_robust: bool = True
     is_offset_free: bool = False
-    is_attitude_removed: bool | None = None
     n_folds: int = 5
     nominal_scale: FloatArray | float | None = None
 
@@ -161,7 +151,7 @@ def align_screened(
     outliers: tuple[int, ...] = ()
     is_near = False
     n_parameters = 9 + (3 if options.is_offset_free else 0)
-    if options.is_robust and 2 * int(np.count_nonzero(used)) > n_parameters + 2:
+    if 2 * int(np.count_nonzero(used)) > n_parameters + 2:
         screen = _core_align(measured, accelerometer, gravity_m_s2, starts, options, used, CAUCHY_SCALE)
         distance = np.asarray(screen.mahalanobis)
         far = used.copy()

@@ -30,6 +30,8 @@ from trihedron.session.averaging import Averaging
 
 GAP_STEPS = 5.0
 """A step of time so much longer than the usual one is a gap: the rate in it is unknown."""
+RATE_DEGREE = 3
+"""Of the rate's polynomial over a sample: corrected for coning."""
 BLOCK_S = 0.5
 """Length of the blocks whose scatter gives the angle random walk: moves last of this order, and it is long against
 the correlation that an anti-alias filter leaves between samples."""
@@ -83,11 +85,13 @@ class MoveMeasurements:
     averaging: Averaging = field(default_factory=Averaging)
 
     def of_rate(
-        self, recording: Recording, segments: Segments, rate: FloatArray, variance: FloatArray | None, degree: int
+        self, recording: Recording, segments: Segments, rate: FloatArray, variance: FloatArray | None
     ) -> MoveMeasurements:
         """The same moves with other gyro readings (n, 3), and what is uncertain of each (n, 3)."""
         mid_s = np.ascontiguousarray(segments.time_mid_s[self.links])
-        moves = Moves(recording.time_s, np.ascontiguousarray(rate), self.edges, mid_s, self.links, degree, variance)
+        moves = Moves(
+            recording.time_s, np.ascontiguousarray(rate), self.edges, mid_s, self.links, RATE_DEGREE, variance
+        )
         return replace(self, moves=moves, rate=rate, reading_variance=variance)
 
     @property
@@ -131,15 +135,13 @@ def measure_moves(
     recording: Recording,
     segments: Segments,
     accelerometer: SensorCalibration,
-    rate_degree: int,
-    is_attitude_removed: bool | None = None,
     *,
     is_bridged: bool = True,
 ) -> MoveMeasurements:
     """Collect pose means, moves and noise; readings that look like the gyro's limit are bridged if ``is_bridged``.
 
-    With ``is_attitude_removed`` (``None``: where the poses show it beyond chance) a bias that follows specific
-    force is subtracted sample by sample: interpolating it between two attitudes would be wrong in the middle of a move.
+    A bias that follows specific force beyond chance is subtracted sample by sample: interpolating it between two
+    attitudes would be wrong in the middle of a move.
 
     Raises
     ------
@@ -155,8 +157,8 @@ def measure_moves(
     var_bias = _mean_variance(segments.gyroscope_sigma_mean)
     force = reading @ accelerometer.S.T + accelerometer.b
     undithered = _undithered(quantum, segments.gyroscope_sigma)
-    attitude = attitude_dependence(zero, var_bias, force) if is_attitude_removed is not False else None
-    if attitude is not None and (attitude.is_present or is_attitude_removed):
+    attitude = attitude_dependence(zero, var_bias, force)
+    if attitude is not None and attitude.is_present:
         rate = gyroscope - (raw_force @ accelerometer.S.T + accelerometer.b) @ attitude.A.T
         zero = np.ascontiguousarray(zero - force @ attitude.A.T)
     else:
@@ -166,7 +168,7 @@ def measure_moves(
     if clipped is not None:
         rate, extra = _bridged(rate, extra, clipped, gyroscope)
     mid_s = np.ascontiguousarray(segments.time_mid_s[links])
-    prepared = Moves(recording.time_s, rate, edges, mid_s, links, rate_degree, extra)
+    prepared = Moves(recording.time_s, rate, edges, mid_s, links, RATE_DEGREE, extra)
     var_reading = _mean_variance(segments.accelerometer_sigma_mean)
     bias_read, var_bias_read = zero, var_bias
     walk = excess_variance(zero[links[:, 1]] - zero[links[:, 0]], var_bias[links[:, 1]] + var_bias[links[:, 0]])

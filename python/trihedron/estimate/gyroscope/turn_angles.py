@@ -228,10 +228,9 @@ def identify_turns(
     measured: MeasuredTurns,
     turns: Sequence[Turn],
     nominal: FloatArray,
-    quantum_rad: float,
     tolerance: float = SCALE_TOLERANCE,
 ) -> list[KnownTurn]:
-    """Nearest case axis and nearest multiple of ``quantum_rad`` for every turn that does not say.
+    """Nearest case axis and nearest quarter turn for every one that does not say.
 
     Small turns come first: each refines the scale by which the next larger one is read, so that eight whole turns are
     recognised although the nominal scale is off by ``tolerance``.
@@ -247,13 +246,13 @@ def identify_turns(
         unit = _unit(axis, turn.direction)
         along = float(vector @ unit) / scale
         off_axis = math.atan2(float(np.linalg.norm(np.cross(vector, unit))), abs(float(vector @ unit)))
-        angle = turn.angle_rad if turn.angle_rad is not None else quantum_rad * round(along / quantum_rad)
+        angle = turn.angle_rad if turn.angle_rad is not None else QUARTER * round(along / QUARTER)
         is_ambiguous = False
         if turn.angle_rad is None:
             unsure = abs(along) * (tolerance if sums[axis, 1] == 0.0 else 0.1 * tolerance)
             # A turn of unknown size can only be read when the doubt about the scale is below half a multiple.
-            is_used = angle != 0.0 and abs(along - angle) < SLACK_RAD + min(unsure, 0.2 * quantum_rad)
-            is_ambiguous = unsure >= 0.5 * quantum_rad
+            is_used = angle != 0.0 and abs(along - angle) < SLACK_RAD + min(unsure, 0.2 * QUARTER)
+            is_ambiguous = unsure >= 0.5 * QUARTER
             is_used = is_used and not is_ambiguous
         else:
             is_used = angle != 0.0 and abs(along - angle) < max(SLACK_RAD, 0.3 * abs(angle))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.gyroscope.turn_angles import KnownTurn
+from trihedron.estimate.gyroscope.turn_angles import QUARTER, KnownTurn
 from trihedron.estimate.gyroscope.turn_screening import FALSE_ALARM, Screened
 from trihedron.probability import chdtrc
 from trihedron.records.finding import Finding, FindingCode
@@ -24,12 +24,9 @@ def turn_findings(
     S: FloatArray,
     inflation: float,
     dof: int,
-    quantum_rad: float,
-    *,
-    is_sigma_given: bool,
 ) -> tuple[Finding, ...]:
     """Turns that are no multiple, turns that contradict each other, turns nobody checks, handedness, drift."""
-    found = [_not_a_multiple(i, turn, quantum_rad) for i, turn in enumerate(known) if _is_wrong(turn)]
+    found = [_not_a_multiple(i, turn) for i, turn in enumerate(known) if _is_wrong(turn)]
     for index in screened.suspects:
         turn = known[index]
         found.append(
@@ -43,7 +40,7 @@ def turn_findings(
             )
         )
     sigma = screened.system.sigma_turn
-    if not is_sigma_given and sigma > LOOSE_TURN_RAD:
+    if sigma > LOOSE_TURN_RAD:
         found.append(Finding.of(FindingCode.TURN_NOT_A_MULTIPLE, "scatter", sigma_turn_rad=sigma))
     if screened.unchecked_axes:
         found.append(Finding.of(FindingCode.TURN_UNCHECKED, axes=[axis + 1 for axis in screened.unchecked_axes]))
@@ -60,14 +57,14 @@ def _is_wrong(turn: KnownTurn) -> bool:
     return not turn.is_used and (turn.was_given or turn.off_axis_rad < math.radians(20.0)) and abs(turn.seen_rad) > 0.2
 
 
-def _not_a_multiple(index: int, turn: KnownTurn, quantum_rad: float) -> Finding:
+def _not_a_multiple(index: int, turn: KnownTurn) -> Finding:
     return Finding.of(
         FindingCode.TURN_NOT_A_MULTIPLE,
         "not-the-stated" if turn.was_given else "no-multiple",
         turn=index,
         axis=turn.axis + 1,
         seen_rad=turn.seen_rad,
-        wanted_rad=turn.angle_rad if turn.was_given else quantum_rad,
+        wanted_rad=turn.angle_rad if turn.was_given else QUARTER,
     )
 
 

@@ -31,8 +31,8 @@ class Screened:
     unchecked_axes: tuple[int, ...]
 
 
-def screen(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) -> Screened:
-    """Find turns that the others contradict, and the standard error of a turn when it is not given.
+def screen(system: TurnSystem, used: BoolArray) -> Screened:
+    """Find turns that the others contradict, and the standard error of a turn.
 
     Each turn is predicted by all others. The scatter of a turn is first read from the median of these predictions,
     which one wrong turn does not move; a turn far beyond it is a suspect. It is removed when two others about its
@@ -45,7 +45,7 @@ def screen(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) ->
     removed: list[int] = []
     system = _with_tilts(replace(system, S_w=solve(system, used).S_w), used)
     while True:
-        distances = _distances(_with_scatter(system, used, sigma_turn_rad), used)
+        distances = _distances(_with_scatter(system, used), used)
         if not distances:
             break
         limit = float(chdtri(3, FALSE_ALARM / len(distances)))
@@ -59,11 +59,7 @@ def screen(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) ->
         removed.append(worst)
         used = used.copy()
         used[worst] = False
-    if sigma_turn_rad is None:
-        system = _matching_scatter(system, used)
-    else:
-        system = replace(system, sigma_turn=sigma_turn_rad)
-    return Screened(system, used, tuple(suspects), tuple(removed), unchecked)
+    return Screened(_matching_scatter(system, used), used, tuple(suspects), tuple(removed), unchecked)
 
 
 def _distances(system: TurnSystem, used: BoolArray) -> dict[int, float]:
@@ -71,10 +67,8 @@ def _distances(system: TurnSystem, used: BoolArray) -> dict[int, float]:
     return {int(i): float(distance2[i]) for i in np.flatnonzero(np.isfinite(distance2))}
 
 
-def _with_scatter(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) -> TurnSystem:
+def _with_scatter(system: TurnSystem, used: BoolArray) -> TurnSystem:
     """The scatter of a turn from the median of the predictions: one wrong turn does not move it."""
-    if sigma_turn_rad is not None:
-        return replace(system, sigma_turn=sigma_turn_rad)
     for _ in range(3):
         along2, across2, noise2 = _components(system, left_out(system, used).residual)
         known = used & np.isfinite(along2)

@@ -159,38 +159,6 @@ def solve(system: TurnSystem, used: BoolArray) -> Solution:
     return Solution(solution[:9].reshape(3, 3), solution[9:], covariance, chi2, len(side) - 12)
 
 
-def solve_zero_first(system: TurnSystem, used: BoolArray) -> Solution:
-    """``b_w`` from the zero turns alone, then ``S_w`` by least squares from the turns freed of it.
-
-    The error of ``b_w`` reaches ``S_w`` through every turn at once: ``δS_w = −G δb_w``.
-    """
-    measured = system.measured
-    zero_s = measured.zero_duration_s[:, None]
-    var = measured.var_rate / zero_s + measured.bias_spread
-    weight = 1.0 / var
-    total = weight.sum(axis=0)
-    rates = measured.zero_angle / zero_s
-    b_w = (weight * rates).sum(axis=0) / total
-    cov_b = np.diag(1.0 / total)
-    if measured.hidden is not None:
-        # What a step hides of the bias is the same in every zero turn.
-        cov_b += np.diag(np.mean(measured.hidden.variance_of_biases() / zero_s**2, axis=0))
-    chi2 = float(np.sum(weight * (rates - b_w) ** 2))
-    matrix, side = system.whitened(used, with_biases=False)
-    to_scale, to_bias = matrix[:, :9], matrix[:, 9:]
-    inner = np.linalg.inv(to_scale.T @ to_scale)
-    gain = inner @ to_scale.T
-    scale = gain @ (side - to_bias @ b_w)
-    through = -gain @ to_bias
-    covariance = np.zeros((12, 12))
-    covariance[:9, :9] = inner + through @ cov_b @ through.T
-    covariance[:9, 9:] = through @ cov_b
-    covariance[9:, :9] = covariance[:9, 9:].T
-    covariance[9:, 9:] = cov_b
-    chi2 += float(np.sum((side - to_bias @ b_w - to_scale @ scale) ** 2))
-    return Solution(scale.reshape(3, 3), b_w, covariance, chi2, len(side) - 9 + 3 * len(rates) - 3)
-
-
 @dataclass(frozen=True, eq=False)
 class LeftOut:
     """Turns predicted by all others: raw ``residual`` (k, 3), its ``covariance`` (k, 3, 3), ``distance2`` (k,).

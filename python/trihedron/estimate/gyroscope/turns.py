@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +13,6 @@ from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.turn_angles import (
     AMBIGUOUS,
     MIN_SPREAD,
-    QUARTER,
     SCALE_TOLERANCE,
     KnownTurn,
     Turn,
@@ -24,39 +22,14 @@ from trihedron.estimate.gyroscope.turn_angles import (
 )
 from trihedron.estimate.gyroscope.turn_findings import turn_findings
 from trihedron.estimate.gyroscope.turn_screening import FALSE_ALARM, screen
-from trihedron.estimate.gyroscope.turn_system import Solution, TurnSystem, left_out, solve, solve_zero_first
+from trihedron.estimate.gyroscope.turn_system import Solution, TurnSystem, left_out, solve
 from trihedron.probability import chdtrc
 from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
 from trihedron.records.finding import Finding
 from trihedron.records.recording import Recording
-from trihedron.records.segments import Segments
 from trihedron.records.words import words
 from trihedron.sensor_model import other_form, other_form_jacobian
 from trihedron.units import rate_to_si
-
-Route = Literal["least-squares", "zero-turn-first"]
-
-TILT = 0.05
-"""Change of the accelerometer reading, in g, above which a move was no turn about the vertical."""
-
-
-def turns_from_segments(segments: Segments) -> tuple[list[Turn], list[tuple[int, int]]]:
-    """Moves as turns of unknown angle and axis, holds as zero turns ``(start, stop)``.
-
-    A turn on a table leaves the accelerometer's reading where it was; a move that changes it by more than 3 degrees (or
-    noise) put the case on another face and is no turn of method 1.
-    """
-    moves = [move for move in segments.moves if move.stop - move.start >= 2]
-    mean, sigma = segments.accelerometer_mean, segments.accelerometer_sigma
-    if mean is not None and sigma is not None and len(mean) > 1:
-        # Opposite faces are two g apart; with fewer poses the farthest pair underestimates g, which only makes it
-        # strict.
-        one_g = 0.5 * float(np.max(np.linalg.norm(mean[:, None] - mean[None], axis=2)))
-        allowed = max(TILT * one_g, 6.0 * float(np.linalg.norm(sigma)))
-        moves = [m for m in moves if np.linalg.norm(mean[m.pose_after] - mean[m.pose_before]) < allowed]
-    return [Turn(move.start, move.stop) for move in moves], [
-        (pose.start, pose.stop) for pose in segments.poses if pose.stop - pose.start >= 2
-    ]
 
 
 def calibrate_turns(
@@ -66,9 +39,6 @@ def calibrate_turns(
     *,
     nominal_scale: FloatArray | float | None = None,
     nominal_tolerance: float = SCALE_TOLERANCE,
-    quantum_rad: float = QUARTER,
-    route: Route = "least-squares",
-    sigma_turn_rad: float | None = None,
     shared_errors: FloatArray | None = None,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Calibrate the gyro from turns about case axes: ``φ'_i = S_w φ_i + b_w Δt_i + δφ_i`` (equation 5.12).
@@ -82,14 +52,10 @@ def calibrate_turns(
     zeros : sequence of (start, stop)
         Stretches without rotation: zero turns.
     nominal_scale : (3, 3) or float, optional
-        rad/s per raw unit, to recognise the multiples of ``quantum_rad``; the unit tells it unless readings are counts.
+        rad/s per raw unit, to recognise quarter turns; the unit tells it unless readings are counts.
         Turns whose angle and axis are given need none, and are believed where they span three axes.
     nominal_tolerance : float
         How far, relatively, the nominal scale may be from the truth.
-    route : "least-squares" or "zero-turn-first"
-        All rows at once (default), or ``b_w`` from the zero turns alone, then ``S_w`` from ``Δw' = w' − b_w``.
-    sigma_turn_rad : float, optional
-        Standard error of a turn's angle (wall, corners); estimated from the residuals when not given.
     shared_errors : (k, 3, m), optional
         What one standard error of each of m independent errors that all turns share does to the turns, rad.
 
@@ -106,12 +72,11 @@ def calibrate_turns(
 
     Notes
     -----
-    White rate noise ``N`` [unit/√Hz] gives ``var δφ = N² Δt``. For the same turns the covariance of the second route is
-    never smaller: it does not use the turns for ``b_w``.
+    White rate noise ``N`` [unit/√Hz] gives ``var δφ = N² Δt``.
     """
     measured = measure_turns(recording, turns, zeros)
     nominal = nominal_matrix(recording, measured, turns, nominal_scale)
-    known = identify_turns(measured, turns, nominal, quantum_rad, nominal_tolerance)
+    known = identify_turns(measured, turns, nominal, nominal_tolerance)
     used = np.array([turn.is_used for turn in known], dtype=bool)
     _require_every_axis(known, used, rate_to_si(recording.gyroscope_unit) is None)
     roughly = np.asarray(np.linalg.inv(nominal), dtype=np.float64)
@@ -119,45 +84,31 @@ def calibrate_turns(
     faces = np.array([turn.face for turn in turns], dtype=np.int64)
     vectors = np.array([turn.vector for turn in known])
     system = TurnSystem(measured, vectors, roughly, sigma_directions=sigmas, faces=faces)
-    screened = screen(system, used, sigma_turn_rad)
+    screened = screen(system, used)
     system, used = screened.system, screened.used
-    fit = solve_zero_first(system, used) if route == "zero-turn-first" else solve(system, used)
+    fit = solve(system, used)
     S, b = other_form(fit.S_w, fit.b_w)
     inflation = _inflation(fit)
-    shared = _of_shared_errors(system, fit, used, route, shared_errors)
+    added = system.correlation(fit, used)
+    if shared_errors is not None:
+        pull = system.pull(fit, used, shared_errors)
+        added = added + pull @ pull.T
     calibration = SensorCalibration(
         S=S,
         b=b,
-        covariance=_covariance(fit, inflation, shared),
+        covariance=_covariance(fit, inflation, added),
         raw_unit=recording.gyroscope_unit.value,
         si_unit="rad/s",
-        method="turns" if route == "least-squares" else "turns, bias first",
+        method="turns",
         quality=_quality(system, used, fit, S),
         observability=_observability(system, used, fit),
     )
     deviation = (measured.raw_angle - np.outer(measured.duration_s, fit.b_w)) @ S.T - system.angles
-    return calibration, turn_findings(
-        known, screened, deviation, S, inflation, fit.dof, quantum_rad, is_sigma_given=sigma_turn_rad is not None
-    )
-
-
-def _of_shared_errors(
-    system: TurnSystem,
-    fit: Solution,
-    used: npt.NDArray[np.bool_],
-    route: Route,
-    shared_errors: FloatArray | None,
-) -> FloatArray:
-    """(12, 12) that errors which turns share add to the covariance of the inverse form."""
-    added = np.zeros((12, 12)) if route == "zero-turn-first" else system.correlation(fit, used)
-    if shared_errors is not None:
-        pull = system.pull(fit, used, shared_errors)
-        added = added + pull @ pull.T
-    return added
+    return calibration, turn_findings(known, screened, deviation, S, inflation, fit.dof)
 
 
 def _covariance(fit: Solution, inflation: float, added: FloatArray) -> FloatArray:
-    """(12, 12) of the direct form."""
+    """(12, 12) of the direct form; ``added`` are errors that turns share, in the inverse form."""
     jacobian = other_form_jacobian(fit.S_w, fit.b_w)
     covariance: FloatArray = jacobian @ (inflation * fit.covariance + added) @ jacobian.T
     return 0.5 * (covariance + covariance.T)

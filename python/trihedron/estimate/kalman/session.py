@@ -10,9 +10,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.kalman.norm_invariant import NormFrame, calibrate_without_references
-from trihedron.estimate.kalman.norm_start import NormStart
-from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
-from trihedron.estimate.kalman.shaping import ShapingOptions
+from trihedron.estimate.kalman.per_axis import calibrate_with_references
 from trihedron.records import (
     AxisNoise,
     Finding,
@@ -135,8 +133,6 @@ def calibrate_session(
     table: PoseTable,
     *,
     noise: AxisNoise | Sequence[AxisNoise] | None = None,
-    prior: Prior | None = None,
-    options: ShapingOptions | None = None,
 ) -> KalmanCalibration:
     """Calibrate the accelerometer of a recording in the known attitudes of a pose table, all methods side by side.
 
@@ -156,8 +152,6 @@ def calibrate_session(
         start_s=poses.start_s,
         pose_s=poses.pose_s,
         extra_variance=extra,
-        prior=prior,
-        options=options,
         raw_unit=recording.accelerometer_unit.value,
     )
     return replace(result, findings=(*findings, *result.findings))
@@ -169,9 +163,7 @@ def calibrate_session_without_references(
     *,
     gravity_m_s2: float,
     noise: AxisNoise | Sequence[AxisNoise] | None = None,
-    start: NormStart | None = None,
     frame: NormFrame = "lower",
-    options: ShapingOptions | None = None,
 ) -> NormKalmanCalibration:
     """Calibrate the accelerometer of a recording from the length of gravity in its poses.
 
@@ -188,10 +180,8 @@ def calibrate_session_without_references(
         start_s=poses.start_s,
         pose_s=poses.pose_s,
         gravity_m_s2=gravity_m_s2,
-        start=start,
         frame=frame,
         extra_variance=extra,
-        options=options,
         raw_unit=recording.accelerometer_unit.value,
     )
     return replace(result, findings=(*findings, *result.findings))

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from trihedron.errors import RefusedError
 from trihedron.simulate.effects.sizes import Sensor, Values, checked, triple
-from trihedron.simulate.motion import Disturb, Motion, Pose, Step, Turn, Vibrate
+from trihedron.simulate.motion.steps import Disturb, Motion, Pose, Step, Turn, Vibrate
 from trihedron.simulate.scenario import Loss, Scenario
 
 

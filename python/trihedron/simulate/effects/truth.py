@@ -10,7 +10,7 @@ import numpy as np
 
 from trihedron.simulate.effects.response import mass_response, response
 from trihedron.simulate.effects.sizes import triple
-from trihedron.simulate.motion import Disturb, Motion, Pose, Turn
+from trihedron.simulate.motion.steps import Disturb, Motion, Pose, Turn
 from trihedron.simulate.readout import Electronics
 from trihedron.simulate.scenario import Scenario, Temperature
 
