@@ -122,7 +122,7 @@ def calibrate(
         raise typer.BadParameter("--labels belong to several logs")
     recording = sources.one().read()
     from trihedron import api
-    from trihedron.report import calibration_report
+    from trihedron.report.reference import calibration_result_report
 
     with progress("calibrating") as tell:
         result = api.calibrate(
@@ -138,7 +138,7 @@ def calibrate(
         )
         if extended:
             result = api.extend(result, progress=tell)
-    document = calibration_report(result.calibration, result.segments, recording)
+    document = calibration_result_report(result)
     more = "Every pose and move: --full, or --report FILE.html with figures."
 
     def machine() -> dict[str, Any]:
@@ -146,7 +146,7 @@ def calibrate(
 
         return calibration_record(result.calibration, result.segments, recording)
 
-    ending.tell(document, machine, result.calibration, FIRST_SCREEN, more)
+    ending.tell(document, machine, result.calibration, FIRST_SCREEN + (result.reference is not None), more)
 
 
 def _only(references: list[Path] | None) -> Path | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 
 from trihedron.records import Finding
@@ -47,7 +48,7 @@ from trihedron.report.numbers import (
     plain_number,
     power_of_ten,
 )
-from trihedron.report.reference import reference_blocks
+from trihedron.report.reference import beside_reference
 
 _CAPTIONS = {
     "static-accel": "Gravity error in every static pose.",
@@ -97,18 +98,21 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
     if diagnosis.residuals:
         sections.append(Section("Figures", tuple(_picture(diagnosis, one) for one in diagnosis.residuals)))
     found = getattr(diagnosis, "reference", None)
-    if found is not None:
-        sections.insert(0, Section("Against the reference", reference_blocks(found)))
-    return Document(
+    strengths = strengths_picture(diagnosis)
+    if found is not None and strengths is not None:
+        # The reference's own error leads then.
+        sections[0] = replace(sections[0], blocks=(*sections[0].blocks, strengths))
+    document = Document(
         title="Diagnosis",
         subtitle=diagnosis.recording_source,
         verdict=verdict_in_words(diagnosis),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
         headlines=tuple(_headlines(diagnosis)),
-        lead=strengths_picture(diagnosis),
+        lead=strengths,
         stated_level=_LEVELS[diagnosis.verdict],
     )
+    return beside_reference(document, found)
 
 
 def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
