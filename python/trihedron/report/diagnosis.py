@@ -12,7 +12,7 @@ from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pictures
-from trihedron.report.diagnosis_charts import before_after_chart, effect_chart
+from trihedron.report.diagnosis_charts import before_after_chart
 from trihedron.report.diagnosis_models import models_blocks
 from trihedron.report.diagnosis_numbers import (
     differing_blocks,
@@ -40,6 +40,7 @@ from trihedron.report.diagnosis_words import (
 )
 from trihedron.report.document import Block, Document, Facts, Headline, Level, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
+from trihedron.report.effect_charts import effect_chart
 from trihedron.report.findings import findings_block
 from trihedron.report.numbers import (
     engineering_exponent,
@@ -298,7 +299,9 @@ def _physics(diagnosis: Diagnosis) -> list[Picture]:
     for effect in diagnosis.effects:
         chart = effect_chart(effect, diagnosis.residuals, *made)  # type: ignore[arg-type]
         if chart is not None:
-            caption = f"{effect.id}: data (dots) against the driving variable, with the model. "
+            caption = f"{effect.id}: curve over the variable that drives it, with what poses show (dots). "
+            if not effect.curves:
+                caption = f"{effect.id}: the residual that it explains. "
             caption += _without_strongest(effect.statement)
             out.append(Picture(f"effect-{effect.id}", caption, None, lambda drawn=chart: drawn))  # type: ignore[misc]
     return out
