@@ -16,12 +16,12 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.hypothesis import Hypothesis
-from trihedron.diagnose.residuals.effect_curves import effect_curves
+from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curves
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
 from trihedron.diagnose.sample_evidence import Seen
 from trihedron.diagnose.search import Found
 from trihedron.diagnose.session.solve import Fit, leverage
-from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, Stage, StageDomain
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectCurve, EffectParameter, Stage, StageDomain
 from trihedron.records.domains import DomainResiduals, HeldOut
 
 HEADLINE = 0.5
@@ -97,7 +97,7 @@ def accepted_effects(answer: Answer, residuals: Sequence[DomainResiduals]) -> tu
 
     ``residuals`` of poses with all of them stand beside their curves.
     """
-    made = [*_of_terms(answer, residuals), *_of_biases(answer), *_of_samples(answer)]
+    made = [*_of_terms(answer, residuals), *_of_biases(answer, residuals), *_of_samples(answer)]
     rows = []
     for record, (effect, _, own), share in zip(made, answer.gains, answer.shares, strict=True):
         is_behind = effect.is_spread or (own is not None and share < HEADLINE)
@@ -131,10 +131,11 @@ def _of_terms(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[dict
     return out
 
 
-def _of_biases(answer: Answer) -> list[dict[str, Any]]:
+def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[dict[str, Any]]:
     model, out = answer.found.model, []
     for one in answer.biases:
         extra: dict[str, Any] = {}
+        curves: tuple[EffectCurve, ...] = ()
         if one.effect.walks:
             twin, obs = model.fitted.twin, model.obs
             path = twin.accel_bias if one.effect.sensor == 0 else twin.gyro_bias
@@ -142,11 +143,13 @@ def _of_biases(answer: Answer) -> list[dict[str, Any]]:
                 "time_s": obs.pose_time_s.tolist(), "value": path.T.tolist(),
                 "sigma": [[float(s)] * obs.n_poses for s in one.std], "unit": one.effect.unit,
             }  # fmt: skip
+            curves = bias_curves(model.context, one.effect.sensor, path, one.std, residuals)
         # Half of a chi-square with one degree of freedom: the strength lies at its boundary without it.
         p = float(np.exp(-0.5 * max(one.gain, 0.0)))
         held = held_out_records(one.without, model)
         rivals = explain_as_much(one, model, answer.found.tried.values())
-        out.append(_record(one.effect, one.parameters, one.statement, p, one.score, rivals, held, **extra))
+        record = _record(one.effect, one.parameters, one.statement, p, one.score, rivals, held, **extra)
+        out.append(record | {"curves": curves})
     return out
 
 

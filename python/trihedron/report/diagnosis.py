@@ -299,12 +299,18 @@ def _physics(diagnosis: Diagnosis) -> list[Picture]:
     for effect in diagnosis.effects:
         chart = effect_chart(effect, diagnosis.residuals, *made)  # type: ignore[arg-type]
         if chart is not None:
-            caption = f"{effect.id}: curve over the variable that drives it, with what poses show (dots). "
-            if not effect.curves:
-                caption = f"{effect.id}: the residual that it explains. "
+            caption = f"{effect.id}: {_drawn_in_words(effect)}. "
             caption += _without_strongest(effect.statement)
             out.append(Picture(f"effect-{effect.id}", caption, None, lambda drawn=chart: drawn))  # type: ignore[misc]
     return out
+
+
+def _drawn_in_words(effect: AcceptedEffect) -> str:
+    if not effect.curves:
+        return "the residual that it explains"
+    beside = any(len(one.data) for one in effect.curves)
+    shown = "with what poses show (dots)" if beside else "and the residual of the moves in which it acts"
+    return f"what it adds, over the variable that drives it, {shown}"
 
 
 def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:

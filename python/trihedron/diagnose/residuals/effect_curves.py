@@ -93,6 +93,28 @@ def effect_curves(
     return tuple(out)
 
 
+def bias_curves(
+    context: Context, sensor: int, path: FloatArray, std: FloatArray, residuals: Sequence[DomainResiduals]
+) -> tuple[EffectCurve, ...]:
+    """A bias that walks as curves over time: ``path`` (poses, 3) with standard errors (3,), SI."""
+    name, _, domain = SIDES[sensor]
+    h = context.obs.n_poses
+    left = next((one for one in residuals if one.domain == domain), None)
+    time = Driver("time", 0, context.time_s)
+    out = []
+    for axis in range(3):
+        column = _Column(axis, np.zeros(context.n_points), np.eye(3)[axis], time, False)
+        poses, data = _of_poses(context, name, column, left)
+        out.append(
+            EffectCurve(
+                name, axis, "time", 0, False,  # type: ignore[arg-type]
+                time.values[:h], path[:, axis], np.full(h, std[axis]),
+                tuple(int(k) for k in poses), time.values[poses], data + path[poses, axis],
+            )
+        )  # fmt: skip
+    return tuple(out)
+
+
 def _driven(context: Context, known: Sequence[Driver], column: FloatArray, k: int) -> _Column | None:
     """The variable that a column (points, 3) is a function of, by itself or as a part of the sensor's own reading."""
     _, strength, rows = np.linalg.svd(column, full_matrices=False)
@@ -160,7 +182,11 @@ def _curve(
     seen = count > 0
     table = np.stack([_means(place, count, one.g)[seen] for one in group], axis=1)
     poses, data = _of_poses(context, sensor, first, left)
-    added = np.stack([one.g[: context.obs.n_poses] for one in group], axis=1) @ value
+    posed = np.stack([one.g[: context.obs.n_poses] for one in group], axis=1)
+    if name not in ("force", "rate"):
+        # Its level is the bias's, or the scale's: a curve is known about its mean.
+        level = np.nanmean(posed, axis=0) if np.isfinite(posed).any(axis=0).all() else table.mean(axis=0)
+        table, posed = table - level, posed - level
     return EffectCurve(
         sensor=sensor,  # type: ignore[arg-type]
         axis=axis, driver=name, driver_axis=driver_axis, is_relative=is_relative,
@@ -169,7 +195,7 @@ def _curve(
         sigma=np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", table, covariance, table), 0.0)),
         poses=tuple(int(k) for k in poses),
         data_x=first.driver.values[poses],
-        data=data + added[poses],
+        data=data + posed[poses] @ value,
     )  # fmt: skip
 
 
