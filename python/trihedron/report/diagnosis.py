@@ -29,6 +29,7 @@ from trihedron.report.diagnosis_overview_charts import (
 from trihedron.report.diagnosis_relations import relations_blocks
 from trihedron.report.diagnosis_words import (
     MEANING,
+    next_step_in_words,
     p_in_words,
     printed_unit,
     quantity,
@@ -111,6 +112,7 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         sections=tuple(sections),
         headlines=tuple(_headlines(diagnosis)),
         lead=strengths,
+        next_step=next_step_in_words(diagnosis),
         stated_level=_LEVELS[diagnosis.verdict],
     )
     return beside_reference(document, found)
@@ -134,7 +136,8 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     )
     judged, figures = (("with the effects",), ("rms with them", "χ²/dof with them")) if has_effects else ((), ())
     head = ("residual", "linear model", *judged, "rms", "χ²/dof", "p", *figures)
-    blocks: list[Block] = [Table(head, rows)]
+    caption = "Residuals by domain; χ²/dof is 1 by noise alone"
+    blocks: list[Block] = [Table(head, rows, caption)]
     # Which parameters differ has a section of its own.
     places = tuple(
         (MEANING[d.domain], place)
@@ -244,7 +247,7 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
             quantity(held),
             *(
                 "–" if held.rms_before == held.rms_after == 0.0 else size_in_words(v, held.unit)
-                for v in _both_rms(held)
+                for v in (held.rms_before, held.rms_after)
             ),
             plain_number(held.chi2_per_dof_before),
             plain_number(held.chi2_per_dof_after),
@@ -257,10 +260,6 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
     head = ("effect", "residual", "rms before", "rms after", "χ²/dof before", "after")
     caption = "Poses and moves predicted by fits that did not see them (held out); noise alone gives χ²/dof 1"
     return (Table(head, rows, caption),)
-
-
-def _both_rms(held: HeldOut) -> tuple[float, float]:
-    return held.rms_before, held.rms_after
 
 
 def _candidates(diagnosis: Diagnosis) -> Block:
