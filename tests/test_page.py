@@ -122,6 +122,15 @@ def test_the_first_screen_says_what_to_do(folder, browser, kind):
     visit.page.close()
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_page_fits_the_paper(folder, browser, kind):
+    # A4 less margins of 13 mm: 184 mm at 96 to the inch.
+    page = Visit(browser, folder / f"{kind}.html", 695, "light").page
+    page.emulate_media(media="print")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 695
+    page.close()
+
+
 @pytest.mark.parametrize("kind", ["calibrate", "diagnose"])
 def test_tools_of_a_figure_hide_no_mark_on_a_phone(folder, browser, kind):
     page = Visit(browser, folder / f"{kind}.html", 390, "light").page
