@@ -13,7 +13,9 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from playwright.sync_api import sync_playwright
+from scipy.spatial.transform import Rotation
 
 from trihedron.cli import main
 from trihedron.files.log import write_recording
@@ -22,6 +24,7 @@ from trihedron.simulate import hand_session, scenario_by_name, simulate
 FIGURES = Path(__file__).parents[1] / "docs" / "figures"
 GRAVITY = ("--gravity", "9.80665")
 VIEWS = ((1280, 860, "light"), (390, 844, "dark"))
+TRACKED_HZ = 100.0
 ON_A_PHONE = ("calibrate", "diagnose")
 """Pages that are also shown as a phone in the dark shows them."""
 
@@ -39,6 +42,28 @@ def logs(folder: Path) -> list[str]:
     return made
 
 
+def beside_a_tracker(folder: Path) -> tuple[str, str]:
+    """A log of a body that rocks for two minutes, and a tracker whose room wanders by a tenth of a degree."""
+    rng = np.random.default_rng(7)
+    time = np.arange(0.0, 120.0, 1.0 / TRACKED_HZ)
+    gate = np.clip(np.minimum(time - 5.0, 115.0 - time) / 2.0, 0.0, 1.0)
+    angles = [gate * sum(np.sin(2 * np.pi * f * time + p) for f, p in rng.uniform(0.05, 0.6, (4, 2))) for _ in range(3)]
+    attitude = Rotation.from_euler("ZYX", 0.5 * np.column_stack(angles))
+    rate = np.zeros((len(time), 3))
+    rate[1:-1] = (attitude[:-2].inv() * attitude[2:]).as_rotvec() * TRACKED_HZ / 2.0
+    force = attitude.inv().apply([0.0, 0.0, 9.80665])
+    gyro = rate * 1.01 + 0.004 + 2e-3 * rng.normal(size=rate.shape)
+    accelerometer = force * 1.005 + 0.1 + 0.02 * rng.normal(size=force.shape)
+    wander = np.radians(0.1) * np.column_stack([np.sin(time / 5.0), np.cos(time / 7.0), 0.0 * time])
+    mounted = Rotation.from_rotvec([0.02, -0.03, 0.05])
+    seen = (Rotation.from_rotvec(wander) * attitude * mounted).as_quat()[:, [3, 0, 1, 2]]
+    names = (folder / "rocked.csv", folder / "tracker.csv")
+    log = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
+    np.savetxt(names[0], np.column_stack([time, accelerometer, gyro]), "%.7g", ",", header=log, comments="")
+    np.savetxt(names[1], np.column_stack([time, seen]), "%.9g", ",", header="t [s],qw,qx,qy,qz", comments="")
+    return str(names[0]), str(names[1])
+
+
 def pages(folder: Path) -> dict[str, Path]:
     """A page of every kind by name."""
     first, *others = logs(folder)
@@ -54,6 +79,9 @@ def pages(folder: Path) -> dict[str, Path]:
     for name, line in lines.items():
         found[name] = folder / f"{name}.html"
         main([*line, "--report", str(found[name])])
+    log, truth = beside_a_tracker(folder)
+    found["reference"] = folder / "reference.html"
+    main(["diagnose", log, "--reference", truth, *GRAVITY, "--report", str(found["reference"])])
     main(["fleet", str(folder / "*" / "log.csv"), "-o", str(folder / "fleet"), "--workers", "0", *GRAVITY])
     return {**found, "fleet": folder / "fleet" / "fleet.html"}
 

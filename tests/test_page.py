@@ -106,6 +106,40 @@ def test_a_report_works_on_a_phone_and_in_the_dark_and_has_no_barrier(folder, br
         page.close()
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_table_has_a_caption(folder, kind):
+    # A table without one is announced as a mere table.
+    assert 'aria-label="table"' not in (folder / f"{kind}.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("kind", ["calibrate", "allan", "kalman", "diagnose", "plan", "check", "segment", "verify"])
+def test_the_first_screen_says_what_to_do(folder, browser, kind):
+    visit = Visit(browser, folder / f"{kind}.html", 1280, "light")
+    told = [box for part in (".foremost", ".next") if (box := visit.page.query_selector(part)) is not None]
+    assert told
+    assert all(0 < box.bounding_box()["y"] < 400 for box in told)
+    assert any("→" in box.inner_text() for box in told)
+    visit.page.close()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_page_fits_the_paper(folder, browser, kind):
+    # A4 less margins of 13 mm: 184 mm at 96 to the inch.
+    page = Visit(browser, folder / f"{kind}.html", 695, "light").page
+    page.emulate_media(media="print")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 695
+    page.close()
+
+
+@pytest.mark.parametrize("kind", ["calibrate", "diagnose"])
+def test_tools_of_a_figure_hide_no_mark_on_a_phone(folder, browser, kind):
+    page = Visit(browser, folder / f"{kind}.html", 390, "light").page
+    for panel in page.query_selector_all("header .panel"):
+        tools, plot = panel.query_selector(".tools").bounding_box(), panel.query_selector(".plot").bounding_box()
+        assert tools["y"] + tools["height"] <= plot["y"] + 1.0
+    page.close()
+
+
 @pytest.mark.parametrize("kind", ["calibrate", "allan", "diagnose"])
 def test_the_verdict_the_number_and_its_figure_are_on_the_first_screen(folder, browser, kind):
     visit = Visit(browser, folder / f"{kind}.html", 1280, "light")

@@ -15,6 +15,7 @@ from trihedron.report.diagnosis_against_charts import (
     stages_chart,
     stages_pictures,
 )
+from trihedron.report.diagnosis_numbers import stages_blocks
 
 EDGES = np.array([[2.0**k, 2.0 ** (k + 1)] for k in range(-3, 8)])
 
@@ -73,3 +74,14 @@ def test_every_domain_is_a_slope_from_its_own_first_stage():
     assert chart.panels[0].x.names == ("as given", "parameters", "noise", "effects")
     assert len(stages_pictures(SimpleNamespace(stages=stages))) == 1
     assert stages_pictures(SimpleNamespace(stages=())) == ()
+
+
+def test_a_domain_that_no_stage_changes_has_no_row():
+    def stage(name, moves):
+        domains = (StageDomain("moves", moves, None, "deg"), StageDomain("noise", 0.574, None, "dB"))
+        return Stage(name, domains)
+
+    found = SimpleNamespace(stages=(stage("as-given", 1.5), stage("numbers", 0.03)))
+    (table,) = stages_blocks(found, {"moves": "tilt", "noise": "noise"})
+    assert [row[0] for row in table.rows] == ["tilt [°]"]
+    assert table.caption.endswith("noise: the same in every stage")

@@ -133,7 +133,8 @@ def calibrate(
 
         found = held_against(recording, reference, gravity, columns=reference_columns)
         by_motion = calibration_by(found, recording, gravity, source, frame)
-        return _result(by_motion, (*said, *by_motion.findings), segments, recording)
+        result = _result(by_motion, (*said, *by_motion.findings), segments, recording)
+        return replace(result, reference=found)
     _require_poses(recording, segments)
     if method == "faces":
         calibration = _by_faces(recording, segments, gravity, source, faces, turns_deg, gyroscope_nominal)

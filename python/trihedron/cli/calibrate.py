@@ -118,7 +118,7 @@ def calibrate(
         raise typer.BadParameter("--labels belong to several logs")
     recording = sources.one().read()
     from trihedron.api import calibrating
-    from trihedron.report import calibration_report
+    from trihedron.report.reference import calibration_result_report
 
     with progress("calibrating") as tell:
         result = calibrating.calibrate(
@@ -134,7 +134,7 @@ def calibrate(
             from trihedron.api import extending
 
             result = extending.extend(result, progress=tell)
-    document = calibration_report(result.calibration, result.segments, recording)
+    document = calibration_result_report(result)
     more = "Every pose and move: --full, or --report FILE.html with figures."
 
     def machine() -> dict[str, Any]:
@@ -142,7 +142,7 @@ def calibrate(
 
         return calibration_record(result.calibration, result.segments, recording)
 
-    ending.tell(document, machine, result.calibration, FIRST_SCREEN, more)
+    ending.tell(document, machine, result.calibration, FIRST_SCREEN + (result.reference is not None), more)
 
 
 def _only(references: list[Path] | None) -> Path | None:

@@ -16,12 +16,13 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.hypothesis import Hypothesis
+from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curves
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
 from trihedron.diagnose.sample_evidence import Seen
 from trihedron.diagnose.search import Found
 from trihedron.diagnose.session.solve import Fit, leverage
-from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, Stage, StageDomain
-from trihedron.records.domains import HeldOut
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectCurve, EffectParameter, Stage, StageDomain
+from trihedron.records.domains import DomainResiduals, HeldOut
 
 HEADLINE = 0.5
 """What carries less than half of the samples' own variance (a faint line) or poses (one bump) follows behind whatever
@@ -91,9 +92,12 @@ def excess(fitted: Fit) -> float:
     return out
 
 
-def accepted_effects(answer: Answer) -> tuple[AcceptedEffect, ...]:
-    """Every accepted effect with its parameters, the one that explains most of the misfit first."""
-    made = [*_of_terms(answer), *_of_biases(answer), *_of_samples(answer)]
+def accepted_effects(answer: Answer, residuals: Sequence[DomainResiduals]) -> tuple[AcceptedEffect, ...]:
+    """Every accepted effect with its parameters, the one that explains most of the misfit first.
+
+    ``residuals`` of poses with all of them stand beside their curves.
+    """
+    made = [*_of_terms(answer, residuals), *_of_biases(answer, residuals), *_of_samples(answer)]
     rows = []
     for record, (effect, _, own), share in zip(made, answer.gains, answer.shares, strict=True):
         is_behind = effect.is_spread or (own is not None and share < HEADLINE)
@@ -106,28 +110,32 @@ def _shared(record: dict[str, Any], share: float) -> AcceptedEffect:
     return AcceptedEffect(**record, share=share)
 
 
-def _of_terms(answer: Answer) -> list[dict[str, Any]]:
+def _of_terms(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[dict[str, Any]]:
     found, out = answer.found, []
     for k, term in enumerate(found.model.terms):
         effect, variant = term.effect, term.variant
         value, covariance = answer.numbers.value(k)
         parameters = effect.parameters(variant, value, covariance)
         wald = _p_of(value, covariance)
+        columns = variant.distortion.force, variant.distortion.rate
+        is_drawn = not effect.is_local
+        curves = effect_curves(found.model.context, columns, value, covariance, residuals) if is_drawn else ()
         out.append(
             _record(
                 effect, parameters, effect.statement(parameters), wald, found.scores[k], found.rivals[k],
                 held_out_records(found.without[k], found.model),
                 variant=variant.label, shape={name: v for name, (v, _) in variant.shape.items()},
                 values=[float(v) for v in value],
-            )
+            ) | {"curves": curves}
         )  # fmt: skip
     return out
 
 
-def _of_biases(answer: Answer) -> list[dict[str, Any]]:
+def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[dict[str, Any]]:
     model, out = answer.found.model, []
     for one in answer.biases:
         extra: dict[str, Any] = {}
+        curves: tuple[EffectCurve, ...] = ()
         if one.effect.walks:
             twin, obs = model.fitted.twin, model.obs
             path = twin.accel_bias if one.effect.sensor == 0 else twin.gyro_bias
@@ -135,11 +143,13 @@ def _of_biases(answer: Answer) -> list[dict[str, Any]]:
                 "time_s": obs.pose_time_s.tolist(), "value": path.T.tolist(),
                 "sigma": [[float(s)] * obs.n_poses for s in one.std], "unit": one.effect.unit,
             }  # fmt: skip
+            curves = bias_curves(model.context, one.effect.sensor, path, one.std, residuals)
         # Half of a chi-square with one degree of freedom: the strength lies at its boundary without it.
         p = float(np.exp(-0.5 * max(one.gain, 0.0)))
         held = held_out_records(one.without, model)
         rivals = explain_as_much(one, model, answer.found.tried.values())
-        out.append(_record(one.effect, one.parameters, one.statement, p, one.score, rivals, held, **extra))
+        record = _record(one.effect, one.parameters, one.statement, p, one.score, rivals, held, **extra)
+        out.append(record | {"curves": curves})
     return out
 
 

@@ -134,10 +134,11 @@ def diagnosed(
     # Without anything missing the numbers are those of a calibration of this recording.
     base = run.bare.fitted
     final = base if verdict == "consistent" else answer.numbers.fitted
+    residuals = residuals_before_after(run.predicted, answer.judged, {one.effect.sensor for one in answer.biases})
     result = Diagnosis(
         verdict=verdict,
         domains=run.domains,
-        effects=accepted_effects(answer),
+        effects=accepted_effects(answer, residuals),
         remaining=run.remaining,
         candidates=candidates(answer, run.candidates, run.asked),
         baseline=with_covariance(linear_model(base), base),
@@ -148,7 +149,7 @@ def diagnosed(
         recording_source=recording.source,
         recording_sha256=recording.sha256,
         references=MappingProxyType(model.context.references),
-        residuals=residuals_before_after(run.predicted, answer.judged, {one.effect.sensor for one in answer.biases}),
+        residuals=residuals,
         relations=relations,
         stages=held_out_stages(run.bare, answer),
     )

@@ -26,6 +26,29 @@ class EffectParameter(Plain):
     unit: str
 
 
+@dataclass(frozen=True, eq=False)
+class EffectCurve(Frozen):
+    """What an effect adds to one sensor's reading along one axis, as a function of one variable, and poses beside it.
+
+    ``driver`` is ``force``, ``rate`` (of ``driver_axis``), ``temperature``, ``supply``, ``vibration`` or ``time``, SI.
+    ``value`` (m,) at ``x`` (m,) with ``sigma`` (m,): m/s² or rad/s, or, with ``is_relative``, part of the reading.
+    ``data`` (n,) at ``data_x`` (n,) of ``poses`` (n,), counted from 0: what is left of each and the curve; none where
+    poses do not show it.
+    """
+
+    sensor: Literal["accelerometer", "gyroscope"]
+    axis: int
+    driver: str
+    driver_axis: int
+    is_relative: bool
+    x: FloatArray
+    value: FloatArray
+    sigma: FloatArray
+    poses: tuple[int, ...]
+    data_x: FloatArray
+    data: FloatArray
+
+
 @dataclass(frozen=True)
 class AcceptedEffect(Frozen, Plain):
     """An effect the recording demands, or, with ``side`` ``model``, one that only the given model has.
@@ -44,6 +67,7 @@ class AcceptedEffect(Frozen, Plain):
     model: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     share: float | None = None
     side: Literal["recording", "model"] = "recording"
+    curves: tuple[EffectCurve, ...] = ()
     LAYOUT: ClassVar[Layout] = Layout(
         {"side": "in", "held_out": "heldout_all"},
         (

@@ -176,6 +176,22 @@ class BiasOverTime(Plain):
 
 
 @dataclass(frozen=True, eq=False)
+class ErrorOverTime(Plain):
+    """Attitude of the reference against the calibrated gyro's over the log's time (m,): rotation vectors (m, 3) [rad].
+
+    Along the axes of the reference's world, about their mean; NaN where the reference has no rows. The reference's own
+    error, and beside it what the gyro's white noise adds since the beginning, ``walk`` [rad/√s].
+    """
+
+    time_s: FloatArray
+    angle: FloatArray
+    walk: float
+
+
+NOWHERE = ErrorOverTime(np.zeros(0), np.zeros((0, 3)), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
 class AgainstReference(Plain):
     """Everything that a reference says of a log: clocks, mounting, lever arm, both sensors, effects, replay.
 
@@ -207,6 +223,7 @@ class AgainstReference(Plain):
     residual_rate: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     earth_rate: Estimate | None = None
     frame_covariance: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
+    apart: ErrorOverTime = NOWHERE
     LAYOUT: ClassVar[Layout] = Layout(
         {},
         (

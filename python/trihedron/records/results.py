@@ -28,6 +28,8 @@ class CalibrationResult(Presented):
         The poses and moves that were used.
     recording : Recording
         The log, in its own unit.
+    reference : AgainstReference, optional
+        What known motion beside the log said, where it was calibrated by that.
 
     Examples
     --------
@@ -40,6 +42,7 @@ class CalibrationResult(Presented):
     calibration: Calibration
     segments: Segments
     recording: Recording
+    reference: AgainstReference | None = None
 
     @property
     def accelerometer(self) -> SensorCalibration:

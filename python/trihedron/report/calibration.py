@@ -31,6 +31,7 @@ from trihedron.units import mm_s2_from_m_s2, mrad_from_radians
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
 """The field's names of the frames."""
+NEXT = "Test it on another recording (trihedron verify), then use it (trihedron apply, trihedron export)."
 MOST_PAIRS = 6
 """Correlated pairs that one line names; the table of correlations holds them all."""
 SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
@@ -62,6 +63,7 @@ def calibration_report(
         sections=tuple(sections),
         headlines=tuple(_headlines(calibration)),
         lead=lead_picture(calibration, segments),
+        next_step=NEXT if calibration.is_trustworthy else "",
     )
 
 

@@ -33,6 +33,7 @@ def check_report(
         ),
         headlines=tuple(_headlines(segments, calibration)),
         lead=signals_picture(recording, segments),
+        next_step="Calibrate: trihedron calibrate LOG -o FILE.",
     )
 
 

@@ -126,7 +126,7 @@ def _truth_table(comparison: Comparison) -> Table:
                 f"{comparison.z[k]:+.1f}".replace("-", "−"),
             )
         )
-    return Table(("", "truth", "estimate ± σ", "error in σ"), tuple(rows))
+    return Table(("", "truth", "estimate ± σ", "error in σ"), tuple(rows), "Every parameter beside the truth")
 
 
 def _coverage(comparison: Comparison) -> str:

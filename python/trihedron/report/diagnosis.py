@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 
 from trihedron.records import Finding
@@ -11,7 +12,7 @@ from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pictures
-from trihedron.report.diagnosis_charts import before_after_chart, effect_chart
+from trihedron.report.diagnosis_charts import before_after_chart
 from trihedron.report.diagnosis_models import models_blocks
 from trihedron.report.diagnosis_numbers import (
     differing_blocks,
@@ -28,6 +29,7 @@ from trihedron.report.diagnosis_overview_charts import (
 from trihedron.report.diagnosis_relations import relations_blocks
 from trihedron.report.diagnosis_words import (
     MEANING,
+    next_step_in_words,
     p_in_words,
     printed_unit,
     quantity,
@@ -39,6 +41,7 @@ from trihedron.report.diagnosis_words import (
 )
 from trihedron.report.document import Block, Document, Facts, Headline, Level, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
+from trihedron.report.effect_charts import effect_chart
 from trihedron.report.findings import findings_block
 from trihedron.report.numbers import (
     engineering_exponent,
@@ -47,7 +50,7 @@ from trihedron.report.numbers import (
     plain_number,
     power_of_ten,
 )
-from trihedron.report.reference import reference_blocks
+from trihedron.report.reference import beside_reference
 
 _CAPTIONS = {
     "static-accel": "Gravity error in every static pose.",
@@ -97,18 +100,22 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
     if diagnosis.residuals:
         sections.append(Section("Figures", tuple(_picture(diagnosis, one) for one in diagnosis.residuals)))
     found = getattr(diagnosis, "reference", None)
-    if found is not None:
-        sections.insert(0, Section("Against the reference", reference_blocks(found)))
-    return Document(
+    strengths = strengths_picture(diagnosis)
+    if found is not None and strengths is not None:
+        # The reference's own error leads then.
+        sections[0] = replace(sections[0], blocks=(*sections[0].blocks, strengths))
+    document = Document(
         title="Diagnosis",
         subtitle=diagnosis.recording_source,
         verdict=verdict_in_words(diagnosis),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
         headlines=tuple(_headlines(diagnosis)),
-        lead=strengths_picture(diagnosis),
+        lead=strengths,
+        next_step=next_step_in_words(diagnosis),
         stated_level=_LEVELS[diagnosis.verdict],
     )
+    return beside_reference(document, found)
 
 
 def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -129,7 +136,8 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     )
     judged, figures = (("with the effects",), ("rms with them", "χ²/dof with them")) if has_effects else ((), ())
     head = ("residual", "linear model", *judged, "rms", "χ²/dof", "p", *figures)
-    blocks: list[Block] = [Table(head, rows)]
+    caption = "Residuals by domain; χ²/dof is 1 by noise alone"
+    blocks: list[Block] = [Table(head, rows, caption)]
     # Which parameters differ has a section of its own.
     places = tuple(
         (MEANING[d.domain], place)
@@ -239,7 +247,7 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
             quantity(held),
             *(
                 "–" if held.rms_before == held.rms_after == 0.0 else size_in_words(v, held.unit)
-                for v in _both_rms(held)
+                for v in (held.rms_before, held.rms_after)
             ),
             plain_number(held.chi2_per_dof_before),
             plain_number(held.chi2_per_dof_after),
@@ -252,10 +260,6 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
     head = ("effect", "residual", "rms before", "rms after", "χ²/dof before", "χ²/dof after")
     caption = "Poses and moves predicted by fits that did not see them (held out); noise alone gives χ²/dof 1"
     return (Table(head, rows, caption),)
-
-
-def _both_rms(held: HeldOut) -> tuple[float, float]:
-    return held.rms_before, held.rms_after
 
 
 def _candidates(diagnosis: Diagnosis) -> Block:
@@ -294,10 +298,18 @@ def _physics(diagnosis: Diagnosis) -> list[Picture]:
     for effect in diagnosis.effects:
         chart = effect_chart(effect, diagnosis.residuals, *made)  # type: ignore[arg-type]
         if chart is not None:
-            caption = f"{effect.id}: data (dots) against the driving variable, with the model. "
+            caption = f"{effect.id}: {_drawn_in_words(effect)}. "
             caption += _without_strongest(effect.statement)
             out.append(Picture(f"effect-{effect.id}", caption, None, lambda drawn=chart: drawn))  # type: ignore[misc]
     return out
+
+
+def _drawn_in_words(effect: AcceptedEffect) -> str:
+    if not effect.curves:
+        return "the residual that it explains"
+    beside = any(len(one.data) for one in effect.curves)
+    shown = "with what poses show (dots)" if beside else "and the residual of the moves in which it acts"
+    return f"what it adds, over the variable that drives it, {shown}"
 
 
 def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:

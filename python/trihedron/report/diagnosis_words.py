@@ -76,6 +76,25 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     return f"MISSING PHYSICS: {'; '.join(said)}{tail}"
 
 
+def next_step_in_words(diagnosis: Diagnosis) -> str:
+    """What to do with the verdict."""
+    if diagnosis.verdict == "consistent":
+        return "Nothing is to be added: use these parameters with their uncertainties."
+    if diagnosis.verdict == "not-testable":
+        return ""
+    if diagnosis.verdict == "unexplained":
+        experiments = [one.experiment for one in diagnosis.relations if one.experiment]
+        again = "Record again: what returns belongs to the sensor, what does not to the session."
+        return experiments[0] if experiments else again
+    rivals = next((effect for effect in diagnosis.effects if effect.confounded_with), None)
+    if rivals is not None and rivals.separating_experiment:
+        others = listed(list(rivals.confounded_with))
+        return f"Tell {rivals.id} from {others} first: {rivals.separating_experiment}."
+    if diagnosis.parameters:
+        return "Take over what the recording says: --improved FILE.toml (simulation) or --updated FILE (calibration)."
+    return "Store the effects with the calibration, for trihedron apply: trihedron calibrate LOG --extended -o FILE."
+
+
 def _not_compared(diagnosis: Diagnosis) -> str:
     """A gyro that one side lacks is no agreement."""
     found = getattr(diagnosis, "findings", ())

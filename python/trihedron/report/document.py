@@ -92,7 +92,8 @@ class Document:
     """A whole report. The first section is the one that fits one screen.
 
     ``headlines`` (the first matters most) and the ``lead`` figure stand beside the verdict; ``stated_level`` overrides
-    the colour that follows from ``is_trustworthy`` and the findings; ``provenance`` says how the report was made.
+    the colour that follows from ``is_trustworthy`` and the findings; ``provenance`` says how the report was made;
+    ``next_step`` is what to do with the result.
     """
 
     title: str
@@ -104,6 +105,7 @@ class Document:
     lead: Picture | None = None
     stated_level: Level | None = None
     provenance: tuple[tuple[str, str], ...] = ()
+    next_step: str = ""
 
     @property
     def level(self) -> Level:

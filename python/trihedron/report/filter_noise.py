@@ -55,6 +55,7 @@ def filter_noise_report(found: FilterNoise) -> Document:
         sections=tuple(sections),
         headlines=tuple(_headline(one) for one in found.sensors),
         lead=picture if tested else None,
+        next_step="Put these values into your filter: --to TARGET writes them for the common ones.",
     )
 
 

@@ -70,6 +70,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         is_trustworthy=n_done > 0 and not mixed,
         sections=tuple(sections),
         lead=_lead(summary) if n_done else None,
+        next_step="Use each device's own calibration; look at failed logs and outliers first." if n_done else "",
     )
 
 
@@ -122,7 +123,10 @@ def _mixed(summary: FleetSummary) -> list[Block]:
         "Scales and directions of axes of one unit repeat within 1 %. Name devices with --serial, or give each a "
         "folder; until then these logs are compared with nothing."
     )
-    return [Paragraph(said), Table(("taken for one device", "logs", "parameter", "differs by"), tuple(rows))]
+    return [
+        Paragraph(said),
+        Table(("taken for one device", "logs", "parameter", "differs by"), tuple(rows), "Logs too unlike"),
+    ]
 
 
 def _physics(summary: FleetSummary) -> list[Block]:
@@ -138,7 +142,7 @@ def _physics(summary: FleetSummary) -> list[Block]:
         )
         for effect in summary.effects
     ]
-    return [Table(("effect", "logs", "devices", "share of devices, 95 %"), tuple(rows))]
+    return [Table(("effect", "logs", "devices", "share of devices, 95 %"), tuple(rows), "Effects by device")]
 
 
 def _spread(summary: FleetSummary) -> list[Block]:
@@ -149,7 +153,7 @@ def _spread(summary: FleetSummary) -> list[Block]:
     said = "Standard deviations beyond each log's uncertainty. Scales are relative; misalignments differ from 90°."
     if summary.passed_over:
         said += f" Not counted: {summary.passed_over}."
-    return [Paragraph(said), Table(tuple(head), tuple(rows))]
+    return [Paragraph(said), Table(tuple(head), tuple(rows), "Scatter between devices, and of one device")]
 
 
 def _spread_row(one: Repeated, is_grouped: bool) -> list[str]:
@@ -176,7 +180,7 @@ def _outliers(summary: FleetSummary) -> list[Block]:
         away = f"{plain_number(one.deviation * factor, 2)} {unit}"
         cells = (one.serial, f"{one.parameter.id} {one.parameter.name}", away, plain_number(one.sigmas, 2))
         rows.append((*cells, f"{one.p_adjusted:.1g}"))
-    return [Table(("device", "parameter", "from the median", "in spreads of the others", "p"), tuple(rows))]
+    return [Table(("device", "parameter", "from the median", "in spreads of the others", "p"), tuple(rows), "Outliers")]
 
 
 def _drift(summary: FleetSummary) -> list[Block]:
@@ -188,7 +192,10 @@ def _drift(summary: FleetSummary) -> list[Block]:
     if not moved:
         return [Paragraph(f"No calibration shift between sessions beyond uncertainty and drift: {tested}")]
     rows = tuple((change.group, change.id, *_drift_cells(change)) for change in moved)
-    return [Paragraph(f"Tested: {tested}"), Table(("device", "parameter", "how", "by", "p"), rows)]
+    return [
+        Paragraph(f"Tested: {tested}"),
+        Table(("device", "parameter", "how", "by", "p"), rows, "Changes between sessions"),
+    ]
 
 
 def _drift_cells(change: Change) -> tuple[str, str, str]:
@@ -219,4 +226,4 @@ def _logs(summary: FleetSummary) -> Table:
         )
         for log in summary.logs
     )
-    return Table(("log", "device", "status", "verdict", "effects", "poses", "held out [mm/s²]"), rows)
+    return Table(("log", "device", "status", "verdict", "effects", "poses", "held out [mm/s²]"), rows, "Every log")

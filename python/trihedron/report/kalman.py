@@ -58,6 +58,7 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         sections=tuple(sections),
         headlines=tuple(_headlines(outcome)),
         lead=lead,
+        next_step="Test the calibration on another recording: trihedron verify." if calibration.is_trustworthy else "",
     )
 
 

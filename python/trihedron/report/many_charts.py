@@ -1,4 +1,4 @@
-"""What a page draws of many recordings of one unit, of a fleet, and of a comparison with known motion."""
+"""What a page draws of many recordings of one unit, and of a fleet."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ import numpy as np
 
 from trihedron.arrays import XYZ
 from trihedron.records.fleet import FleetSummary
-from trihedron.records.reference import AgainstReference
 from trihedron.records.sessions import PARAMETERS, SessionsModel
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Panel, Points, Scale
-from trihedron.report.drawn import envelope, said
+from trihedron.report.drawn import said
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 SHOWN: dict[str, tuple[float, str]] = {
@@ -103,15 +102,3 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
         y = Scale(f"{parameter.id} {parameter.name}  [{unit}]", unit)
         panels.append(Panel(x, y, tuple(marks), height_px=150))
     return Chart(tuple(panels), columns=3 if most is None else 2)
-
-
-def residual_chart(found: AgainstReference) -> Chart:
-    """What is left of the rate over time, one panel an axis."""
-    left = degrees_from_radians(1.0) * found.residual_rate
-    reach = 1.3 * float(np.percentile(np.abs(left), 99.5))
-    panels = []
-    for k in range(3):
-        marks = (Level(y=0.0), Line(*envelope(found.residual_time_s, left[:, k]), "", AXIS_COLOURS[k], is_thin=True))
-        y = Scale(f"{XYZ[k]}  [°/s]", "°/s", limits=(-reach, reach))
-        panels.append(Panel(Scale("time [s]", "s"), y, marks, height_px=110))
-    return Chart(tuple(panels), is_linked=True, legend=False)

@@ -52,6 +52,7 @@ def noise_report(
         is_trustworthy=noise.is_trustworthy,
         headlines=tuple(_headlines(groups)),
         lead=_lead(noise, groups) if groups else None,
+        next_step="Take N, B, K into a filter (trihedron export --noise); average no longer than stated.",
         sections=(
             Section("Result", tuple(tables)),
             Section("Data sheet", tuple(dict.fromkeys(b for unit, axes in groups for b in _customary(axes, unit)))),

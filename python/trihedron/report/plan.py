@@ -37,6 +37,7 @@ def plan_report(plan: ExperimentPlan) -> Document:
         is_trustworthy=True,
         headlines=tuple(_headlines(plan)),
         lead=_picture(plan.poses),
+        next_step="Choose a set of poses below and record it: trihedron capture --guide leads through it.",
         sections=(
             Section("Known turns (method 1)", (_turns(plan),)),
             Section(
@@ -54,6 +55,7 @@ def plan_report(plan: ExperimentPlan) -> Document:
                         tuple(
                             (move.name, f"{move.n_moves}", f"{move.rank}", _percent(move.scale)) for move in plan.moves
                         ),
+                        "What sets of moves determine of the gyro",
                     ),
                     Paragraph(
                         "A move determines two parameters, for a turn about the vertical leaves gravity where it was: "
@@ -127,6 +129,7 @@ def _turns(plan: ExperimentPlan) -> Table:
         tuple(
             (name, _percent(scale), f"{plain_number(degrees_from_radians(bias), 2)} °/s") for name, scale, bias in rows
         ),
+        "What turns by known angles determine of the gyro",
     )
 
 
@@ -146,7 +149,9 @@ def _poses(poses: tuple[PosePlan, ...]) -> Table:
             )
         )
     return Table(
-        ("largest standard uncertainty (1 σ)", "of 9 parameters", "scale", "angle between axes", "bias"), tuple(rows)
+        ("largest standard uncertainty (1 σ)", "of 9 parameters", "scale", "angle between axes", "bias"),
+        tuple(rows),
+        "What sets of poses determine of the accelerometer",
     )
 
 

@@ -36,6 +36,7 @@ from trihedron.report.noise_files import noise_record
 from trihedron.report.page import to_html
 from trihedron.report.plan import plan_record, plan_report
 from trihedron.report.ranking import ranking_record, ranking_report
+from trihedron.report.reference import calibration_result_report
 from trihedron.report.saved import with_report
 from trihedron.report.sessions import sessions_columns, sessions_record, sessions_report
 from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
@@ -64,7 +65,7 @@ def _calibrated(result: Any) -> Any:
 
 _KINDS: dict[type, _Shown] = {
     CalibrationResult: _Shown(
-        lambda r: calibration_report(r.calibration, r.segments, r.recording),
+        calibration_result_report,
         _calibrated,
         lambda r: frames.calibration_columns(r.calibration),
     ),

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from trihedron.arrays import AXES
 from trihedron.records import Calibration
 from trihedron.records.reference import AgainstReference, Estimate, FitToReference, ReferenceError
+from trihedron.records.results import CalibrationResult
 from trihedron.report.calibration import calibration_report
-from trihedron.report.document import Block, Document, Facts, Picture, Section, Table
-from trihedron.report.drawing import later
-from trihedron.report.many_charts import residual_chart
+from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
 from trihedron.report.numbers import engineering_exponent, plain_number, power_of_ten, with_sigma
+from trihedron.report.reference_charts import error_picture, residual_picture
 from trihedron.sanitise import printable
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
@@ -69,15 +68,22 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
         blocks.append(_matrix("Accelerometer", "f", "m/s²", found.accelerometer))
     for ident, one in found.effects.items():
         blocks.append(_effect(ident, one))
-    blocks.append(
-        Picture(
-            "reference",
-            "What is left of the rate, window by window.",
-            later("chart_figures", "draw_chart", partial(residual_chart, found)),
-            partial(residual_chart, found),
-        )
-    )
+    blocks.append(residual_picture(found))
     return tuple(blocks)
+
+
+def reference_headlines(found: AgainstReference) -> list[Headline]:
+    """What the reference is worth, and what the gyro does with its numbers."""
+    error = found.error
+    size = plain_number(degrees_from_radians(error.slow_rad[0]), 2)
+    out = [Headline("slow error of the reference", size, "°", f"1 σ an axis, within {plain_number(error.slow_s, 2)} s")]
+    if found.replay:
+        *others, last = found.replay
+        beside = f"by the gyro alone, {last.stage}, held out"
+        beside += "".join(f"; {plain_number(degrees_from_radians(r.error_rad))}° {r.stage}" for r in others)
+        angle = plain_number(degrees_from_radians(last.error_rad))
+        out.append(Headline(f"attitude error after {last.horizon_s:g} s", angle, "°", beside))
+    return out
 
 
 def _latitude(found: AgainstReference) -> str:
@@ -111,8 +117,28 @@ def references_report(calibration: Calibration, references: tuple[AgainstReferen
         "S and effects are shared; bias (g-sensitivity at the mean force in it) and clock are each recording's own",
     )
     effects = tuple(_effect(ident, one) for ident, one in references[0].effects.items())
-    sections = (document.sections[0], Section("References", (own, *effects)), *document.sections[1:])
-    return replace(document, subtitle=f"{len(references)} recordings beside references", sections=sections)
+    drawn = [error_picture(one, f"reference-error-{k}") for k, one in enumerate(references, 1)]
+    pictures = [
+        replace(picture, caption=f"{printable(one.source)}. {picture.caption}")
+        for picture, one in zip(drawn, references, strict=True)
+        if picture is not None
+    ]
+    sections = (document.sections[0], Section("References", (own, *effects, *pictures[1:])), *document.sections[1:])
+    subtitle = f"{len(references)} recordings beside references"
+    return replace(document, subtitle=subtitle, sections=sections, lead=next(iter(pictures), document.lead))
+
+
+def beside_reference(document: Document, found: AgainstReference | None, place: int = 0) -> Document:
+    """The report of one recording with its reference's numbers, tables and figures as the section at ``place``."""
+    if found is None:
+        return document
+    section = Section("Against the reference", reference_blocks(found))
+    return replace(
+        document,
+        sections=(*document.sections[:place], section, *document.sections[place:]),
+        headlines=(*reference_headlines(found), *document.headlines),
+        lead=error_picture(found) or document.lead,
+    )
 
 
 def _slow(error: ReferenceError) -> str:
@@ -234,3 +260,9 @@ def _shown_from(ident: str, one: Estimate) -> str:
         return ": this reference drifts too much to show any"
     size, unit = _SHEET[ident]
     return f": beside this reference about {plain_number(size * one.shown_from, 2)} {unit} in every number"
+
+
+def calibration_result_report(result: CalibrationResult) -> Document:
+    """The report of a calibration, with its reference's where it has one."""
+    document = calibration_report(result.calibration, result.segments, result.recording)
+    return beside_reference(document, result.reference, 1)

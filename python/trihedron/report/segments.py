@@ -38,6 +38,7 @@ def segments_report(recording: Recording, segments: Segments) -> Document:
             Headline("moves between them", str(len(segments.moves))),
         ),
         lead=signals_picture(recording, segments),
+        next_step="Are poses missing, or moves among them? If not: trihedron calibrate LOG.",
     )
 
 

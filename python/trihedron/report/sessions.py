@@ -46,6 +46,7 @@ def sessions_report(model: SessionsModel) -> Document:
         is_trustworthy=model.is_trustworthy,
         sections=tuple(sections),
         lead=_lead(model),
+        next_step="Use the common parameters (-o FILE writes them): their uncertainty is that of the next recording.",
     )
 
 
@@ -148,7 +149,7 @@ def _changes(model: SessionsModel) -> list[Block]:
             "Each parameter of all recordings against one common value, by each recording's uncertainty and the drift "
             "of its biases; p corrected for multiple testing (Holm)."
         ),
-        Table(head, tuple(rows)),
+        Table(head, tuple(rows), "Changes beyond what repeats"),
     ]
 
 
@@ -189,7 +190,7 @@ def _thermal(thermal: ThermalModel) -> list[Block]:
             f"Polynomials of T − {thermal.reference_degc:.2f} °C; the order is the one that predicts recordings it "
             f"has not seen. Valid from {_range(thermal)}: `trihedron apply` holds the ends outside it and says so."
         ),
-        Table(("parameter", "x or xy", "y or xz", "z or yz"), tuple(rows)),
+        Table(("parameter", "x or xy", "y or xz", "z or yz"), tuple(rows), "Slopes by axis"),
     ]
 
 
@@ -205,7 +206,9 @@ def _sessions(model: SessionsModel) -> Table:
         shown_degc = ["–" if math.isnan(s.temperature_degc) else f"{s.temperature_degc:.1f}" for s in model.sessions]
         branch = [{1: "heating", -1: "cooling"}.get(s.branch, "") for s in model.sessions]
         columns += [("temperature [°C]", shown_degc), ("branch", branch)]
-    return Table(tuple(name for name, _ in columns), tuple(zip(*(cells for _, cells in columns), strict=True)))
+    return Table(
+        tuple(name for name, _ in columns), tuple(zip(*(cells for _, cells in columns), strict=True)), "Every recording"
+    )
 
 
 def _picture(model: SessionsModel) -> Picture:

@@ -27,7 +27,10 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
         sections=(
             Section("Effects that all recordings share", _effects(found, names)),
             Section("Each recording by itself", (_each(found, names),)),
-            Section("Candidates", (Table(("effect", "score together"), _candidates(found)),)),
+            Section(
+                "Candidates",
+                (Table(("effect", "score together"), _candidates(found), "The catalogue"),),
+            ),
         ),
         stated_level="usable" if found.effects else "good",
     )
@@ -66,7 +69,7 @@ def _parameters(effect: SharedEffect, names: list[str]) -> Table:
         unit = " ".join(word for word in (power_of_ten(exponent), printed_unit(common.unit)) if word)
         cells = [_cell(one[i], 10.0**-exponent) for one in (effect.parameters, *effect.each)]
         rows.append((common.name, *cells, unit))
-    return Table(("parameter", "together", *names, "unit"), tuple(rows))
+    return Table(("parameter", "together", *names, "unit"), tuple(rows), "Parameters together and alone")
 
 
 def _cell(one: EffectParameter, scale: float) -> str:
@@ -78,7 +81,7 @@ def _each(found: SharedDiagnosis, names: list[str]) -> Table:
         (name, verdict_in_words(one).split(":")[0].lower(), listed(list(alone)) if alone else "–")
         for name, one, alone in zip(names, found.diagnoses, found.of_single_recordings, strict=True)
     )
-    return Table(("recording", "verdict", "named here alone"), rows)
+    return Table(("recording", "verdict", "named here alone"), rows, "Recordings by themselves")
 
 
 def _candidates(found: SharedDiagnosis) -> tuple[tuple[str, ...], ...]:

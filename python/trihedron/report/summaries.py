@@ -105,7 +105,7 @@ def curve_summary(curve: AllanCurve) -> Document:
         f"intervals of {100.0 * curve.confidence:g} %.",
         is_trustworthy=True,
         sections=(
-            Section("Deviation", (Table(("τ [s]", *names), rows),)),
+            Section("Deviation", (Table(("τ [s]", *names), rows, "Allan deviation"),)),
             Section("Figures", (Picture("allan", "Allan deviation.", later("noise_figures", "draw_curve", curve)),)),
         ),
     )

@@ -23,7 +23,7 @@ from trihedron.estimate.reference.refusals import refuse_still, refuse_strangers
 from trihedron.estimate.reference.remarks import remarks
 from trihedron.estimate.reference.replay import held_out
 from trihedron.estimate.reference.settled import plateaus
-from trihedron.estimate.reference.smoothed import bias_over_time, frame_covariance, without_slow_error
+from trihedron.estimate.reference.smoothed import bias_over_time, error_over_time, frame_covariance, without_slow_error
 from trihedron.estimate.reference.together import Grid, Reference, grid_of
 from trihedron.estimate.reference.windows import Windows, windows_on
 from trihedron.estimate.reference.worth import error_of
@@ -193,6 +193,7 @@ def _answer(
         bias=bias_over_time(found, k),
         residual_time_s=side.grid.time_s[one.windows.middle],
         residual_rate=one.gyro.solution.residual,
+        apart=error_over_time(found, k),
     )
     return replace(result, findings=(*motion.findings, *remarks(result, one.is_turned)))
 

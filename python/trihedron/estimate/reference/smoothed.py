@@ -11,7 +11,7 @@ from trihedron.estimate.reference.accelerometer import turns
 from trihedron.estimate.reference.likelihood import FARTHEST, SPREAD, STRENGTHS, TYPICAL, Together, equations, together
 from trihedron.estimate.reference.motion import MotionFit, slow_error
 from trihedron.estimate.reference.together import Reference
-from trihedron.records.reference import BiasOverTime
+from trihedron.records.reference import BiasOverTime, ErrorOverTime
 
 BODY = STRENGTHS.index("body")
 
@@ -37,6 +37,28 @@ def bias_over_time(found: MotionFit, k: int) -> BiasOverTime:
     covariance = beside + change @ cov @ np.swapaxes(change, 1, 2)
     sigma = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
     return BiasOverTime(problem.blocks.time_s(), value + change @ mean, sigma)
+
+
+def error_over_time(found: MotionFit, k: int) -> ErrorOverTime:
+    """Attitude of the reference of recording k against the gyro's, whose parameters and bias over time are taken off.
+
+    ``angle = observed - columns theta - Σ ΔM Δb``: M is the sum of attitudes that a bias acts through, Δb what the bias
+    has walked since the beginning.
+    """
+    problem = found.problems[k]
+    mean = _posterior(found, found.fitted.strengths).mean[problem.index]
+    strengths = np.exp(found.fitted.strengths[k])
+    columns, beside, _, _ = problem.blocks.smoothed(problem.table(), strengths.tolist())
+    m = len(beside)
+    columns = columns.reshape(m, 3, -1)
+    walked = columns[:, :, -1] - columns[:, :, :-1] @ mean
+    acting = problem.columns.reshape(m, 3, -1)[:, :, problem.bias] / problem.sigma[problem.bias]
+    steps = np.einsum("mij,mj->mi", np.diff(acting, axis=0), 0.5 * (walked[1:] + walked[:-1]))
+    by_walk = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    angle = (problem.observed - problem.columns @ mean).reshape(m, 3) - by_walk
+    angle[problem.blocks.rows()[:, 0] == 0] = np.nan
+    walk = float(strengths[STRENGTHS.index("angle_walk")])
+    return ErrorOverTime(problem.blocks.time_s(), angle - np.nanmean(angle, axis=0), walk)
 
 
 def without_slow_error(found: MotionFit, k: int) -> Reference:

@@ -1,0 +1,215 @@
+"""An effect as a curve over the one variable that drives it, found from its columns, with what every pose shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from trihedron.arrays import FloatArray, IntArray
+from trihedron.diagnose.context import Context
+from trihedron.records.diagnosis import EffectCurve
+from trihedron.records.domains import DomainResiduals
+
+N_BINS = 80
+"""Parts of a variable's range in which a column is a number: the square of a force bends by 0.3 % within one."""
+LEAST_TOLD = 0.98
+"""Part of a column's variance that its variable tells; a column of two variables keeps tenths of it."""
+STRAIGHT = 0.99
+"""Part of a column that lies along one direction: what acts on one sensor axis does."""
+LEAST_PART = 0.4
+"""Of gravity along an axis: a pose with less of it says little of that axis."""
+BEYOND = 0.1
+"""How far a curve goes on where no pose lies, as a part of the range of the poses."""
+SIDES = (("accelerometer", "force", "static-accel"), ("gyroscope", "rate", "static-gyro"))
+
+
+@dataclass(frozen=True, eq=False)
+class Driver:
+    """A variable at every point (points,), SI, and whose axis it is."""
+
+    name: str
+    axis: int
+    values: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Column:
+    """One parameter's column along the sensor axis that it acts on: ``g`` (points,), its direction (3,), its driver."""
+
+    parameter: int
+    g: FloatArray
+    direction: FloatArray
+    driver: Driver
+    is_relative: bool
+
+    @property
+    def key(self) -> tuple[int, str, int, bool]:
+        """What is drawn as one curve."""
+        return int(np.abs(self.direction).argmax()), self.driver.name, self.driver.axis, self.is_relative
+
+
+def drivers(context: Context) -> list[Driver]:
+    """Every variable that a column may be a function of, the plainest first."""
+    out = [Driver("force", j, context.axis_force[:, j]) for j in range(3)]
+    out += [Driver("rate", j, context.axis_rate[:, j]) for j in range(3)]
+    means = context.references
+    if context.temperature is not None:
+        out.append(Driver("temperature", 0, context.temperature + means["temperature_degc"]))
+    if context.supply is not None:
+        out.append(Driver("supply", 0, (context.supply + 1.0) * means["supply_v"]))
+    power, is_pose = context.vibration_power, (np.arange(context.n_points) < context.obs.n_poses)[:, None]
+    for shaken in (power, np.where(is_pose, power, 0.0)):
+        out += [Driver("vibration", j, shaken[:, j]) for j in range(3)]
+        out.append(Driver("vibration", 3, shaken.sum(axis=1)))
+    return [*out, Driver("time", 0, context.time_s)]
+
+
+def effect_curves(
+    context: Context,
+    columns: tuple[FloatArray | None, FloatArray | None],
+    value: FloatArray,
+    covariance: FloatArray,
+    residuals: Sequence[DomainResiduals],
+) -> tuple[EffectCurve, ...]:
+    """Curves of an effect whose ``columns`` (points, 3, k) of force and rate have parameters ``value`` (k,).
+
+    ``residuals`` are the poses' with everything accepted. A parameter whose column is a function of no one variable has
+    no curve.
+    """
+    known = drivers(context)
+    by_domain = {one.domain: one for one in residuals}
+    out = []
+    for (sensor, _, domain), side in zip(SIDES, columns, strict=True):
+        if side is None:
+            continue
+        found = [one for k in range(side.shape[2]) if (one := _driven(context, known, side[:, :, k], k)) is not None]
+        for key in dict.fromkeys(one.key for one in found):
+            group = [one for one in found if one.key == key]
+            at = [one.parameter for one in group]
+            left = by_domain.get(domain)  # type: ignore[call-overload]
+            out.append(_curve(context, sensor, group, (value[at], covariance[np.ix_(at, at)]), left))
+    return tuple(out)
+
+
+def bias_curves(
+    context: Context, sensor: int, path: FloatArray, std: FloatArray, residuals: Sequence[DomainResiduals]
+) -> tuple[EffectCurve, ...]:
+    """A bias that walks as curves over time: ``path`` (poses, 3) with standard errors (3,), SI."""
+    name, _, domain = SIDES[sensor]
+    h = context.obs.n_poses
+    left = next((one for one in residuals if one.domain == domain), None)
+    time = Driver("time", 0, context.time_s)
+    out = []
+    for axis in range(3):
+        column = _Column(axis, np.zeros(context.n_points), np.eye(3)[axis], time, False)
+        poses, data = _of_poses(context, name, column, left)
+        out.append(
+            EffectCurve(
+                name, axis, "time", 0, False,  # type: ignore[arg-type]
+                time.values[:h], path[:, axis], np.full(h, std[axis]),
+                tuple(int(k) for k in poses), time.values[poses], data + path[poses, axis],
+            )
+        )  # fmt: skip
+    return tuple(out)
+
+
+def _driven(context: Context, known: Sequence[Driver], column: FloatArray, k: int) -> _Column | None:
+    """The variable that a column (points, 3) is a function of, by itself or as a part of the sensor's own reading."""
+    _, strength, rows = np.linalg.svd(column, full_matrices=False)
+    if strength[0] <= 0.0 or strength[0] ** 2 < STRAIGHT * float(strength @ strength):
+        return None
+    direction = rows[0] * np.sign(rows[0][np.abs(rows[0]).argmax()])
+    g = column @ direction
+    for driver in known:
+        if _is_told(context, driver, g):
+            return _Column(k, g, direction, driver, False)
+    axis = int(np.abs(direction).argmax())
+    for motion in (context.axis_force[:, axis], context.axis_rate[:, axis]):
+        part = np.where(
+            np.abs(motion) > LEAST_PART * np.abs(motion).max(), g / np.where(motion == 0.0, 1.0, motion), np.nan
+        )
+        for driver in known:
+            if driver.name not in ("force", "rate") and _is_told(context, driver, part):
+                return _Column(k, part, direction, driver, True)
+    return None
+
+
+def _range(context: Context, driver: Driver) -> tuple[float, float]:
+    """Where poses lie and somewhat beyond; the whole range of what no pose varies."""
+    posed = driver.values[: context.obs.n_poses]
+    low, high = float(posed.min()), float(posed.max())
+    if high - low <= 1e-6 * float(np.ptp(driver.values)):
+        return float(driver.values.min()), float(driver.values.max())
+    return low - BEYOND * (high - low), high + BEYOND * (high - low)
+
+
+def _bins(context: Context, driver: Driver, g: FloatArray) -> tuple[IntArray, IntArray]:
+    """Bin of every point (points,), -1 outside, and how many points each bin holds."""
+    low, high = _range(context, driver)
+    place = np.floor((driver.values - low) / max(high - low, 1e-300) * (N_BINS - 1e-9)).astype(np.intp)
+    place[~np.isfinite(g) | (place < 0) | (place >= N_BINS)] = -1
+    return place, np.bincount(place[place >= 0], minlength=N_BINS)
+
+
+def _means(place: IntArray, count: IntArray, values: FloatArray) -> FloatArray:
+    inside = place >= 0
+    return np.asarray(np.bincount(place[inside], values[inside], N_BINS) / np.maximum(count, 1))
+
+
+def _is_told(context: Context, driver: Driver, g: FloatArray) -> bool:
+    """Whether a column is a function of a variable: hardly any of its variance is within bins."""
+    place, count = _bins(context, driver, g)
+    inside = place >= 0
+    if inside.sum() < 2 * N_BINS or np.ptp(driver.values[inside]) <= 0.0:
+        return False
+    whole = float(np.var(g[inside]))
+    within = float(np.mean((g[inside] - _means(place, count, g)[place[inside]]) ** 2))
+    return whole > 0.0 and within < (1.0 - LEAST_TOLD) * whole
+
+
+def _curve(
+    context: Context,
+    sensor: str,
+    group: Sequence[_Column],
+    fitted: tuple[FloatArray, FloatArray],
+    left: DomainResiduals | None,
+) -> EffectCurve:
+    value, covariance = fitted
+    first, (axis, name, driver_axis, is_relative) = group[0], group[0].key
+    place, count = _bins(context, first.driver, first.g)
+    seen = count > 0
+    table = np.stack([_means(place, count, one.g)[seen] for one in group], axis=1)
+    poses, data = _of_poses(context, sensor, first, left)
+    posed = np.stack([one.g[: context.obs.n_poses] for one in group], axis=1)
+    if name not in ("force", "rate"):
+        # Its level is the bias's, or the scale's: a curve is known about its mean.
+        level = np.nanmean(posed, axis=0) if np.isfinite(posed).any(axis=0).all() else table.mean(axis=0)
+        table, posed = table - level, posed - level
+    return EffectCurve(
+        sensor=sensor,  # type: ignore[arg-type]
+        axis=axis, driver=name, driver_axis=driver_axis, is_relative=is_relative,
+        x=_means(place, count, first.driver.values)[seen],
+        value=table @ value,
+        sigma=np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", table, covariance, table), 0.0)),
+        poses=tuple(int(k) for k in poses),
+        data_x=first.driver.values[poses],
+        data=data + posed[poses] @ value,
+    )  # fmt: skip
+
+
+def _of_poses(context: Context, sensor: str, one: _Column, left: DomainResiduals | None) -> tuple[IntArray, FloatArray]:
+    """Poses that say something of an axis (n,), and what is left of each along it (n,)."""
+    h = context.obs.n_poses
+    nothing = np.zeros(0, dtype=np.intp), np.zeros(0)
+    if left is None or len(left.after) != h or (one.driver.name == "rate"):
+        return nothing
+    if sensor == "gyroscope":
+        return nothing if one.is_relative else (np.arange(h), left.after @ one.direction)
+    # A norm tells what lies along gravity.
+    up = context.force[:h] / np.linalg.norm(context.force[:h], axis=1)[:, None]
+    part = up @ one.direction
+    said = np.flatnonzero(np.abs(part) >= LEAST_PART)
+    along = left.after[said, 0] / part[said]
+    return said, along / context.axis_force[said, int(np.abs(one.direction).argmax())] if one.is_relative else along

@@ -1,0 +1,78 @@
+"""Effects as curves over the variable that drives them, found from their columns, with what poses show beside them."""
+
+import numpy as np
+import pytest
+
+from diagnosed_session import diagnosed, simulated
+from trihedron import diagnose
+from trihedron.records.plain import as_plain
+from trihedron.report.chart import Band, Line, Points
+from trihedron.report.diagnosis import diagnosis_report
+from trihedron.report.document import Picture
+from trihedron.report.effect_charts import curve_panels
+
+G = 9.80665
+
+
+def accepted(effect_id, **size):
+    found = diagnosed(effect_id, n_poses=26, **size)
+    return next(effect for effect in found.effects if effect.id == effect_id)
+
+
+def test_a_quadratic_is_a_parabola_over_the_force_along_each_axis():
+    true = (6e-4, -4e-4, 4e-4)
+    curves = accepted("accel-quadratic", k2=true).curves
+    assert [(c.sensor, c.axis, c.driver, c.driver_axis) for c in curves] == [
+        ("accelerometer", j, "force", j) for j in range(3)
+    ]
+    for curve, k2 in zip(curves, true, strict=True):
+        # What was put in, to three of the curve's own standard errors and the width of a bin.
+        assert np.all(np.abs(curve.value - k2 * curve.x**2) < 3.5 * curve.sigma + 0.01 * abs(k2) * G**2)
+        at = np.interp(curve.data_x, curve.x, curve.value)
+        # A pose shows 2 to 5 mm/s^2 beside the curve; it bends by 40 and more.
+        assert np.std(curve.data - at) < 0.2 * abs(k2) * G**2
+        assert len(curve.data) == len(curve.poses) >= 6
+
+
+def test_g_sensitivity_is_one_panel_a_component_of_force_with_three_lines():
+    matrix = ((3e-4, -2e-4, 1e-4), (1e-4, 4e-4, 0.0), (0.0, -3e-4, 2e-4))
+    curves = accepted("gyro-g-sensitivity", matrix=matrix).curves
+    assert len(curves) == 9
+    for curve in curves:
+        slope = np.polyfit(curve.x, curve.value, 1)[0]
+        assert slope == pytest.approx(matrix[curve.axis][curve.driver_axis], abs=4e-5)  # 0.02 deg/s/g
+    panels = curve_panels(curves)
+    assert [panel.x.label for panel in panels] == ["f_x [m/s²]", "f_y [m/s²]", "f_z [m/s²]"]
+    assert all(sum(isinstance(mark, kind) for mark in panels[0].marks) == 3 for kind in (Line, Points, Band))
+
+
+@pytest.mark.parametrize(
+    ("effect_id", "size", "driver", "is_relative"),
+    [
+        ("gyro-thermal-bias", {"per_k": (1e-3, -1e-3, 5e-4)}, "temperature", False),
+        ("accel-thermal-scale", {"per_k": (1e-3, -1e-3, 2e-3)}, "temperature", True),
+        ("gyro-bias-drift", {"amplitude": (0.01, -0.02, 0.01)}, "time", False),
+        ("vibration-rectification", {"sensor": "accelerometer", "coefficient": 0.02}, "vibration", False),
+    ],
+)
+def test_what_drives_an_effect_is_found_from_its_columns(effect_id, size, driver, is_relative):
+    curves = accepted(effect_id, **size).curves
+    assert [(c.axis, c.driver, c.is_relative) for c in curves] == [(j, driver, is_relative) for j in range(3)]
+    for curve in curves:
+        left = curve.data - np.interp(curve.data_x, curve.x, curve.value)
+        # Half of what it adds: the weakest of these is a few times the noise of a pose.
+        assert np.std(left) < 0.5 * np.ptp(curve.value)
+
+
+def test_an_effect_of_moves_is_a_curve_beside_the_residual_that_it_explains():
+    recording, truth = simulated("gyro-scale-nonlinearity", n_poses=26, c3=(0.02, 0.02, -0.02))
+    result = diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
+    effect = next(one for one in result.effects if one.id == "gyro-scale-nonlinearity")
+    assert [c.driver for c in effect.curves] == ["rate"] * 3
+    assert not any(len(c.data) for c in effect.curves)
+    blocks = [block for section in diagnosis_report(result).sections for block in section.blocks]
+    drawn = next(b for b in blocks if isinstance(b, Picture) and b.name == "effect-gyro-scale-nonlinearity")
+    assert len(drawn.chart().panels) == 4
+    assert "moves in which it acts" in drawn.caption
+    # Curves are for the page: the machine's answer holds the parameters.
+    assert "curves" not in as_plain(effect)
