@@ -159,9 +159,13 @@ def _shakes(channels: Channels, activity: Activity, run: Run) -> bool:
 
 
 def _turns(channels: Channels, run: Run, settled: list[Run]) -> bool:
-    """Whether the gyro reads on one way beside the nearest ``settled`` pose: the middle of a slow turn is as quiet."""
-    near = min(settled, key=lambda other: max(other.first - run.last, run.first - other.last))
-    return turns_on(channels, run.first, run.last, run_mean(channels, near)[0])
+    """Whether the gyro reads on one way beyond what ``settled`` poses read: the middle of a slow turn is as quiet.
+
+    Their biases scatter with the attitude (g-sensitivity), with temperature and with time.
+    """
+    biases = np.array([run_mean(channels, one)[0] for one in settled])
+    nearest = np.clip(run_mean(channels, run)[0], biases.min(axis=0), biases.max(axis=0))
+    return turns_on(channels, run.first, run.last, nearest)
 
 
 def _stays(seen: _Seen, stretch: Range) -> bool:
