@@ -200,7 +200,7 @@ def test_a_clipped_move_is_bridged_and_weighs_less(quiet):
     assert FindingCode.CLIPPING in codes(findings)
     assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
     hard = np.clip(recording.gyroscope, -0.3 * limit, 0.3 * limit)
-    with pytest.raises(ValueError, match="limit in every move"):
+    with pytest.raises(ValueError, match="clipped in every move"):
         calibrate_moves(replace(recording, gyroscope=hard), segments, given_accelerometer(truth), truth.gravity_m_s2)
 
 

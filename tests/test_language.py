@@ -166,8 +166,9 @@ def written(path: Path) -> Iterator[str]:
             text = node.value
         else:
             continue
-        # A label of a random stream keeps its letters, or every seed would draw another series.
-        if " " in text.strip() and not text.startswith("{/"):
+        # A label of a random stream keeps its letters, or every seed would draw another series; verbs are listed bare.
+        is_verbs = set(text.split()) <= set(trihedron.__all__)
+        if " " in text.strip() and not text.startswith("{/") and not is_verbs:
             yield text
 
 

@@ -40,7 +40,7 @@ pub struct Fit {
     pub cov_with_bias: DMatrix<f64>,
     /// Weighted sum of squares, robust weights included, and its degrees of freedom.
     pub chi2: f64,
-    /// Rows minus determined parameters.
+    /// Rows minus determined parameters; what was known of the offset is none.
     pub dof: usize,
     /// SVD of the whitened Jacobian with unit columns.
     pub certainty: Certainty,
@@ -269,7 +269,8 @@ fn finish(
     let rows: Vec<_> = (0..problem.links.len())
         .map(|index| problem.move_row(&at, index))
         .collect();
-    let dof = layout.n.saturating_sub(certainty.rank);
+    // What was known of the offset is no observation: against it moves are as free as without.
+    let dof = (layout.n - problem.n_offset_rows()).saturating_sub(certainty.rank);
     Ok(Fit {
         covariance,
         cov_with_bias,

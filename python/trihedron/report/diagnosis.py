@@ -28,6 +28,7 @@ from trihedron.report.diagnosis_overview_charts import (
 )
 from trihedron.report.diagnosis_relations import relations_blocks
 from trihedron.report.diagnosis_words import (
+    LEVELS,
     MEANING,
     next_step_in_words,
     p_in_words,
@@ -39,7 +40,7 @@ from trihedron.report.diagnosis_words import (
     verdict_in_words,
     where_in_words,
 )
-from trihedron.report.document import Block, Document, Facts, Headline, Level, Paragraph, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.effect_charts import effect_chart
 from trihedron.report.findings import findings_block
@@ -58,14 +59,6 @@ _CAPTIONS = {
     "moves": "Tilt error after every rotation: gravity predicted with the gyro against gravity measured.",
     "dynamics": "Velocity error over a rotation: integral of acceleration between two poses; should be 0.",
 }
-_LEVELS: dict[str, Level] = {
-    "consistent": "good",
-    "parameters-differ": "usable",
-    "missing-physics": "usable",
-    "not-testable": "usable",
-    "unexplained": "bad",
-}
-"""A diagnosis that names what is missing has done its work; one that cannot is no base for anything."""
 MOST_PARAMETERS = 9
 
 
@@ -113,7 +106,7 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         headlines=tuple(_headlines(diagnosis)),
         lead=strengths,
         next_step=next_step_in_words(diagnosis),
-        stated_level=_LEVELS[diagnosis.verdict],
+        stated_level=LEVELS[diagnosis.verdict],
     )
     return beside_reference(document, found)
 

@@ -6,8 +6,18 @@ from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.finding import FindingCode
 from trihedron.report.diagnosis_numbers import differing_in_short
+from trihedron.report.document import Level
 from trihedron.report.numbers import listed, plain_number, unit_in_print, with_sigma
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
+
+LEVELS: dict[str, Level] = {
+    "consistent": "good",
+    "parameters-differ": "usable",
+    "missing-physics": "usable",
+    "not-testable": "usable",
+    "unexplained": "bad",
+}
+"""A diagnosis that names what is missing has done its work; one that cannot is no base for anything."""
 
 MEANING = {
     "static-accel": "gravity error in static poses",

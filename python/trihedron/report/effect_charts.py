@@ -133,7 +133,7 @@ def _drivers(
         ]
     if effect_id in _FORCE and seen.kind == "pose" and recording.accelerometer is not None:
         force = force_at(seen.time_before_s, recording, calibration)
-        return [(f"f_{'xyz'[j]} [m/s²]", "m/s²", force[:, j]) for j in range(3)]
+        return [(f"f_{AXES[j]} [m/s²]", "m/s²", force[:, j]) for j in range(3)]
     return [("time [s]", "s", seen.time_before_s)]
 
 

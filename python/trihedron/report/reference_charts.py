@@ -60,7 +60,7 @@ def residual_chart(found: AgainstReference) -> Chart:
     panels = []
     for k in range(3):
         marks = (Level(y=0.0), Line(*envelope(found.residual_time_s, left[:, k]), "", AXIS_COLOURS[k], is_thin=True))
-        y = Scale(f"{'XYZ'[k]}  [°/s]", "°/s", limits=(-reach, reach))
+        y = Scale(f"{XYZ[k]}  [°/s]", "°/s", limits=(-reach, reach))
         panels.append(Panel(Scale("time [s]", "s"), y, marks, height_px=110))
     return Chart(tuple(panels), is_linked=True, legend=False)
 

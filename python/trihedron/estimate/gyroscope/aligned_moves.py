@@ -130,6 +130,9 @@ class _Session:
         dof, before = aligned.fit.dof, aligned
         if dof < 1 or aligned.fit.chi2 <= dof:
             return measured, aligned
+        # Samples lost unseen would be as good a reason for what moves miss.
+        if is_asked_for_losses(self.recording.time_s, measured, aligned, aligned.fit.chi2, dof):
+            return measured, aligned
         last = measured.edges[:, 1] - 2
         of_turn = np.zeros(measured.rate.shape)
         of_turn[last] = 1.0 / (measured.nominal_step_s * np.linalg.norm(aligned.fit.gyroscope_scale, 2)) ** 2

@@ -203,7 +203,11 @@ def losses_that_fit(
 def is_asked_for_losses(
     time_s: FloatArray, measured: MoveMeasurements, aligned: Aligned, chi2: float, dof: float
 ) -> bool:
-    """Whether losses may be behind what moves miss: those in use beyond noise, or those left out by whole samples."""
+    """Whether losses may be behind what moves miss: those in use beyond noise, or those left out by whole samples.
+
+    Turns that a step hides are given the size that misses show: lost samples are as good a reason for them.
+    """
+    chi2 = max(chi2, aligned.excess * dof)
     return asks_for_losses(chi2, dof, len(aligned.outliers)) or left_out_as_by_losses(time_s, measured, aligned)
 
 
