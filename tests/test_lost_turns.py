@@ -106,7 +106,7 @@ def test_moves_left_out_for_a_sample_they_lack_are_losses_and_knocked_ones_are_n
             is_said = FindingCode.SAMPLES_LOST in {one.code for one in found.findings}
             lossy += is_lossy and is_said
             false += not is_lossy and is_said
-    # 48 of 54 sessions (44 before).
+    # 41 of 54 sessions: what three lost samples do to moves that others were left out of may be a hidden turn as well.
     assert lossy >= n - 2
     # None of 30 sessions: a knock meets the curve of a loss by chance only.
     assert false <= 1
