@@ -9,7 +9,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
-import trihedron.estimate.joint as joint
+import trihedron.estimate.session.solved as solved_session
 from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import hand
@@ -26,13 +26,13 @@ def recording_of(f, w, t, rate):
 @pytest.fixture
 def solved(monkeypatch):
     """The session solutions that calibrations came from, in turn."""
-    kept, plain = [], joint.solve_session
+    kept, plain = [], solved_session.solve_session
 
     def kept_too(*given):
         kept.append(plain(*given))
         return kept[-1]
 
-    monkeypatch.setattr(joint, "solve_session", kept_too)
+    monkeypatch.setattr(solved_session, "solve_session", kept_too)
     return kept
 
 

@@ -158,37 +158,16 @@ impl Layout {
         Ok((c.cholesky()?, mahalanobis))
     }
 
-    /// How the rows answer to the zero reading of every pose: `(n, 3)` each.
-    pub fn wrt_bias(&self, problem: &Alignment, at: &Evaluated) -> Vec<DMatrix<f64>> {
-        let mut out = vec![DMatrix::zeros(self.n, 3); problem.holds.len()];
-        for source in self
-            .sources(problem, at)
-            .iter()
-            .filter(|source| source.is_zero)
-        {
-            for (block, wrt) in &source.touched {
-                let mut view =
-                    out[source.hold].view_mut((self.offsets[*block], 0), (wrt.nrows(), 3));
-                view += wrt;
-            }
-        }
-        out
-    }
-
     /// The means of every pose and the rows they entered.
     fn sources(&self, problem: &Alignment, at: &Evaluated) -> Vec<Source> {
         let mut readings: Vec<Source> = (0..problem.holds.len())
             .map(|hold| Source {
-                hold,
-                is_zero: false,
                 var: problem.holds[hold].var_reading,
                 touched: Vec::new(),
             })
             .collect();
         let mut zeros: Vec<Source> = (0..problem.holds.len())
             .map(|hold| Source {
-                hold,
-                is_zero: true,
                 var: problem.holds[hold].var_bias,
                 touched: Vec::new(),
             })
@@ -229,8 +208,6 @@ impl Layout {
 
 /// The mean of one pose, its variance, and the derivative of every block that used it.
 struct Source {
-    hold: usize,
-    is_zero: bool,
     var: Vector3<f64>,
     touched: Vec<(usize, DMatrix<f64>)>,
 }

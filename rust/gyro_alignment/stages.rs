@@ -33,11 +33,6 @@ impl Default for Settings {
 pub struct Fit {
     /// Both sensors at the solution.
     pub model: Model,
-    /// `(p, p)` of the free parameters (accelerometer, `S_ω`, offset): noise of everything measured; no doubt about fixed
-    /// accelerometer parameters.
-    pub covariance: DMatrix<f64>,
-    /// `(p, 3)`: covariance of the solution with the weighted mean of the zero readings.
-    pub cov_with_bias: DMatrix<f64>,
     /// Weighted sum of squares, robust weights included, and its degrees of freedom.
     pub chi2: f64,
     /// Rows minus determined parameters; what was known of the offset is none.
@@ -52,8 +47,6 @@ pub struct Fit {
     pub residuals: Vec<Vector3<f64>>,
     /// Covariance of each from its own measurements.
     pub cov_residuals: Vec<Matrix3<f64>>,
-    /// Derivative of each with respect to the free parameters, `(3, p)`.
-    pub jacobians: Vec<DMatrix<f64>>,
     /// Predicted force after each move, m/s².
     pub predicted: Vec<Vector3<f64>>,
     /// Linearisations made.
@@ -75,16 +68,9 @@ const SETTLED: f64 = 1e-3;
 
 /// Fits from each start and keeps the best; then weighs by the full covariance.
 ///
-/// `bias_weights` `(n_poses)` are the weights of each pose's zero reading in the mean that the caller forms.
-///
 /// # Errors
 /// When the pieces do not fit together, no start is given, or no start gives finite residuals.
-pub fn fit(
-    problem: &Alignment,
-    starts: &[Model],
-    bias_weights: &[Vector3<f64>],
-    settings: &Settings,
-) -> Result<Fit> {
+pub fn fit(problem: &Alignment, starts: &[Model], settings: &Settings) -> Result<Fit> {
     problem.check()?;
     let turns = LastTurns::default();
     let mut base = match starts {
@@ -143,15 +129,7 @@ pub fn fit(
     }
     let solution = last.ok_or_else(|| Error::bad_input("a fit needs at least one round"))?;
     let at = problem.evaluate(base, &turns);
-    finish(
-        problem,
-        at,
-        &weights,
-        bias_weights,
-        &solution,
-        iterations,
-        settled,
-    )
+    finish(problem, at, &weights, &solution, iterations, settled)
 }
 
 /// Least squares on directions with a robust loss, accelerometer fixed, from every start; the cheapest wins.
@@ -237,7 +215,6 @@ fn finish(
     problem: &Alignment,
     at: Evaluated,
     weights: &[f64],
-    bias_weights: &[Vector3<f64>],
     solution: &Solution,
     iterations: usize,
     settled: bool,
@@ -252,28 +229,14 @@ fn finish(
     let chi2 = whitened.norm_squared();
     let jacobian = columns.remove_column(0);
     let certainty = gauss_newton::certainty(&jacobian, 1.0, Options::default().rank_tolerance);
-    let covariance = certainty.covariance.clone();
     // Where rounding of the cost hides the last part of the descent, what is left of it is still known.
-    let left = (&jacobian * (&covariance * (jacobian.transpose() * &whitened))).norm();
-    // x̂ = x − K ε with K = P Jᵀ in whitened rows: how anything that entered the rows reaches the solution.
-    let gain = &covariance * jacobian.transpose();
-    let mut cov_with_bias = DMatrix::zeros(problem.n_parameters(), 3);
-    for (hold, mut wrt) in layout.wrt_bias(problem, &at).into_iter().enumerate() {
-        factor.whiten(&mut wrt);
-        let var = problem.holds[hold]
-            .var_bias
-            .component_mul(&bias_weights.get(hold).copied().unwrap_or_default());
-        cov_with_bias -=
-            &gain * wrt * DMatrix::from_diagonal(&DVector::from_column_slice(var.as_slice()));
-    }
+    let left = (&jacobian * (&certainty.covariance * (jacobian.transpose() * &whitened))).norm();
     let rows: Vec<_> = (0..problem.links.len())
         .map(|index| problem.move_row(&at, index))
         .collect();
     // What was known of the offset is no observation: against it moves are as free as without.
     let dof = (layout.n - problem.n_offset_rows()).saturating_sub(certainty.rank);
     Ok(Fit {
-        covariance,
-        cov_with_bias,
         chi2,
         dof,
         certainty,
@@ -283,7 +246,6 @@ fn finish(
         cov_residuals: (0..rows.len())
             .map(|index| whole_covariance(problem, &at, index))
             .collect(),
-        jacobians: rows.into_iter().map(|row| row.jacobian).collect(),
         predicted: problem
             .links
             .iter()

@@ -33,27 +33,24 @@ struct Moves {
 #[pyclass(frozen, module = "trihedron._core")]
 struct AlignmentPoses {
     holds: Vec<StillPose>,
-    bias_weights: Vec<Vector3<f64>>,
     var_bias_walk: Vector3<f64>,
 }
 
 #[pymethods]
 impl AlignmentPoses {
     #[new]
-    #[pyo3(signature = (*, reading, var_reading, zero, var_bias, bias_weights, var_bias_walk))]
+    #[pyo3(signature = (*, reading, var_reading, zero, var_bias, var_bias_walk))]
     fn new(
         reading: PyReadonlyArray2<'_, f64>,
         var_reading: PyReadonlyArray2<'_, f64>,
         zero: PyReadonlyArray2<'_, f64>,
         var_bias: PyReadonlyArray2<'_, f64>,
-        bias_weights: PyReadonlyArray2<'_, f64>,
         var_bias_walk: PyReadonlyArray1<'_, f64>,
     ) -> PyResult<Self> {
         let reading = rows3("reading", &reading)?;
         let var_reading = rows3("var_reading", &var_reading)?;
         let zero = rows3("zero", &zero)?;
         let var_bias = rows3("var_bias", &var_bias)?;
-        let bias_weights = rows3("bias_weights", &bias_weights)?;
         let n = reading.len();
         same_length(
             n,
@@ -61,7 +58,6 @@ impl AlignmentPoses {
                 ("var_reading", var_reading.len()),
                 ("zero", zero.len()),
                 ("var_bias", var_bias.len()),
-                ("bias_weights", bias_weights.len()),
             ],
         )?;
         Ok(Self {
@@ -73,7 +69,6 @@ impl AlignmentPoses {
                     var_bias: var_bias[h],
                 })
                 .collect(),
-            bias_weights,
             var_bias_walk: vector3("var_bias_walk", &var_bias_walk)?,
         })
     }
@@ -112,9 +107,6 @@ struct AlignmentFit {
     accelerometer_scale: Py<PyArray2<f64>>,
     accelerometer_bias: Py<PyArray1<f64>>,
     gyroscope_scale: Py<PyArray2<f64>>,
-    rate_offset: Py<PyArray1<f64>>,
-    covariance: Py<PyArray2<f64>>,
-    cov_with_bias: Py<PyArray2<f64>>,
     chi2: f64,
     dof: usize,
     rank: usize,
@@ -124,7 +116,6 @@ struct AlignmentFit {
     mahalanobis: Py<PyArray1<f64>>,
     residuals: Py<PyArray2<f64>>,
     cov_residuals: Py<PyArray3<f64>>,
-    jacobians: Py<PyArray3<f64>>,
     predicted: Py<PyArray2<f64>>,
     iterations: usize,
     is_converged: bool,
@@ -268,25 +259,17 @@ impl Moves {
             is_near,
             ..Settings::default()
         };
-        let found = super::run_long(py, || {
-            fit(&problem, &starts, &poses.bias_weights, &settings)
-        })?;
+        let found = super::run_long(py, || fit(&problem, &starts, &settings))?;
         export(py, &found)
     }
 }
 
 fn export(py: Python<'_>, found: &Fit) -> PyResult<AlignmentFit> {
     let m = found.residuals.len();
-    let p = found.covariance.nrows();
     let cov: Vec<f64> = found
         .cov_residuals
         .iter()
         .flat_map(|matrix| matrix.as_slice().to_vec())
-        .collect();
-    let jacobians: Vec<f64> = found
-        .jacobians
-        .iter()
-        .flat_map(|matrix| matrix.transpose().as_slice().to_vec())
         .collect();
     Ok(AlignmentFit {
         accelerometer_scale: of3(py, &found.model.accelerometer_scale)?.unbind(),
@@ -297,9 +280,6 @@ fn export(py: Python<'_>, found: &Fit) -> PyResult<AlignmentFit> {
             .to_pyarray(py)
             .unbind(),
         gyroscope_scale: of3(py, &found.model.gyroscope_scale)?.unbind(),
-        rate_offset: found.model.rate_offset.as_slice().to_pyarray(py).unbind(),
-        covariance: matrix(py, &found.covariance)?.unbind(),
-        cov_with_bias: matrix(py, &found.cov_with_bias)?.unbind(),
         chi2: found.chi2,
         dof: found.dof,
         rank: found.certainty.rank,
@@ -314,7 +294,6 @@ fn export(py: Python<'_>, found: &Fit) -> PyResult<AlignmentFit> {
         mahalanobis: found.mahalanobis.to_pyarray(py).unbind(),
         residuals: vectors(py, &found.residuals)?.unbind(),
         cov_residuals: cov.to_pyarray(py).reshape([m, 3, 3])?.unbind(),
-        jacobians: jacobians.to_pyarray(py).reshape([m, 3, p])?.unbind(),
         predicted: vectors(py, &found.predicted)?.unbind(),
         iterations: found.iterations,
         is_converged: found.is_converged,

@@ -7,6 +7,7 @@ difference; rotations that do not commute do. Which sensor it is, moves show as 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,7 +47,7 @@ def sharpened(readings: FloatArray, time_s: FloatArray, share: float) -> FloatAr
     return out
 
 
-def averaging_of(chi2: tuple[float, float, float]) -> Averaging:
+def averaging_of(chi2: Sequence[float]) -> Averaging:
     """Posterior of ``a`` from χ² at ``TRIED`` and the prior."""
     at0, at_half, at1 = chi2
     curvature, slope = max(2.0 * (at0 + at1 - 2.0 * at_half), 0.0), 4.0 * at_half - 3.0 * at0 - at1

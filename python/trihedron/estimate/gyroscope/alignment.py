@@ -24,12 +24,6 @@ FALSE_ALARM = 1e-3
 LEAST_SHRINK = 0.1
 """Of residuals by what was fitted to them: hardly any freedom is left, and a ratio of noise says no more."""
 
-TINY = 1e-300
-"""Variance of what is known exactly, to divide by."""
-
-AT_LEAST = 0.84
-"""One standard error: as much of the rounding charged as misses with this chance would be larger than those seen."""
-
 
 @dataclass(frozen=True)
 class MoveOptions:
@@ -86,29 +80,19 @@ def given_accelerometer(model: SensorCalibration) -> AccelerometerPart:
 
 @dataclass(frozen=True, eq=False)
 class Aligned:
-    """A finished alignment.
-
-    ``parameters_covariance`` (p, p) of (free accelerometer, ``S_ω``, offset) with everything in it; ``covariance``
-    (24, 24) of (``S_f``, ``b_f``, ``S_ω``, ``b_ω``); ``used`` (m,) the moves behind it, ``outliers`` those screened
-    out; ``inflation`` the factor χ²/dof by which the covariance was widened, one when the residual is within the noise,
-    and ``excess`` what it would be without turns that a step hides.
-    """
+    """A finished alignment: ``used`` (m,) the moves behind it, ``outliers`` those screened out, ``n_gyroscope``
+    parameters of the gyro in it."""
 
     fit: AlignmentFit
-    gyroscope_bias: FloatArray
-    covariance: FloatArray
-    parameters_covariance: FloatArray
     used: BoolArray
     outliers: tuple[int, ...]
-    inflation: float
     n_gyroscope: int
-    excess: float = 1.0
 
     @property
-    def parameters(self) -> FloatArray:
-        """(24,) in the order of ``covariance``."""
-        S_f, b_f, S_w = self.fit.accelerometer_scale, self.fit.accelerometer_bias, self.fit.gyroscope_scale
-        return np.concatenate([np.ravel(S_f), b_f, np.ravel(S_w), self.gyroscope_bias])
+    def excess(self) -> float:
+        """χ²/dof where the residual is beyond the noise, else one."""
+        fit = self.fit
+        return fit.chi2 / fit.dof if fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < FALSE_ALARM else 1.0
 
 
 def align(
@@ -163,21 +147,7 @@ def align_screened(
         starts = np.concatenate([np.asarray(screen.gyroscope_scale)[None], starts])
         is_near = screen.is_converged
     fit = _core_align(measured, accelerometer, gravity_m_s2, starts, options, used, None, is_near)
-    return finished(fit, measured, accelerometer, used, outliers)
-
-
-def finished(
-    fit: AlignmentFit,
-    measured: MoveMeasurements,
-    accelerometer: AccelerometerPart,
-    used: BoolArray,
-    outliers: tuple[int, ...],
-) -> Aligned:
-    """The alignment of a fit, its covariance widened where the residual is beyond the noise."""
-    inflation = 1.0
-    if fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < FALSE_ALARM:
-        inflation = fit.chi2 / fit.dof
-    return assemble(fit, measured, accelerometer, used, outliers, inflation)
+    return Aligned(fit, used, outliers, n_parameters)
 
 
 def are_far(distance: FloatArray, dof: float) -> BoolArray:
@@ -211,7 +181,6 @@ def _core_align(
             var_reading=measured.var_reading,
             zero=measured.zero,
             var_bias=measured.var_bias,
-            bias_weights=measured.bias_weights,
             var_bias_walk=measured.var_bias_walk,
         ),
         noise=_core.RateNoise(measured.noise_density, measured.sigma_time_s, measured.nominal_step_s),
@@ -233,102 +202,3 @@ def _place_white(measured: MoveMeasurements, S: FloatArray) -> FloatArray:
     axes = measured.is_undithered
     out: FloatArray = np.linalg.pinv(S)[axes] / (measured.quantum[axes, None] / np.sqrt(12.0))
     return np.ascontiguousarray(out)
-
-
-def assemble(
-    fit: AlignmentFit,
-    measured: MoveMeasurements,
-    accelerometer: AccelerometerPart,
-    used: BoolArray,
-    outliers: tuple[int, ...],
-    inflation: float,
-) -> Aligned:
-    """Covariance of (S_f, b_f, S_ω, b_ω) from that of the fit, of the biases and of a fixed accelerometer.
-
-    ``b_ω = −S_ω z̄ + offset``, so ``δb = −δS_ω z̄ − S_ω δz̄ + δoffset``. The fit's own error is independent of ``z̄`` and
-    of the accelerometer, whose errors it follows: what widens or narrows it leaves these alone, and the whole positive.
-    """
-    S = np.asarray(fit.gyroscope_scale)
-    k = accelerometer.basis.shape[1]
-    p = fit.covariance.shape[0]
-    of_fit, sigma_bias = np.asarray(fit.covariance), np.sqrt(measured.var_bias_mean)
-    # How (fit parameters, z̄, given accelerometer) follow errors of unit size: of z̄, and of the given directions.
-    given = accelerometer.basis if accelerometer.is_given else np.zeros((12, 0))
-    follows = np.zeros((p + 15, 3 + given.shape[1]))
-    follows[:p, :3] = fit.cov_with_bias / np.maximum(sigma_bias, TINY)
-    follows[:p, 3:] = of_fit[:, : given.shape[1]]
-    follows[p : p + 3, :3] = np.diag(sigma_bias)
-    follows[p + 3 :, 3:] = given
-    own = _positive(inflation * (of_fit + _unseen(fit, S, k)) - follows[:p] @ follows[:p].T)
-    narrower = np.ones(p)
-    narrower[k : k + 9] = _narrowing(fit, measured)
-    joint = follows @ follows.T
-    joint[:p, :p] += own * np.outer(narrower, narrower)
-    if measured.still_response is not None:
-        joint[:p] = measured.still_response @ joint[:p]
-        joint[:, :p] = joint[:, :p] @ measured.still_response.T
-    to_all = np.zeros((24, p + 15))
-    to_all[:, :p] = from_fit(p, measured, accelerometer)
-    if accelerometer.is_given:
-        to_all[:12, :k] = 0.0
-        to_all[:12, p + 3 :] = np.eye(12)
-    to_all[21:, p : p + 3] = -S
-    covariance = to_all @ joint @ to_all.T
-    return Aligned(
-        fit=fit,
-        gyroscope_bias=np.asarray(fit.rate_offset) - S @ measured.bias_mean,
-        covariance=0.5 * (covariance + covariance.T),
-        parameters_covariance=joint[:p, :p],
-        used=used,
-        outliers=outliers,
-        inflation=inflation,
-        n_gyroscope=p - k,
-    )
-
-
-def from_fit(p: int, measured: MoveMeasurements, accelerometer: AccelerometerPart) -> FloatArray:
-    """How (S_f, b_f, S_ω, b_ω) follow the ``p`` parameters of the fit, (24, p); ``b_ω = −S_ω z̄ + offset``."""
-    k = accelerometer.basis.shape[1]
-    out = np.zeros((24, p))
-    out[:12, :k] = accelerometer.basis
-    out[12:21, k : k + 9] = np.eye(9)
-    out[21:, k : k + 9] = -np.kron(np.eye(3), measured.bias_mean)
-    if p > k + 9:
-        out[21:, k + 9 :] = np.eye(3)
-    return out
-
-
-def _positive(covariance: FloatArray) -> FloatArray:
-    """A covariance without what rounding leaves below zero, whatever the units of its parameters."""
-    size = np.sqrt(np.maximum(np.diag(covariance), TINY))
-    values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
-    root = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    out: FloatArray = root @ root.T
-    return out
-
-
-def _narrowing(fit: AlignmentFit, measured: MoveMeasurements) -> float:
-    """Factor, at most one, on the scale's standard errors where readings are coarser than their noise.
-
-    What rounding may hide is charged for the usual hand; what it did hide shows in the misses, up to their own chance.
-    The offset, which all moves share, does not show in them, and keeps the whole charge.
-    """
-    if fit.dof < 1 or not np.any(measured.is_undithered):
-        return 1.0
-    return min(1.0, float(np.sqrt(fit.chi2 / chdtri(fit.dof, AT_LEAST))))
-
-
-def _unseen(fit: AlignmentFit, S: FloatArray, k: int) -> FloatArray:
-    """Variance of directions that the moves do not see, (p, p): as uncertain as the scale itself is large."""
-    p = len(fit.singular_values)
-    extra = np.zeros((p, p))
-    if fit.rank == p:
-        return extra
-    size = float(np.linalg.norm(S, 2))
-    for direction in np.asarray(fit.directions).T[fit.rank :]:
-        scaled = np.zeros(p)
-        scaled[k : k + 9] = direction[k : k + 9]
-        length = float(np.linalg.norm(scaled))
-        if length > 0.0:
-            extra += np.outer(scaled, scaled) * (size / length) ** 2
-    return extra

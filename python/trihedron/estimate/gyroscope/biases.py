@@ -8,13 +8,11 @@ from trihedron.arrays import FloatArray
 from trihedron.probability import chdtri
 
 
-def pool_biases(
-    zero: FloatArray, var_bias: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+def pool_biases(zero: FloatArray, var_bias: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Random-effects mean of biases (n, 3) of variance (n, 3) (DerSimonian & Laird 1986).
 
-    Returns weights (n, 3), mean (3,), its variance (3,), χ² against constancy (3,) with n − 1 degrees of freedom, and
-    the variance (3,) of the true bias between poses, nothing where χ² is within chance.
+    Returns the mean (3,), χ² against constancy (3,) with n − 1 degrees of freedom, and the variance (3,) of the true
+    bias between poses, nothing where χ² is within chance.
     """
     floor = np.maximum(var_bias, 1e-30 + 1e-24 * zero**2)
     weight = 1.0 / floor
@@ -27,9 +25,7 @@ def pool_biases(
     spread = np.where(chi2 > dof + 4.0 * np.sqrt(2.0 * max(dof, 1)), spread, 0.0)
     weight = 1.0 / (floor + spread)
     weight /= weight.sum(axis=0)
-    mean = (weight * zero).sum(axis=0)
-    variance = (weight**2 * (floor + spread)).sum(axis=0)
-    return np.ascontiguousarray(weight), mean, variance, chi2, spread
+    return (weight * zero).sum(axis=0), chi2, spread
 
 
 def excess_variance(values: FloatArray, noise: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""What the alignment noticed, as findings."""
+"""What the moves showed, as findings."""
 
 from __future__ import annotations
 
@@ -7,41 +7,48 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.alignment import FALSE_ALARM, Aligned
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, audit_moves
-from trihedron.estimate.gyroscope.observability import describe, observability_findings
-from trihedron.estimate.gyroscope.verification import Prediction, is_astray
+from trihedron.estimate.gyroscope.observability import observability_findings
+from trihedron.estimate.gyroscope.verification import ASTRAY_DEG
+from trihedron.estimate.session.carried import Carried
+from trihedron.estimate.session.fit import SessionSolution
 from trihedron.probability import chdtrc
+from trihedron.quantiles import median
+from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode, Severity
-from trihedron.records.words import words
 from trihedron.units import STANDARD_GRAVITY_M_S2, RateUnit, rate_to_si
 
 MAX_SCALE_RATIO = 1.5
 """Untrimmed MEMS gyros are within 10 % of their data sheet; half as much again is a wrong unit or rate."""
 
 
-def findings_of(aligned: Aligned, measured: MoveMeasurements, held: Prediction | None) -> tuple[Finding, ...]:
-    """Everything the alignment noticed."""
-    fit = aligned.fit
-    S = np.asarray(fit.gyroscope_scale)
-    covariance = aligned.covariance[12:21, 12:21]
+def findings_of(
+    aligned: Aligned,
+    measured: MoveMeasurements,
+    solution: SessionSolution,
+    gyroscope: SensorCalibration,
+    seen: Carried,
+) -> tuple[Finding, ...]:
+    """Everything that the moves showed."""
+    S, observability = gyroscope.S, gyroscope.observability
+    assert observability is not None
     found = audit_moves(measured)
-    found += handedness(S, np.asarray(fit.accelerometer_scale))
-    found += observability_findings(describe(fit, covariance, S, aligned.n_gyroscope), covariance, S)
-    if not fit.is_converged:
-        found.append(Finding.of(FindingCode.NOT_CONVERGED, "gyro", stopped_because=words(fit.stopped_because)))
+    found += handedness(S, solution.S_a)
+    found += observability_findings(observability, gyroscope.covariance[:9, :9], S)
+    if not solution.is_converged:
+        found.append(Finding.of(FindingCode.NOT_CONVERGED, "session", stopped_because=solution.stopped_because))
     found += _outlier_findings(aligned, measured)
-    excess = max(aligned.inflation, aligned.excess)
-    if excess > 1.0:
+    if solution.inflation[0] > 1.0:
         # Bars that are widened in proportion say nothing about a minimum elsewhere.
+        is_astray = median(seen.angle_deg[~measured.is_lost]) > ASTRAY_DEG
         found.append(
             Finding.of(
                 FindingCode.RESIDUAL_ABOVE_NOISE,
                 "moves",
-                severity=Severity.SERIOUS if is_astray(aligned, measured) else Severity.WARNING,
-                chi2_per_dof=excess,
-                dof=fit.dof,
+                severity=Severity.SERIOUS if is_astray else Severity.WARNING,
+                chi2_per_dof=solution.moves_chi2 / max(solution.moves_dof, 1.0),
+                dof=solution.moves_dof,
             )
         )
-    found += _held_out_findings(held, aligned)
     found += _attitude_findings(measured, S)
     found += _drift_findings(measured, S)
     return tuple(found)
@@ -103,24 +110,6 @@ def _outlier_findings(aligned: Aligned, measured: MoveMeasurements) -> list[Find
             )
         )
     return found
-
-
-def _held_out_findings(held: Prediction | None, aligned: Aligned) -> list[Finding]:
-    if held is None:
-        return []
-    z2 = held.z2[aligned.used & np.isfinite(held.z2)]
-    chi2, dof = float(z2.sum()), 2 * len(z2)
-    # Residuals of neighbouring moves are correlated, which widens the scatter of their sum.
-    if chdtrc(dof, chi2 / aligned.inflation / 1.5) > FALSE_ALARM:
-        return []
-    return [
-        Finding.of(
-            FindingCode.HELD_OUT_WORSE,
-            "moves",
-            times=np.sqrt(chi2 / dof / aligned.inflation),
-            chi2_per_dof=chi2 / dof,
-        )
-    ]
 
 
 def _attitude_findings(measured: MoveMeasurements, S: FloatArray) -> list[Finding]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +10,6 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.alignment import Aligned
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.estimate.gyroscope.verification import predict
 from trihedron.probability import fdtrc
 from trihedron.records.finding import Finding, FindingCode
 
@@ -203,28 +202,5 @@ def losses_that_fit(
 def is_asked_for_losses(
     time_s: FloatArray, measured: MoveMeasurements, aligned: Aligned, chi2: float, dof: float
 ) -> bool:
-    """Whether losses may be behind what moves miss: those in use beyond noise, or those left out by whole samples.
-
-    Turns that a step hides are given the size that misses show: lost samples are as good a reason for them.
-    """
-    chi2 = max(chi2, aligned.excess * dof)
+    """Whether losses may be behind what moves miss: those in use beyond noise, or those left out by whole samples."""
     return asks_for_losses(chi2, dof, len(aligned.outliers)) or left_out_as_by_losses(time_s, measured, aligned)
-
-
-def of_alignment(
-    time_s: FloatArray, measured: MoveMeasurements, aligned: Aligned, gravity_m_s2: float
-) -> tuple[Aligned, tuple[Finding, ...]]:
-    """An alignment of moves alone, widened by the losses that its misses leave room for, and what is to be said."""
-    if not is_asked_for_losses(time_s, measured, aligned, aligned.fit.chi2, aligned.fit.dof):
-        return aligned, ()
-    seen = predict(aligned, measured, is_held_out=False)
-    S = np.asarray(aligned.fit.gyroscope_scale)
-    n_used = int(np.count_nonzero(aligned.used))
-    dof = max(2 * n_used - min(9, aligned.fit.rank), 1)
-    losses = losses_that_fit(
-        time_s, measured, S, gravity_m_s2, (seen.angle_deg, seen.floor2), float(dof), aligned.used
-    )  # fmt: skip
-    own = relative_sigma(aligned.covariance[12:, 12:], S)
-    covariance = aligned.covariance.copy()
-    covariance[12:, 12:] = losses.widened(covariance[12:, 12:], S, aligned.gyroscope_bias, max(aligned.inflation, 1.0))
-    return replace(aligned, covariance=covariance), losses.findings(own)

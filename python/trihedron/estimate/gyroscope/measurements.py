@@ -14,9 +14,11 @@ from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
 from trihedron.estimate.gyroscope.biases import excess_variance, pool_biases, shrink
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, Clipped, bridge_clipping, clipped_time
+from trihedron.estimate.gyroscope.resting_ends import resting_ends
 from trihedron.estimate.gyroscope.rounding import (
     common_bias,
     density_without_rounding,
+    resting_axes,
     rounding_variance,
     undithered_axes,
 )
@@ -46,13 +48,12 @@ class MoveMeasurements:
     ``noise_density`` (3,) the angle random walk in raw unit · √s; ``var_bias_walk`` (3,) the variance by which the
     true bias changes from pose to pose; ``clipped_s`` (m,) is the time in each move that the gyro spent at
     its limit. ``attitude`` is the dependence of the bias on specific force where it was removed: ``rate``
-    (samples, 3) are the raw gyro readings without it, and so are the biases. ``bias_weights`` (n, 3) make the
-    session's bias ``bias_mean`` (3,) of variance ``var_bias_mean`` (3,). ``is_undithered`` (3,) are the axes
-    whose zero lies hidden inside an LSB, ``quantum`` (3,) the LSB. ``bias_read``, ``var_bias_read`` (n, 3) are the
-    biases as each hold alone shows them, ``var_reading_noise`` (n, 3) the variance of the pose means by noise alone,
-    ``reading_variance`` (samples, 3) that of gyro readings which were bridged or rounded; ``still_response`` (p, p) how
-    the fit's parameters follow errors of their own once readings at rest are told from the offset that they fit;
-    ``averaging`` by how much ``rate`` was sharpened, the readings being means over their interval.
+    (samples, 3) are the raw gyro readings without it, and so are the biases, whose mean over the
+    session is ``bias_mean`` (3,). ``is_undithered`` (3,) are the axes whose bias lies hidden inside an LSB, ``quantum``
+    (3,) the LSB, ``is_hidden`` (samples, 3) where a reading of such an axis stands in the LSB of its bias.
+    ``bias_read``, ``var_bias_read`` (n, 3) are the biases as each pose alone shows them, ``var_reading_noise`` (n, 3)
+    the variance of the pose means by noise alone, ``reading_variance`` (samples, 3) that of gyro readings which were
+    bridged or rounded, ``averaging`` by how much ``rate`` was sharpened, the readings being means over their interval.
     """
 
     moves: Moves
@@ -63,9 +64,7 @@ class MoveMeasurements:
     var_reading: FloatArray
     zero: FloatArray
     var_bias: FloatArray
-    bias_weights: FloatArray
     bias_mean: FloatArray
-    var_bias_mean: FloatArray
     var_bias_walk: FloatArray
     noise_density: FloatArray
     sigma_time_s: float
@@ -81,7 +80,7 @@ class MoveMeasurements:
     var_reading_noise: FloatArray
     reading_variance: FloatArray | None
     quantum: FloatArray
-    still_response: FloatArray | None = None
+    is_hidden: FloatArray
     averaging: Averaging = field(default_factory=Averaging)
 
     def of_rate(
@@ -93,6 +92,10 @@ class MoveMeasurements:
             recording.time_s, np.ascontiguousarray(rate), self.edges, mid_s, self.links, RATE_DEGREE, variance
         )
         return replace(self, moves=moves, rate=rate, reading_variance=variance)
+
+    def coarse(self, recording: Recording, segments: Segments) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+        """Readings (n, 3), their LSB (3,), those at rest (3,), and the axes (3,) that their noise does not dither."""
+        return _coarse(recording, segments, self.is_undithered)
 
     @property
     def is_lost(self) -> BoolArray:
@@ -172,14 +175,15 @@ def measure_moves(
     var_reading = _mean_variance(segments.accelerometer_sigma_mean)
     bias_read, var_bias_read = zero, var_bias
     walk = excess_variance(zero[links[:, 1]] - zero[links[:, 0]], var_bias[links[:, 1]] + var_bias[links[:, 0]])
-    weights, mean, var_mean, excess, _ = pool_biases(zero, var_bias)
+    mean, excess, _ = pool_biases(zero, var_bias)
     zero, var_bias = shrink(zero, var_bias, mean)
     if np.any(undithered):
         zero, var_bias = _with_hidden_bias(zero, var_bias, segments, quantum, undithered)
-        weights, mean, var_mean = _pooled_hidden(zero, var_bias, undithered, (weights, mean, var_mean))
+        mean = np.where(undithered, zero.mean(axis=0), mean)
+    coarse = _coarse(recording, segments, undithered)
+    hidden = (resting_ends(*coarse, edges) | resting_axes(*coarse)).astype(np.float64)
     seen = rate_noise_density(recording, segments)
     density = density_without_rounding(seen, quantum, 1.0 / recording.rate_hz, undithered)
-    var_mean = var_mean if attitude is None else np.maximum(var_mean, attitude.var_bias)
     steps, nominal, jitter = _steps_of(recording)
     return MoveMeasurements(
         moves=prepared,
@@ -190,9 +194,7 @@ def measure_moves(
         var_reading=var_reading + _unexplained_reading_variance(accelerometer),
         zero=zero,
         var_bias=var_bias,
-        bias_weights=weights,
         bias_mean=mean,
-        var_bias_mean=var_mean,
         var_bias_walk=walk,
         noise_density=density,
         sigma_time_s=jitter,
@@ -208,7 +210,16 @@ def measure_moves(
         var_reading_noise=var_reading,
         reading_variance=extra,
         quantum=quantum,
+        is_hidden=hidden,
     )
+
+
+def _coarse(
+    recording: Recording, segments: Segments, undithered: BoolArray
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    assert recording.gyroscope is not None
+    assert segments.gyroscope_mean is not None
+    return recording.gyroscope, recording.facts.of("gyroscope").step, medians(segments.gyroscope_mean), undithered
 
 
 def _moves_of(recording: Recording, segments: Segments) -> list[Move]:
@@ -237,23 +248,6 @@ def _with_hidden_bias(
     hidden = np.where(undithered, quantum**2 / 12.0, 0.0)
     own = np.maximum(np.asarray(segments.gyroscope_sigma_mean, dtype=np.float64) ** 2 - hidden, 0.0)
     return common_bias(zero, np.where(undithered, own, var_bias), undithered)
-
-
-def _pooled_hidden(
-    zero: FloatArray, var_bias: FloatArray, undithered: BoolArray, pooled: tuple[FloatArray, FloatArray, FloatArray]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Weights, mean and variance of the session's bias, on undithered axes without what their step hides.
-
-    That is the offset that the moves are asked for: counted twice, it makes bars too wide.
-    """
-    weights, mean, var_mean = pooled
-    n = len(zero)
-    weights = np.ascontiguousarray(np.where(undithered, 1.0 / n, weights))
-    return (
-        weights,
-        np.where(undithered, zero.mean(axis=0), mean),
-        np.where(undithered, var_bias.mean(axis=0) / n, var_mean),
-    )
 
 
 def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:

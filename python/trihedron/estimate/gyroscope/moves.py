@@ -2,15 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from trihedron.estimate.gyroscope.aligned_moves import measured_and_aligned
-from trihedron.estimate.gyroscope.alignment import Aligned, MoveOptions, given_accelerometer
-from trihedron.estimate.gyroscope.findings import findings_of
-from trihedron.estimate.gyroscope.lost_turns import of_alignment
-from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.estimate.gyroscope.observability import describe
-from trihedron.estimate.gyroscope.verification import Prediction, held_out, quality_of
+from trihedron.estimate.gyroscope.alignment import MoveOptions, given_accelerometer
+from trihedron.estimate.session.solved import in_frame_of, solved
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding
 from trihedron.records.recording import Recording
@@ -49,32 +42,6 @@ def calibrate_moves(
     ValueError
         When a sensor or every move is missing, or nothing tells the scale to start from.
     """
-    options = options or MoveOptions()
     part = given_accelerometer(accelerometer)
-    measured, aligned, options = measured_and_aligned(recording, segments, part, gravity_m_s2, options)
-    held = held_out(aligned, measured, part, gravity_m_s2, options)
-    aligned, of_losses = of_alignment(recording.time_s, measured, aligned, gravity_m_s2)
-    found = (*findings_of(aligned, measured, held), *of_losses)
-    return gyroscope_of(aligned, measured, recording, gravity_m_s2, held, "moves"), found
-
-
-def gyroscope_of(
-    aligned: Aligned,
-    measured: MoveMeasurements,
-    recording: Recording,
-    gravity_m_s2: float,
-    held: Prediction | None,
-    method: str,
-) -> SensorCalibration:
-    """The gyro's record from an alignment."""
-    S = np.asarray(aligned.fit.gyroscope_scale)
-    return SensorCalibration(
-        S=S,
-        b=aligned.gyroscope_bias,
-        covariance=aligned.covariance[12:, 12:],
-        raw_unit=recording.gyroscope_unit.value,
-        si_unit="rad/s",
-        method=method,
-        quality=quality_of(aligned, measured, gravity_m_s2, held),
-        observability=describe(aligned.fit, aligned.covariance[12:21, 12:21], S, aligned.n_gyroscope),
-    )
+    found = solved(recording, segments, part, gravity_m_s2, options or MoveOptions())
+    return in_frame_of(part, found), found.findings

@@ -153,7 +153,7 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], zeros: Sequence[t
     var_rate = np.maximum(sums / count, recording.facts.of("gyroscope").step ** 2 / 12.0 * step_s)
     zero_s = np.array(zero_duration)
     rates = zero_angle / zero_s[:, None]
-    _, mean, _, excess, spread = pool_biases(rates, var_rate / zero_s[:, None])
+    mean, excess, spread = pool_biases(rates, var_rate / zero_s[:, None])
     hidden = hidden_angles(
         gyroscope, step_s, recording.facts.of("gyroscope").step, [(t.start, t.stop) for t in turns], zeros, raw_angle
     )

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.alignment import are_far
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.observed import Observed
 from trihedron.probability import fdtrc
 from trihedron.records.words import words
@@ -56,6 +57,14 @@ class SessionSolution:
         """Whether the accelerometer's bias walks faster than the noise of parts makes it."""
         return self.core.strengths[0][0] < NOISE_CORNER_S
 
+    def as_read(self, measured: MoveMeasurements) -> MoveMeasurements:
+        """The moves as this solution reads them: a bias that its LSB hides in its place, at rest and where readings
+        stand there."""
+        axes = np.flatnonzero(measured.is_undithered)
+        place = np.zeros(3)
+        place[axes] = self.core.effect[: len(axes)]
+        return replace(measured, rate=measured.rate - measured.is_hidden * place, zero=measured.zero - place)
+
     @property
     def parameters(self) -> FloatArray:
         """(24,) in the order of ``covariance``."""
@@ -73,7 +82,7 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     """
     core = fitted(observed, S_a, b_a + S_a @ observed.force_origin, S_w)
     corner, scatter, between, (gravity, _) = core.strengths
-    heard = _again(observed, core, (corner, scatter, between, (gravity, 1.0)), np.zeros(1))
+    heard = _again(observed, core, (corner, scatter, between, (gravity, 1.0)), np.append(core.effect, 0.0))
     chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in _misfits(heard))
     is_expected = dof < 1.0 or fdtrc(dof, NOISE_DOF, chi2 / dof) >= FALSE_ALARM
     return _solution(observed, heard if is_expected else core)
@@ -85,10 +94,9 @@ def refitted(observed: Observed, solution: SessionSolution) -> SessionSolution:
     return _solution(observed, _again(observed, core, core.strengths, np.asarray(core.effect)))
 
 
-def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths, delay_s: FloatArray) -> _core.SessionFit:
-    """The fit of a session from where another one stands, strengths of all noise given; ``delay_s`` (1,) of the
-    accelerometer to begin with where it is free, else (0,)."""
-    is_free = len(delay_s) > 0
+def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths, effect: FloatArray) -> _core.SessionFit:
+    """The fit of a session from where another one stands, strengths of all noise given; ``effect`` begins with the
+    places of the bias inside its LSB, and ends with the delay [s] of the accelerometer where it is free."""
     state = _core.SessionState(
         force_scale=core.force_scale,
         force_bias=core.force_bias,
@@ -96,16 +104,23 @@ def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths, del
         up=core.up,
         pose_rate_bias=core.pose_rate_bias,
         pose_force_bias=core.pose_force_bias,
-        effect=delay_s,
+        effect=effect,
     )
-    slope = np.ascontiguousarray((observed.force_slope @ np.asarray(core.force_scale).T)[:, :, None])
+    delayed = len(effect) - len(observed.hidden_sigma)
+    slope = np.repeat((observed.force_slope @ np.asarray(core.force_scale).T)[:, :, None], delayed, axis=2)
+    hidden = _hidden_rate(observed, np.asarray(core.rate_scale))
     return observed.model().fit(
         state=state,
         strengths=strengths,
-        force_effect=slope if is_free else None,
-        rate_effect=None,
-        sizes=[DELAY_S] if is_free else None,
+        force_effect=np.concatenate([np.zeros(hidden.shape), slope], axis=2) if delayed else None,
+        rate_effect=np.concatenate([hidden, np.zeros(slope.shape)], axis=2) if hidden.size else None,
+        sizes=[*observed.hidden_sigma, DELAY_S][: len(effect)] if len(effect) else None,
     )
+
+
+def _hidden_rate(observed: Observed, S_w: FloatArray) -> FloatArray:
+    """Effect (poses, then samples of moves, 3, axes) by which readings in the LSB of their bias are off, rad/s."""
+    return np.ascontiguousarray(np.einsum("ij,njk->nik", S_w, observed.rate_hidden))
 
 
 def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
@@ -155,14 +170,16 @@ def fitted(
         up=np.ascontiguousarray(force / np.linalg.norm(force, axis=1, keepdims=True)),
         pose_rate_bias=np.ascontiguousarray(observed.pose_rate),
         pose_force_bias=np.zeros((len(force), 3)),
-        effect=np.zeros(0),
+        effect=np.zeros(len(observed.hidden_sigma)),
     )
+    hidden = _hidden_rate(observed, S_w)
     return observed.model().fit(
         state=state,
         strengths=(*START_STRENGTHS[:3], (1.0, DEAF)),
         force_effect=None,
-        rate_effect=None,
+        rate_effect=hidden if hidden.size else None,
         within=ANYTHING,
+        sizes=list(observed.hidden_sigma) if hidden.size else None,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,11 @@ from trihedron.records.segments import Segments
 from trihedron.session.averaging import sharpened
 from trihedron.session.noise import Along, measure_noise, scatter_unit
 
+LOWER = np.tril_indices(3)
+"""Elements of a lower triangular scale, row by row."""
+HELD = 1e-7
+"""Relative standard error of what is given: far below any noise, and above what rounding does to the rows."""
+
 
 @dataclass(frozen=True, eq=False)
 class Observed:
@@ -22,7 +27,10 @@ class Observed:
 
     Hold means and standard errors (n, 3), densities (3,) raw · √s, the samples of the ``moves`` with the holds
     ``before`` (m,) they begin in; ``force_slope`` (poses, then samples of moves, 3) raw/s, nothing in poses;
-    ``force_up``, ``force_scatter`` as in :class:`SessionNoise`.
+    ``force_up``, ``force_scatter`` as in :class:`SessionNoise`. ``rate_hidden`` (like ``force_slope``, one column an
+    axis whose noise does not dither its LSB): where readings stand in the LSB of their bias, off by its place inside,
+    of standard deviation ``hidden_sigma`` (columns,) raw. ``prior``: mean (18,) and covariance (18, 18) of both linear
+    models on centred readings.
     """
 
     gravity_m_s2: float
@@ -40,8 +48,11 @@ class Observed:
     sigma_time_s: float
     nominal_step_s: float
     force_slope: FloatArray
+    rate_hidden: FloatArray
+    hidden_sigma: FloatArray
     force_up: Along | None = None
     force_scatter: float = 0.0
+    prior: tuple[FloatArray, FloatArray] | None = None
 
     def model(self) -> _core.SessionModel:
         """The Rust model; zeros may scatter from pose to pose as far as the evidence goes."""
@@ -61,7 +72,7 @@ class Observed:
             poses=poses,
             moves=self.moves,
             noise=(self.sigma_time_s, self.nominal_step_s),
-            prior=None,
+            prior=None if self.prior is None else (*self.prior, True),
             scatter=(unit, self.force_scatter / float(unit[0, 0])),
         )
 
@@ -94,6 +105,11 @@ def arranged(
         for k, (a, b) in enumerate(ranges):
             unresolved[k, 1] += measured.reading_variance[a:b].sum(axis=0) * measured.nominal_step_s**2
     pose_time_s = np.ascontiguousarray(segments.time_mid_s, dtype=np.float64)
+    # Of readings that noise does not dither, what toggles and what drifts; their place in the step is a column.
+    is_coarse, coarse = measured.is_undithered, np.flatnonzero(measured.is_undithered)
+    lasts_s = np.array([pose.stop - pose.start for pose in segments.poses]) * measured.nominal_step_s
+    of_coarse = np.sqrt(measured.var_bias + measured.noise_density**2 / lasts_s[:, None])
+    is_hidden = np.vstack([np.ones((len(pose_time_s), 3)), _samples_of(ranges, measured.is_hidden)])
     return Observed(
         gravity_m_s2=gravity_m_s2,
         force_origin=force_origin,
@@ -103,9 +119,9 @@ def arranged(
         # Where readings dither too little their rounding does not average out: the larger of the two.
         pose_force_sigma=np.maximum(noise.force_sigma, np.sqrt(measured.var_reading_noise)),
         force_density=noise.force_density,
-        pose_rate=measured.bias_read - rate_origin,
-        pose_rate_sigma=np.maximum(noise.rate_sigma, np.sqrt(measured.var_bias_read)),
-        rate_density=noise.rate_density,
+        pose_rate=np.where(is_coarse, measured.zero, measured.bias_read) - rate_origin,
+        pose_rate_sigma=np.where(is_coarse, of_coarse, np.maximum(noise.rate_sigma, np.sqrt(measured.var_bias_read))),
+        rate_density=np.where(is_coarse, measured.noise_density, noise.rate_density),
         moves=_core.SessionMoves(
             pose_time_s=pose_time_s,
             time_s=_samples_of(ranges, recording.time_s),
@@ -121,9 +137,21 @@ def arranged(
         force_slope=np.vstack(
             [np.zeros((len(pose_time_s), 3)), _slopes(recording.with_distinct_timestamps().time_s, force, ranges)]
         ),
+        rate_hidden=np.ascontiguousarray(is_hidden[:, :, None] * np.eye(3)[:, coarse]),
+        hidden_sigma=measured.quantum[coarse] / np.sqrt(12.0),
         force_up=noise.force_up,
         force_scatter=noise.force_scatter,
     )
+
+
+def with_prior(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray, *, is_given: bool) -> Observed:
+    """The session with what is known of both models beforehand: scales are as large as they look (``S_a`` (3, 3) lower
+    triangular, ``b_a`` (3,) m/s², ``S_w`` (3, 3)), or an accelerometer ``is_given``.
+    """
+    mean = np.concatenate([S_a[LOWER], b_a + S_a @ observed.force_origin, S_w.ravel()])
+    sizes = float(np.linalg.norm(S_a, 2)), observed.gravity_m_s2, float(np.linalg.norm(S_w, 2))
+    sigma = np.repeat(sizes, (6, 3, 9)) * np.repeat((HELD if is_given else 1.0, 1.0), (9, 9))
+    return replace(observed, prior=(mean, np.diag(sigma**2)))
 
 
 def _samples_of(ranges: list[tuple[int, int]], samples: FloatArray) -> FloatArray:

@@ -18,14 +18,6 @@ _SAME_GRAVITY = "turns about the vertical leave gravity where it was, and a whol
 _MOVES = (
     Entry(
         Code.NOT_CONVERGED,
-        "gyro",
-        SERIOUS,
-        "the gyro fit did not converge ({stopped_because}).",
-        _CONTRADICTING,
-        _LOOK_AT_MOVES,
-    ),
-    Entry(
-        Code.NOT_CONVERGED,
         "session",
         SERIOUS,
         "the fit of the session did not converge ({stopped_because}).",
@@ -37,19 +29,10 @@ _MOVES = (
         "moves",
         WARNING,
         "the tilt error after rotations exceeds what noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} "
-        "degrees of freedom; the standard uncertainties are multiplied by its root.",
-        _OUTSIDE_THE_MODEL,
-        "Run trihedron diagnose to see which.",
-        or_severity=SERIOUS,
-    ),
-    Entry(
-        Code.RESIDUAL_ABOVE_NOISE,
-        "moves-joint",
-        WARNING,
-        "the tilt error after rotations exceeds what noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} "
         "degrees of freedom; the rotations are weighted by the noise that they show.",
         _OUTSIDE_THE_MODEL,
         "Run trihedron diagnose to see which.",
+        or_severity=SERIOUS,
     ),
     Entry(
         Code.SCALE_NOT_NOMINAL,
@@ -92,15 +75,6 @@ _MOVES = (
         "times its noise, and is excluded.",
         "one of its poses was not still, samples were lost, or the gyro was driven beyond its range limit",
         "Look at this move; repeat it.",
-    ),
-    Entry(
-        Code.HELD_OUT_WORSE,
-        "moves",
-        WARNING,
-        "cross-validated moves have {times:.1f} times the error that the uncertainties allow.",
-        "too few moves for the number of parameters, or an effect that differs from move to move",
-        "Record more moves, about all axes, both ways.",
-        numbers=("chi2_per_dof",),
     ),
     Entry(
         Code.GYRO_G_SENSITIVITY,
