@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from trihedron.read.names import parse_name, sensor_said, unit_said
+from trihedron.read.names import clock_said, parse_name, sensor_said, unit_said
 
 COMMENT_STARTS = ("#", "%", "//")
 MISSING = frozenset({"", "na", "n/a", "null", "none", "nan", "-", "--", "?", "#n/a", "missing"})
@@ -259,7 +259,7 @@ def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
     if qualifiers:
         names = [f"{name} {word}".strip() for name, word in zip(names, qualifiers, strict=True)]
     if units:
-        bare = [unit[1:-1] if unit[:1] + unit[-1:] in ("[]", "()") else unit for unit in units]
+        bare = [unit[1:-1] if unit[:1] + unit[-1:] in ("[]", "()") else unit.strip("-") for unit in units]
         names = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, bare, strict=True)]
     metadata |= stated_units(line for i, line in enumerate(lines) if i not in used)
     return _Header(tuple(names), metadata, "", tuple(used))
@@ -293,7 +293,8 @@ _STATEMENT = re.compile(r"^\W*(?P<what>[^:=\[(]+?)\s*(?:\bin\b|[:=\[(])\s*(?P<un
 
 
 def stated_units(lines: Iterable[str]) -> dict[str, str]:
-    """Unit of each sensor as stated, under ``accelerometer unit`` and ``gyroscope unit``; the first statement counts.
+    """Unit of each sensor and of the time as stated, under ``accelerometer unit``, ``gyroscope unit`` and ``time unit``;
+    the first statement counts.
 
     A clause says what (a sensor and no more, perhaps the word unit) and its unit: ``accelerometer range: 4 g`` and
     ``gyro bias: 0.1 deg/s`` state none of the readings.
@@ -306,4 +307,6 @@ def stated_units(lines: Iterable[str]) -> dict[str, str]:
             unit = unit_said(sensor, said["unit"]) if said and sensor else ""
             if unit:
                 found.setdefault(f"{sensor} unit", unit)
+            elif said and not sensor and (clock := clock_said(said["what"], said["unit"])):
+                found.setdefault("time unit", clock)
     return found

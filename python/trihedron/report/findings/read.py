@@ -31,6 +31,14 @@ _UNITS = (
         _SAY_ACCEL_UNIT,
     ),
     Entry(
+        Code.UNIT_ASSUMED,
+        "mg-or-gal",
+        WARNING,
+        "The accelerometer reads {rest_norm:.4g} at rest: mg (1000) or cm/s^2 (981); taken as {unit}.",
+        "Both look alike. The calibration differs only in its name of the raw unit.",
+        _SAY_ACCEL_UNIT,
+    ),
+    Entry(
         Code.UNIT_DETECTED,
         "accelerometer-counts",
         NOTE,
