@@ -29,6 +29,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import trihedron
+from trihedron.records import FindingCode
 
 G = 9.80665
 DEG = np.pi / 180
@@ -48,7 +49,7 @@ FORCE_UNITS: dict[str, tuple[float, tuple[str, ...], str]] = {
     "LSB 16g": (G / 2048, ("LSB", "raw", "counts"), "counts"),
 }
 RATE_UNITS: dict[str, tuple[float, tuple[str, ...], str]] = {
-    "rad/s": (1.0, ("rad/s", "rad.s^-1", "rad/sec", "rad s-1", "rps"), "rad/s"),
+    "rad/s": (1.0, ("rad/s", "rad.s^-1", "rad/sec", "rad s-1"), "rad/s"),
     "deg/s": (DEG, ("deg/s", "dps", "°/s", "deg/sec", "deg.s^-1", "º/s"), "deg/s"),
     "mdps": (DEG * 1e-3, ("mdps", "mdeg/s", "millidps"), "mdeg/s"),
     "mrad/s": (1e-3, ("mrad/s", "millirad/s"), "mrad/s"),
@@ -128,9 +129,10 @@ class Layout:
         """What nobody can know from this text."""
         clockless = self.clock in ("none", "counter", "ticks bare")
         rare = self.units == "nowhere" and (self.force_unit == "cm/s2" or self.rate_unit in ("deg/h", "rpm"))
+        unnamed = self.writing == "no names" and bool(self.extras)
         return tuple(
             what
-            for what, is_open in (("clock", clockless), ("devices", self.devices != "one"), ("units", rare))
+            for what, is_open in (("clock", clockless), ("devices", self.devices != "one"), ("units", rare), ("names", unnamed))
             if is_open
         )
 
@@ -144,6 +146,8 @@ class Layout:
         if "devices" in self.open_for:
             marked = self.devices in ("id column", "blocks", "bursts")
             made["instance"] = self.options["values"][0] if marked else 1
+        if "names" in self.open_for:
+            made["columns"] = self.options["columns"]
         if self.units == "nowhere":
             made["accelerometer_unit"] = FORCE_UNITS[self.force_unit][2]
             made["gyroscope_unit"] = RATE_UNITS[self.rate_unit][2]
@@ -354,6 +358,14 @@ def structured(of: Layout, names: list[str], rows: list[tuple[str, ...]]) -> str
     return "".join(("\n" if of.writing == "labelled lines" else "  ").join(parts(row)) + "\n" for row in cells)
 
 
+def roles(of: Layout, names: list[str], clock: list[str]) -> str:
+    """`--columns` of a table without names."""
+    triads = [(f"{s}{a}", of.names[k].format(u=a, U=a.upper(), n=i, m=i + 1, p="pqr"[i]))
+              for k, s in enumerate("ag") for i, a in enumerate("xyz")]  # fmt: skip
+    times = [("time", k) for k in clock[:1] if "count" not in of.clock]
+    return ",".join(f"{role}={names.index(k) + 1}" for role, k in times + triads if k in names)
+
+
 def text(of: Layout, parts: list[Session], rng: Rng) -> str:
     """The file's text."""
     names, rows, units = table_of(of, parts, rng)
@@ -368,6 +380,7 @@ def text(of: Layout, parts: list[Session], rng: Rng) -> str:
     if of.writing.startswith(("json", "labelled")):
         return (head if of.writing.startswith("labelled") else "") + structured(of, names, rows)
     lines: list[Any] = [] if of.writing == "no names" else [names]
+    of.options["columns"] = roles(of, names, list(units)[6:])
     if of.units == "row":
         lines.append([units.get(k, "-") for k in names])
     point = (lambda v: v.replace(".", ",") if isinstance(number(v), float) else v) if of.comma else str
@@ -406,7 +419,9 @@ def outcome(path: Path, of: Layout, parts: list[Session], **options: Any) -> tup
     if worst <= 1:
         wanted = FORCE_UNITS[of.force_unit][2], RATE_UNITS[of.rate_unit][2]
         for unit, right in zip((recording.accelerometer_unit.value, recording.gyroscope_unit.value), wanted, strict=True):
-            if unit not in (right, "counts") or (unit != right and of.units != "nowhere"):
+            is_left_open = unit == "counts" and (of.units == "nowhere" or "ADC" in of.names[1])
+            is_doubted = FindingCode.UNIT_ASSUMED in {f.code for f in recording.findings} and of.units == "nowhere"
+            if unit != right and not is_left_open and not is_doubted:
                 worst, what = 2.0, f"unit {unit} for {right}"
         short = len(recording.time_s) < 0.98 * len(parts[0].time_s)
         worst, what = (3.0, f"{len(recording.time_s)} of {len(parts[0].time_s)} rows") if short else (worst, what)

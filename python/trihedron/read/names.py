@@ -29,7 +29,7 @@ _AXIS_FIRST = re.compile(r"^([xyz])(acc|accel|accelerometer|acceleration|gyr|gyr
 """As MAVLink writes them: xacc, ygyro."""
 _NUMBERED = re.compile(r"^(acc|accel|gyr|gyro|omega)([0123])$")
 _DEVICE_WORD = re.compile(r"(imu|dev|device|sensor|node|unit|port|ch|mpu|bmi|icm|lsm)\d*$")
-_LOOKS_LIKE_A_UNIT = re.compile(r"[/^²°]|\bper\b|^(ft|hz|rev|gon|grad|ips|rps|kdps|ug|µg)$")
+_LOOKS_LIKE_A_UNIT = re.compile(r"[/^²°]|\bper\b|^(ft|hz|rev|gon|grad|ips|rps|kdps|ug|µg)$|^(micro|nano|kilo|mega)")
 """A unit that a bracket states, known or not: one that is not known is asked for."""
 _UNIT_BEHIND = re.compile(r"[xyz][ _]([a-zµ°]+/[a-z]+[0-9²]?)$")
 """The same behind the axis: gyro_x_rev/s."""
@@ -192,7 +192,7 @@ def parse_name(name: str) -> ColumnName:
     text = re.sub(r"([XYZ])(Mps2|RadPerSec|MicroT)\b", lambda m: f" {m[1]} {m[2].lower()}", text)
     bracket = ""
     index = ""
-    text = re.sub(r"\s+in\s+([^\s\])]+)$", r" [\1]", _TICK_BEHIND.sub(r" [\1]", text))
+    text = re.sub(r"\s+(?:in|/)\s+([^\s\])]+)$", r" [\1]", _TICK_BEHIND.sub(r" [\1]", text))
     found = re.search(r"[\[({]\s*([^\])}]*?)\s*[\])}]\s*$", text)
     if found:
         inside = found.group(1)

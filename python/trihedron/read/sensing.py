@@ -19,6 +19,8 @@ from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, a
 
 NEAR_GRAVITY = 0.2
 """An uncalibrated accelerometer at rest may be this far off: scale a few per cent, zero offset a tenth of g."""
+MG_OR_GAL = 0.015
+"""Share of a length by which a thousand mg must stand off 980.665 cm/s^2; the two differ by 0.02."""
 WHOLE = "whole numbers"
 """Stands for the unit of readings that were whole numbers before they were interpolated."""
 
@@ -88,7 +90,8 @@ def judge_accelerometer(
     lengths = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si := acceleration_to_si(unit))}
     nearest = min(lengths, key=lambda unit: abs(norm - lengths[unit]) if math.isfinite(norm) else 0.0)
     if _is_near(norm, lengths[nearest]):
-        is_alike = nearest in (AccelerationUnit.MG, AccelerationUnit.CM_S2)
+        # Nearer to cm/s^2 than a usual scale error takes mg.
+        is_alike = nearest is AccelerationUnit.CM_S2 or abs(norm / lengths[AccelerationUnit.CM_S2] - 1.0) < MG_OR_GAL
         code, variant = (
             (FindingCode.UNIT_ASSUMED, "mg-or-gal") if is_alike else (FindingCode.UNIT_DETECTED, "accelerometer-at-rest")
         )
