@@ -332,6 +332,11 @@ def number(cell: str) -> float | int | str:
             return cell
 
 
+def glued(cell: str) -> str:
+    """A cell without blanks, for tables whose columns blanks part."""
+    return cell.replace(" ", "T" if cell[:1].isdigit() else "_")
+
+
 def structured(of: Layout, names: list[str], rows: list[tuple[str, ...]]) -> str:
     """JSON and prints with labels."""
     cells = [dict(zip(names, row, strict=True)) for row in rows]
@@ -386,11 +391,11 @@ def text(of: Layout, parts: list[Session], rng: Rng) -> str:
     point = (lambda v: v.replace(".", ",") if isinstance(number(v), float) else v) if of.comma else str
     lines += [[point(v) for v in row] for row in rows]
     if of.writing == "fixed":
-        plain = [[str(c).replace(" ", "") for c in line] for line in lines]
+        plain = [[glued(c) for c in line] for line in lines]
         wide = [max(map(len, column)) + 2 for column in zip(*plain, strict=True)]
         return head + "".join("".join(c.rjust(w) for c, w in zip(line, wide, strict=True)) + "\n" for line in plain)
     if of.separator == " ":
-        lines = [[str(c).replace(" ", "_") for c in line] for line in lines]
+        lines = [[glued(c) for c in line] for line in lines]
     return head + "".join(of.separator.join(line) + "\n" for line in lines)
 
 

@@ -24,6 +24,8 @@ LONGEST_BURST = 256
 _DEVICE_NAMES = frozenset(
     {
         "i",
+        "addr",
+        "src",
         "ch",
         "channel",
         "port",

@@ -30,7 +30,7 @@ _PAIR = re.compile(
     rf"([^\W\d][\w.\[\]()/^°² -]*?)\s*[:=：]\s*({_VALUE})(?![\d:])"
     r"(?:\s*((?:[^\W\d_]|°)[\w/^°²*]*)(?!\s*[:=：\w\[(]|\.\w))?"
 )
-_HAS_LABEL = re.compile(r".*?(?:[^\W\d]|[\])])\s*[:=：]")
+_HAS_LABEL = re.compile(r".*?(?:[^\W\d]|[\])]|\b[^\W\d]\w{0,40})\s*[:=：]")
 _BARE_TIMESTAMP = re.compile(rf"\s*({_VALUE})\s*[,;]?\s+(?=[^\W\d_])")
 _THREE = re.compile(
     rf"([^\W\d]\w*)\s*[:=：]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})(?![\d:.])(?!\s*[,;\s]\s*[-+.\d])"
