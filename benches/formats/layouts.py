@@ -65,7 +65,7 @@ NAMES: dict[str, tuple[tuple[str, str], ...]] = {
         ("{u}acc", "{u}gyro"), ("accel{U}", "rot{U}"), ("imu0_a{u}", "imu0_g{u}"), ("a{u}", "w{u}"),
         ("Acc_{U}", "Gyr_{U}"), ("linear_acceleration_{u}", "angular_velocity_{u}"), ("Acc{U}", "Gyr{U}"),
         ("accelerometer_{u}", "gyroscope_{u}"), ("Accel_{U}", "Gyro_{U}"), ("ACCEL_{U}OUT", "GYRO_{U}OUT"),
-        ("accSmooth[{n}]", "gyroADC[{n}]"), ("accelerometer_m_s2[{n}]", "gyro_rad[{n}]"), ("Acc{m}", "Gyr{m}"),
+        ("accSmooth[{n}]", "gyroADC[{n}]"), ("Acc{m}", "Gyr{m}"),
         ("acc.{u}", "gyro.{u}"), ("A_{u}", "Omega_{u}"), ("userAcc_{u}", "gyro_{u}"), ("a_{u}", "om_{u}"),
         ("f{u}", "w{u}"), ("body_acc_{u}", "body_gyro_{u}"), ("sensors.accel.{u}", "sensors.gyro.{u}"),
         ("Accelerometer {U}-axis", "Gyroscope {U}-axis"), ("{U} Accel", "{U} Gyro"), ("RawAccel{U}", "RawGyro{U}"),
@@ -143,7 +143,7 @@ class Layout:
             made["rate_hz"] = self.rate_hz
         if self.clock == "ticks bare":
             made["time_unit"] = self.options["tick"]
-        if "devices" in self.open_for:
+        if self.devices not in ("one", "columns"):
             marked = self.devices in ("id column", "blocks", "bursts")
             made["instance"] = self.options["values"][0] if marked else 1
         if "names" in self.open_for:

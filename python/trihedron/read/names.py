@@ -76,7 +76,7 @@ _SUPPLY = {"supply", "vdd", "vcc", "voltage", "vbat", "battery", "vin", "avdd"}
 
 _TIME_UNITS = {
     "s": ["s", "sec", "secs", "second", "seconds", "stime"],
-    "ms": ["ms", "msec", "msecs", "millis", "milliseconds", "millisecond", "mstime"],
+    "ms": ["ms", "msec", "msecs", "millis", "milliseconds", "millisecond", "mstime", "cts"],
     "us": ["us", "µs", "usec", "micros", "microseconds", "microsecond", "ustime"],
     "ns": ["ns", "nsec", "nanos", "nanoseconds", "nanosecond", "nanosec", "nstime"],
 }
@@ -188,6 +188,8 @@ def parse_name(name: str) -> ColumnName:
     if re.fullmatch(r"gF[xyz]", text):
         # Physics Toolbox: force in g along an axis, not a gyro's x.
         return ColumnName("accelerometer", text[-1], "gf", "g", rank=1)
+    # An aircraft's load factors, beside p q r.
+    text = re.sub(r"^N(?=[xyz](?![A-Za-z]))", "acc ", text)
     # GnssLogger joins axis and unit: UncalAccelXMps2, UncalGyroZRadPerSec.
     text = re.sub(r"([XYZ])(Mps2|RadPerSec|MicroT)\b", lambda m: f" {m[1]} {m[2].lower()}", text)
     bracket = ""
@@ -275,7 +277,7 @@ def _classify(words: list[str], unit_words: list[str], index: str) -> ColumnName
         return ColumnName("bare", axis, key, words=tuple(rest + unit_words)) if _unit_words_only(rest) else ColumnName()
     unit = _unit(sensor, unit_words) or _unit(sensor, left) if sensor in _UNIT_OF else ""
     rank = 0
-    if any(w in {"measured", "raw", "uncalibrated", "uncal", "unbiased"} for w in rest):
+    if any(w in {"measured", "raw", "uncalibrated", "uncalib", "uncal", "unbiased"} for w in rest):
         rank += 2
     if "unfilt" in rest or "unfiltered" in rest:
         rank += 1

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.read.text.layout import COMMENT_STARTS
+
 NEARLY_ALL = 0.9
 _SAMPLE_LINES = 400
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -136,14 +138,15 @@ def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[str], list[i
 
     for number, line in filled:
         pairs = _pairs(_expanded(line, has_timestamp), known)
-        if not pairs or any(label not in counts for label, _ in pairs):
+        known_labels = names if line.startswith(COMMENT_STARTS) else counts
+        if not pairs or any(label not in known_labels for label, _ in pairs):
             # A greeting above the first row is no row, nor is a line drawn between rows; the reader
             # refuses the rest by number.
             end()
             if rows:
                 rows.append(line if any(map(str.isalnum, line)) else f"# {line}")
                 numbers.append(number)
-            elif line.startswith("#"):
+            elif line.startswith(COMMENT_STARTS):
                 preamble.append(line)
             continue
         if not row.keys().isdisjoint(label for label, _ in pairs):

@@ -230,6 +230,7 @@ def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
         # GCDC's loggers say so before the names.
         plain = re.sub(r"^headers\s*,\s*", "", plain, flags=re.IGNORECASE)
         fields = _header_fields(plain, separator, n_fields)
+        fields = _numbered_on(fields) if fields is not None else None
         if fields is not None and any(fields) and not any(is_number(f, False) for f in fields):
             matching.append((i, fields))
             continue
@@ -263,6 +264,15 @@ def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
         names = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, bare, strict=True)]
     metadata |= stated_units(line for i, line in enumerate(lines) if i not in used)
     return _Header(tuple(names), metadata, "", tuple(used))
+
+
+def _numbered_on(fields: list[str]) -> list[str]:
+    """Names with those of ``Accelerometer [m/s2], 1, 2`` written out, as GoPro's telemetry has them."""
+    out = list(fields)
+    for i, name in enumerate(fields[:-2]):
+        if fields[i + 1 : i + 3] == ["1", "2"] and not is_number(name, False):
+            out[i : i + 3] = [re.sub(r"^[^\[(]*[^\[( ]", rf"\g<0>[{k}]", name, count=1) for k in range(3)]
+    return out
 
 
 def _names_sensors(fields: list[str]) -> bool:
