@@ -71,15 +71,10 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
     elif table.names is not None:
         chosen = _named(table, sensor)
         if explicit is not None:
-            chosen = replace(
-                chosen,
-                time=chosen.time if explicit.time is None else explicit.time,
-                time_unit=chosen.time_unit if explicit.time is None else explicit.time_unit,
-                temperature=chosen.temperature if explicit.temperature is None else explicit.temperature,
-                supply=chosen.supply if explicit.supply is None else explicit.supply,
-                counter=chosen.counter if explicit.counter is None else explicit.counter,
-                device=explicit.device,
-            )
+            roles = ("time", "temperature", "supply", "counter", "device")
+            said = {role: column for role in roles if (column := getattr(explicit, role)) is not None}
+            unit = chosen.time_unit if explicit.time is None else explicit.time_unit
+            chosen = replace(chosen, **said, time_unit=unit)
     else:
         chosen = _positional(table, sensor)
     chosen = _stated(table, chosen, explicit)
@@ -291,7 +286,7 @@ _WARMTH = ColumnName("temperature")
 
 def _is_warmth(name: str, values: FloatArray) -> bool:
     """Whether a column called T that states no unit falls as a temperature does and a clock does not."""
-    return name.strip() == "T" and bool(np.mean(np.diff(values) < 0.0) > _FALLS)
+    return name.strip() == "T" and bool(np.count_nonzero(np.diff(values) < 0.0) > _FALLS * len(values))
 
 
 _FALLS = 0.05

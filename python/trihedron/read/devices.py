@@ -151,8 +151,8 @@ def _changes_with(table: Table, time: int) -> Callable[[npt.NDArray[np.int64]], 
     raw = table.columns[time]
     back = np.flatnonzero(np.diff(raw) < 0.0)
     if not len(back) or unwrap(raw, table, None, [])[1]:
-        return lambda codes: False
-    return lambda codes: bool(np.diff(codes)[back].all()) and np.count_nonzero(np.diff(codes)) <= 2 * len(back) + 1
+        return lambda _: False
+    return lambda codes: bool(np.diff(codes)[back].all() and np.count_nonzero(np.diff(codes)) <= 2 * len(back) + 1)
 
 
 def _in_time(table: Table, time: int | None, most: int) -> npt.NDArray[np.int64]:

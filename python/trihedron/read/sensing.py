@@ -92,10 +92,12 @@ def judge_accelerometer(
     if _is_near(norm, lengths[nearest]):
         # Nearer to cm/s^2 than a usual scale error takes mg.
         is_alike = nearest is AccelerationUnit.CM_S2 or abs(norm / lengths[AccelerationUnit.CM_S2] - 1.0) < MG_OR_GAL
-        code, variant = (
-            (FindingCode.UNIT_ASSUMED, "mg-or-gal") if is_alike else (FindingCode.UNIT_DETECTED, "accelerometer-at-rest")
-        )
-        return Judged(nearest, (Finding.of(code, variant, rest_norm=norm, unit=nearest.value),))
+        if is_alike:
+            return Judged(
+                nearest, (Finding.of(FindingCode.UNIT_ASSUMED, "mg-or-gal", rest_norm=norm, unit=nearest.value),)
+            )
+        told = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-at-rest", rest_norm=norm, unit=nearest.value)
+        return Judged(nearest, (told,))
     if norm < 1.0 and not whole:
         return Judged(AccelerationUnit.M_S2, (_gravity_missing(norm),))
     return Judged(

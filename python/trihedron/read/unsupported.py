@@ -44,7 +44,7 @@ def refuse_foreign(path: Path, magic: bytes) -> None:
     if magic[4:8] == b"ftyp":
         raise ReadError(
             f"{path}: this is a video, which is not read here; extract its motion data as CSV "
-            "(GoPro's ACCL and GYRO with gopro-telemetry; other makers' with telemetry-parser)."
+            "(GoPro's GPMF with gopro-telemetry; other makers' with telemetry-parser)."
         )
     text = magic.removeprefix(b"\xef\xbb\xbf").lstrip()
     own = re.match(rb'\{\s*"format":\s*"(trihedron [a-z ]+)"', text)

@@ -303,8 +303,8 @@ _STATEMENT = re.compile(r"^\W*(?P<what>[^:=\[(]+?)\s*(?:\bin\b|[:=\[(])\s*(?P<un
 
 
 def stated_units(lines: Iterable[str]) -> dict[str, str]:
-    """Unit of each sensor and of the time as stated, under ``accelerometer unit``, ``gyroscope unit`` and ``time unit``;
-    the first statement counts.
+    """Unit of each sensor and of the time, under ``accelerometer unit``, ``gyroscope unit`` and ``time unit``, as
+    stated first.
 
     A clause says what (a sensor and no more, perhaps the word unit) and its unit: ``accelerometer range: 4 g`` and
     ``gyro bias: 0.1 deg/s`` state none of the readings.
