@@ -371,14 +371,16 @@ def structured(of: Layout, names: list[str], rows: list[tuple[str, ...]]) -> str
     if of.writing == "labelled":
         join = "\t" if of.separator == "\t" else " "
         return "".join(join.join(f"{k.replace(' ', '')}:{v}" for k, v in row.items()) + "\n" for row in cells)
-    parts = lambda row: (
+    lines = [
         [f"{k}: {row[k]}" for k in plain]
-        + [  # noqa: E731
+        + [
             f"{label}: " + ", ".join(row[k] for k in triad)
             for label, triad in zip(("Accel", "Gyro"), sensors, strict=True)
         ]
-    )
-    return "".join(("\n" if of.writing == "labelled lines" else "  ").join(parts(row)) + "\n" for row in cells)
+        for row in cells
+    ]
+    between = "\n" if of.writing == "labelled lines" else "  "
+    return "".join(between.join(line) + "\n" for line in lines)
 
 
 def roles(of: Layout, names: list[str], clock: list[str]) -> str:
