@@ -391,6 +391,7 @@ def test_sensorstream_rawimu_and_kitti_keep_every_reading(tmp_path):
     drive = read_recording(tmp_path / "drive")
     np.testing.assert_allclose(drive.accelerometer, force)
     assert drive.rate_hz == pytest.approx(100.0)
+    assert read_recording(oxts / "data").rows_read == drive.rows_read
 
 
 def test_names_of_several_words_two_blanks_apart_are_names(tmp_path):

@@ -8,6 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
+from trihedron.read.clock.unit import TICKS
 from trihedron.read.errors import ReadError
 from trihedron.read.names import ColumnName, parse_name
 from trihedron.read.table import Table
@@ -69,15 +71,10 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
     elif table.names is not None:
         chosen = _named(table, sensor)
         if explicit is not None:
-            chosen = replace(
-                chosen,
-                time=chosen.time if explicit.time is None else explicit.time,
-                time_unit=chosen.time_unit if explicit.time is None else explicit.time_unit,
-                temperature=chosen.temperature if explicit.temperature is None else explicit.temperature,
-                supply=chosen.supply if explicit.supply is None else explicit.supply,
-                counter=chosen.counter if explicit.counter is None else explicit.counter,
-                device=explicit.device,
-            )
+            roles = ("time", "temperature", "supply", "counter", "device")
+            said = {role: column for role in roles if (column := getattr(explicit, role)) is not None}
+            unit = chosen.time_unit if explicit.time is None else explicit.time_unit
+            chosen = replace(chosen, **said, time_unit=unit)
     else:
         chosen = _positional(table, sensor)
     chosen = _stated(table, chosen, explicit)
@@ -100,6 +97,9 @@ def _stated(table: Table, chosen: Columns, explicit: Columns | None) -> Columns:
         chosen,
         accelerometer_unit=chosen.accelerometer_unit or table.metadata.get("accelerometer unit", ""),
         gyroscope_unit=chosen.gyroscope_unit or table.metadata.get("gyroscope unit", ""),
+        time_unit=table.metadata.get("time unit", chosen.time_unit)
+        if chosen.time_unit in ("", TICKS)
+        else chosen.time_unit,
     )
     if said.counter is not None:
         chosen = replace(chosen, counter=said.counter)
@@ -224,7 +224,10 @@ def _positional(table: Table, sensor: Sensor | None) -> Columns:
 
 def _named(table: Table, sensor: Sensor | None) -> Columns:
     assert table.names is not None
-    parsed = [parse_name(n) if len(table.columns[i]) else ColumnName() for i, n in enumerate(table.names)]
+    parsed = [
+        ColumnName() if not len(values) else _WARMTH if _is_warmth(name, values) else parse_name(name)
+        for name, values in zip(table.names, table.columns, strict=True)
+    ]
     notes: list[Finding] = []
     triads: dict[str, Triad | None] = {}
     units: dict[str, str] = {}
@@ -278,15 +281,28 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
     )
 
 
+_WARMTH = ColumnName("temperature")
+
+
+def _is_warmth(name: str, values: FloatArray) -> bool:
+    """Whether a column called T that states no unit falls as a temperature does and a clock does not."""
+    return name.strip() == "T" and bool(np.count_nonzero(np.diff(values) < 0.0) > _FALLS * len(values))
+
+
+_FALLS = 0.05
+"""Rows at which a clock goes back: where packets of two sensors are late, one in twenty at most."""
+
+
 def _nanoseconds_beside(names: tuple[str, ...], time: int | None) -> int | None:
     """``stamp.nsecs`` beside ``stamp.secs``, as ROS writes it."""
     if time is None:
         return None
-    stem = re.fullmatch(r"(.*?)secs?", names[time].strip().lower())
+    plain = [re.sub(r"\s*[\[(].*", "", name.strip().lower()) for name in names]
+    stem = re.fullmatch(r"(.*?)secs?", plain[time])
     if stem is None:
         return None
     wanted = {f"{stem.group(1)}{word}" for word in ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")}
-    return next((i for i, name in enumerate(names) if name.strip().lower() in wanted), None)
+    return next((i for i, name in enumerate(plain) if name in wanted), None)
 
 
 _SENSORS = ("accelerometer", "gyroscope")

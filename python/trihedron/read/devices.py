@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.read.clock.order import unwrap
 from trihedron.read.errors import ReadError
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
@@ -23,6 +24,8 @@ LONGEST_BURST = 256
 _DEVICE_NAMES = frozenset(
     {
         "i",
+        "addr",
+        "src",
         "ch",
         "channel",
         "port",
@@ -106,6 +109,8 @@ def one_device(
             return replace(table, findings=(*table.findings, Finding.of(FindingCode.DEVICES_INTERLEAVED, n=n)))
         if column < 0:
             return _by_turn(table, choice.instance or "", n, time)
+    if column < 0 and time is not None:
+        column, words, codes = _device_column(table, used, None, _changes_with(table, time))
     if column < 0:
         if choice.instance is not None:
             raise ReadError(
@@ -139,6 +144,15 @@ def chosen(where: Words, what: str, listed: Words, rows_left_out: int) -> Findin
         chosen=what,
         numbers={"rows_left_out": float(rows_left_out)} if rows_left_out else {},
     )
+
+
+def _changes_with(table: Table, time: int) -> Callable[[npt.NDArray[np.int64]], bool]:
+    """Whether codes (n,) change wherever the clock goes back, but where it wraps, and hardly elsewhere."""
+    raw = table.columns[time]
+    back = np.flatnonzero(np.diff(raw) < 0.0)
+    if not len(back) or unwrap(raw, table, None, [])[1]:
+        return lambda _: False
+    return lambda codes: bool(np.diff(codes)[back].all() and np.count_nonzero(np.diff(codes)) <= 2 * len(back) + 1)
 
 
 def _in_time(table: Table, time: int | None, most: int) -> npt.NDArray[np.int64]:

@@ -15,8 +15,9 @@ _FIRST_EXTRA = len(_NAMES.split())
 
 
 def oxts_folder(path: Path) -> Path | None:
-    """The folder of samples and times in ``path``, or itself; None where it is no recording of KITTI."""
-    return next((f for f in (path, path / "oxts") if (f / "data").is_dir() and (f / "timestamps.txt").is_file()), None)
+    """The folder of samples and times in ``path``, around it, or itself; None where it is no recording of KITTI."""
+    folders = (path, path / "oxts", path.parent)
+    return next((f for f in folders if (f / "data").is_dir() and (f / "timestamps.txt").is_file()), None)
 
 
 def read_kitti(folder: Path) -> Table:

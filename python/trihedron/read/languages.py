@@ -20,7 +20,8 @@ _MEANINGS = {
     "angular": "angulaire\\w* angolar\\w* katow\\w* uhlov\\w* ac[iı]sal угл\\w* кутов\\w*",
     "velocity": "geschwindigkeit\\w* vitesse velocidad\\w* velocita predkosc rychlost h[iı]z скор\\w* швидк\\w*",
     "linear": "linear[ei]\\w* lineal\\w* lineaire\\w* liniow\\w* линейн\\w*",
-    "time": "uhrzeit heure hora czas tijd cas zaman aika врем\\w* 시간 \\w*[时時][间間刻]\\w*",
+    "time": "uhrzeit zeit zeitstempel temps horodatage heure tiempo tempo hora czas tijd cas zaman aika врем\\w* 시간 "
+    "\\w*[时時][间間刻]\\w*",
     "temperature": "темп\\w* [温溫]度",
     "axis": "achse axe eje eixo asse axel osa ось оси [轴軸] 축",
     **{"s": "с сек sek 秒", "ms": "мс 毫秒", "us": "мкс 微秒", "m": "м", "rad": "рад", "deg": "град"},
@@ -47,7 +48,7 @@ def plain(text: str) -> str:
         return text
     # The marks of European letters; those of kana (U+3099) make other syllables.
     bare = "".join(c for c in unicodedata.normalize("NFD", text) if not "\u0300" <= c <= "\u036f")
-    bare = unicodedata.normalize("NFC", bare).replace("μ", "µ").replace("（", "(").replace("）", ")")
+    bare = unicodedata.normalize("NFC", bare).replace("μ", "µ").replace("º", "°").replace("（", "(").replace("）", ")")
     # A word, though nobody knows which: "x" behind letters that are lost is no bare x.
     return _BETWEEN_SCRIPTS.sub(" ", _LOST.sub(" unreadable ", bare))
 

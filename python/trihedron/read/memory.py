@@ -143,8 +143,11 @@ def columns_table(kind: str, items: list[tuple[Any, Any]]) -> Table:
                 raise ReadError(
                     f"{kind}: '{name}' has shape {array.shape}; rows are samples, so give its transpose if it is 3 x n."
                 )
-            names += [f"{name}[{k}]" for k in range(array.shape[1])]
-            columns += [_floats(kind, name, array[:, k]) for k in range(array.shape[1])]
+            parts = [_floats(kind, name, array[:, k]) for k in range(array.shape[1])]
+            has_clock = len(parts) == 4 and len(parts[0]) > 2 and bool(np.all(np.diff(parts[0]) > 0.0))
+            # A clock beside three readings in one array, as RoNIN's raw readings have it.
+            names += [f"{name} time"] * has_clock + [f"{name}[{k}]" for k in range(len(parts) - has_clock)]
+            columns += parts
         else:
             raise ReadError(f"{kind}: '{name}' has {array.ndim} dimensions; give (n,) or (n, 3).")
     lengths = {name: len(column) for name, column in zip(names, columns, strict=True) if len(column)}

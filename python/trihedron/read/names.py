@@ -16,9 +16,9 @@ _NOT_A_SENSOR = frozenset(
     | {"status", "heading", "delta", "id", "count", "error", "drift"}
 )
 _SENSOR_WORDS = {
-    "accelerometer": re.compile(r"acc\d*|acce|accl|accel\w*|acceler\w*|specific|specificforce|sf"),
+    "accelerometer": re.compile(r"acc\d*|acce|accl|accel\w*|acceler\w*|specific|specificforce|spec|sf|xl"),
     "gyroscope": re.compile(
-        r"gyr\d*|gyro\w*|angular|omega|rot|rotation|rotationrate|angvel|angrate|rotrate|av|angularvelocity|rate"
+        r"gyr\d*|gyro\w*|angular|omega|om|rot|rotation|rotationrate|angvel|angrate|rotrate|av|angularvelocity|rate"
     ),
 }
 _LETTER = {"a": "accelerometer", "f": "accelerometer", "g": "gyroscope", "w": "gyroscope", "t": "translation"}
@@ -29,10 +29,12 @@ _AXIS_FIRST = re.compile(r"^([xyz])(acc|accel|accelerometer|acceleration|gyr|gyr
 """As MAVLink writes them: xacc, ygyro."""
 _NUMBERED = re.compile(r"^(acc|accel|gyr|gyro|omega)([0123])$")
 _DEVICE_WORD = re.compile(r"(imu|dev|device|sensor|node|unit|port|ch|mpu|bmi|icm|lsm)\d*$")
-_LOOKS_LIKE_A_UNIT = re.compile(r"[/^²°]|\bper\b|^(ft|hz|rev|gon|grad|ips|rps|kdps|ug|µg)$")
+_LOOKS_LIKE_A_UNIT = re.compile(r"[/^²°]|\bper\b|^(ft|hz|rev|gon|grad|ips|rps|kdps|ug|µg)$|^(micro|nano|kilo|mega)")
 """A unit that a bracket states, known or not: one that is not known is asked for."""
 _UNIT_BEHIND = re.compile(r"[xyz][ _]([a-zµ°]+/[a-z]+[0-9²]?)$")
 """The same behind the axis: gyro_x_rev/s."""
+_TICK_BEHIND = re.compile(r"(?:\s+in\s+|[\s_/]+)((?:1/)?\d[\d.]*\s*(?:k?hz|[mnuµ]?s))$", re.IGNORECASE)
+"""The size of a tick behind a name: ticks_25 us, ticks_1/32768 s."""
 _OTHER_TIMES = frozenset({"min", "minute", "h", "hr", "hour"})
 """Behind what would be a unit of the second: rad/min begins as rad does."""
 _OF_READINGS = frozenset({"unit", "units", "raw", "data", "reading", "readings", "value", "values"})
@@ -54,35 +56,35 @@ _TIME_WORDS = {
     "clock",
     "when",
     "datetime",
-    # The clock of GNSS receivers; time in the languages of loggers that translate their names.
+    "uptime",
+    # The clock of GNSS receivers.
     "tow",
     "itow",
-    "zeit",
-    "zeitstempel",
-    "temps",
-    "tiempo",
-    "tempo",
 }
 _TICK_WORDS = {"ticks", "tick", "clk", "sensortime"}
 """What counts, and does not say how fast."""
 _TIME_WORDS |= _TICK_WORDS | {"millis", "micros", "seconds", "secs", "unix"}
 _STEP_WORDS = {"dt", "deltat", "deltatime", "timedelta"}
 """The time since the row before."""
+_RATE_WORDS = {"rate", "frequency", "freq", "odr", "fs"}
+_OF_RATES = {"sampling", "sample", "sensor", "output", "data", "update", "log", "logging", "imu", "nominal", "hz"}
+"""What may stand beside the word for a rate: a baud rate or an i2c frequency is another."""
+_OF_CLOCKS = {"1", "unit", "units", "resolution", "size", "period", "frequency"}
 _COUNTER_WORDS = {"index", "counter", "seq", "packet", "frame", "idx", "no", "number", "row", "samplenumber", "nr"}
 _TEMPERATURE = re.compile(r"temp|temperature|tempc|temperature\w*|temp_?\w{0,4}")
 _SUPPLY = {"supply", "vdd", "vcc", "voltage", "vbat", "battery", "vin", "avdd"}
 
 _TIME_UNITS = {
     "s": ["s", "sec", "secs", "second", "seconds", "stime"],
-    "ms": ["ms", "msec", "msecs", "millis", "milliseconds", "millisecond", "mstime"],
+    "ms": ["ms", "msec", "msecs", "millis", "milliseconds", "millisecond", "mstime", "cts"],
     "us": ["us", "µs", "usec", "micros", "microseconds", "microsecond", "ustime"],
     "ns": ["ns", "nsec", "nanos", "nanoseconds", "nanosecond", "nanosec", "nstime"],
 }
 _TIME_UNIT_OF = {word: unit for unit, words in _TIME_UNITS.items() for word in words}
 _UNITS = {
     "accelerometer": {
-        "m/s^2": "ms2 mss mps2 mpers2 msec2 ms-2 m/s2 m/s/s mpss",
-        "g": "g g0 gn gee gees",
+        "m/s^2": "si ms2 mss mps2 mpers2 msec2 ms-2 m/s2 m/s/s mpss",
+        "g": "g g0 gn gs gee gees",
         "mg": "mg millig mgee",
         "cm/s^2": "cms2 gal",
         "counts": "adc counts count lsb ticks digits int16 v mv volt volts",
@@ -90,11 +92,11 @@ _UNITS = {
     },
     "gyroscope": {
         "mdeg/s": "mdps mdegs mdegsec mdegps",
-        "rad/s": "rads radss radsec rad rads-1 radps radpersec",
+        "rad/s": "si rads radss radsec rad rads-1 radps radpersec",
         "mrad/s": "mrads mrad mradps",
         "deg/s": "dps degs deg degsec degps °s ° degs-1 °s-1",
         "deg/h": "dph degh deghr degphr °h °hr degperhour",
-        "rpm": "rpm revmin",
+        "rpm": "rpm revmin rmin",
         "counts": "adc counts count lsb ticks digits int16 v mv volt volts",
         "raw": "raw",
     },
@@ -127,12 +129,21 @@ def _unit(sensor: str, words: list[str]) -> str:
     table = _UNIT_OF[sensor]
     if not _COUNTS.isdisjoint(words):
         return "counts"
+    found = [""]
     for length in (4, 3, 2, 1):
         for start in range(len(words) - length + 1):
-            joined = "".join(words[start : start + length])
+            joined = "".join(words[start : start + length]).replace("milli", "m")
             if joined in table and not set(words[start + length : start + length + 1]) & _OTHER_TIMES:
-                return table[joined]
-    return ""
+                found.append(table[joined])
+    # gyroADC [dps]: what a converter gave is in a unit where the name says which.
+    return next((unit for unit in found[1:] if unit not in ("counts", "raw")), found[min(len(found) - 1, 1)])
+
+
+def _of_unit(text: str) -> list[str]:
+    """Words of a unit, with its exponents as digits: ``rad.s^-1`` is rad, s; ``m s^-2`` is m, s2."""
+    for mark, digits in (("²", "2"), ("^", ""), ("-1", ""), ("-2", "2")):
+        text = text.replace(mark, digits)
+    return english(_WORD.findall(text))
 
 
 def sensor_said(text: str) -> str:
@@ -145,9 +156,29 @@ def sensor_said(text: str) -> str:
 
 def unit_said(sensor: str, text: str) -> str:
     """The unit that is all a remark says, known or not; "" where it says anything else."""
-    words = _WORD.findall(plain(text).lower().replace("²", "2").replace("^", "").replace("-", ""))
-    known = _UNIT_OF[sensor].get("".join(words), "")
-    return known or (text if _LOOKS_LIKE_A_UNIT.search(text) and not any(w.isdecimal() for w in words[:1]) else "")
+    is_unit = _LOOKS_LIKE_A_UNIT.search(text) and not text[:1].isdecimal()
+    return known_unit(sensor, text) or (text if is_unit else "")
+
+
+def known_unit(sensor: str, text: str) -> str:
+    """The unit of that sensor that a text spells, as the records call it; ``raw`` for no unit; "" where unknown."""
+    return _UNIT_OF[sensor].get("".join(_of_unit(plain(text).strip().lower())).replace("milli", "m"), "")
+
+
+def clock_said(what: str, unit: str) -> str:
+    """The time unit or the size of a tick that a remark states: ``time in ms``, ``1 tick = 25 us``; else ""."""
+    words = english(_WORD.findall(plain(what).lower()))
+    sized = re.sub(r"^ticks?\s+of\s+", "", unit)
+    is_tick = sized != unit or not _TICK_WORDS.isdisjoint(words)
+    is_clock = not _TIME_WORDS.isdisjoint(words) and all(w in _TIME_WORDS or w in _OF_CLOCKS for w in words)
+    known = _TIME_UNIT_OF.get(sized, sized if is_tick else "")
+    return known if is_clock and seconds_of(known) > 0.0 else ""
+
+
+def is_rate(text: str) -> bool:
+    """Whether a remark's key names the sampling rate, and nothing else: ``Sample rate``, ``ODR``, ``fs [Hz]``."""
+    words = _WORD.findall(text.lower())
+    return not _RATE_WORDS.isdisjoint(words) and all(w in _RATE_WORDS or w in _OF_RATES for w in words)
 
 
 @lru_cache(maxsize=4096)
@@ -157,11 +188,13 @@ def parse_name(name: str) -> ColumnName:
     if re.fullmatch(r"gF[xyz]", text):
         # Physics Toolbox: force in g along an axis, not a gyro's x.
         return ColumnName("accelerometer", text[-1], "gf", "g", rank=1)
+    # An aircraft's load factors, beside p q r.
+    text = re.sub(r"^N(?=[xyz](?![A-Za-z]))", "acc ", text)
     # GnssLogger joins axis and unit: UncalAccelXMps2, UncalGyroZRadPerSec.
     text = re.sub(r"([XYZ])(Mps2|RadPerSec|MicroT)\b", lambda m: f" {m[1]} {m[2].lower()}", text)
     bracket = ""
     index = ""
-    text = re.sub(r"(?:\s+in\s+|_(?=\d+/))([^\s\])]+(?: s)?)$", r" [\1]", text)
+    text = re.sub(r"\s+(?:in|/)\s+([^\s\])]+)$", r" [\1]", _TICK_BEHIND.sub(r" [\1]", text))
     found = re.search(r"[\[({]\s*([^\])}]*?)\s*[\])}]\s*$", text)
     if found:
         inside = found.group(1)
@@ -181,7 +214,7 @@ def parse_name(name: str) -> ColumnName:
     words = english(_WORD.findall(re.sub(r"([a-z])([A-Z])", r"\1 \2", text).lower()))
     # The size of a count, or a range: no unit of the readings.
     stated = "" if re.match(r"[±+x*×-]*\s*\d[\d.]*(\s*/\s*[\d.]+)?\s*[a-zµ°]", bracket) else bracket
-    unit_words = english(_WORD.findall(stated.replace("²", "2").replace("-1", "").replace("-2", "2")))
+    unit_words = _of_unit(stated)
     said = _classify(words, unit_words, index)
     behind = _UNIT_BEHIND.search(text.lower())
     unknown = stated if _LOOKS_LIKE_A_UNIT.search(stated) else behind[1] if behind else ""
@@ -244,7 +277,7 @@ def _classify(words: list[str], unit_words: list[str], index: str) -> ColumnName
         return ColumnName("bare", axis, key, words=tuple(rest + unit_words)) if _unit_words_only(rest) else ColumnName()
     unit = _unit(sensor, unit_words) or _unit(sensor, left) if sensor in _UNIT_OF else ""
     rank = 0
-    if any(w in {"measured", "raw", "uncalibrated", "uncal", "unbiased"} for w in rest):
+    if any(w in {"measured", "raw", "uncalibrated", "uncalib", "uncal", "unbiased"} for w in rest):
         rank += 2
     if "unfilt" in rest or "unfiltered" in rest:
         rank += 1
@@ -304,6 +337,7 @@ def _single_role(words: list[str], unit_words: list[str]) -> ColumnName | None:
     is_time = is_time or any(
         w in {"time", "timestamp", "timestamps", "stamp", "datetime", "tow", "itow"} for w in words
     )
+    is_time = is_time or all(w in _TIME_WORDS or w in _TIME_UNIT_OF for w in words)
     if is_time and not any(w in {"x", "y", "z", "zone", "offset", "valid"} for w in words):
         units = [_TIME_UNIT_OF[w] for w in [*words, *unit_words] if w in _TIME_UNIT_OF]
         rank = 2 if words[0] in {"t", "time", "timestamp"} else 1

@@ -12,12 +12,15 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, is_integer, look
 from trihedron.read.errors import ReadError
+from trihedron.read.names import known_unit
 from trihedron.read.turning import Turning
 from trihedron.records import Finding, FindingCode
 from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si
 
 NEAR_GRAVITY = 0.2
 """An uncalibrated accelerometer at rest may be this far off: scale a few per cent, zero offset a tenth of g."""
+MG_OR_GAL = 0.015
+"""Share of a length by which a thousand mg must stand off 980.665 cm/s^2; the two differ by 0.02."""
 WHOLE = "whole numbers"
 """Stands for the unit of readings that were whole numbers before they were interpolated."""
 
@@ -33,11 +36,9 @@ class Judged:
 
 def parse_acceleration_unit(text: str | AccelerationUnit) -> AccelerationUnit:
     """A user's unit word."""
-    words = {"m/s2": "m/s^2", "m/s²": "m/s^2", "mps2": "m/s^2", "si": "m/s^2", "raw": "counts", "lsb": "counts"}
-    words |= {"g0": "g", "cm/s2": "cm/s^2", "cm/s²": "cm/s^2", "gal": "cm/s^2"}
-    key = text.value if isinstance(text, AccelerationUnit) else str(text).strip().lower()
+    key = text.value if isinstance(text, AccelerationUnit) else known_unit("accelerometer", text)
     try:
-        return AccelerationUnit(words.get(key, key))
+        return AccelerationUnit(key.replace("raw", "counts"))
     except ValueError:
         raise ReadError(
             f"'{text}' is not an acceleration unit known here; state one with --accel-unit: "
@@ -47,11 +48,9 @@ def parse_acceleration_unit(text: str | AccelerationUnit) -> AccelerationUnit:
 
 def parse_rate_unit(text: str | RateUnit) -> RateUnit:
     """A user's unit word."""
-    words = {"dps": "deg/s", "mdps": "mdeg/s", "°/s": "deg/s", "si": "rad/s", "raw": "counts", "lsb": "counts"}
-    words |= {"dph": "deg/h", "°/h": "deg/h", "deg/hr": "deg/h"}
-    key = text.value if isinstance(text, RateUnit) else str(text).strip().lower()
+    key = text.value if isinstance(text, RateUnit) else known_unit("gyroscope", text)
     try:
-        return RateUnit(words.get(key, key))
+        return RateUnit(key.replace("raw", "counts"))
     except ValueError:
         raise ReadError(
             f"'{text}' is not an angular rate unit known here; state one with --gyro-unit: "
@@ -88,15 +87,17 @@ def judge_accelerometer(
                 (Finding.of(FindingCode.UNIT_ASSUMED, "counts-or-mg", rest_norm=norm),),
             )
         return Judged(found, (Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-counts", rest_norm=norm),))
-    for unit, length in (
-        (AccelerationUnit.M_S2, STANDARD_GRAVITY_M_S2),
-        (AccelerationUnit.G, 1.0),
-        (AccelerationUnit.MG, 1000.0),
-    ):
-        if _is_near(norm, length):
+    lengths = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si := acceleration_to_si(unit))}
+    nearest = min(lengths, key=lambda unit: abs(norm - lengths[unit]) if math.isfinite(norm) else 0.0)
+    if _is_near(norm, lengths[nearest]):
+        # Nearer to cm/s^2 than a usual scale error takes mg.
+        is_alike = nearest is AccelerationUnit.CM_S2 or abs(norm / lengths[AccelerationUnit.CM_S2] - 1.0) < MG_OR_GAL
+        if is_alike:
             return Judged(
-                unit, (Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-at-rest", rest_norm=norm, unit=unit.value),)
+                nearest, (Finding.of(FindingCode.UNIT_ASSUMED, "mg-or-gal", rest_norm=norm, unit=nearest.value),)
             )
+        told = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-at-rest", rest_norm=norm, unit=nearest.value)
+        return Judged(nearest, (told,))
     if norm < 1.0 and not whole:
         return Judged(AccelerationUnit.M_S2, (_gravity_missing(norm),))
     return Judged(

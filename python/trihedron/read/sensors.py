@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -21,6 +22,7 @@ from trihedron.read.constant import refuse_constant
 from trihedron.read.copies import copied_rows
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
+from trihedron.read.names import is_rate
 from trihedron.read.sensing import order_of_triads
 from trihedron.read.table import Table
 from trihedron.read.text.store import side_by_side
@@ -37,11 +39,6 @@ FEWEST_ROWS = 2
 WITNESS_ROWS = 200_000
 LONGEST_MTI_STEP = 5000.0
 """Counts of 100 µs between samples at 2 Hz, below an MTi's usual rates; a DOT's are 8333 µs apart at least."""
-_RATE_KEYS = frozenset(
-    f"{a}{b}"
-    for a in ("fs", "rate", "sampling rate", "sample rate", "sampling frequency", "frequency", "update rate")
-    for b in ("", " hz", " [hz]", " (hz)")
-)
 
 
 @dataclass(frozen=True)
@@ -261,13 +258,10 @@ def _stated_rate(table: Table) -> float | None:
     if table.clock.rate_hz is not None:
         return table.clock.rate_hz
     for key, text in table.metadata.items():
-        if key.strip().lower().replace("_", " ") in _RATE_KEYS:
-            try:
-                rate = float(text.split()[0].lower().removesuffix("hz"))
-            except (ValueError, IndexError):
-                continue
-            if 0 < rate < 1e7:
-                return rate
+        # A number and no other unit: fs is a full scale too.
+        value = re.fullmatch(r"(\d+\.?\d*(?:e\d+)?)\s*(?:(k?)hz\b.*)?", text.strip().lower()) if is_rate(key) else None
+        if value and 0.0 < (rate := float(value[1]) * (1e3 if value[2] else 1.0)) < 1e7:
+            return rate
     return None
 
 

@@ -22,6 +22,8 @@ _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
     (b"MD\xfc\x03", "an Axivity .cwa log", "export it as CSV in OmGui"),
     (b"\x7fELF", "a program", "name the log itself"),
     (b"\xaaD\x12", "a NovAtel binary log", "convert RAWIMU to ASCII with NovAtel Convert"),
+    (b"\xaaD\x13", "a NovAtel binary log", "convert RAWIMUS to ASCII with NovAtel Convert"),
+    (b"DEVC\0", "a GoPro GPMF stream", "write its ACCL and GYRO as CSV with gopro-telemetry"),
     (b"HDF", "an HDF4 file", "convert it to HDF5 or CSV"),
     (b"ply\n", "a point cloud", "name the log of the IMU"),
     (b"bplist00", "a property list", "export the log as CSV"),
@@ -41,7 +43,8 @@ def refuse_foreign(path: Path, magic: bytes) -> None:
             raise ReadError(f"{path}: this is {kind}, which is not read here; {remedy}.")
     if magic[4:8] == b"ftyp":
         raise ReadError(
-            f"{path}: this is a video, which is not read here; extract its motion data (GoPro's GPMF) as CSV."
+            f"{path}: this is a video, which is not read here; extract its motion data as CSV "
+            "(GoPro's GPMF with gopro-telemetry; other makers' with telemetry-parser)."
         )
     text = magic.removeprefix(b"\xef\xbb\xbf").lstrip()
     own = re.match(rb'\{\s*"format":\s*"(trihedron [a-z ]+)"', text)

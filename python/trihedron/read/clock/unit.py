@@ -110,7 +110,8 @@ def time_unit(
     possible = [u for u in _CANDIDATES if shortest <= usual * SECONDS[u] <= longest]
     # A date between 2001 and 2096 in the unit settles it; nothing else counts that high.
     dated = [u for u in _CANDIDATES if 1e9 <= start * SECONDS[u] <= 4e9]
-    dated = [u for u in dated if u in possible] or (dated if len(dated) == 1 and not wraps else [])
+    is_date_throughout = len(dated) == 1 and not wraps and raw[-1] * SECONDS[dated[0]] <= 4e9
+    dated = [u for u in dated if u in possible] or (dated if is_date_throughout else [])
     if dated:
         choice, sure = dated[0], True
     elif possible:

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.read.text.layout import COMMENT_STARTS
+
 NEARLY_ALL = 0.9
 _SAMPLE_LINES = 400
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -30,7 +32,7 @@ _PAIR = re.compile(
     rf"([^\W\d][\w.\[\]()/^°² -]*?)\s*[:=：]\s*({_VALUE})(?![\d:])"
     r"(?:\s*((?:[^\W\d_]|°)[\w/^°²*]*)(?!\s*[:=：\w\[(]|\.\w))?"
 )
-_HAS_LABEL = re.compile(r".*?(?:[^\W\d]|[\])])\s*[:=：]")
+_HAS_LABEL = re.compile(r".*?(?:[^\W\d]|[\])]|\b[^\W\d]\w{0,40})\s*[:=：]")
 _BARE_TIMESTAMP = re.compile(rf"\s*({_VALUE})\s*[,;]?\s+(?=[^\W\d_])")
 _THREE = re.compile(
     rf"([^\W\d]\w*)\s*[:=：]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})(?![\d:.])(?!\s*[,;\s]\s*[-+.\d])"
@@ -136,14 +138,15 @@ def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[str], list[i
 
     for number, line in filled:
         pairs = _pairs(_expanded(line, has_timestamp), known)
-        if not pairs or any(label not in counts for label, _ in pairs):
+        known_labels = names if line.startswith(COMMENT_STARTS) else counts
+        if not pairs or any(label not in known_labels for label, _ in pairs):
             # A greeting above the first row is no row, nor is a line drawn between rows; the reader
             # refuses the rest by number.
             end()
             if rows:
                 rows.append(line if any(map(str.isalnum, line)) else f"# {line}")
                 numbers.append(number)
-            elif line.startswith("#"):
+            elif line.startswith(COMMENT_STARTS):
                 preamble.append(line)
             continue
         if not row.keys().isdisjoint(label for label, _ in pairs):

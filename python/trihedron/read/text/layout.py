@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from trihedron.read.names import parse_name, sensor_said, unit_said
+from trihedron.read.names import clock_said, parse_name, sensor_said, unit_said
 
 COMMENT_STARTS = ("#", "%", "//")
 MISSING = frozenset({"", "na", "n/a", "null", "none", "nan", "-", "--", "?", "#n/a", "missing"})
@@ -230,6 +230,7 @@ def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
         # GCDC's loggers say so before the names.
         plain = re.sub(r"^headers\s*,\s*", "", plain, flags=re.IGNORECASE)
         fields = _header_fields(plain, separator, n_fields)
+        fields = _numbered_on(fields) if fields is not None else None
         if fields is not None and any(fields) and not any(is_number(f, False) for f in fields):
             matching.append((i, fields))
             continue
@@ -259,10 +260,19 @@ def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
     if qualifiers:
         names = [f"{name} {word}".strip() for name, word in zip(names, qualifiers, strict=True)]
     if units:
-        bare = [unit[1:-1] if unit[:1] + unit[-1:] in ("[]", "()") else unit for unit in units]
+        bare = [unit[1:-1] if unit[:1] + unit[-1:] in ("[]", "()") else unit.strip("-") for unit in units]
         names = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, bare, strict=True)]
     metadata |= stated_units(line for i, line in enumerate(lines) if i not in used)
     return _Header(tuple(names), metadata, "", tuple(used))
+
+
+def _numbered_on(fields: list[str]) -> list[str]:
+    """Names with those of ``Accelerometer [m/s2], 1, 2`` written out, as GoPro's telemetry has them."""
+    out = list(fields)
+    for i, name in enumerate(fields[:-2]):
+        if fields[i + 1 : i + 3] == ["1", "2"] and not is_number(name, False):
+            out[i : i + 3] = [re.sub(r"^[^\[(]*[^\[( ]", rf"\g<0>[{k}]", name, count=1) for k in range(3)]
+    return out
 
 
 def _names_sensors(fields: list[str]) -> bool:
@@ -293,7 +303,8 @@ _STATEMENT = re.compile(r"^\W*(?P<what>[^:=\[(]+?)\s*(?:\bin\b|[:=\[(])\s*(?P<un
 
 
 def stated_units(lines: Iterable[str]) -> dict[str, str]:
-    """Unit of each sensor as stated, under ``accelerometer unit`` and ``gyroscope unit``; the first statement counts.
+    """Unit of each sensor and of the time, under ``accelerometer unit``, ``gyroscope unit`` and ``time unit``, as
+    stated first.
 
     A clause says what (a sensor and no more, perhaps the word unit) and its unit: ``accelerometer range: 4 g`` and
     ``gyro bias: 0.1 deg/s`` state none of the readings.
@@ -306,4 +317,6 @@ def stated_units(lines: Iterable[str]) -> dict[str, str]:
             unit = unit_said(sensor, said["unit"]) if said and sensor else ""
             if unit:
                 found.setdefault(f"{sensor} unit", unit)
+            elif said and not sensor and (clock := clock_said(said["what"], said["unit"])):
+                found.setdefault("time unit", clock)
     return found

@@ -11,6 +11,7 @@ from trihedron.report.findings.entry import Entry
 NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 _SAY_ACCEL_UNIT = "Say it with --accel-unit m/s^2, g, mg, ..., or counts, if this is wrong."
 _SAY_GYRO_UNIT = "Say it with --gyro-unit rad/s, deg/s, ..., or counts, if this is wrong."
+_ALIKE = "Both look alike. The calibration differs only in its name of the raw unit."
 _SOURCE = "{is_given:?as you said|by its column names}"
 _TURNING = (
     "gravity rotates {factor:.3g} (± {percent:.1g} %) times as fast as a gyro in {unit} would read "
@@ -27,7 +28,15 @@ _UNITS = (
         WARNING,
         "The accelerometer reads whole numbers of length {rest_norm:.4g} at rest: counts of about 1/1000 g, or mg; "
         "taken as counts.",
-        "Both look alike. The calibration differs only in its name of the raw unit.",
+        _ALIKE,
+        _SAY_ACCEL_UNIT,
+    ),
+    Entry(
+        Code.UNIT_ASSUMED,
+        "mg-or-gal",
+        WARNING,
+        "The accelerometer reads {rest_norm:.4g} at rest: mg (1000) or cm/s^2 (981); taken as {unit}.",
+        _ALIKE,
         _SAY_ACCEL_UNIT,
     ),
     Entry(
@@ -95,12 +104,7 @@ _UNITS = (
         "A time base or rate that is wrong by that factor, or a gyro in counts or a unit of its own.",
         "State the gyro's unit (--gyro-unit, counts if it has none) and the clock (--time-unit, --rate).",
     ),
-    Entry(
-        Code.UNIT_DETECTED,
-        "gyro-counts",
-        NOTE,
-        "The gyro's readings are whole numbers and were taken as counts.",
-    ),
+    Entry(Code.UNIT_DETECTED, "gyro-counts", NOTE, "The gyro's readings are whole numbers and were taken as counts."),
     Entry(Code.UNIT_DETECTED, "gyro-by-turning", NOTE, f"The gyro's unit is {{unit}}: {_TURNING}."),
     Entry(
         Code.UNIT_ASSUMED,
@@ -227,12 +231,7 @@ _COLUMNS = (
         NOTE,
         "Column {column} holds words (such as {example!r}) and was excluded.",
     ),
-    Entry(
-        Code.COLUMN_LEFT_OUT,
-        "type",
-        NOTE,
-        "Column '{column}' holds {kind}, not numbers, and was excluded.",
-    ),
+    Entry(Code.COLUMN_LEFT_OUT, "type", NOTE, "Column '{column}' holds {kind}, not numbers, and was excluded."),
 )
 
 _ROWS = (

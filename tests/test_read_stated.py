@@ -1,0 +1,176 @@
+"""What a text states of its clock, its units and its devices, in the many ways that people and programs write it."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trihedron
+from trihedron.read import ReadError, read_recording
+from trihedron.read.names import clock_said, is_rate, known_unit, parse_name
+from trihedron.records import FindingCode, Severity
+from trihedron.units import AccelerationUnit, RateUnit
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benches" / "formats"))
+from drawn import session
+
+T, FORCE, RATE = (lambda s: (s.time_s, s.force, s.rate))(session(np.random.default_rng(7), 50.0, 10))
+NAMES = "ax,ay,az,gx,gy,gz"
+
+
+def written(path, clock, names, remark="", force=FORCE, rate=RATE):
+    rows = zip(clock, force.tolist(), rate.tolist(), strict=True)
+    body = "".join(f"{t},{','.join(f'{v:.7g}' for v in (*a, *w))}\n" for t, a, w in rows)
+    path.write_text(f"{remark}{names}\n{body}")
+    return path
+
+
+def doubts(recording):
+    return {f.code for f in recording.findings if f.severity is not Severity.NOTE}
+
+
+@pytest.mark.parametrize(
+    ("remark", "name", "per_s"),
+    [
+        ("# 1 tick = 39.0625 us\n", "ticks", 25600.0),
+        ("// time in ticks of 1/32768 s\n", "ticks", 32768.0),
+        ("% tick: 62.5 us\n", "t", 16000.0),
+        ("# timestamp unit: us\n", "timestamp", 1e6),
+        ("", "ticks_25 us", 40000.0),
+        ("", "ticks / 62.5 us", 16000.0),
+    ],
+)
+def test_the_size_of_a_tick_is_taken_from_where_it_is_stated(tmp_path, remark, name, per_s):
+    recording = read_recording(written(tmp_path / "log.csv", np.rint(T * per_s).astype(int), f"{name},{NAMES}", remark))
+    # Ticks of 62.5 us round the time to 3e-3 of a step.
+    assert recording.rate_hz == pytest.approx(50.0, rel=1e-3)
+    assert not doubts(recording)
+
+
+def test_remarks_about_other_times_are_no_tick():
+    assert not clock_said("start time", "5 s")
+    assert not clock_said("exposure time", "ms")
+    assert not clock_said("time", "25 us")
+
+
+@pytest.mark.parametrize("remark", ["# ODR = 50 Hz", "# fs=50 Hz", "% sample_rate_hz: 50", "// Output rate: 0.05 kHz"])
+def test_a_remark_about_the_rate_is_known_by_its_words(tmp_path, remark):
+    recording = read_recording(written(tmp_path / "log.csv", range(len(T)), f"n,{NAMES}", remark + "\n"))
+    assert recording.rate_hz == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize("remark", ["# fs = 4 g", "# baud rate: 115200", "# i2c frequency: 400000"])
+def test_a_full_scale_and_other_rates_are_no_sampling_rate(tmp_path, remark):
+    recording = read_recording(written(tmp_path / "log.csv", range(len(T)), f"n,{NAMES}", remark + "\n"))
+    assert FindingCode.RATE_ASSUMED in doubts(recording)
+    assert not is_rate("baud rate")
+
+
+@pytest.mark.parametrize(
+    ("sensor", "text", "unit"),
+    [
+        ("accelerometer", "m.s^-2", "m/s^2"),
+        ("accelerometer", "g's", "g"),
+        ("accelerometer", "milli-g", "mg"),
+        ("gyroscope", "º/s", "deg/s"),
+        ("gyroscope", "rad s-1", "rad/s"),
+        ("gyroscope", "millidps", "mdeg/s"),
+        ("gyroscope", "r/min", "rpm"),
+        ("gyroscope", "furlongs", ""),
+    ],
+)
+def test_a_unit_is_known_alike_in_names_remarks_and_options(sensor, text, unit):
+    assert known_unit(sensor, text) == unit
+    if unit:
+        stem = "acc_x" if sensor == "accelerometer" else "gyr_x"
+        assert {parse_name(stem + form.format(text)).unit for form in (" [{}]", " ({})", "_{}", " / {}")} == {unit}
+
+
+def test_a_converters_name_with_a_unit_is_in_that_unit():
+    assert parse_name("gyroADC[0] dps").unit == "deg/s"
+    assert parse_name("gyroADC[0]").unit == "counts"
+
+
+def test_a_converter_gives_no_counts_of_microdegrees():
+    assert parse_name("gyro_x [microdps]").unit == "microdps"
+
+
+def test_whole_seconds_and_nanoseconds_belong_together_above_a_row_of_units(tmp_path):
+    clock = [f"{1730650831 + int(t)},{round(t % 1 * 1e9)}" for t in T]
+    log = written(tmp_path / "log.csv", clock, f"secs,nsecs,{NAMES}\n-,-,m/s^2,m/s^2,m/s^2,rad/s,rad/s,rad/s")
+    assert read_recording(log).rate_hz == pytest.approx(50.0)
+
+
+def test_a_column_t_that_falls_is_no_clock(tmp_path):
+    warm = np.round(27.0 + np.random.default_rng(1).normal(0.0, 0.02, len(T)), 2)
+    log = written(tmp_path / "log.csv", warm, f"T,{NAMES}", "# fs=50 Hz\n")
+    recording = read_recording(log)
+    assert recording.rate_hz == pytest.approx(50.0)
+    np.testing.assert_allclose(recording.temperature_degc, warm)
+
+
+def test_a_count_that_starts_like_a_date_and_runs_off_is_none(tmp_path):
+    log = written(tmp_path / "log.csv", np.rint((T + 3.217) * 1e9).astype(int), f"t,{NAMES}")
+    assert read_recording(log).rate_hz == pytest.approx(50.0)
+
+
+def test_a_column_that_changes_where_the_clock_goes_back_identifies_devices(tmp_path):
+    one = [f"left,{t:.4f}" for t in T]
+    force, rate = np.concatenate([FORCE, 1.01 * FORCE]), np.concatenate([RATE, RATE])
+    log = written(
+        tmp_path / "log.csv", [*one, *(r.replace("left", "right") for r in one)], f"wrist,t,{NAMES}", "", force, rate
+    )
+    with pytest.raises(ReadError, match="'wrist' identifies 2 devices: left"):
+        read_recording(log)
+    assert len(read_recording(log, instance="right").time_s) == len(T)
+
+
+def test_mg_and_gal_that_nothing_states_are_a_warning_where_both_are_near(tmp_path):
+    for length, unit in ((981.0, AccelerationUnit.CM_S2), (1003.0, AccelerationUnit.MG)):
+        log = written(tmp_path / "log.csv", T, f"t,{NAMES}", "", FORCE / 9.80665 * length)
+        recording = read_recording(log)
+        assert recording.accelerometer_unit is unit
+        assert (FindingCode.UNIT_ASSUMED in doubts(recording)) == (unit is AccelerationUnit.CM_S2)
+
+
+def test_labels_that_end_in_a_digit_and_remarks_above_prints_are_understood(tmp_path):
+    rows = [
+        f"q0: {t:.3f}\nq1: 0.1\nq2: 0.2\nAccel: {a[0]:.6f}, {a[1]:.6f}, {a[2]:.6f}\n"
+        f"Gyro: {w[0]:.6f}, {w[1]:.6f}, {w[2]:.6f}\n"
+        for t, a, w in zip(np.sin(T), FORCE, RATE, strict=True)
+    ]
+    (tmp_path / "log.txt").write_text("% board 3\n% fs=50 Hz\n" + "".join(rows))
+    recording = read_recording(tmp_path / "log.txt")
+    assert recording.rate_hz == pytest.approx(50.0)
+    np.testing.assert_allclose(recording.gyroscope, RATE, atol=1e-6)
+
+
+def test_an_array_with_its_own_clock_is_a_clock_and_three_readings():
+    recording = trihedron.read({"acce": np.c_[1e3 + T, FORCE], "gyro": np.c_[1e3 + T, RATE]})
+    assert recording.rate_hz == pytest.approx(50.0)
+    np.testing.assert_allclose(recording.accelerometer, FORCE)
+
+
+GOPRO = [",".join(f"Accelerometer ({a}) [m/s²]" for a in "zxy"), "Accelerometer [m/s2],1,2"]
+
+
+@pytest.mark.parametrize("names", GOPRO)
+def test_gopros_telemetry_is_read_as_its_extractor_writes_it(tmp_path, names):
+    rows = "".join(f"{1e3 * t:.3f},{a[0]:.6f},{a[1]:.6f},{a[2]:.6f},31.5\n" for t, a in zip(T, FORCE, strict=True))
+    (tmp_path / "accl.csv").write_text(f"cts,{names},temperature [°C]\n{rows}")
+    recording = read_recording(tmp_path / "accl.csv")
+    assert (recording.rate_hz, recording.accelerometer_unit) == (pytest.approx(50.0), AccelerationUnit.M_S2)
+    assert np.sort(recording.accelerometer[0]) == pytest.approx(np.sort(FORCE[0]), abs=1e-6)
+
+
+@pytest.mark.parametrize(("start", "kind"), [(b"\xaaD\x13", "NovAtel.*RAWIMUS"), (b"DEVC\0\x01", "GoPro GPMF")])
+def test_binary_streams_are_refused_by_name_with_the_way_in(tmp_path, start, kind):
+    (tmp_path / "log.bin").write_bytes(start + bytes(400))
+    with pytest.raises(ReadError, match=kind):
+        read_recording(tmp_path / "log.bin")
+
+
+def test_load_factors_beside_p_q_r_are_the_accelerometer(tmp_path):
+    recording = read_recording(written(tmp_path / "log.csv", T, "time,Nx,Ny,Nz,p,q,r", "", FORCE / 9.80665))
+    assert (recording.accelerometer_unit, recording.gyroscope_unit) == (AccelerationUnit.G, RateUnit.RAD_S)
