@@ -17,7 +17,7 @@ from trihedron.session.noise import Along, measure_noise, scatter_unit
 
 LOWER = np.tril_indices(3)
 """Elements of a lower triangular scale, row by row."""
-HELD = 1e-7
+HELD = 1e-10
 """Relative standard error of what is given: far below any noise, and above what rounding does to the rows."""
 
 
