@@ -151,6 +151,7 @@ def test_a_declared_frame_is_read_with_any_checksum_and_byte_order(kind, endian,
     [
         (("sync", "synk"), "no key 'synk'"),
         (('"AA 55"', '"XY"'), "not hexadecimal"),
+        (("sync", "length = " + "9" * 5000 + "\nsync"), "is not TOML"),
         (('"u16"', '"u17"'), "no type 'u17'"),
         (('"crc16-ccitt"', '"md5"'), "no checksum 'md5'"),
         (('unit = "us"', ""), "needs its step"),
