@@ -58,7 +58,7 @@ def test_moves_are_judged_each_for_itself_in_noises_of_their_channels():
     readings[300, 2] = np.nan
     together = _steps(readings, noise, moves)
     scaled = np.nan_to_num(readings / noise)
-    alone = [_steps(scaled[a - 4 : b + 5], np.ones(6), [(4, 4 + b - a)]) for a, b in moves]
+    alone = [_steps(scaled[a - 4 : b + 5], np.ones(6), np.array([(4, 4 + b - a)])) for a, b in moves]
     for name in ("is_sharp", "is_long", "is_short"):
         assert np.array_equal(getattr(together, name), np.concatenate([getattr(one, name) for one in alone]))
     assert together.is_sharp.any()

@@ -100,8 +100,8 @@ def _by_session(
         # One move that was knocked would be shared out among all as if each were so uncertain.
         aligned = fewer
     anchors = segments.time_mid_s[measured.links]
-    seen = carried(recording.time_s, measured, anchors, solution.S_a, solution.b_a, solution.S_w)
-    left_out = held_out_of_session(recording.time_s, observed, measured, anchors, solution, options.n_folds)
+    seen = carried(measured, anchors, solution.S_a, solution.b_a, solution.S_w)
+    left_out = held_out_of_session(observed, measured, anchors, solution, options.n_folds)
     covariance = solution.covariance + _by_averaging(recording, segments, measured, aligned, gravity_m_s2, solution)
     if measured.attitude is not None:
         more = solution.S_w @ np.diag(measured.attitude.var_bias) @ solution.S_w.T
@@ -171,7 +171,7 @@ def _by_averaging(
     found = measured.averaging
     more = replace(
         measured,
-        rate=sharpened(measured.rate, recording.time_s, found.sigma),
+        rate=sharpened(measured.rate, measured.time_s, found.sigma),
         averaging=replace(found, share=found.share + found.sigma),
     )
     observed = arranged(recording, segments, more, gravity_m_s2, aligned.used)

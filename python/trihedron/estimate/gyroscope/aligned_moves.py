@@ -84,7 +84,7 @@ class _Session:
         """Moves of a sensor that averages over its interval as far as they show it, and what they leave open of it."""
 
         def at(share: float) -> tuple[MoveMeasurements, Aligned]:
-            rate = sharpened(measured.rate, self.recording.time_s, share)
+            rate = sharpened(measured.rate, measured.time_s, share)
             return self._again(self._read_as(measured, rate, measured.reading_variance), aligned)
 
         points, half, means = (at(share)[1] for share in TRIED)
@@ -102,7 +102,7 @@ class _Session:
         """
         coarse = self._coarse(measured)
         quantum = coarse[1]
-        is_still = resting_ends(*coarse, measured.edges) | resting_axes(*coarse)
+        is_still = (resting_ends(*coarse, measured.edges_in_log) | resting_axes(*coarse))[measured.rows]
         still = np.mean(np.concatenate([is_still[a:b] for a, b in measured.edges.tolist()]), axis=0)
         rate = measured.rate
         passes = np.log(LEFT) / np.log(np.clip(still.max(), LEFT, 1.0 - LEFT))
@@ -118,7 +118,9 @@ class _Session:
             return measured, aligned
         # Once moves agree among themselves: what they share where their rate stands still inside a step.
         shared = plateau_variance(*coarse)
-        variance = measured.reading_variance if shared is None else np.maximum(_variance(measured), shared)
+        variance = (
+            measured.reading_variance if shared is None else np.maximum(_variance(measured), shared[measured.rows])
+        )
         return self._again(self._read_as(measured, measured.rate, variance), aligned)
 
     def with_hidden_turns(self, measured: MoveMeasurements, aligned: Aligned) -> tuple[MoveMeasurements, Aligned]:
@@ -150,7 +152,8 @@ class _Session:
         """The covariance with what rounding does to all moves alike."""
         if not np.any(measured.is_undithered):
             return aligned
-        followed = self._followed(measured, aligned, shared_errors(*self._coarse(measured)))
+        errors = (error[measured.rows] for error in shared_errors(*self._coarse(measured)))
+        followed = self._followed(measured, aligned, errors)
         return widened(aligned, measured, self.part, followed)
 
     def _still_response(self, measured: MoveMeasurements, aligned: Aligned, is_still: BoolArray) -> FloatArray:
@@ -163,7 +166,7 @@ class _Session:
         return grown
 
     def _followed(self, measured: MoveMeasurements, aligned: Aligned, errors: Iterable[FloatArray]) -> FloatArray:
-        """(m, p) by how much the fit's parameters follow ``m`` errors (n, 3) of the readings."""
+        """(m, p) by how much the fit's parameters follow ``m`` errors (samples, 3) of the readings."""
         rates = (measured.rate, *(measured.rate + error for error in errors))
         fits = [self._again(self._read_as(measured, rate, measured.reading_variance), aligned)[1] for rate in rates]
         first, *others = (self._parameters(fit) for fit in fits)
@@ -185,7 +188,7 @@ class _Session:
         return readings, self.recording.facts.of("gyroscope").step, medians(means), measured.is_undithered
 
     def _read_as(self, measured: MoveMeasurements, rate: FloatArray, variance: FloatArray | None) -> MoveMeasurements:
-        return measured.of_rate(self.recording, self.segments, rate, variance)
+        return measured.of_rate(self.segments, rate, variance)
 
     def _again(self, measured: MoveMeasurements, aligned: Aligned) -> tuple[MoveMeasurements, Aligned]:
         """The same moves used as before, from where the fit was."""
@@ -203,7 +206,7 @@ class _Session:
         is_known = options.nominal() is not None or rate_to_si(self.recording.gyroscope_unit) is not None
         if is_known or not is_astray(found, measured):
             return found
-        again = turned_starts(self.recording, measured, part.model, first[0])
+        again = turned_starts(measured, part.model, first[0])
         if again is None:
             return found
         other = align_screened(measured, part, gravity, again, options)

@@ -22,6 +22,7 @@ from trihedron.estimate.gyroscope.rounding import (
 )
 from trihedron.probability import chdtrc
 from trihedron.quantiles import median, medians
+from trihedron.ranges import rows_beside
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
@@ -32,6 +33,8 @@ GAP_STEPS = 5.0
 """A step of time so much longer than the usual one is a gap: the rate in it is unknown."""
 RATE_DEGREE = 3
 """Of the rate's polynomial over a sample: corrected for coning."""
+BESIDE = 2
+"""Samples kept on either side of a move: one that brackets it, and that one's neighbour."""
 BLOCK_S = 0.5
 """Length of the blocks whose scatter gives the angle random walk: moves last of this order, and it is long against
 the correlation that an anti-alias filter leaves between samples."""
@@ -42,7 +45,8 @@ class MoveMeasurements:
     """Everything the alignment needs, in raw units of each sensor.
 
     ``reading``, ``zero`` (n, 3) are the pose means of accelerometer and gyro, ``var_reading``, ``var_bias`` (n, 3) the
-    variances of these means; ``links`` (m, 2) the poses each move joins, ``edges`` (m, 2) its samples;
+    variances of these means; ``links`` (m, 2) the poses each move joins. ``rows`` (samples,) are the recording's rows
+    in and beside moves, move after move, ``time_s`` (samples,) their times, ``edges`` (m, 2) each move among them;
     ``noise_density`` (3,) the angle random walk in raw unit · √s; ``var_bias_walk`` (3,) the variance by which the
     true bias changes from pose to pose; ``clipped_s`` (m,) is the time in each move that the gyro spent at
     its limit. ``attitude`` is the dependence of the bias on specific force where it was removed: ``rate``
@@ -57,6 +61,8 @@ class MoveMeasurements:
 
     moves: Moves
     links: IntArray
+    rows: IntArray
+    time_s: FloatArray
     edges: IntArray
     durations_s: FloatArray
     reading: FloatArray
@@ -84,15 +90,17 @@ class MoveMeasurements:
     still_response: FloatArray | None = None
     averaging: Averaging = field(default_factory=Averaging)
 
-    def of_rate(
-        self, recording: Recording, segments: Segments, rate: FloatArray, variance: FloatArray | None
-    ) -> MoveMeasurements:
-        """The same moves with other gyro readings (n, 3), and what is uncertain of each (n, 3)."""
+    def of_rate(self, segments: Segments, rate: FloatArray, variance: FloatArray | None) -> MoveMeasurements:
+        """The same moves with other gyro readings (samples, 3), and what is uncertain of each (samples, 3)."""
         mid_s = np.ascontiguousarray(segments.time_mid_s[self.links])
-        moves = Moves(
-            recording.time_s, np.ascontiguousarray(rate), self.edges, mid_s, self.links, RATE_DEGREE, variance
-        )
+        moves = Moves(self.time_s, np.ascontiguousarray(rate), self.edges, mid_s, self.links, RATE_DEGREE, variance)
         return replace(self, moves=moves, rate=rate, reading_variance=variance)
+
+    @property
+    def edges_in_log(self) -> IntArray:
+        """Half-open ranges (m, 2) of the moves in rows of the recording."""
+        out: IntArray = self.rows[self.edges - np.array([0, 1])] + np.array([0, 1])
+        return out
 
     @property
     def is_lost(self) -> BoolArray:
@@ -151,7 +159,8 @@ def measure_moves(
     gyroscope = _required(recording.gyroscope, "gyroscope")
     raw_force = _required(recording.accelerometer, "accelerometer")
     accelerometer_mean, gyroscope_mean = _both_means(segments)
-    edges, links = _edges_and_links(_moves_of(recording, segments))
+    in_log, links = _edges_and_links(_moves_of(recording, segments))
+    rows, edges = rows_beside(in_log, BESIDE, recording.n_samples)
     reading, zero = (np.ascontiguousarray(mean, dtype=np.float64) for mean in (accelerometer_mean, gyroscope_mean))
     quantum = recording.facts.of("gyroscope").step
     var_bias = _mean_variance(segments.gyroscope_sigma_mean)
@@ -159,16 +168,18 @@ def measure_moves(
     undithered = _undithered(quantum, segments.gyroscope_sigma)
     attitude = attitude_dependence(zero, var_bias, force)
     if attitude is not None and attitude.is_present:
-        rate = gyroscope - (raw_force @ accelerometer.S.T + accelerometer.b) @ attitude.A.T
+        rate = gyroscope[rows] - (raw_force[rows] @ accelerometer.S.T + accelerometer.b) @ attitude.A.T
         zero = np.ascontiguousarray(zero - force @ attitude.A.T)
     else:
-        attitude, rate = None, gyroscope
+        attitude, rate = None, gyroscope[rows]
     clipped = bridge_clipping(recording) if is_bridged else None
     extra = rounding_variance(gyroscope, quantum, medians(gyroscope_mean), undithered)
+    extra = None if extra is None else extra[rows]
     if clipped is not None:
-        rate, extra = _bridged(rate, extra, clipped, gyroscope)
+        rate, extra = _bridged(rate, extra, clipped, gyroscope, rows)
+    time_s = recording.time_s[rows]
     mid_s = np.ascontiguousarray(segments.time_mid_s[links])
-    prepared = Moves(recording.time_s, rate, edges, mid_s, links, RATE_DEGREE, extra)
+    prepared = Moves(time_s, rate, edges, mid_s, links, RATE_DEGREE, extra)
     var_reading = _mean_variance(segments.accelerometer_sigma_mean)
     bias_read, var_bias_read = zero, var_bias
     walk = excess_variance(zero[links[:, 1]] - zero[links[:, 0]], var_bias[links[:, 1]] + var_bias[links[:, 0]])
@@ -184,6 +195,8 @@ def measure_moves(
     return MoveMeasurements(
         moves=prepared,
         links=links,
+        rows=rows,
+        time_s=time_s,
         edges=edges,
         durations_s=prepared.durations_s(),
         reading=reading,
@@ -197,8 +210,8 @@ def measure_moves(
         noise_density=density,
         sigma_time_s=jitter,
         nominal_step_s=nominal,
-        clipped_s=clipped_time(clipped, edges, nominal),
-        is_gapped=_gapped(steps, nominal, edges),
+        clipped_s=clipped_time(clipped, in_log, nominal),
+        is_gapped=_gapped(steps, nominal, in_log),
         bias_excess=excess,
         attitude=attitude,
         rate=rate,
@@ -223,11 +236,12 @@ def _moves_of(recording: Recording, segments: Segments) -> list[Move]:
 
 
 def _bridged(
-    rate: FloatArray, extra: FloatArray | None, clipped: Clipped, gyroscope: FloatArray
+    rate: FloatArray, extra: FloatArray | None, clipped: Clipped, gyroscope: FloatArray, rows: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Rates with the readings at the gyro's limit replaced, and the variance of what replaced them."""
-    rate = np.where(clipped.is_clipped, rate + clipped.readings - gyroscope, rate)
-    return rate, clipped.variance if extra is None else clipped.variance + np.where(clipped.is_clipped, 0.0, extra)
+    """Rates at ``rows`` with the readings at the gyro's limit replaced, and the variance of what replaced them."""
+    is_clipped, variance = clipped.is_clipped[rows], clipped.variance[rows]
+    rate = np.where(is_clipped, rate + clipped.readings[rows] - gyroscope[rows], rate)
+    return rate, variance if extra is None else variance + np.where(is_clipped, 0.0, extra)
 
 
 def _with_hidden_bias(
