@@ -54,7 +54,7 @@ def test_moves_are_judged_each_for_itself_in_noises_of_their_channels():
     rng = np.random.default_rng(11)
     readings = np.cumsum(np.cumsum(rng.normal(size=(400, 6)), axis=0), axis=0)
     readings = np.delete(readings, 130, axis=0)
-    noise, moves = np.array([0.1, 0.2, 0.1, 0.5, 0.3, 0.1]), [(60, 190), (190, 201), (240, 390)]
+    noise, moves = np.array([0.1, 0.2, 0.1, 0.5, 0.3, 0.1]), np.array([(60, 190), (190, 201), (240, 390)])
     readings[300, 2] = np.nan
     together = _steps(readings, noise, moves)
     scaled = np.nan_to_num(readings / noise)
@@ -65,4 +65,4 @@ def test_moves_are_judged_each_for_itself_in_noises_of_their_channels():
     assert len(together.is_sharp) == sum(b - a for a, b in moves)
     for outside in ([(3, 50)], [(50, 396)], [(60, 50)], [(10, 500)]):
         with pytest.raises(ValueError, match=r"samples before|rows"):
-            _steps(readings, noise, outside)
+            _steps(readings, noise, np.array(outside))
