@@ -199,6 +199,12 @@ def test_a_reader_that_never_came_costs_no_file_that_was_asked_for(session, tmp_
     assert {path.name for path in tmp_path.iterdir()} == {name for name in asked if name in ("c.json", "r.html")}
 
 
+def test_a_pipe_without_a_writer_is_no_saved_result_and_not_waited_for(tmp_path, capsys):
+    os.mkfifo(tmp_path / "fifo")
+    assert main(["report", str(tmp_path / "fifo")]) == 1
+    assert "no plain file" in capsys.readouterr().err
+
+
 # What runs but is not to be trusted
 
 
