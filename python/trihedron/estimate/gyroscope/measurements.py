@@ -24,7 +24,6 @@ from trihedron.probability import chdtrc
 from trihedron.quantiles import median, medians
 from trihedron.ranges import rows_beside
 from trihedron.records.calibration import SensorCalibration
-from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
 from trihedron.session.averaging import Averaging
@@ -275,38 +274,6 @@ def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
     steps = np.diff(recording.time_s)
     nominal = median(steps[steps > 0]) if np.any(steps > 0) else 1.0 / recording.rate_hz
     return steps, nominal, median(np.abs(steps - nominal)) * 1.4826 / np.sqrt(2.0)
-
-
-def audit_moves(measured: MoveMeasurements) -> list[Finding]:
-    """Findings on clipped moves, gaps inside moves, and a bias that changes from pose to pose."""
-    findings = []
-    if np.any(measured.clipped_s > 0.0):
-        which = [int(i) + 1 for i in np.flatnonzero(measured.clipped_s > 0.0)]
-        lost = int(np.count_nonzero(measured.is_lost))
-        findings.append(
-            Finding.of(
-                FindingCode.CLIPPING,
-                "moves",
-                moves=len(which),
-                n_moves=measured.n_moves,
-                which=which,
-                longest_s=measured.clipped_s.max(),
-                bridged=len(which) - lost,
-                left_out=lost,
-            )
-        )
-    if np.any(measured.is_gapped):
-        which = [int(i) + 1 for i in np.flatnonzero(measured.is_gapped)]
-        findings.append(
-            Finding.of(
-                FindingCode.TIME_GAP,
-                "moves",
-                moves=len(which),
-                n_moves=measured.n_moves,
-                which=which,
-            )
-        )
-    return findings
 
 
 def _edges_and_links(moves: Sequence[Move]) -> tuple[IntArray, IntArray]:
