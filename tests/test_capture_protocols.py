@@ -117,6 +117,17 @@ def test_a_counter_that_begins_anew_is_a_restart_not_a_loss():
     assert (sequence.tally.saved, sequence.tally.lost, sequence.tally.restarts) == (105, 0, 1)
 
 
+@pytest.mark.parametrize(("modulus", "uncounted"), [(1 << 8, 1), (1 << 16, 0)])
+def test_what_a_short_counter_counts_over_a_long_pause_is_a_lower_bound(modulus, uncounted):
+    sequence = Sequence(by_counter=True, modulus=modulus)
+    numbers = [*range(500), *range(850, 900)]
+    for number in numbers:
+        sequence.push([Frame(number % modulus, None, (0.0,), str(number))], number / 1000.0)
+    sequence.finish()
+    # 350 frames are missing; a counter of one byte has gone round once and shows 94 of them.
+    assert (sequence.tally.lost, sequence.tally.uncounted) == (350 - 256 * uncounted, uncounted)
+
+
 @pytest.mark.parametrize("modulus", [0, 1 << 16, 1 << 32])
 def test_a_clock_that_wraps_or_stutters_loses_nothing(modulus):
     rng = random.Random(4)
@@ -151,6 +162,7 @@ def test_a_declared_frame_is_read_with_any_checksum_and_byte_order(kind, endian,
     [
         (("sync", "synk"), "no key 'synk'"),
         (('"AA 55"', '"XY"'), "not hexadecimal"),
+        (("sync", "length = " + "9" * 5000 + "\nsync"), "is not TOML"),
         (('"u16"', '"u17"'), "no type 'u17'"),
         (('"crc16-ccitt"', '"md5"'), "no checksum 'md5'"),
         (('unit = "us"', ""), "needs its step"),

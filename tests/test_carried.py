@@ -29,31 +29,31 @@ def measured_session(noise=1e-3):
     return recording, segments, measure_moves(recording, segments, known), truth
 
 
-def seen(recording, segments, measured, truth, covariance=None):
+def seen(segments, measured, truth, covariance=None):
     middle = segments.time_mid_s[measured.links]
-    return carried(recording.time_s, measured, middle, truth.accelerometer_S, truth.accelerometer_b,
+    return carried(measured, middle, truth.accelerometer_S, truth.accelerometer_b,
                    truth.gyroscope_S, covariance)  # fmt: skip
 
 
 def test_two_turns_about_the_vertical_with_stamps_that_stray_have_no_negative_variance():
-    recording, segments, measured, truth = measured_session(1e-12)
+    _, segments, measured, truth = measured_session(1e-12)
     # Timestamps alone: an error along the axis turned about, which is the vertical, and none across it.
     zero = np.zeros_like(measured.zero)
     alone = replace(measured, sigma_time_s=1e-3, var_bias=zero, var_reading=zero, noise_density=np.zeros(3))
     one = np.linspace(-1.0, 1.0, 9)
-    out = seen(recording, segments, alone, truth, np.outer(one, one))
+    out = seen(segments, alone, truth, np.outer(one, one))
     assert (out.floor2 >= 0.0).all()
     assert (out.model2 >= 0.0).all()
     assert np.isfinite(out.sigma).all()
 
 
 def test_variances_of_independent_causes_add_up():
-    recording, segments, measured, truth = measured_session()
+    _, segments, measured, truth = measured_session()
     measured = replace(measured, sigma_time_s=1e-4)
     zero = np.zeros_like(measured.zero)
     nothing = {"sigma_time_s": 0.0, "var_bias": zero, "var_reading": zero, "noise_density": np.zeros(3)}
-    whole = seen(recording, segments, measured, truth)
-    parts = [seen(recording, segments, replace(measured, **(nothing | {name: getattr(measured, name)})), truth)
+    whole = seen(segments, measured, truth)
+    parts = [seen(segments, replace(measured, **(nothing | {name: getattr(measured, name)})), truth)
              for name in nothing]  # fmt: skip
     # Sums of some hundred squares: rounding alone.
     assert np.allclose(whole.floor2, sum(part.floor2 for part in parts), rtol=1e-9)

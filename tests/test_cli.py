@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -180,6 +181,28 @@ def test_a_reader_that_leaves_early_is_no_error(session):
     assert done.stdout.startswith("time_s,acc_x")
     assert "Traceback" not in done.stderr
     assert "Exception" not in done.stderr
+
+
+@pytest.mark.parametrize("command", ["segment", "check", "calibrate", "verify", "guide"])
+def test_a_reader_that_never_came_costs_no_file_that_was_asked_for(session, tmp_path, command):
+    asked = {
+        "calibrate": ["--gravity", G, "-o", "c.json", "--report", "r.html", "--json", "-"],
+        "guide": ["--gravity", G, "-o", "c.json", "--every"],
+    }.get(command, ["--report", "r.html", "--json", "-"])
+    known = [str(session / "c.json")] if command == "verify" else []
+    words = [sys.executable, "-m", "trihedron", command, *known, str(session / "log.csv"), *asked]
+    read_end, write_end = os.pipe()
+    os.close(read_end)
+    done = subprocess.run(words, cwd=tmp_path, stdout=write_end, stderr=subprocess.PIPE, text=True)
+    os.close(write_end)
+    assert "Traceback" not in done.stderr
+    assert {path.name for path in tmp_path.iterdir()} == {name for name in asked if name in ("c.json", "r.html")}
+
+
+def test_a_pipe_without_a_writer_is_no_saved_result_and_not_waited_for(tmp_path, capsys):
+    os.mkfifo(tmp_path / "fifo")
+    assert main(["report", str(tmp_path / "fifo")]) == 1
+    assert "no plain file" in capsys.readouterr().err
 
 
 # What runs but is not to be trusted

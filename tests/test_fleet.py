@@ -16,6 +16,7 @@ from trihedron.fleet import find_jobs, running, summarise
 from trihedron.fleet.work import work
 from trihedron.records.sessions import PARAMETERS
 from trihedron.report.fleet import fleet_report
+from trihedron.sanitise import printable
 
 
 @pytest.fixture(scope="module")
@@ -187,6 +188,16 @@ def test_what_is_no_file_has_a_row_and_its_reason(logs, tmp_path):
         assert said["log_2.csv"][0] == "refused"
         assert "pipe" in said["log_2.csv"][1]
         assert "a folder without logs" in said["log_1.csv"][1]
+
+
+def test_what_a_log_is_called_sends_nothing_to_a_terminal_from_the_table(tmp_path):
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs" / "a\x1b[2J\x9b\u202eb.csv").write_text("no log\n")
+    trihedron.fleet(tmp_path / "logs", tmp_path / "out", workers=0, diagnose=False, gravity_m_s2=G)
+    for name in ("fleet.csv", "fleet.html"):
+        text = (tmp_path / "out" / name).read_text()
+        assert "a\\x1b[2J\\x9b\\u202eb.csv" in text
+        assert printable(text) == text
 
 
 def test_the_diagnosis_of_a_log_is_in_its_row(logs):

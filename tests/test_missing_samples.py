@@ -54,15 +54,15 @@ def test_moves_are_judged_each_for_itself_in_noises_of_their_channels():
     rng = np.random.default_rng(11)
     readings = np.cumsum(np.cumsum(rng.normal(size=(400, 6)), axis=0), axis=0)
     readings = np.delete(readings, 130, axis=0)
-    noise, moves = np.array([0.1, 0.2, 0.1, 0.5, 0.3, 0.1]), [(60, 190), (190, 201), (240, 390)]
+    noise, moves = np.array([0.1, 0.2, 0.1, 0.5, 0.3, 0.1]), np.array([(60, 190), (190, 201), (240, 390)])
     readings[300, 2] = np.nan
     together = _steps(readings, noise, moves)
     scaled = np.nan_to_num(readings / noise)
-    alone = [_steps(scaled[a - 4 : b + 5], np.ones(6), [(4, 4 + b - a)]) for a, b in moves]
+    alone = [_steps(scaled[a - 4 : b + 5], np.ones(6), np.array([(4, 4 + b - a)])) for a, b in moves]
     for name in ("is_sharp", "is_long", "is_short"):
         assert np.array_equal(getattr(together, name), np.concatenate([getattr(one, name) for one in alone]))
     assert together.is_sharp.any()
     assert len(together.is_sharp) == sum(b - a for a, b in moves)
     for outside in ([(3, 50)], [(50, 396)], [(60, 50)], [(10, 500)]):
         with pytest.raises(ValueError, match=r"samples before|rows"):
-            _steps(readings, noise, outside)
+            _steps(readings, noise, np.array(outside))

@@ -4,6 +4,7 @@ import contextlib
 import gzip
 import inspect
 import io
+import json
 import multiprocessing
 import os
 import subprocess
@@ -14,10 +15,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from small_session import made_elsewhere
 from trihedron import _core
 from trihedron.documents import DocumentError, read_text
 from trihedron.errors import RefusedError
-from trihedron.files.calibration import CalibrationFileError, read_calibration
+from trihedron.files.calibration import CalibrationFileError, read_calibration, write_calibration
 from trihedron.files.diagnosis import DiagnosisFileError, read_diagnosis
 from trihedron.files.noise import NoiseFileError, read_noise
 from trihedron.read import ReadError, read_recording
@@ -92,6 +94,17 @@ def test_archives_that_unpack_to_harm_are_refused(tmp_path):
 def test_escapes_of_a_terminal_are_spelled_out():
     assert printable("a\x1b[2J\x9b\u202eb\n\t") == "a\\x1b[2J\\x9b\\u202eb\n\t"
     assert printable_json('"\x9b"') == '"\\u009b"'
+
+
+def test_what_a_log_is_called_sends_nothing_to_a_terminal_from_a_calibration_that_is_shown(tmp_path):
+    known = json.loads((made_elsewhere() / "c.json").read_text())
+    known["recording"] = {"source": "a\x1b[2J\x9b\u202eb.csv", "sha256": ""}
+    (tmp_path / "named.json").write_text(json.dumps(known))
+    calibration = read_calibration(tmp_path / "named.json")
+    write_calibration(calibration, tmp_path / "again.json")
+    text = (tmp_path / "again.json").read_text()
+    assert printable(text) == text
+    assert read_calibration(tmp_path / "again.json").recording_source == calibration.recording_source
 
 
 @pytest.mark.parametrize("step_s", [1e-300, 5e-324, 1e-30, 1e-11])

@@ -28,3 +28,15 @@ def grown(mask: BoolArray, part: Range) -> Range:
     while last < len(mask) and mask[last]:
         last += 1
     return first, last
+
+
+def rows_beside(ranges: IntArray, beside: int, n: int) -> tuple[IntArray, IntArray]:
+    """Rows (r,) of ``n`` that lie in half-open ``ranges`` (m, 2) or up to ``beside`` from one, range after range, and
+    where each range lies among them, (m, 2).
+
+    Of a long log nothing else is asked for once its poses are means.
+    """
+    wide = np.clip(ranges + np.array([-beside, beside]), 0, n)
+    before = np.cumsum(wide[:, 1] - wide[:, 0]) - (wide[:, 1] - wide[:, 0])
+    rows = np.concatenate([np.arange(a, b, dtype=np.int64) for a, b in wide.tolist()])
+    return rows, np.ascontiguousarray(ranges + (before - wide[:, 0])[:, None], dtype=np.int64)

@@ -28,6 +28,11 @@ class Count:
         """Frames that were sent and are not in the log: by counter or clock, else as far as remains were seen."""
         return self.corrupt if self.counted_by == "nothing" else self.tally.lost
 
+    @property
+    def is_least(self) -> bool:
+        """Whether more may be lost: a count began anew, or is so short that it may have gone round in a pause."""
+        return self.counted_by != "nothing" and bool(self.tally.restarts or self.tally.uncounted)
+
     def sentence(self) -> str:
         """For people and for the header."""
         how = {
@@ -35,7 +40,7 @@ class Count:
             "clock": "by the device's clock",
             "nothing": "as far as remains were seen: there is no counter and no clock",
         }[self.counted_by]
-        parts = [f"{self.tally.saved} saved", f"{self.lost} lost {how}"]
+        parts = [f"{self.tally.saved} saved", f"{'at least ' if self.is_least else ''}{self.lost} lost {how}"]
         for n, words in (
             (self.corrupt if self.counted_by != "nothing" else 0, "corrupt pieces seen"),
             (self.tally.garbled, "with a garbled count"),

@@ -249,6 +249,7 @@ class Recorder:
         missing = before.missing_until(first.frame, most)
         if missing is None:
             self._rows.say("how many frames were lost while it was away is not known from what the device sends")
+            self._past = (*self._past[:2], replace(self._past[2], uncounted=self._past[2].uncounted + 1))
             return 0
         earlier = self._past[2]
         self._past = (*self._past[:2], replace(earlier, lost=earlier.lost + missing))

@@ -64,7 +64,8 @@ class Rows:
         time_s = timeline.place(index, one.frame.ticks, one.host_s, restarted=one.restarted or is_first)
         lost = one.lost + lost_while_away
         if lost:
-            self.say(f"lost {lost} before frame {index} at {time_s:.6f} s")
+            least = "at least " if one.is_wrapped else ""
+            self.say(f"lost {least}{lost} before frame {index} at {time_s:.6f} s")
         if one.restarted:
             self.say(f"the device began to count anew before frame {index} at {time_s:.6f} s")
         self._next_index = index + 1

@@ -41,25 +41,29 @@ _WRAPS = (1 << 8, 1 << 16, 1 << 32)
 
 
 class Placed(NamedTuple):
-    """A frame with its place in the stream; ``lost`` frames are missing before it, unless the device ``restarted``."""
+    """A frame with its place in the stream; ``lost`` frames are missing before it, unless the device ``restarted``;
+    they may be more, ``is_wrapped``, where the count is so short that it may have wrapped meanwhile."""
 
     place: int
     lost: int
     restarted: bool
     host_s: float
     frame: Frame
+    is_wrapped: bool = False
 
 
 @dataclass
 class Tally:
     """What became of frames: ``lost`` are missing by the device's own counter or clock; ``garbled`` were whole but
-    contradicted their neighbours' (they are among the lost); ``repeated`` came twice."""
+    contradicted their neighbours' (they are among the lost); ``repeated`` came twice. Over ``uncounted`` pauses more
+    may be lost than the count says."""
 
     saved: int = 0
     lost: int = 0
     garbled: int = 0
     repeated: int = 0
     restarts: int = 0
+    uncounted: int = 0
 
 
 class Sequence:
@@ -87,6 +91,7 @@ class Sequence:
         self._late = 0.0
         self._index = -1
         self._waiting: list[tuple[float, Frame]] = []
+        self._first_host_s = self._last_host_s = 0.0
         self.tally = Tally()
 
     def push(self, frames: list[Frame], host_s: float) -> list[Placed]:
@@ -320,9 +325,22 @@ class Sequence:
                 self._period += gain * min(max(surprise / ahead, -limit), limit)
                 self._late = 0.8 * surprise
         self._last, self._newest = key, frame
+        is_wrapped = ahead > 1 and self._may_have_wrapped(host_s)
+        if self.tally.saved == 0:
+            self._first_host_s = host_s
+        self._last_host_s = host_s
         self.tally.saved += 1
         self.tally.lost += ahead - 1
-        out.append(Placed(self._index, ahead - 1, restarted, host_s, frame))
+        self.tally.uncounted += is_wrapped
+        out.append(Placed(self._index, ahead - 1, restarted, host_s, frame, is_wrapped))
+
+    def _may_have_wrapped(self, host_s: float) -> bool:
+        """Whether nothing came for so long that a counter as short as this one may have gone round."""
+        span_s = self._last_host_s - self._first_host_s
+        if not (self._by_counter and self._modulus and span_s > 0.0):
+            return False
+        rate_hz = (self.tally.saved + self.tally.lost) / span_s
+        return (host_s - self._last_host_s) * rate_hz >= self._modulus // 2
 
 
 def _longest_of(runs: list[list[int]]) -> list[int]:

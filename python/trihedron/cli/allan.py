@@ -122,8 +122,8 @@ def allan(
 
         write_whole(plot, png_of(noise_picture(found)), overwrite=force)
         say(f"plot: {plot}")
-    write_json(machine, json, force=force, document=document)
     write_report(document, machine, report, force=force)
+    write_json(machine, json, force=force, document=document)
     if not full and report is None:
         say("Data-sheet units, how long to record, Kalibr's names: --full; curves: --plot F.png or --report F.html.")
     leave(all_findings(found))

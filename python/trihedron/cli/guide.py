@@ -43,7 +43,7 @@ def guide(
 ) -> None:
     """Replay a log through the guide: what it would have said pose by pose, then calibrate and verify."""
     from trihedron.api.replaying import replay
-    from trihedron.cli.output import check_outputs
+    from trihedron.cli.output import check_outputs, put
     from trihedron.cli.screen import as_text
     from trihedron.records.guiding import Accuracy
 
@@ -51,12 +51,12 @@ def guide(
     check_outputs(output, force=force, inputs=source.files)
 
     def tell(view: GuideView) -> None:
-        typer.echo(_line(view))
+        put(_line(view) + "\n")
         if every:
-            typer.echo(as_text(view, *_size()))
+            put(as_text(view, *_size()) + "\n")
 
     done = replay(source.read(), wanted, gravity_m_s2=gravity, on_pose=tell)
-    typer.echo(as_text(done.view, *_size()))
+    put(as_text(done.view, *_size()) + "\n")
     finish(done.recording, done.cut_s, gravity, output, force=force)
 
 
@@ -86,7 +86,7 @@ def finish(
 ) -> None:
     """Calibrate, verify on the poses held back, report; status 2 where the answer is not to be trusted."""
     from trihedron.api.guiding import conclude
-    from trihedron.cli.output import leave, put, style
+    from trihedron.cli.output import leave, put, say, style
     from trihedron.files.calibration import write_calibration
     from trihedron.report import calibration_report, to_text, verification_report
 
@@ -94,12 +94,12 @@ def finish(
     put(to_text(calibration_report(result.calibration, result.segments, result.recording), sections=2, style=style()))
     findings = list(result.calibration.findings)
     if check is not None:
-        typer.echo("")
+        put("\n")
         document = verification_report(check.verification, check.segments, check.recording)
         put(to_text(document, sections=2, style=style()))
     if output is not None:
         write_calibration(result.calibration, output, overwrite=force)
-        typer.echo(f"calibration: {output}", err=True)
+        say(f"calibration: {output}")
     leave(findings)
 
 

@@ -63,8 +63,8 @@ def kalman(
     if output is not None:
         write_calibration(result.calibration, output, overwrite=force)
         say(f"calibration: {output}")
-    write_json(machine, json, force=force, document=document)
     write_report(document, machine, report, force=force)
+    write_json(machine, json, force=force, document=document)
     if not full and report is None:
         say("Every pose: --full; convergence, innovations and residuals drawn: --report FILE.html.")
     leave(result.findings)

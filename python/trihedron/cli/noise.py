@@ -94,11 +94,11 @@ def noise(
         put(text)
     else:
         show(document, json, sections=None if full else FIRST_SCREEN)
-    write_json(machine, json, force=force, document=document)
     write_report(document, machine, report, force=force)
     if text is not None and str(output) != "-":
         write_whole(output, text, overwrite=force)
         say(f"noise for {to}: {output}")
+    write_json(machine, json, force=force, document=document)
     if not full and report is None:
         say("The test on the other half: --full; with the picture: --report FILE.html.")
     leave(found.findings)

@@ -77,7 +77,10 @@ def _saved(machine: dict[str, Any], document: Document) -> str:
 
 
 def write_json(machine: dict[str, Any], target: Path | None, *, force: bool, document: Document | None = None) -> None:
-    """The result for machines, to a file or ('-') to stdout; a file holds the report too, for ``trihedron report``."""
+    """The result for machines, to a file or ('-') to stdout; a file holds the report too, for ``trihedron report``.
+
+    Comes after every other file: who reads stdout may have left.
+    """
     if target is None:
         return
     from trihedron.report.machine import json_text
@@ -120,8 +123,8 @@ class Ending:
             say(f"calibration: {self.output}")
         if self.json is not None or self.report is not None:
             made = machine()
-            write_json(made, self.json, force=self.force, document=document)
             write_report(document, made, self.report, force=self.force)
+            write_json(made, self.json, force=self.force, document=document)
         if more and not self.full and self.report is None:
             say(more)
         leave(calibration.findings)
@@ -138,8 +141,8 @@ def tell_all(
 ) -> None:
     """A result on stdout (its first ``sections``), as JSON and as a report, where these are asked for."""
     show(document, json, sections=sections)
-    write_json(machine, json, force=force, document=document)
     write_report(document, machine, report, force=force)
+    write_json(machine, json, force=force, document=document)
 
 
 def show(document: Document, json_target: Path | None, *, sections: int | None) -> None:

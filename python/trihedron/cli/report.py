@@ -36,11 +36,16 @@ def _read(path: Path) -> tuple[Document, dict[str, Any]]:
     from trihedron.report.saved import KEY, report_of
 
     try:
+        # A pipe without a writer would be waited for.
+        if path.exists() and not path.is_file():
+            raise RefusedError(f"{path}: this is no plain file; name a saved result.")
         if path.stat().st_size > MOST_BYTES:
             raise RefusedError(f"{path}: too large for a saved result.")
         saved = json_format.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise RefusedError(f"{path}: there is no such file; check the name and the folder.") from None
+    except RefusedError:
+        raise
     except (OSError, ValueError, RecursionError):
         raise RefusedError(f"{path}: not a saved result (JSON).") from None
     if isinstance(saved, dict) and KEY not in saved and "accelerometer" in saved:

@@ -95,7 +95,7 @@ def suspicions_of(
     measured = measure_moves(recording, segments, own.accelerometer)
     # A wrong accelerometer would be seen in the tilt as well.
     base = calibration if found is None else own
-    tilt = _Tilt(recording, segments, measured)
+    tilt = _Tilt(segments, measured)
     rates = segments.gyroscope_mean
     of_gyro = gyroscope_suspicion(
         gyro.S,
@@ -110,19 +110,14 @@ def suspicions_of(
 class _Tilt:
     """Gravity carried through the moves of one log, by any S of the gyro."""
 
-    def __init__(self, recording: Recording, segments: Segments, measured: MoveMeasurements) -> None:
-        self._time_s = recording.time_s
+    def __init__(self, segments: Segments, measured: MoveMeasurements) -> None:
         self._anchors_s = segments.time_mid_s[measured.links]
         self._measured = measured
 
     def rms_deg(self, calibration: Calibration, S: FloatArray) -> float:
         """Root mean square of the tilt errors [deg]."""
         accel = calibration.accelerometer
-        return _rms(
-            carried(self._time_s, self._measured, self._anchors_s, accel.S, accel.b, S).angle_deg[
-                ~self._measured.is_lost
-            ]
-        )
+        return _rms(carried(self._measured, self._anchors_s, accel.S, accel.b, S).angle_deg[~self._measured.is_lost])
 
 
 def _rms(values: FloatArray) -> float:

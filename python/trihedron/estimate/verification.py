@@ -191,10 +191,10 @@ def _carried(
 
     def seen_in(measured: MoveMeasurements) -> Carried:
         if calibration.averaging:
-            rate = sharpened(measured.rate, recording.time_s, calibration.averaging)
-            measured = measured.of_rate(recording, segments, rate, measured.reading_variance)
+            rate = sharpened(measured.rate, measured.time_s, calibration.averaging)
+            measured = measured.of_rate(segments, rate, measured.reading_variance)
         return carried(
-            recording.time_s, measured, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b,
+            measured, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b,
             gyroscope.S, gyroscope.covariance[:9, :9],
         )  # fmt: skip
 

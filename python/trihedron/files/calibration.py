@@ -30,6 +30,7 @@ from trihedron.records import (
     SensorCalibration,
 )
 from trihedron.records.plain import as_plain, from_plain
+from trihedron.sanitise import printable_json
 
 FORMAT = "trihedron calibration"
 FORMAT_VERSION = 1
@@ -96,7 +97,7 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
 
 def calibration_text(calibration: Calibration) -> str:
     """The file's content."""
-    return _folded(calibration_document(calibration)) + "\n"
+    return printable_json(_folded(calibration_document(calibration))) + "\n"
 
 
 def calibration_document(calibration: Calibration) -> dict[str, Any]:

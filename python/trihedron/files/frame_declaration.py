@@ -45,8 +45,9 @@ def read_frame_declaration(path: str | Path) -> FrameDeclaration:
         raise RefusedError(of_path(path, error)) from None
     except RecursionError:
         raise RefusedError(f"{path}: this is nested too deeply.") from None
-    except tomllib.TOMLDecodeError as error:
-        raise RefusedError(f"{path} is not TOML: {error}.") from None
+    # A whole number of thousands of digits is a ValueError that is no TOMLDecodeError.
+    except ValueError as error:
+        raise RefusedError(f"{path} is not TOML: {str(error).split(';')[0][:200]}.") from None
     try:
         return _declaration(table, path.stem)
     except OverflowError:

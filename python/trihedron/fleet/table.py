@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from trihedron.files.output import write_whole
 from trihedron.records.fleet import FleetSummary
 from trihedron.records.sessions import PARAMETERS
+from trihedron.sanitise import printable
 
 if TYPE_CHECKING:
     import polars
@@ -39,7 +40,7 @@ def write_tables(rows: Sequence[dict[str, Any]], summary: FleetSummary, folder: 
     buffer = io.BytesIO()
     frame.write_parquet(buffer)
     write_whole(folder / "fleet.parquet", buffer.getvalue(), overwrite=True)
-    write_whole(folder / "fleet.csv", frame.write_csv(), overwrite=True)
+    write_whole(folder / "fleet.csv", printable(frame.write_csv()), overwrite=True)
     write_whole(folder / "fleet.html", to_html(fleet_report(summary)), overwrite=True)
 
 

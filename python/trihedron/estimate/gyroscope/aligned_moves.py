@@ -66,7 +66,7 @@ class _Session:
         """Moves of a sensor that averages over its interval as far as they show it."""
 
         def at(share: float) -> tuple[MoveMeasurements, Aligned]:
-            rate = sharpened(measured.rate, self.recording.time_s, share)
+            rate = sharpened(measured.rate, measured.time_s, share)
             return self._again(self._read_as(measured, rate, measured.reading_variance), aligned)
 
         excess = aligned.excess
@@ -75,7 +75,7 @@ class _Session:
         return replace(again, averaging=found), left
 
     def _read_as(self, measured: MoveMeasurements, rate: FloatArray, variance: FloatArray | None) -> MoveMeasurements:
-        return measured.of_rate(self.recording, self.segments, rate, variance)
+        return measured.of_rate(self.segments, rate, variance)
 
     def _again(self, measured: MoveMeasurements, aligned: Aligned) -> tuple[MoveMeasurements, Aligned]:
         """The same moves used as before, from where the fit was."""
@@ -93,7 +93,7 @@ class _Session:
         is_known = options.nominal() is not None or rate_to_si(self.recording.gyroscope_unit) is not None
         if is_known or not is_astray(found, measured):
             return found
-        again = turned_starts(self.recording, measured, part.model, first[0])
+        again = turned_starts(measured, part.model, first[0])
         if again is None:
             return found
         other = align_screened(measured, part, gravity, again, options)

@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.alignment import FALSE_ALARM, Aligned
-from trihedron.estimate.gyroscope.measurements import MoveMeasurements, audit_moves
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.gyroscope.observability import observability_findings
 from trihedron.estimate.gyroscope.verification import ASTRAY_DEG
 from trihedron.estimate.session.carried import Carried
@@ -149,3 +149,35 @@ def _drift_findings(measured: MoveMeasurements, S: FloatArray) -> list[Finding]:
             times=np.sqrt(measured.bias_excess[axis] / dof),
         )
     ]
+
+
+def audit_moves(measured: MoveMeasurements) -> list[Finding]:
+    """Findings on clipped moves, gaps inside moves, and a bias that changes from pose to pose."""
+    findings = []
+    if np.any(measured.clipped_s > 0.0):
+        which = [int(i) + 1 for i in np.flatnonzero(measured.clipped_s > 0.0)]
+        lost = int(np.count_nonzero(measured.is_lost))
+        findings.append(
+            Finding.of(
+                FindingCode.CLIPPING,
+                "moves",
+                moves=len(which),
+                n_moves=measured.n_moves,
+                which=which,
+                longest_s=measured.clipped_s.max(),
+                bridged=len(which) - lost,
+                left_out=lost,
+            )
+        )
+    if np.any(measured.is_gapped):
+        which = [int(i) + 1 for i in np.flatnonzero(measured.is_gapped)]
+        findings.append(
+            Finding.of(
+                FindingCode.TIME_GAP,
+                "moves",
+                moves=len(which),
+                n_moves=measured.n_moves,
+                which=which,
+            )
+        )
+    return findings

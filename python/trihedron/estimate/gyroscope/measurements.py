@@ -24,8 +24,8 @@ from trihedron.estimate.gyroscope.rounding import (
 )
 from trihedron.probability import chdtrc
 from trihedron.quantiles import median, medians
+from trihedron.ranges import rows_beside
 from trihedron.records.calibration import SensorCalibration
-from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
 from trihedron.session.averaging import Averaging
@@ -34,6 +34,8 @@ GAP_STEPS = 5.0
 """A step of time so much longer than the usual one is a gap: the rate in it is unknown."""
 RATE_DEGREE = 3
 """Of the rate's polynomial over a sample: corrected for coning."""
+BESIDE = 2
+"""Samples kept on either side of a move: one that brackets it, and that one's neighbour."""
 BLOCK_S = 0.5
 """Length of the blocks whose scatter gives the angle random walk: moves last of this order, and it is long against
 the correlation that an anti-alias filter leaves between samples."""
@@ -44,7 +46,8 @@ class MoveMeasurements:
     """Everything the alignment needs, in raw units of each sensor.
 
     ``reading``, ``zero`` (n, 3) are the pose means of accelerometer and gyro, ``var_reading``, ``var_bias`` (n, 3) the
-    variances of these means; ``links`` (m, 2) the poses each move joins, ``edges`` (m, 2) its samples;
+    variances of these means; ``links`` (m, 2) the poses each move joins. ``rows`` (samples,) are the recording's rows
+    in and beside moves, move after move, ``time_s`` (samples,) their times, ``edges`` (m, 2) each move among them;
     ``noise_density`` (3,) the angle random walk in raw unit · √s; ``var_bias_walk`` (3,) the variance by which the
     true bias changes from pose to pose; ``clipped_s`` (m,) is the time in each move that the gyro spent at
     its limit. ``attitude`` is the dependence of the bias on specific force where it was removed: ``rate``
@@ -58,6 +61,8 @@ class MoveMeasurements:
 
     moves: Moves
     links: IntArray
+    rows: IntArray
+    time_s: FloatArray
     edges: IntArray
     durations_s: FloatArray
     reading: FloatArray
@@ -83,19 +88,21 @@ class MoveMeasurements:
     is_hidden: FloatArray
     averaging: Averaging = field(default_factory=Averaging)
 
-    def of_rate(
-        self, recording: Recording, segments: Segments, rate: FloatArray, variance: FloatArray | None
-    ) -> MoveMeasurements:
-        """The same moves with other gyro readings (n, 3), and what is uncertain of each (n, 3)."""
+    def of_rate(self, segments: Segments, rate: FloatArray, variance: FloatArray | None) -> MoveMeasurements:
+        """The same moves with other gyro readings (samples, 3), and what is uncertain of each (samples, 3)."""
         mid_s = np.ascontiguousarray(segments.time_mid_s[self.links])
-        moves = Moves(
-            recording.time_s, np.ascontiguousarray(rate), self.edges, mid_s, self.links, RATE_DEGREE, variance
-        )
+        moves = Moves(self.time_s, np.ascontiguousarray(rate), self.edges, mid_s, self.links, RATE_DEGREE, variance)
         return replace(self, moves=moves, rate=rate, reading_variance=variance)
 
     def coarse(self, recording: Recording, segments: Segments) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
         """Readings (n, 3), their LSB (3,), those at rest (3,), and the axes (3,) that their noise does not dither."""
         return _coarse(recording, segments, self.is_undithered)
+
+    @property
+    def edges_in_log(self) -> IntArray:
+        """Half-open ranges (m, 2) of the moves in rows of the recording."""
+        out: IntArray = self.rows[self.edges - np.array([0, 1])] + np.array([0, 1])
+        return out
 
     @property
     def is_lost(self) -> BoolArray:
@@ -154,7 +161,8 @@ def measure_moves(
     gyroscope = _required(recording.gyroscope, "gyroscope")
     raw_force = _required(recording.accelerometer, "accelerometer")
     accelerometer_mean, gyroscope_mean = _both_means(segments)
-    edges, links = _edges_and_links(_moves_of(recording, segments))
+    in_log, links = _edges_and_links(_moves_of(recording, segments))
+    rows, edges = rows_beside(in_log, BESIDE, recording.n_samples)
     reading, zero = (np.ascontiguousarray(mean, dtype=np.float64) for mean in (accelerometer_mean, gyroscope_mean))
     quantum = recording.facts.of("gyroscope").step
     var_bias = _mean_variance(segments.gyroscope_sigma_mean)
@@ -162,16 +170,18 @@ def measure_moves(
     undithered = _undithered(quantum, segments.gyroscope_sigma)
     attitude = attitude_dependence(zero, var_bias, force)
     if attitude is not None and attitude.is_present:
-        rate = gyroscope - (raw_force @ accelerometer.S.T + accelerometer.b) @ attitude.A.T
+        rate = gyroscope[rows] - (raw_force[rows] @ accelerometer.S.T + accelerometer.b) @ attitude.A.T
         zero = np.ascontiguousarray(zero - force @ attitude.A.T)
     else:
-        attitude, rate = None, gyroscope
+        attitude, rate = None, gyroscope[rows]
     clipped = bridge_clipping(recording) if is_bridged else None
     extra = rounding_variance(gyroscope, quantum, medians(gyroscope_mean), undithered)
+    extra = None if extra is None else extra[rows]
     if clipped is not None:
-        rate, extra = _bridged(rate, extra, clipped, gyroscope)
+        rate, extra = _bridged(rate, extra, clipped, gyroscope, rows)
+    time_s = recording.time_s[rows]
     mid_s = np.ascontiguousarray(segments.time_mid_s[links])
-    prepared = Moves(recording.time_s, rate, edges, mid_s, links, RATE_DEGREE, extra)
+    prepared = Moves(time_s, rate, edges, mid_s, links, RATE_DEGREE, extra)
     var_reading = _mean_variance(segments.accelerometer_sigma_mean)
     bias_read, var_bias_read = zero, var_bias
     walk = excess_variance(zero[links[:, 1]] - zero[links[:, 0]], var_bias[links[:, 1]] + var_bias[links[:, 0]])
@@ -181,13 +191,15 @@ def measure_moves(
         zero, var_bias = _with_hidden_bias(zero, var_bias, segments, quantum, undithered)
         mean = np.where(undithered, zero.mean(axis=0), mean)
     coarse = _coarse(recording, segments, undithered)
-    hidden = (resting_ends(*coarse, edges) | resting_axes(*coarse)).astype(np.float64)
+    hidden = (resting_ends(*coarse, in_log) | resting_axes(*coarse))[rows].astype(np.float64)
     seen = rate_noise_density(recording, segments)
     density = density_without_rounding(seen, quantum, 1.0 / recording.rate_hz, undithered)
     steps, nominal, jitter = _steps_of(recording)
     return MoveMeasurements(
         moves=prepared,
         links=links,
+        rows=rows,
+        time_s=time_s,
         edges=edges,
         durations_s=prepared.durations_s(),
         reading=reading,
@@ -199,8 +211,8 @@ def measure_moves(
         noise_density=density,
         sigma_time_s=jitter,
         nominal_step_s=nominal,
-        clipped_s=clipped_time(clipped, edges, nominal),
-        is_gapped=_gapped(steps, nominal, edges),
+        clipped_s=clipped_time(clipped, in_log, nominal),
+        is_gapped=_gapped(steps, nominal, in_log),
         bias_excess=excess,
         attitude=attitude,
         rate=rate,
@@ -234,11 +246,12 @@ def _moves_of(recording: Recording, segments: Segments) -> list[Move]:
 
 
 def _bridged(
-    rate: FloatArray, extra: FloatArray | None, clipped: Clipped, gyroscope: FloatArray
+    rate: FloatArray, extra: FloatArray | None, clipped: Clipped, gyroscope: FloatArray, rows: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Rates with the readings at the gyro's limit replaced, and the variance of what replaced them."""
-    rate = np.where(clipped.is_clipped, rate + clipped.readings - gyroscope, rate)
-    return rate, clipped.variance if extra is None else clipped.variance + np.where(clipped.is_clipped, 0.0, extra)
+    """Rates at ``rows`` with the readings at the gyro's limit replaced, and the variance of what replaced them."""
+    is_clipped, variance = clipped.is_clipped[rows], clipped.variance[rows]
+    rate = np.where(is_clipped, rate + clipped.readings[rows] - gyroscope[rows], rate)
+    return rate, variance if extra is None else variance + np.where(is_clipped, 0.0, extra)
 
 
 def _with_hidden_bias(
@@ -255,38 +268,6 @@ def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
     steps = np.diff(recording.time_s)
     nominal = median(steps[steps > 0]) if np.any(steps > 0) else 1.0 / recording.rate_hz
     return steps, nominal, median(np.abs(steps - nominal)) * 1.4826 / np.sqrt(2.0)
-
-
-def audit_moves(measured: MoveMeasurements) -> list[Finding]:
-    """Findings on clipped moves, gaps inside moves, and a bias that changes from pose to pose."""
-    findings = []
-    if np.any(measured.clipped_s > 0.0):
-        which = [int(i) + 1 for i in np.flatnonzero(measured.clipped_s > 0.0)]
-        lost = int(np.count_nonzero(measured.is_lost))
-        findings.append(
-            Finding.of(
-                FindingCode.CLIPPING,
-                "moves",
-                moves=len(which),
-                n_moves=measured.n_moves,
-                which=which,
-                longest_s=measured.clipped_s.max(),
-                bridged=len(which) - lost,
-                left_out=lost,
-            )
-        )
-    if np.any(measured.is_gapped):
-        which = [int(i) + 1 for i in np.flatnonzero(measured.is_gapped)]
-        findings.append(
-            Finding.of(
-                FindingCode.TIME_GAP,
-                "moves",
-                moves=len(which),
-                n_moves=measured.n_moves,
-                which=which,
-            )
-        )
-    return findings
 
 
 def _edges_and_links(moves: Sequence[Move]) -> tuple[IntArray, IntArray]:

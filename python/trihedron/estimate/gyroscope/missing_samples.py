@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.probability import bdtrc
-from trihedron.ranges import Range
+from trihedron.ranges import rows_beside
 from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
 
 HALF_WINDOW = 4
@@ -56,19 +55,19 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
     if recording.accelerometer is not None and segments.accelerometer_sigma is not None:
         triads.append(recording.accelerometer)
         noise.append(_positive(segments.accelerometer_sigma))
-    readings = np.concatenate(triads, axis=1)
+    ends = recording.n_samples - HALF_WINDOW - 1
+    inner = np.array([(max(move.start, HALF_WINDOW), min(move.stop, ends)) for move in segments.moves], dtype=np.int64)
+    inner = inner[inner[:, 1] - inner[:, 0] >= 2 * HALF_WINDOW]
+    if not len(inner):
+        return []
+    rows, inner = rows_beside(inner, HALF_WINDOW + 1, recording.n_samples)
+    readings, time_s = np.concatenate([triad[rows] for triad in triads], axis=1), recording.time_s[rows]
     step_s = 1.0 / recording.rate_hz
     # A step that the timestamps show to be long is a gap, known and reported; no curve is laid across it.
-    is_gap = ~(np.abs(np.diff(recording.time_s) - step_s) < 0.4 * step_s)
-    if not np.isfinite(readings).all():
-        is_missing: npt.NDArray[np.bool_] = ~np.all(np.isfinite(readings), axis=1)
-        is_gap |= is_missing[1:] | is_missing[:-1]
-    is_cut = np.convolve(is_gap, np.ones(2 * HALF_WINDOW + 1), mode="same") > 0.5 if is_gap.any() else is_gap
-    ends = recording.n_samples - HALF_WINDOW - 1
-    inner = [(max(move.start, HALF_WINDOW), min(move.stop, ends)) for move in segments.moves]
-    inner = [(first, last) for first, last in inner if last - first >= 2 * HALF_WINDOW]
-    if not inner:
-        return []
+    is_gap = ~(np.abs(np.diff(time_s) - step_s) < 0.4 * step_s)
+    is_missing: BoolArray = ~np.all(np.isfinite(readings), axis=1)
+    is_gap |= is_missing[1:] | is_missing[:-1]
+    is_cut = np.convolve(is_gap, np.ones(2 * HALF_WINDOW + 1), mode="same") > 0.5
     found = _steps(readings, np.concatenate(noise), inner)
     step = np.concatenate([np.arange(first, last) for first, last in inner])
     is_known = ~is_cut[step]
@@ -81,7 +80,7 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
     share, error = (n_long - n_short) / n, float(np.sqrt(n_long + n_short)) / n
     if share < FALSE_SHARE:
         return []
-    first_s = float(recording.time_s[at[0]])
+    first_s = float(time_s[at[0]])
     return [
         Finding.of(
             FindingCode.SAMPLES_LOST,
@@ -113,9 +112,9 @@ def _positive(sigma: FloatArray) -> FloatArray:
 class _Steps:
     """Of the steps of moves: which would show a lost sample, which are one sample too long, which too short."""
 
-    is_sharp: npt.NDArray[np.bool_]
-    is_long: npt.NDArray[np.bool_]
-    is_short: npt.NDArray[np.bool_]
+    is_sharp: BoolArray
+    is_long: BoolArray
+    is_short: BoolArray
 
 
 def _contrasts(missing: int) -> FloatArray:
@@ -130,7 +129,7 @@ CONTRASTS = np.array([_contrasts(missing) for missing in (0, 1, -1)])
 """As the readings stand, with one sample put between, and with one taken out."""
 
 
-def _steps(readings: FloatArray, noise: FloatArray, moves: list[Range]) -> _Steps:
+def _steps(readings: FloatArray, noise: FloatArray, moves: IntArray) -> _Steps:
     """The steps behind the samples of ``moves``, one after the other; ``noise`` (c,) of the channels.
 
     A short step is also one whose jump falls short of the slope beside it, the mirror image of a long one: a bend is as
@@ -139,7 +138,7 @@ def _steps(readings: FloatArray, noise: FloatArray, moves: list[Range]) -> _Step
     flags = _core.motion_joints(
         readings,
         noise,
-        np.array(moves, dtype=np.int64),
+        moves,
         CONTRASTS,
         nearby=NEARBY,
         sharp=SHARP,

@@ -35,8 +35,8 @@ def integral_start(
         return None
     before, after = np.asarray(measured.links).T
     moments = _core.move_moments(
-        recording.time_s,
-        recording.accelerometer,
+        measured.time_s,
+        recording.accelerometer[measured.rows],
         accelerometer.S,
         accelerometer.b,
         measured.rate,
@@ -89,7 +89,7 @@ def starts(
 
 
 def turned_starts(
-    recording: Recording, measured: MoveMeasurements, accelerometer: SensorCalibration, linear: FloatArray
+    measured: MoveMeasurements, accelerometer: SensorCalibration, linear: FloatArray
 ) -> FloatArray | None:
     """Starts (k, 3, 3) that carry gravity best among scales of one size on all axes, or ``None`` without whole moves.
 
@@ -102,7 +102,7 @@ def turned_starts(
     for (a, b), (before, after), lost in zip(measured.edges, measured.links, measured.is_lost, strict=True):
         rate = measured.rate[a:b] - 0.5 * (measured.zero[before] + measured.zero[after])
         if not lost and b - a > 1 and np.isfinite(rate).all():
-            courses.append((recording.time_s[a:b], rate, up[before], up[after]))
+            courses.append((measured.time_s[a:b], rate, up[before], up[after]))
     if len(courses) < FEWEST_MOVES:
         return None
     most = max(float(np.linalg.norm(rate, axis=1) @ _trapezoid_weights(time)) for time, rate, _, _ in courses)

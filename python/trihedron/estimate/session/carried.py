@@ -37,7 +37,6 @@ class Carried:
 
 
 def carried(
-    time_s: FloatArray,
     measured: MoveMeasurements,
     anchors_s: FloatArray,
     S_a: FloatArray,
@@ -51,7 +50,7 @@ def carried(
     ``covariance_S_w`` (9, 9) is that of S_w row by row.
     """
     model = Linear(np.arange(len(measured.links)), S_a, b_a, S_w)
-    return carried_each(time_s, measured, anchors_s, [model], covariance_S_w)
+    return carried_each(measured, anchors_s, [model], covariance_S_w)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +64,6 @@ class Linear:
 
 
 def carried_each(
-    time_s: FloatArray,
     measured: MoveMeasurements,
     anchors_s: FloatArray,
     models: list[Linear],
@@ -82,7 +80,7 @@ def carried_each(
         at, zero = one.moves, -measured.zero @ one.S_w.T
         S_a[at], b_a[at], S_w[at] = one.S_a, one.b_a, one.S_w
         rotation[at], wrt_scale[at], wrt_before[at], wrt_after[at], cov_rate[at] = _core.integrate_moves(
-            time_s, measured.rate, measured.edges[at], np.ascontiguousarray(anchors_s[at]),
+            measured.time_s, measured.rate, measured.edges[at], np.ascontiguousarray(anchors_s[at]),
             np.ascontiguousarray(one.S_w), zero[before[at]], zero[after[at]], 3, noise,
         )  # fmt: skip
     start = np.einsum("mij,mj->mi", S_a, measured.reading[before]) + b_a

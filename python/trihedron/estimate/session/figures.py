@@ -64,7 +64,6 @@ class HeldOut:
 
 
 def held_out(
-    time_s: FloatArray,
     observed: Observed,
     measured: MoveMeasurements,
     anchors_s: FloatArray,
@@ -99,7 +98,7 @@ def held_out(
         for fold, (S, b, S_w, _) in enumerate(rests[n_folds:])
     ]
     part = replace(measured, links=measured.links[which], edges=measured.edges[which])
-    seen = carried_each(time_s, part, anchors_s[which], models)
+    seen = carried_each(part, anchors_s[which], models)
     return HeldOut(norm, norm_sigma, seen.spread(which, measured.n_moves))
 
 

@@ -84,19 +84,20 @@ def arranged(
     assert recording.accelerometer is not None
     n = recording.n_samples
     force_origin, rate_origin = measured.reading.mean(axis=0), measured.bias_read.mean(axis=0)
+    rows = measured.rows
+    readings = recording.accelerometer[rows]
     ranges: list[tuple[int, int]] = []
     before = []
     for (start, stop), (hold, after), is_used in zip(measured.edges, measured.links, used, strict=True):
-        a, b = max(int(start) - 1, 0), min(int(stop) + 1, n)
-        values = recording.accelerometer[a:b]
-        if not is_used or after != hold + 1 or b - a < 3 or not np.isfinite(values).all():
+        a, b = int(start) - int(rows[start] > 0), int(stop) + int(rows[stop - 1] < n - 1)
+        if not is_used or after != hold + 1 or b - a < 3 or not np.isfinite(readings[a:b]).all():
             continue
         if not np.isfinite(measured.rate[a:b]).all():
             continue
         ranges.append((a, b))
         before.append(hold)
-    noise = measure_noise(recording, segments, ranges)
-    force = sharpened(recording.accelerometer, recording.time_s, measured.averaging.share)
+    noise = measure_noise(recording, segments, [(int(rows[a]), int(rows[b - 1]) + 1) for a, b in ranges])
+    force = sharpened(readings, measured.time_s, measured.averaging.share)
     assert noise.rate_sigma is not None
     assert noise.rate_density is not None
     unresolved = noise.unresolved
@@ -124,7 +125,7 @@ def arranged(
         rate_density=np.where(is_coarse, measured.noise_density, noise.rate_density),
         moves=_core.SessionMoves(
             pose_time_s=pose_time_s,
-            time_s=_samples_of(ranges, recording.time_s),
+            time_s=_samples_of(ranges, measured.time_s),
             force=_samples_of(ranges, force) - force_origin,
             rate=_samples_of(ranges, measured.rate) - rate_origin,
             ranges=_in_turn(ranges),
@@ -135,7 +136,7 @@ def arranged(
         sigma_time_s=measured.sigma_time_s,
         nominal_step_s=measured.nominal_step_s,
         force_slope=np.vstack(
-            [np.zeros((len(pose_time_s), 3)), _slopes(recording.with_distinct_timestamps().time_s, force, ranges)]
+            [np.zeros((len(pose_time_s), 3)), _slopes(recording.with_distinct_timestamps().time_s[rows], force, ranges)]
         ),
         rate_hidden=np.ascontiguousarray(is_hidden[:, :, None] * np.eye(3)[:, coarse]),
         hidden_sigma=measured.quantum[coarse] / np.sqrt(12.0),

@@ -91,8 +91,8 @@ def solved(
         aligned = fewer
     anchors = segments.time_mid_s[measured.links]
     shown = solution.as_read(measured)
-    seen = carried(recording.time_s, shown, anchors, solution.S_a, solution.b_a, solution.S_w)
-    left_out = held_out(recording.time_s, observed, shown, anchors, solution, options.n_folds)
+    seen = carried(shown, anchors, solution.S_a, solution.b_a, solution.S_w)
+    left_out = held_out(observed, shown, anchors, solution, options.n_folds)
     covariance = solution.covariance + _by_readings(log, measured, aligned, solution, near)
     if measured.attitude is not None:
         more = solution.S_w @ np.diag(measured.attitude.var_bias) @ solution.S_w.T
@@ -170,11 +170,11 @@ def _by_readings(
     in common. Readings off by one standard error, fitted anew.
     """
     found = measured.averaging
-    rate = sharpened(measured.rate, log.recording.time_s, found.sigma)
+    rate = sharpened(measured.rate, measured.time_s, found.sigma)
     others = [replace(measured, rate=rate, averaging=replace(found, share=found.share + found.sigma))]
     if np.any(measured.is_undithered):
         errors = shared_errors(*measured.coarse(log.recording, log.segments))
-        others += [replace(measured, rate=measured.rate + error) for error in errors]
+        others += [replace(measured, rate=measured.rate + error[measured.rows]) for error in errors]
     fits = [refitted(log.observed(one, aligned, near), solution) for one in others]
     along = np.array([fit.parameters for fit in fits]) - solution.parameters
     return along.T @ along

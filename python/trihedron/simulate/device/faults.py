@@ -17,7 +17,8 @@ class Faults:
     ``missing``: the frame is never sent. ``cut``: only its beginning. ``flipped``: one bit turned over. ``garbage``: 1
     to 40 random bytes before it. ``byte_lost``, ``byte_doubled``: one byte inside. ``twice``: sent again.
     ``drift_ppm``: the board clock is fast by that. ``start_text``: lines printed first. ``disconnect_s``: instants at
-    which it goes away for ``away_s``. ``clean_ends`` frames at either end stay whole: what is lost before the first
+    which it goes away for ``away_s``. ``pause_s``: instants at which it sends nothing for ``paused_s``, and counts on.
+    ``clean_ends`` frames at either end stay whole: what is lost before the first
     and after the last frame saved is nobody's to count.
     """
 
@@ -31,6 +32,8 @@ class Faults:
     drift_ppm: float = 0.0
     disconnect_s: tuple[float, ...] = ()
     away_s: float = 1.0
+    pause_s: tuple[float, ...] = ()
+    paused_s: float = 0.5
     start_text: bool = False
     clean_ends: int = 0
 
@@ -38,6 +41,11 @@ class Faults:
     def any_per_frame(self) -> bool:
         """Whether frames are touched at all."""
         return any(getattr(self, kind) > 0.0 for kind in KINDS)
+
+    def during(self, t: float) -> Faults:
+        """The faults that strike at ``t`` seconds: in a pause every frame is missing."""
+        is_paused = any(begin <= t < begin + self.paused_s for begin in self.pause_s)
+        return Faults(missing=1.0) if is_paused else self
 
 
 def parse_faults(text: str) -> Faults:

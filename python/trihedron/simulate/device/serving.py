@@ -62,7 +62,7 @@ class Device:
                 yield t, bytes(piece)
                 piece, start_s = bytearray(), t
             is_end = n < faults.clean_ends or n >= recording.n_samples - faults.clean_ends
-            piece += spoil(encode(n, t * fast, accel[n], gyro[n]), n, none if is_end else faults, rng, sent)
+            piece += spoil(encode(n, t * fast, accel[n], gyro[n]), n, none if is_end else faults.during(t), rng, sent)
         yield float(recording.time_s[-1]), bytes(piece)
 
 
