@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 
 import numpy as np
@@ -34,6 +34,11 @@ from trihedron.report.ticks import ticks
 
 UNITS = 10000
 """Across a panel, both ways. Marks are in these; a page of 4 k is a third as fine."""
+COARSE = 10
+"""Units in a step of a long curve: no screen shows less of a line through so many points."""
+LONG = 500
+BETWEEN = "|"
+"""Stands between what is told of the dots, or the bars, of one path."""
 FEWEST_SAID = 2
 MOST_LETTERS = 32
 """Of all names below a panel; half a page has room for these side by side. Longer ones are counted."""
@@ -44,17 +49,36 @@ def drawn(chart: Chart, caption: str) -> str:
     link = " data-linked" if chart.is_linked else ""
     parts = [_legend(chart)] if chart.legend else []
     parts.append(f'<div class="panels n{chart.columns}"{link}>')
-    parts += [_one(panel, caption) for panel in chart.panels]
+    parts += [_one(panel, caption, _surroundings(chart)) for panel in chart.panels]
     parts.append("</div>")
     return "".join(parts)
 
 
-def _one(panel: Panel | Disc | Sphere | Matrix, caption: str) -> str:
+def _one(panel: Panel | Disc | Sphere | Matrix, caption: str, around: tuple[int, bool]) -> str:
     if isinstance(panel, Disc):
         return drawn_disc(panel, caption)
     if isinstance(panel, Sphere):
         return drawn_sphere(panel, caption)
-    return drawn_matrix(panel, caption) if isinstance(panel, Matrix) else _panel(panel, caption)
+    return drawn_matrix(panel, caption) if isinstance(panel, Matrix) else _panel(panel, caption, around)
+
+
+def _surroundings(chart: Chart) -> tuple[int, bool]:
+    """What aligns neighbours: letters left of panels that stand below each other, a line of titles beside each other."""
+    panels = [panel for panel in chart.panels if isinstance(panel, Panel)]
+    if chart.columns > 1:
+        return 0, any(panel.title for panel in panels)
+    return max((_letters(_y_ticks(panel)) for panel in panels), default=0), False
+
+
+def _y_ticks(panel: Panel) -> list[tuple[float, str]]:
+    if panel.y.names:
+        return [(-float(k), name) for k, name in enumerate(panel.y.names, 1)]
+    _, (low, high) = limits_of(panel)
+    return ticks(low, high, is_log=panel.y.is_log, whole=panel.y.whole, most=5)
+
+
+def _letters(said: Sequence[tuple[float, str]]) -> int:
+    return max((len(word) for _, word in said), default=1)
 
 
 def _legend(chart: Chart) -> str:
@@ -105,27 +129,23 @@ def _placed(values: npt.ArrayLike, limits: tuple[float, float], *, is_log: bool)
     return out
 
 
-def _panel(panel: Panel, caption: str) -> str:
+def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
     at = _Places(panel)
     (x0, x1), (y0, y1) = at.x_limits, at.y_limits
     x_ticks = ticks(x0, x1, is_log=panel.x.is_log, whole=panel.x.whole)
     if _has_room_for_names(panel):
         x_ticks = [(float(k), name) for k, name in enumerate(panel.x.names, 1)]
-    y_ticks = ticks(y0, y1, is_log=panel.y.is_log, whole=panel.y.whole, most=5)
-    if panel.y.names:
-        y_ticks = [(-float(k), name) for k, name in enumerate(panel.y.names, 1)]
+    y_ticks = _y_ticks(panel)
     xs, ys = at.x([t for t, _ in x_ticks]), at.y([t for t, _ in y_ticks])
     grid = "".join(f"M{x:.0f} 0V{UNITS}" for x in xs) + "".join(f"M0 {y:.0f}H{UNITS}" for y in ys)
     x_words = "".join(_word(w, f"left:{x / UNITS:.2%}") for x, (_, w) in zip(xs, x_ticks, strict=True) if w)
     y_words = "".join(_word(w, f"top:{y / UNITS:.2%}") for y, (_, w) in zip(ys, y_ticks, strict=True) if w)
-    room = max((len(w) for _, w in y_ticks), default=1)
+    room = max(around[0], _letters(y_ticks))
     notes = "".join(_note(mark, at) for mark in panel.marks if isinstance(mark, Note))
-    back: list[str] = []
-    front: list[str] = []
-    for mark in panel.marks:
-        (back if isinstance(mark, Band | Span) else front).append(_mark(mark, at))
+    back = [_mark(mark, at) for mark in panel.marks if isinstance(mark, Band)] + _spans(panel, at)
+    front = [_mark(mark, at) for mark in panel.marks if not isinstance(mark, Band | Span)]
     about = f"{panel.title}: {caption}" if panel.title else caption
-    title = f'<div class="ptitle">{escape(panel.title)}</div>' if panel.title else ""
+    title = f'<div class="ptitle">{escape(panel.title) or "&nbsp;"}</div>' if panel.title or around[1] else ""
     spec = f'data-x="{x0:.9g} {x1:.9g}" data-y="{y0:.9g} {y1:.9g}" data-ux="{escape(panel.x.unit)}" '
     spec += f'data-uy="{escape(panel.y.unit)}" data-lx="{escape(panel.x.label)}"'
     spec += (" data-xlog" if panel.x.is_log else "") + (" data-ylog" if panel.y.is_log else "")
@@ -163,16 +183,17 @@ def _mark(mark: Mark, at: _Places) -> str:
         thin = (" dash" if mark.is_dashed else "") + (" thin" if mark.is_thin else "")
         # Strokes of noise are no curve to read a value from.
         name = f' data-n="{escape(mark.name)}"' if mark.name and mark.colour != "shade" else ""
-        return f'<path class="ln {mark.colour}{thin}"{name} d="{_path(at.x(mark.x), at.y(mark.y))}"/>'
+        x, y = at.x(mark.x), at.y(mark.y)
+        if len(x) < LONG:
+            return f'<path class="ln {mark.colour}{thin}"{name} d="{_path(x, y)}"/>'
+        steps = f'data-k="{COARSE}" transform="scale({COARSE})"'
+        return f'<path class="ln {mark.colour}{thin}"{name} {steps} d="{_path(x / COARSE, y / COARSE)}"/>'
     if isinstance(mark, Points):
         return _points(mark, at)
     if isinstance(mark, Bars):
         return _bars(mark, at)
     if isinstance(mark, Band):
         return _band(mark, at)
-    if isinstance(mark, Span):
-        first, last = at.x([mark.first, mark.last])
-        return f'<path class="area {mark.colour}" d="M{first:.0f} 0H{last:.0f}V{UNITS}H{first:.0f}z"/>'
     if isinstance(mark, Level):
         dash = " dash" if mark.is_dashed else ""
         where = (
@@ -182,6 +203,17 @@ def _mark(mark: Mark, at: _Places) -> str:
         )
         return f'<path class="level {mark.colour}{dash}" d="{where}"/>'
     return ""
+
+
+def _spans(panel: Panel, at: _Places) -> list[str]:
+    """All stretches of one colour as one path, in the order in which the colours come."""
+    places: dict[str, str] = {}
+    for mark in panel.marks:
+        if isinstance(mark, Span):
+            first, last = at.x([mark.first, mark.last])
+            where = f"M{first:.0f} 0H{last:.0f}V{UNITS}H{first:.0f}z"
+            places[mark.colour] = places.get(mark.colour, "") + where
+    return [f'<path class="area {colour}" d="{where}"/>' for colour, where in places.items()]
 
 
 def _path(x: FloatArray, y: FloatArray) -> str:
@@ -225,16 +257,23 @@ def _points(mark: Points, at: _Places) -> str:
         )
         out.append(f'<path class="err {mark.colour}" d="{bars}"/>')
     first, last = shared_ends(mark.said)
-    dots = []
-    for x, y, said in zip(xs, ys, mark.said, strict=True):
-        if math.isfinite(x + y):
-            dot = f'd="M{x:.0f} {y:.0f}h0"'
-            dots.append(f'<path class="dot" data-t="{escape(said[len(first) : len(said) - len(last)])}" {dot}/>')
-            if mark.is_hollow:
-                dots.append(f'<path class="hole" {dot}/>')
-    told = f' data-a="{escape(first)}" data-z="{escape(last)}"'
-    out.append(f'<g class="{mark.colour}"{told}>{"".join(dots)}</g>')
+    seen = [k for k, (x, y) in enumerate(zip(xs, ys, strict=True)) if math.isfinite(x + y)]
+    if not seen:
+        return "".join(out)
+    places = "".join(f"M{xs[k]:.0f} {ys[k]:.0f}h0" for k in seen)
+    told = _told(mark.said, seen, first, last)
+    hole = f'<path class="hole" d="{places}"/>' if mark.is_hollow else ""
+    out.append(
+        f'<g class="{mark.colour}"><path class="dot" data-a="{escape(first)}" data-z="{escape(last)}" '
+        f'data-t="{told}" d="{places}"/>{hole}</g>'
+    )
     return "".join(out)
+
+
+def _told(said: Sequence[str], seen: Iterable[int], first: str, last: str) -> str:
+    """What is told of the marks ``seen`` of one path, without what all of them begin and end with."""
+    parts = (said[k][len(first) : len(said[k]) - len(last)] for k in seen)
+    return escape(BETWEEN.join(part.replace(BETWEEN, "¦") for part in parts))
 
 
 def shared_ends(said: Sequence[str]) -> tuple[str, str]:
@@ -257,11 +296,16 @@ def _bars(mark: Bars, at: _Places) -> str:
         left, right, foot, top = at.x(base), at.x(mark.x), at.y(mark.y - half), at.y(mark.y + half)
     else:
         left, right, foot, top = at.x(mark.x - half), at.x(mark.x + half), at.y(base), at.y(mark.y)
+    ends = np.column_stack([left, foot, top, right])
+    seen = np.flatnonzero(np.isfinite(ends).all(axis=1))
+    if not len(seen):
+        return ""
     way = " across" if mark.is_across else ""
-    return "".join(
-        f'<path class="area {mark.colour}{way}" data-t="{escape(said)}" d="M{a:.0f} {f:.0f}V{t:.0f}H{b:.0f}V{f:.0f}z"/>'
-        for a, b, t, f, said in zip(left, right, top, foot, mark.said, strict=True)
-        if math.isfinite(a + b + t + f)
+    places = "".join(f"M{a:.0f} {f:.0f}V{t:.0f}H{b:.0f}V{f:.0f}z" for a, f, t, b in ends[seen])
+    first, last = shared_ends(mark.said)
+    return (
+        f'<path class="area {mark.colour}{way}" data-a="{escape(first)}" data-z="{escape(last)}" '
+        f'data-t="{_told(mark.said, seen, first, last)}" d="{places}"/>'
     )
 
 
@@ -274,7 +318,7 @@ def _band(mark: Band, at: _Places) -> str:
     return f'<path class="area {mark.colour}" d="{_path(at.x(x), at.y(y))}z"/>'
 
 
-def envelope(x: FloatArray, y: FloatArray, most: int = 2400) -> tuple[FloatArray, FloatArray]:
+def envelope(x: FloatArray, y: FloatArray, most: int = 1000) -> tuple[FloatArray, FloatArray]:
     """Smallest and largest value of each block: a long log drawn whole, with no peak lost."""
     n = len(y)
     if n <= most:
