@@ -63,7 +63,7 @@ def _one(panel: Panel | Disc | Sphere | Matrix, caption: str, around: tuple[int,
 
 
 def _surroundings(chart: Chart) -> tuple[int, bool]:
-    """What aligns neighbours: letters left of panels that stand below each other, a line of titles beside each other."""
+    """What aligns neighbours: letters left of panels below each other, a line of titles of panels beside each other."""
     panels = [panel for panel in chart.panels if isinstance(panel, Panel)]
     if chart.columns > 1:
         return 0, any(panel.title for panel in panels)

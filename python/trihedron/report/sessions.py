@@ -53,9 +53,9 @@ def sessions_report(model: SessionsModel) -> Document:
 def _lead(model: SessionsModel) -> Picture:
     """Scales and biases alone: what a user carries from one session to the next."""
     chart = partial(sessions_chart, model, DRIFTING, 2)
-    caption = (
-        "Scale and bias of both sensors in every recording, about the common value; the band: how far they repeat."
-    )
+    has_band = model.thermal is None and any(one.within is not None for one in model.repeated)
+    caption = "Scale and bias of both sensors in every recording, about the common value"
+    caption += "; the band: how far they repeat." if has_band else "."
     return Picture("drift", caption, later("chart_figures", "draw_chart", chart), chart)
 
 
