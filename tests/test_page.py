@@ -242,3 +242,13 @@ def test_a_table_is_sorted_by_its_numbers_and_back(folder, browser):
         table.query_selector("thead th:nth-child(5) button").click()
     assert page.evaluate(cells, table) == before
     page.close()
+
+
+def test_what_several_recordings_share_is_drawn_and_says_what_to_do(folder, browser, tmp_path):
+    page = tmp_path / "shared.html"
+    assert main(["diagnose", str(folder / "log.csv"), str(folder / "other.csv"), "--gravity", "9.80665",
+                 "--report", str(page)]) == 0  # fmt: skip
+    visit = Visit(browser, page, 1280, "light")
+    assert "→" in visit.page.inner_text(".next")
+    assert visit.page.locator(".number .value").count() == 2
+    visit.page.close()
