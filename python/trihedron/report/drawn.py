@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from html import escape
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.report.chart import (
@@ -29,11 +28,10 @@ from trihedron.report.chart import (
 from trihedron.report.disc import drawn_disc
 from trihedron.report.matrix import drawn_matrix
 from trihedron.report.numbers import plain_number
+from trihedron.report.places import UNITS, Places
 from trihedron.report.sphere import drawn_sphere
 from trihedron.report.ticks import ticks
 
-UNITS = 10000
-"""Across a panel, both ways. Marks are in these; a page of 4 k is a third as fine."""
 COARSE = 10
 """Units in a step of a long curve: no screen shows less of a line through so many points."""
 LONG = 500
@@ -103,34 +101,8 @@ def _swatch(mark: Mark) -> str:
     return f"{shape} {mark.colour}"
 
 
-class _Places:
-    """Data units to units of the panel."""
-
-    def __init__(self, panel: Panel) -> None:
-        self.x_limits, self.y_limits = limits_of(panel)
-        self.x_log, self.y_log = panel.x.is_log, panel.y.is_log
-
-    def x(self, values: npt.ArrayLike) -> FloatArray:
-        return _placed(values, self.x_limits, is_log=self.x_log)
-
-    def y(self, values: npt.ArrayLike) -> FloatArray:
-        return UNITS - _placed(values, self.y_limits, is_log=self.y_log)
-
-
-def _placed(values: npt.ArrayLike, limits: tuple[float, float], *, is_log: bool) -> FloatArray:
-    v = np.asarray(values, dtype=np.float64)
-    low, high = limits
-    if is_log:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            v = np.log10(v)
-        low, high = math.log10(low), math.log10(high)
-    # Marks far outside must not leave the range of a float32 of the renderer.
-    out: FloatArray = np.clip((v - low) / ((high - low) or 1.0) * UNITS, -9 * UNITS, 10 * UNITS)
-    return out
-
-
 def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
-    at = _Places(panel)
+    at = Places(panel)
     (x0, x1), (y0, y1) = at.x_limits, at.y_limits
     x_ticks = ticks(x0, x1, is_log=panel.x.is_log, whole=panel.x.whole)
     if _has_room_for_names(panel):
@@ -172,13 +144,13 @@ def _word(text: str, place: str) -> str:
     return f'<span style="{place}">{escape(text)}</span>'
 
 
-def _note(note: Note, at: _Places) -> str:
+def _note(note: Note, at: Places) -> str:
     x, y = float(at.x(note.x)), float(at.y(note.y))
     place = f"left:{x / UNITS:.2%};top:{y / UNITS:.2%}"
     return f'<span class="tag {note.side} t-{note.colour}" style="{place}">{escape(note.text)}</span>'
 
 
-def _mark(mark: Mark, at: _Places) -> str:
+def _mark(mark: Mark, at: Places) -> str:
     if isinstance(mark, Line):
         thin = (" dash" if mark.is_dashed else "") + (" thin" if mark.is_thin else "")
         # Strokes of noise are no curve to read a value from.
@@ -205,7 +177,7 @@ def _mark(mark: Mark, at: _Places) -> str:
     return ""
 
 
-def _spans(panel: Panel, at: _Places) -> list[str]:
+def _spans(panel: Panel, at: Places) -> list[str]:
     """All stretches of one colour as one path, in the order in which the colours come."""
     places: dict[str, str] = {}
     for mark in panel.marks:
@@ -240,7 +212,7 @@ def _path(x: FloatArray, y: FloatArray) -> str:
     return "".join(out).rstrip(" l")
 
 
-def _points(mark: Points, at: _Places) -> str:
+def _points(mark: Points, at: Places) -> str:
     xs, ys = at.x(mark.x), at.y(mark.y)
     sigma = np.zeros(len(xs)) if mark.sigma is None else np.where(np.isfinite(mark.sigma), mark.sigma, 0.0)
     out = []
@@ -289,7 +261,7 @@ def shared_ends(said: Sequence[str]) -> tuple[str, str]:
     return said[0][:n], said[0][len(said[0]) - m :]
 
 
-def _bars(mark: Bars, at: _Places) -> str:
+def _bars(mark: Bars, at: Places) -> str:
     base = np.zeros(len(mark.x)) if mark.base is None else mark.base
     half = mark.width / 2
     if mark.is_across:
@@ -309,7 +281,7 @@ def _bars(mark: Bars, at: _Places) -> str:
     )
 
 
-def _band(mark: Band, at: _Places) -> str:
+def _band(mark: Band, at: Places) -> str:
     good = np.isfinite(mark.x) & np.isfinite(mark.lower) & np.isfinite(mark.upper)
     if not np.any(good):
         return ""
