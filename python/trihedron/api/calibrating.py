@@ -204,9 +204,7 @@ def _require_poses(recording: Recording, segments: Segments) -> None:
             "or name its columns with --columns."
         )
     if segments.n_poses < 3:
-        found = {0: "no pose was found", 1: "only one pose was found"}.get(
-            segments.n_poses, f"only {segments.n_poses} poses were found"
-        )
+        found = f"poses found: {segments.n_poses}"
         grave = next((one for one in segments.findings if one.severity is not Severity.NOTE), None)
         why = f"{found[0].upper()}{found[1:]}." if grave is None else grave.seen
         if grave is not None and grave.code not in COUNTS_OF_POSES:
