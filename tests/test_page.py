@@ -1,6 +1,7 @@
 """Every kind of report in a real browser: no error, no request, nothing beyond the edge of a phone, no barrier."""
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from importlib.util import find_spec
@@ -150,11 +151,72 @@ def test_the_verdict_the_number_and_its_figure_are_on_the_first_screen(folder, b
     visit.page.close()
 
 
+def point_at_the_first_dot(page, figure):
+    """The dots of a group are one path of places in ten thousandths of the panel."""
+    plot = page.query_selector(f"{figure} .plot")
+    plot.scroll_into_view_if_needed()
+    x, y = re.match(r"M(\d+) (\d+)", plot.query_selector(".dot").get_attribute("d")).groups()
+    box = plot.query_selector("svg").bounding_box()
+    page.mouse.move(box["x"] + box["width"] * int(x) / 1e4, box["y"] + box["height"] * int(y) / 1e4)
+
+
+def test_one_cursor_runs_over_all_axes_of_time_and_over_no_other(folder, browser):
+    page = Visit(browser, folder / "calibrate.html", 1280, "light").page
+    signals = page.query_selector("#signals .plot")
+    signals.scroll_into_view_if_needed()
+    box = signals.bounding_box()
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    time = "(p) => p.querySelector('.xlabel').textContent === 'time [s]'"
+    panels = page.query_selector_all(".panel")
+    of_time = [panel for panel in panels if page.evaluate(time, panel)]
+    # Residuals of poses and of moves, and the signals of both sensors.
+    assert len(of_time) == 4
+    for panel in panels:
+        cursor = panel.query_selector(".cursor")
+        assert (cursor is not None) == (panel in of_time)
+    shares = [float(re.search(r"left: ([\d.]+)%", panel.query_selector(".cursor").get_attribute("style"))[1])
+              for panel in of_time if panel.query_selector(".cursor").is_visible()]  # fmt: skip
+    # All run over the same seconds; the panel that is pointed at shows no second cursor.
+    assert len(shares) == 3
+    assert all(abs(share - 50.0) < 0.5 for share in shares)
+    page.close()
+
+
+def test_a_bar_and_a_cell_of_correlations_tell_their_value(folder, browser):
+    page = Visit(browser, folder / "calibrate.html", 1280, "light").page
+    page.query_selector("#moves").scroll_into_view_if_needed()
+    box = page.query_selector("#moves .plot").bounding_box()
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.9 * box["height"])
+    assert re.search(r"move \d+ .*°", page.inner_text("#tip"))
+    page.locator(".cell").first.hover()
+    assert re.fullmatch(r"[aw] \S+ and [aw] \S+: [+−][01]\.\d\d", page.inner_text("#tip"))
+    page.close()
+
+
+def test_the_verdict_is_not_said_twice(tmp_path, browser):
+    motion = hand_session(n_poses=5, pose_s=2.0, move_s=1.5)
+    write_recording(simulate(replace(scenario_by_name("hand-session"), motion=motion), 1)[0], tmp_path / "few.csv")
+    assert main(["calibrate", str(tmp_path / "few.csv"), "--gravity", "9.8", "--report", str(tmp_path / "r.html")]) == 2
+    page = Visit(browser, tmp_path / "r.html", 1280, "light").page
+    seen = page.inner_text(".verdict").removeprefix("NOT TO BE TRUSTED: ")
+    assert seen not in page.inner_text(".foremost")
+    assert "→" in page.inner_text(".foremost")
+    page.close()
+
+
+def test_a_hundred_poses_fit_two_hundred_kilobytes(tmp_path):
+    motion = hand_session(n_poses=100, pose_s=2.0, move_s=1.5, first_pose_s=5.0)
+    write_recording(simulate(replace(scenario_by_name("hand-session"), motion=motion), 5)[0], tmp_path / "log.csv")
+    page = tmp_path / "page.html"
+    assert main(["calibrate", str(tmp_path / "log.csv"), "--gravity", "9.80665", "--report", str(page)]) in (0, 2)
+    assert page.stat().st_size <= 200_000
+
+
 def test_a_point_tells_its_value_and_a_figure_zooms_and_returns(folder, browser):
     page = Visit(browser, folder / "calibrate.html", 1280, "light").page
-    dot = page.query_selector("#residuals .plot .dot").bounding_box()
-    page.mouse.move(dot["x"] + dot["width"] / 2, dot["y"] + dot["height"] / 2)
-    assert "mm/s²" in page.inner_text("#tip")
+    point_at_the_first_dot(page, "#residuals")
+    assert re.fullmatch(r"(held out, )?pose 1: −?\d+\.\d+ ± \d+\.\d+ mm/s²", page.inner_text("#tip"))
+    assert page.locator("#residuals .plot .on").count() == 1
     svg, ticks = "#residuals .plot > svg", "#residuals .xticks"
     whole, before = page.get_attribute(svg, "viewBox"), page.inner_text(ticks)
     page.click("#residuals .tools button[aria-label^='Zoom in']")
@@ -180,3 +242,13 @@ def test_a_table_is_sorted_by_its_numbers_and_back(folder, browser):
         table.query_selector("thead th:nth-child(5) button").click()
     assert page.evaluate(cells, table) == before
     page.close()
+
+
+def test_what_several_recordings_share_is_drawn_and_says_what_to_do(folder, browser, tmp_path):
+    page = tmp_path / "shared.html"
+    assert main(["diagnose", str(folder / "log.csv"), str(folder / "other.csv"), "--gravity", "9.80665",
+                 "--report", str(page)]) == 0  # fmt: skip
+    visit = Visit(browser, page, 1280, "light")
+    assert "→" in visit.page.inner_text(".next")
+    assert visit.page.locator(".number .value").count() == 2
+    visit.page.close()

@@ -152,7 +152,7 @@ pyo3::create_exception!(
     trihedron._core,
     RefusedError,
     PyValueError,
-    "A question that its readings or numbers do not answer, refused in one sentence; never a defect of the program."
+    "A log, a value or a question that cannot be answered; the message says why and what to do. Never a defect of the program."
 );
 
 fn finish<T>(out: Guarded<T>, requests_before: usize) -> PyResult<T> {

@@ -49,6 +49,8 @@ METHODS: tuple[Method, ...] = get_args(Method)
 
 Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
 
+COUNTS_OF_POSES = (FindingCode.FEW_POSES, FindingCode.NOT_STATIC)
+"""Findings that say themselves how many poses there are."""
 MOST_CREEPING = 0.05
 """Share of poses that may be seen to creep. The creep that is seen is the top of what is not: with one of 18 seen, on a
 support that yields, the gyro's scale lay outside its 95 % bars in a fifth of its elements."""
@@ -202,13 +204,13 @@ def _require_poses(recording: Recording, segments: Segments) -> None:
             "or name its columns with --columns."
         )
     if segments.n_poses < 3:
-        found = {0: "no pose was found", 1: "only one pose was found"}.get(
-            segments.n_poses, f"only {segments.n_poses} poses were found"
-        )
-        grave = [finding.seen for finding in segments.findings if finding.severity is not Severity.NOTE]
-        why = grave[0] + " " if grave else ""
+        found = f"poses found: {segments.n_poses}"
+        grave = next((one for one in segments.findings if one.severity is not Severity.NOTE), None)
+        why = f"{found[0].upper()}{found[1:]}." if grave is None else grave.seen
+        if grave is not None and grave.code not in COUNTS_OF_POSES:
+            why = f"{found}. {why}"
         raise RefusedError(
-            f"{recording.source}: {found}. {why}Hold the sensor still for 3 to 5 seconds in each of 18 or more "
+            f"{recording.source}: {why} Hold the sensor still for 3 to 5 seconds in each of 18 or more "
             "different poses (docs/procedure.md); `trihedron segment LOG` shows what was seen."
         )
 

@@ -160,8 +160,8 @@ def sessions_of(results: Sequence[CalibrationResult], groups: Sequence[str]) -> 
 
 
 def _names(sources: Sequence[str]) -> list[str]:
-    """Names as short as they stay distinct."""
-    short = [Path(source).name or source for source in sources]
+    """Names as short as they stay distinct; of two files of one log both."""
+    short = [" + ".join(Path(part).name or part for part in source.split(" + ")) for source in sources]
     return [name if short.count(name) == 1 else source for name, source in zip(short, sources, strict=True)]
 
 

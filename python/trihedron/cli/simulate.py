@@ -91,6 +91,7 @@ def simulate(
     from trihedron.files.log import LOG_SUFFIXES, write_recording
     from trihedron.files.output import OutputError
     from trihedron.files.truth import write_truth
+    from trihedron.report.numbers import how_many
 
     if output is not None and output.suffix.lower() not in LOG_SUFFIXES:
         raise OutputError(f"{output}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
@@ -119,7 +120,8 @@ def simulate(
         serve_recording(recording, known, serve, protocol, faults, speed=speed, baud=baud, link=link)
         return
     typer.echo(f"{output}: {recording.n_samples} samples, {recording.duration_s:.1f} s at {recording.rate_hz:.4g} Hz")
-    typer.echo(f"{len(known.poses)} poses, {len(known.moves)} moves, |g| {known.gravity_m_s2:.6g} m/s²")
+    motion = f"{how_many(len(known.poses), 'pose')}, {how_many(len(known.moves), 'move')}"
+    typer.echo(f"{motion}, |g| {known.gravity_m_s2:.6g} m/s²")
     for name, parameters in known.effects.items():
         from trihedron.report.simulation import in_rows
 

@@ -285,7 +285,7 @@ def _corner(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float)
     is_clear = seen.corner_hz.upper * LEAST_CORNER_RATIO < other.corner_above_hz
     values = _value(m.corner_hz), _value(r.corner_hz)
     side = "recording" if seen is r else "model"
-    name = "accelerometer" if sensor == "accelerometer" else "gyro"
+    name = f"{'accelerometer' if sensor == 'accelerometer' else 'gyro'} {axis.upper()}"
     remark = f"The noise of the {name} is filtered in the {side} only (corner {seen.corner_hz.value:.3g} Hz)."
     yield NoiseDifference(
         sensor, axis, "bandwidth", *values, None, None, "Hz", None, is_clear, remark if is_clear else ""
@@ -312,7 +312,7 @@ def _octaves(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float
         is_off = is_off and not (filters_differ and octave.high_hz > min(corners))
         band = f"{octave.low_hz:g} to {octave.high_hz:g} Hz"
         name = "accelerometer" if sensor == "accelerometer" else "gyro"
-        remark = f"Noise of the {name} {axis} at {band} is {math.sqrt(ratio.value):.3g} times the recording's."
+        remark = f"Noise of the {name} {axis.upper()} at {band} is {math.sqrt(ratio.value):.3g} times the recording's."
         yield NoiseDifference(
             sensor, axis, "octave", math.sqrt(twin.density.value), math.sqrt(octave.density.value),
             math.sqrt(ratio.value), (math.sqrt(ratio.lower), math.sqrt(ratio.upper)),

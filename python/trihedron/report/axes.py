@@ -14,8 +14,15 @@ from trihedron.arrays import FloatArray
 from trihedron.records import SensorCalibration
 from trihedron.sensor_model import other_form, other_form_jacobian
 
+LETTERS = 2
+"""Of a name that is made of axes alone."""
 BIAS = "the reading at zero input, −S⁻¹ b: its sign is opposite to that of b"
 """What a bias is in every report; b is what a corrected reading adds."""
+
+
+def axis_in_print(name: str) -> str:
+    """Axes as on the silkscreen, ``x`` and ``xy`` as ``X`` and ``XY``; a longer name as it is."""
+    return name.upper() if len(name) <= LETTERS else name
 
 
 @dataclass(frozen=True, eq=False)

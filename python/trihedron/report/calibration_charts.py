@@ -18,6 +18,8 @@ STRONG = 0.5
 """Correlation above which two parameters are named together."""
 LIMIT_SIGMAS = 3.0
 """A pose or move beyond it happens by chance once in 370."""
+MOST_NUMBERED = 60
+"""Poses on a disc that carry their number; of more, one would cover the next."""
 
 
 def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> Chart:
@@ -35,7 +37,7 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
         held = mm_s2(quality.held_out)
         held_sigma = None if quality.held_out_sigma is None else mm_s2(quality.held_out_sigma)
         told = [
-            said(f"{name}, held out", "", v, "mm/s²", None if held_sigma is None else s)
+            said(f"held out, {name}", "", v, "mm/s²", None if held_sigma is None else s)
             for name, v, s in zip(label, held, held if held_sigma is None else held_sigma, strict=True)
         ]
         marks.append(
@@ -79,9 +81,9 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     if np.any(is_out):
         marks.append(Bars(move - shift, np.where(is_out, quality.angle_deg, np.nan), width, told, "excluded", "soft"))
     if held is not None:
-        told_held = [said(f"{w}, held out", "", v, "°") for w, v in zip(names, held, strict=True)]
+        told_held = [said(f"held out, {w}", "", v, "°") for w, v in zip(names, held, strict=True)]
         marks.append(Bars(move + shift, np.where(is_out, np.nan, held), width, told_held, "held out", "accent"))
-    told_noise = [said(f"{w}, noise alone", "", v, "° rms") for w, v in zip(names, noise, strict=True)]
+    told_noise = [said(f"noise alone, {w}", "", v, "° rms") for w, v in zip(names, noise, strict=True)]
     marks.append(Points(move, noise, told_noise, None, "noise alone (rms)", "ink"))
     shown = np.concatenate([quality.angle_deg[~is_out], [] if held is None else held[~is_out]])
     shown = shown[np.isfinite(shown)]
@@ -110,7 +112,8 @@ def sphere_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
             # A pose with level Z lies on the rim of both.
             if sign * u[2] >= -1e-2:
                 words = " ".join(f"{c:+.2f}" for c in u).replace("-", "−")
-                points.append((*equal_area((u[0], u[1], u[2])), str(k + 1), f"pose {k + 1}: up is {words}", "taken"))
+                label = str(k + 1) if len(up) <= MOST_NUMBERED else ""
+                points.append((*equal_area((u[0], u[1], u[2])), label, f"pose {k + 1}: up is {words}", "taken"))
         for n, (words, d) in enumerate(wanted):
             if sign * d[2] >= -1e-2:
                 points.append((*equal_area((d[0], d[1], d[2])), str(n + 1), f"to add, {n + 1}: {words}", "wanted"))

@@ -33,10 +33,8 @@ def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture
     quality = calibration.accelerometer.quality
     if quality is None:
         return None
-    caption = (
-        "Norm of gravity minus its true value in every pose, against 3 σ of noise alone; circles: cross-validated, "
-        "predicted by a fit that did not see that pose."
-    )
+    circles = "; circles: cross-validated, predicted by a fit that did not see that pose" if _is_held(quality) else ""
+    caption = f"Norm of gravity minus its true value in every pose, against 3 σ of noise alone{circles}."
     means = None if segments is None else segments.accelerometer_mean
     chart = partial(residual_chart, quality)
     if means is not None and len(means) == len(quality.residual):
@@ -100,7 +98,13 @@ def _as_read(calibration: Calibration) -> float | None:
 
 def _unseen(quality: FitQuality) -> FloatArray:
     """(n,) residuals of fits that did not see the pose, where there are such."""
-    return quality.residual if quality.held_out is None else quality.held_out
+    held = quality.held_out
+    return held if held is not None and _is_held(quality) else quality.residual
+
+
+def _is_held(quality: FitQuality) -> bool:
+    """Whether any pose was predicted by a fit that did not see it."""
+    return quality.held_out is not None and bool(np.any(np.isfinite(quality.held_out)))
 
 
 def figure_blocks(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> list[Block]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
+from trihedron.report.axes import axis_in_print
 from trihedron.report.chart import Chart, Colour, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawing import later
@@ -95,7 +96,9 @@ def spectra_chart(diagnosis: Diagnosis) -> Chart:
         unit = _unit(sensor) + "/√Hz"
         x = np.concatenate([edges, np.full((len(edges), 1), np.nan)], axis=1).ravel()
         marks = _both(x, np.repeat(model, 3), np.repeat(own, 3))
-        panels.append(_panel("frequency [Hz]", "Hz", f"density [{unit}]", unit, marks, f"{_said(sensor)} {axis}"))
+        panels.append(
+            _panel("frequency [Hz]", "Hz", f"density [{unit}]", unit, marks, f"{_said(sensor)} {axis_in_print(axis)}")
+        )
     return Chart(tuple(panels), columns=3)
 
 
@@ -114,7 +117,14 @@ def allan_chart(diagnosis: Diagnosis) -> Chart:
         tau = np.geomspace(0.5 / edges[-1, 1], 0.25 / edges[0, 0], 60)
         marks = _both(tau, allan_of(edges, model, tau), allan_of(edges, own, tau))
         panels.append(
-            _panel("averaging time τ [s]", "s", f"Allan deviation [{unit}]", unit, marks, f"{_said(sensor)} {axis}")
+            _panel(
+                "averaging time τ [s]",
+                "s",
+                f"Allan deviation [{unit}]",
+                unit,
+                marks,
+                f"{_said(sensor)} {axis_in_print(axis)}",
+            )
         )
     return Chart(tuple(panels), columns=3)
 

@@ -11,6 +11,7 @@ import numpy as np
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
+from trihedron.report.axes import axis_in_print
 from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.diagnosis_numbers import GROUPS, in_print, named
 from trihedron.report.diagnosis_words import MEANING
@@ -23,6 +24,8 @@ ROW_PX = 26
 """A row of names on a page."""
 LEAST_CHI2 = 0.3
 """Where bars of χ² per degree of freedom begin: what noise explains is 1."""
+SLIVER = 1.04
+"""Of the least: what lies below it is drawn so long, to be seen and pointed at."""
 TWO_SIGMA = 2.0
 WINDOW_S = 6.0
 """Of traces drawn: a move and its poses on both sides."""
@@ -62,7 +65,7 @@ def strengths_chart(diagnosis: Diagnosis) -> Chart:
         for name, colour, values in side:
             if np.any(np.isfinite(values)):
                 told = [f"{what}, {name}: χ²/dof {plain_number(v)}" for what, v in zip(names, values, strict=True)]
-                shown = np.maximum(values, LEAST_CHI2)
+                shown = np.maximum(values, SLIVER * LEAST_CHI2)
                 marks.append(Bars(shown, place, 0.92 * width, told, name, colour, base, is_across=True))
     marks.append(Level(x=1.0, name="noise alone", is_dashed=True))
     top = float(np.nanmax([np.nanmax(v, initial=1.0) for side in sides for _, _, v in side]))
@@ -113,7 +116,7 @@ def _forest(title: str, members: list[ParameterDifference]) -> Panel:
     name = "differs" if members[0].significant else "agrees"
     dots = Points(value, place, told, TWO_SIGMA * sigma, f"recording, {name}", colour, is_across=True)
     x = Scale(f"recording − model [{unit}]" if unit else "recording − model", unit, includes=(0.0,))
-    names = tuple(p.name.upper() if len(p.name) < 3 else p.name for p in members)
+    names = tuple(axis_in_print(p.name) for p in members)
     height = ROW_PX * len(members) + ROW_PX
     return Panel(x, Scale("", names=names), (Level(x=0.0, name="model"), dots), title=title, height_px=height)
 
@@ -139,7 +142,7 @@ def ratios_chart(rows: Sequence[NoiseDifference]) -> Chart:
 
 def _row_name(n: NoiseDifference) -> str:
     sensor = {"gyroscope": "gyro", "accelerometer": "accel", "both": "sampling"}[n.sensor]
-    return " ".join(part for part in (sensor, n.axis, n.term) if part)
+    return " ".join(part for part in (sensor, axis_in_print(n.axis), n.term) if part)
 
 
 def _ratio_words(n: NoiseDifference, name: str) -> str:

@@ -23,12 +23,13 @@ def drawn_disc(disc: Disc, caption: str) -> str:
     marks = []
     # What is wanted lies on top.
     for x, y, label, said, kind in sorted(disc.points, key=lambda p: p[4]):
-        place = f'transform="translate({_RADIUS * x:.1f} {-_RADIUS * y:.1f})"'
-        shape = '<circle r="7.5"/>' if kind == "taken" else '<path d="M0-10L9 6H-9z"/>'
-        drop = 3 if kind == "taken" else 4
-        marks.append(
-            f'<g class="pose {kind}" data-t="{escape(said)}" {place}>{shape}<text y="{drop}">{escape(label)}</text></g>'
-        )
+        px, py, told = f"{_RADIUS * x:.1f}", f"{-_RADIUS * y:.1f}", f'data-t="{escape(said)}"'
+        if kind == "taken":
+            shape, drop = f'<circle class="pose" {told} cx="{px}" cy="{py}" r="7.5"/>', 3.0
+        else:
+            shape, drop = f'<path class="pose" {told} d="M{px} {py}m0-10l9 16h-18z"/>', 4.0
+        name = f'<text class="{kind}" x="{px}" y="{drop - _RADIUS * y:.1f}">{escape(label)}</text>' if label else ""
+        marks.append(shape + name)
     about = f"{disc.title}: {caption}"
     return (
         f'<div class="disc"><div class="ptitle">{escape(disc.title)}</div>'

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.report.chart import (
@@ -29,11 +28,15 @@ from trihedron.report.chart import (
 from trihedron.report.disc import drawn_disc
 from trihedron.report.matrix import drawn_matrix
 from trihedron.report.numbers import plain_number
+from trihedron.report.places import UNITS, Places
 from trihedron.report.sphere import drawn_sphere
 from trihedron.report.ticks import ticks
 
-UNITS = 10000
-"""Across a panel, both ways. Marks are in these; a page of 4 k is a third as fine."""
+COARSE = 10
+"""Units in a step of a long curve: no screen shows less of a line through so many points."""
+LONG = 500
+BETWEEN = "|"
+"""Stands between what is told of the dots, or the bars, of one path."""
 FEWEST_SAID = 2
 MOST_LETTERS = 32
 """Of all names below a panel; half a page has room for these side by side. Longer ones are counted."""
@@ -44,17 +47,36 @@ def drawn(chart: Chart, caption: str) -> str:
     link = " data-linked" if chart.is_linked else ""
     parts = [_legend(chart)] if chart.legend else []
     parts.append(f'<div class="panels n{chart.columns}"{link}>')
-    parts += [_one(panel, caption) for panel in chart.panels]
+    parts += [_one(panel, caption, _surroundings(chart)) for panel in chart.panels]
     parts.append("</div>")
     return "".join(parts)
 
 
-def _one(panel: Panel | Disc | Sphere | Matrix, caption: str) -> str:
+def _one(panel: Panel | Disc | Sphere | Matrix, caption: str, around: tuple[int, bool]) -> str:
     if isinstance(panel, Disc):
         return drawn_disc(panel, caption)
     if isinstance(panel, Sphere):
         return drawn_sphere(panel, caption)
-    return drawn_matrix(panel, caption) if isinstance(panel, Matrix) else _panel(panel, caption)
+    return drawn_matrix(panel, caption) if isinstance(panel, Matrix) else _panel(panel, caption, around)
+
+
+def _surroundings(chart: Chart) -> tuple[int, bool]:
+    """What aligns neighbours: letters left of panels below each other, a line of titles of panels beside each other."""
+    panels = [panel for panel in chart.panels if isinstance(panel, Panel)]
+    if chart.columns > 1:
+        return 0, any(panel.title for panel in panels)
+    return max((_letters(_y_ticks(panel)) for panel in panels), default=0), False
+
+
+def _y_ticks(panel: Panel) -> list[tuple[float, str]]:
+    if panel.y.names:
+        return [(-float(k), name) for k, name in enumerate(panel.y.names, 1)]
+    _, (low, high) = limits_of(panel)
+    return ticks(low, high, is_log=panel.y.is_log, whole=panel.y.whole, most=5)
+
+
+def _letters(said: Sequence[tuple[float, str]]) -> int:
+    return max((len(word) for _, word in said), default=1)
 
 
 def _legend(chart: Chart) -> str:
@@ -79,53 +101,23 @@ def _swatch(mark: Mark) -> str:
     return f"{shape} {mark.colour}"
 
 
-class _Places:
-    """Data units to units of the panel."""
-
-    def __init__(self, panel: Panel) -> None:
-        self.x_limits, self.y_limits = limits_of(panel)
-        self.x_log, self.y_log = panel.x.is_log, panel.y.is_log
-
-    def x(self, values: npt.ArrayLike) -> FloatArray:
-        return _placed(values, self.x_limits, is_log=self.x_log)
-
-    def y(self, values: npt.ArrayLike) -> FloatArray:
-        return UNITS - _placed(values, self.y_limits, is_log=self.y_log)
-
-
-def _placed(values: npt.ArrayLike, limits: tuple[float, float], *, is_log: bool) -> FloatArray:
-    v = np.asarray(values, dtype=np.float64)
-    low, high = limits
-    if is_log:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            v = np.log10(v)
-        low, high = math.log10(low), math.log10(high)
-    # Marks far outside must not leave the range of a float32 of the renderer.
-    out: FloatArray = np.clip((v - low) / ((high - low) or 1.0) * UNITS, -9 * UNITS, 10 * UNITS)
-    return out
-
-
-def _panel(panel: Panel, caption: str) -> str:
-    at = _Places(panel)
+def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
+    at = Places(panel)
     (x0, x1), (y0, y1) = at.x_limits, at.y_limits
     x_ticks = ticks(x0, x1, is_log=panel.x.is_log, whole=panel.x.whole)
     if _has_room_for_names(panel):
         x_ticks = [(float(k), name) for k, name in enumerate(panel.x.names, 1)]
-    y_ticks = ticks(y0, y1, is_log=panel.y.is_log, whole=panel.y.whole, most=5)
-    if panel.y.names:
-        y_ticks = [(-float(k), name) for k, name in enumerate(panel.y.names, 1)]
+    y_ticks = _y_ticks(panel)
     xs, ys = at.x([t for t, _ in x_ticks]), at.y([t for t, _ in y_ticks])
     grid = "".join(f"M{x:.0f} 0V{UNITS}" for x in xs) + "".join(f"M0 {y:.0f}H{UNITS}" for y in ys)
     x_words = "".join(_word(w, f"left:{x / UNITS:.2%}") for x, (_, w) in zip(xs, x_ticks, strict=True) if w)
     y_words = "".join(_word(w, f"top:{y / UNITS:.2%}") for y, (_, w) in zip(ys, y_ticks, strict=True) if w)
-    room = max((len(w) for _, w in y_ticks), default=1)
+    room = max(around[0], _letters(y_ticks))
     notes = "".join(_note(mark, at) for mark in panel.marks if isinstance(mark, Note))
-    back: list[str] = []
-    front: list[str] = []
-    for mark in panel.marks:
-        (back if isinstance(mark, Band | Span) else front).append(_mark(mark, at))
+    back = [_mark(mark, at) for mark in panel.marks if isinstance(mark, Band)] + _spans(panel, at)
+    front = [_mark(mark, at) for mark in panel.marks if not isinstance(mark, Band | Span)]
     about = f"{panel.title}: {caption}" if panel.title else caption
-    title = f'<div class="ptitle">{escape(panel.title)}</div>' if panel.title else ""
+    title = f'<div class="ptitle">{escape(panel.title) or "&nbsp;"}</div>' if panel.title or around[1] else ""
     spec = f'data-x="{x0:.9g} {x1:.9g}" data-y="{y0:.9g} {y1:.9g}" data-ux="{escape(panel.x.unit)}" '
     spec += f'data-uy="{escape(panel.y.unit)}" data-lx="{escape(panel.x.label)}"'
     spec += (" data-xlog" if panel.x.is_log else "") + (" data-ylog" if panel.y.is_log else "")
@@ -152,27 +144,28 @@ def _word(text: str, place: str) -> str:
     return f'<span style="{place}">{escape(text)}</span>'
 
 
-def _note(note: Note, at: _Places) -> str:
+def _note(note: Note, at: Places) -> str:
     x, y = float(at.x(note.x)), float(at.y(note.y))
     place = f"left:{x / UNITS:.2%};top:{y / UNITS:.2%}"
     return f'<span class="tag {note.side} t-{note.colour}" style="{place}">{escape(note.text)}</span>'
 
 
-def _mark(mark: Mark, at: _Places) -> str:
+def _mark(mark: Mark, at: Places) -> str:
     if isinstance(mark, Line):
         thin = (" dash" if mark.is_dashed else "") + (" thin" if mark.is_thin else "")
         # Strokes of noise are no curve to read a value from.
         name = f' data-n="{escape(mark.name)}"' if mark.name and mark.colour != "shade" else ""
-        return f'<path class="ln {mark.colour}{thin}"{name} d="{_path(at.x(mark.x), at.y(mark.y))}"/>'
+        x, y = at.x(mark.x), at.y(mark.y)
+        if len(x) < LONG:
+            return f'<path class="ln {mark.colour}{thin}"{name} d="{_path(x, y)}"/>'
+        steps = f'data-k="{COARSE}" transform="scale({COARSE})"'
+        return f'<path class="ln {mark.colour}{thin}"{name} {steps} d="{_path(x / COARSE, y / COARSE)}"/>'
     if isinstance(mark, Points):
         return _points(mark, at)
     if isinstance(mark, Bars):
         return _bars(mark, at)
     if isinstance(mark, Band):
         return _band(mark, at)
-    if isinstance(mark, Span):
-        first, last = at.x([mark.first, mark.last])
-        return f'<path class="area {mark.colour}" d="M{first:.0f} 0H{last:.0f}V{UNITS}H{first:.0f}z"/>'
     if isinstance(mark, Level):
         dash = " dash" if mark.is_dashed else ""
         where = (
@@ -182,6 +175,17 @@ def _mark(mark: Mark, at: _Places) -> str:
         )
         return f'<path class="level {mark.colour}{dash}" d="{where}"/>'
     return ""
+
+
+def _spans(panel: Panel, at: Places) -> list[str]:
+    """All stretches of one colour as one path, in the order in which the colours come."""
+    places: dict[str, str] = {}
+    for mark in panel.marks:
+        if isinstance(mark, Span):
+            first, last = at.x([mark.first, mark.last])
+            where = f"M{first:.0f} 0H{last:.0f}V{UNITS}H{first:.0f}z"
+            places[mark.colour] = places.get(mark.colour, "") + where
+    return [f'<path class="area {colour}" d="{where}"/>' for colour, where in places.items()]
 
 
 def _path(x: FloatArray, y: FloatArray) -> str:
@@ -208,7 +212,7 @@ def _path(x: FloatArray, y: FloatArray) -> str:
     return "".join(out).rstrip(" l")
 
 
-def _points(mark: Points, at: _Places) -> str:
+def _points(mark: Points, at: Places) -> str:
     xs, ys = at.x(mark.x), at.y(mark.y)
     sigma = np.zeros(len(xs)) if mark.sigma is None else np.where(np.isfinite(mark.sigma), mark.sigma, 0.0)
     out = []
@@ -225,16 +229,23 @@ def _points(mark: Points, at: _Places) -> str:
         )
         out.append(f'<path class="err {mark.colour}" d="{bars}"/>')
     first, last = shared_ends(mark.said)
-    dots = []
-    for x, y, said in zip(xs, ys, mark.said, strict=True):
-        if math.isfinite(x + y):
-            dot = f'd="M{x:.0f} {y:.0f}h0"'
-            dots.append(f'<path class="dot" data-t="{escape(said[len(first) : len(said) - len(last)])}" {dot}/>')
-            if mark.is_hollow:
-                dots.append(f'<path class="hole" {dot}/>')
-    told = f' data-a="{escape(first)}" data-z="{escape(last)}"'
-    out.append(f'<g class="{mark.colour}"{told}>{"".join(dots)}</g>')
+    seen = [k for k, (x, y) in enumerate(zip(xs, ys, strict=True)) if math.isfinite(x + y)]
+    if not seen:
+        return "".join(out)
+    places = "".join(f"M{xs[k]:.0f} {ys[k]:.0f}h0" for k in seen)
+    told = _told(mark.said, seen, first, last)
+    hole = f'<path class="hole" d="{places}"/>' if mark.is_hollow else ""
+    out.append(
+        f'<g class="{mark.colour}"><path class="dot" data-a="{escape(first)}" data-z="{escape(last)}" '
+        f'data-t="{told}" d="{places}"/>{hole}</g>'
+    )
     return "".join(out)
+
+
+def _told(said: Sequence[str], seen: Iterable[int], first: str, last: str) -> str:
+    """What is told of the marks ``seen`` of one path, without what all of them begin and end with."""
+    parts = (said[k][len(first) : len(said[k]) - len(last)] for k in seen)
+    return escape(BETWEEN.join(part.replace(BETWEEN, "¦") for part in parts))
 
 
 def shared_ends(said: Sequence[str]) -> tuple[str, str]:
@@ -250,22 +261,27 @@ def shared_ends(said: Sequence[str]) -> tuple[str, str]:
     return said[0][:n], said[0][len(said[0]) - m :]
 
 
-def _bars(mark: Bars, at: _Places) -> str:
+def _bars(mark: Bars, at: Places) -> str:
     base = np.zeros(len(mark.x)) if mark.base is None else mark.base
     half = mark.width / 2
     if mark.is_across:
         left, right, foot, top = at.x(base), at.x(mark.x), at.y(mark.y - half), at.y(mark.y + half)
     else:
         left, right, foot, top = at.x(mark.x - half), at.x(mark.x + half), at.y(base), at.y(mark.y)
+    ends = np.column_stack([left, foot, top, right])
+    seen = np.flatnonzero(np.isfinite(ends).all(axis=1))
+    if not len(seen):
+        return ""
     way = " across" if mark.is_across else ""
-    return "".join(
-        f'<path class="area {mark.colour}{way}" data-t="{escape(said)}" d="M{a:.0f} {f:.0f}V{t:.0f}H{b:.0f}V{f:.0f}z"/>'
-        for a, b, t, f, said in zip(left, right, top, foot, mark.said, strict=True)
-        if math.isfinite(a + b + t + f)
+    places = "".join(f"M{a:.0f} {f:.0f}V{t:.0f}H{b:.0f}V{f:.0f}z" for a, f, t, b in ends[seen])
+    first, last = shared_ends(mark.said)
+    return (
+        f'<path class="area {mark.colour}{way}" data-a="{escape(first)}" data-z="{escape(last)}" '
+        f'data-t="{_told(mark.said, seen, first, last)}" d="{places}"/>'
     )
 
 
-def _band(mark: Band, at: _Places) -> str:
+def _band(mark: Band, at: Places) -> str:
     good = np.isfinite(mark.x) & np.isfinite(mark.lower) & np.isfinite(mark.upper)
     if not np.any(good):
         return ""
@@ -274,7 +290,7 @@ def _band(mark: Band, at: _Places) -> str:
     return f'<path class="area {mark.colour}" d="{_path(at.x(x), at.y(y))}z"/>'
 
 
-def envelope(x: FloatArray, y: FloatArray, most: int = 2400) -> tuple[FloatArray, FloatArray]:
+def envelope(x: FloatArray, y: FloatArray, most: int = 1000) -> tuple[FloatArray, FloatArray]:
     """Smallest and largest value of each block: a long log drawn whole, with no peak lost."""
     n = len(y)
     if n <= most:

@@ -43,7 +43,7 @@ def filter_noise_report(found: FilterNoise) -> Document:
     chart = partial(horizon_chart, found)
     picture = Picture(
         "horizon",
-        "Error of a filter that carries on alone for a horizon: predicted and actual, effective and static.",
+        "Error of a filter that carries on alone for a horizon: predicted by its N and K, and actual.",
         later("chart_figures", "draw_chart", chart),
         chart,
     )

@@ -9,6 +9,7 @@ from functools import partial
 
 from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.records.sessions import Change, Repeated
+from trihedron.report.axes import axis_in_print
 from trihedron.report.chart import Chart
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
@@ -118,7 +119,7 @@ def _mixed(summary: FleetSummary) -> list[Block]:
     for one in summary.mixed:
         factor, unit = shown(one.parameter.unit)
         by = f"{plain_number(one.difference * factor, 2)} {unit}"
-        rows.append((one.serial, str(one.n_logs), f"{one.parameter.id} {one.parameter.name}", by))
+        rows.append((one.serial, str(one.n_logs), f"{one.parameter.id} {axis_in_print(one.parameter.name)}", by))
     said = (
         "Scales and directions of axes of one unit repeat within 1 %. Name devices with --serial, or give each a "
         "folder; until then these logs are compared with nothing."
@@ -160,7 +161,7 @@ def _spread_row(one: Repeated, is_grouped: bool) -> list[str]:
     factor, unit = shown(one.parameter.unit)
     value = one.value - (0.5 * math.pi if one.parameter.id.endswith("misalignment") else 0.0)
     is_scale = one.parameter.id.endswith("scale")
-    cells = [f"{one.parameter.id} {one.parameter.name} [{unit}]"]
+    cells = [f"{one.parameter.id} {axis_in_print(one.parameter.name)} [{unit}]"]
     cells.append(f"± {plain_number(one.std * factor, 2)}" if is_scale else with_sigma(value * factor, one.std * factor))
     for spread in (one.between, one.within) if is_grouped else (one.within,):
         if spread is None:
@@ -178,7 +179,12 @@ def _outliers(summary: FleetSummary) -> list[Block]:
     for one in summary.outliers:
         factor, unit = shown(one.parameter.unit)
         away = f"{plain_number(one.deviation * factor, 2)} {unit}"
-        cells = (one.serial, f"{one.parameter.id} {one.parameter.name}", away, plain_number(one.sigmas, 2))
+        cells = (
+            one.serial,
+            f"{one.parameter.id} {axis_in_print(one.parameter.name)}",
+            away,
+            plain_number(one.sigmas, 2),
+        )
         rows.append((*cells, f"{one.p_adjusted:.1g}"))
     return [Table(("device", "parameter", "from the median", "in spreads of the others", "p"), tuple(rows), "Outliers")]
 

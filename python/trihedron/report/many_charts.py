@@ -9,6 +9,7 @@ import numpy as np
 from trihedron.arrays import XYZ
 from trihedron.records.fleet import FleetSummary
 from trihedron.records.sessions import PARAMETERS, SessionsModel
+from trihedron.report.axes import axis_in_print
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Panel, Points, Scale
 from trihedron.report.drawn import said
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
@@ -54,7 +55,7 @@ def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int 
             values = np.array([session.numbers[k] - centre for session in model.sessions]) * factor
             error = np.array([np.sqrt(max(session.covariance[k, k], 0.0)) for session in model.sessions]) * factor
             told = [
-                said(f"{session.name}, {PARAMETERS[k].name}", "", v, f"± {e:.2g} {unit}")
+                said(f"{session.name}, {axis_in_print(PARAMETERS[k].name)}", "", v, f"± {e:.2g} {unit}")
                 for session, v, e in zip(model.sessions, values, error, strict=True)
             ]
             spread = model.repeated[k].within
@@ -83,7 +84,7 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
     across = 1.0 + serial_of + 0.5 * ((order + 0.5) / count - 0.5)
     numbers = np.array([log.numbers[:n] for log in logs if log.numbers is not None])
     errors = np.array([log.std[:n] for log in logs if log.std is not None])
-    x = Scale("device, in the order of the table", whole=True, names=tuple(serials))
+    x = Scale("device, in the order of the table", whole=True, limits=(0.5, len(serials) + 0.5), names=tuple(serials))
     panels = []
     apart = numbers - np.median(numbers, axis=0)
     strength = np.sum((apart / np.where(errors > 0.0, errors, np.inf)) ** 2, axis=0)
@@ -99,6 +100,6 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
             if part.any():
                 told = [said(logs[i].serial, "", values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
                 marks.append(Points(across[part], values[part], told, error[part], name, colour))
-        y = Scale(f"{parameter.id} {parameter.name}  [{unit}]", unit)
+        y = Scale(f"{parameter.id} {axis_in_print(parameter.name)}  [{unit}]", unit)
         panels.append(Panel(x, y, tuple(marks), height_px=150))
     return Chart(tuple(panels), columns=3 if most is None else 2)

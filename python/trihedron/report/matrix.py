@@ -25,11 +25,9 @@ def drawn_matrix(matrix: Matrix, caption: str) -> str:
         for j in range(i):
             r = float(matrix.values[i, j])
             if abs(r) >= SEEN:
-                told = f"{name} and {matrix.names[j]}: {r:+.2f}".replace("-", "−")
                 side = "pos" if r > 0.0 else "neg"
                 cells.append(
-                    f'<path class="cell {side}" data-t="{escape(told)}" fill-opacity="{abs(r):.2f}" '
-                    f'd="M{CELL * j} {CELL * i}h9v9h-9z"/>'
+                    f'<path class="cell {side}" fill-opacity="{abs(r):.2f}" d="M{CELL * j} {CELL * i}h9v9h-9z"/>'
                 )
     frame = "".join(f"M0 {CELL * i + 9.5}H{CELL * i + 9}" for i in range(n))
     box = f"{-NAMES} -34 {CELL * n + NAMES + 30} {CELL * n + 38}"

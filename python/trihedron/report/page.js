@@ -8,8 +8,6 @@
     const text = size >= 1e-4 && size < 1e6 ? String(+v.toPrecision(4)) : v.toExponential(3).replace("e+", "e");
     return text.replace(/-/g, MINUS);
   };
-  /* What all marks of a group begin and end with is said once, by the group. */
-  const told = (node) => { const g = node.parentNode.dataset; return (g.a || "") + node.dataset.t + (g.z || ""); };
   function show(text, event) {
     tip.textContent = text; tip.hidden = false;
     const left = Math.min(event.pageX + 12, scrollX + document.documentElement.clientWidth - tip.offsetWidth - 4);
@@ -95,19 +93,23 @@
       if (this.ready) return this.ready;
       const dots = [], lines = [];
       for (const p of this.svg.querySelectorAll("[data-t]")) {
-        const n = p.getAttribute("d").match(/-?[\d.]+/g).map(Number);
-        /* A bar is pointed at anywhere along its length. */
-        if (!p.classList.contains("area")) dots.push([n[0], n[1], p, 0, 0]);
-        else if (p.classList.contains("across")) dots.push([0, (n[1] + n[2]) / 2, p, Infinity, Math.abs(n[2] - n[1]) / 2]);
-        else dots.push([(n[0] + n[3]) / 2, 0, p, Math.abs(n[3] - n[0]) / 2, Infinity]);
+        const n = p.getAttribute("d").match(/-?[\d.]+/g).map(Number), { a, z, t } = p.dataset, is = (name) => p.classList.contains(name);
+        /* Dots of a path are three numbers each, bars five; what all are told by begins with a and ends with z. */
+        t.split("|").forEach((one, k) => {
+          const text = a + one + z, [x, y, v, w] = n.slice((is("area") ? 5 : 3) * k);
+          /* A bar is pointed at anywhere along its length. */
+          if (!is("area")) dots.push([x, y, text, 0, 0, p]);
+          else if (is("across")) dots.push([0, (y + v) / 2, text, Infinity, Math.abs(v - y) / 2]);
+          else dots.push([(x + w) / 2, 0, text, Math.abs(w - x) / 2, Infinity]);
+        });
       }
       for (const p of this.svg.querySelectorAll("path[data-n]")) {
-        const xs = [], ys = [];
+        const xs = [], ys = [], size = p.dataset.k || 1;
         for (const part of p.getAttribute("d").split("M").filter(Boolean)) {
           const n = part.match(/-?\d+/g).map(Number); let [x, y] = n; xs.push(x); ys.push(y);
           for (let k = 2; k + 1 < n.length; k += 2) { x += n[k]; y += n[k + 1]; xs.push(x); ys.push(y); }
         }
-        lines.push([p.dataset.n, xs, ys]);
+        lines.push([p.dataset.n, xs.map((x) => x * size), ys.map((y) => y * size)]);
       }
       return (this.ready = { dots, lines });
     }
@@ -143,7 +145,13 @@
         e.preventDefault(); const [x, y] = at(e); this.zoom(e.deltaY > 0 ? 1.25 : 0.8, x, 1 - y);
       }, { passive: false });
     }
-    mark(node) { if (this.marked) this.marked.classList.remove("on"); this.marked = node; if (node && node.classList.contains("dot")) node.classList.add("on"); }
+    mark(dot) {
+      if (this.marked) this.marked.remove();
+      this.marked = null;
+      if (!dot || !dot[5]) return;
+      this.marked = dot[5].cloneNode(); delete this.marked.dataset.t;
+      this.marked.classList.add("on"); this.marked.setAttribute("d", `M${dot[0]} ${dot[1]}h0`); dot[5].parentNode.append(this.marked);
+    }
     /* One cursor over all axes of time. */
     follow(share) {
       if (!this.isTime) return;
@@ -160,12 +168,12 @@
       const { dots, lines } = this.marks(), view = this.svg.viewBox.baseVal;
       const ux = view.x + x * view.width, uy = view.y + y * view.height, sx = r.width / view.width, sy = r.height / view.height;
       let best = null, least = 26;
-      for (const [px, py, node, hx, hy] of dots) {
-        const d = Math.hypot(Math.max(0, Math.abs(px - ux) - hx) * sx, Math.max(0, Math.abs(py - uy) - hy) * sy);
-        if (d < least) { least = d; best = node; }
+      for (const dot of dots) {
+        const [px, py, , hx, hy] = dot, d = Math.hypot(Math.max(0, Math.abs(px - ux) - hx) * sx, Math.max(0, Math.abs(py - uy) - hy) * sy);
+        if (d < least) { least = d; best = dot; }
       }
       this.mark(best);
-      if (best) return show(told(best), e);
+      if (best) return show(best[2], e);
       const said = [];
       for (const [name, xs, ys] of lines) {
         let k = 0, near = Infinity;
@@ -218,8 +226,14 @@
     }
   }
   for (const canvas of document.querySelectorAll(".sphere canvas")) new Sphere(canvas);
-  for (const node of document.querySelectorAll(".pose, .cell")) {
-    node.addEventListener("pointermove", (e) => show(node.dataset.t, e)); node.addEventListener("pointerleave", hide);
+  const tells = (node, text) => { node.addEventListener("pointermove", (e) => show(text, e)); node.addEventListener("pointerleave", hide); };
+  for (const node of document.querySelectorAll(".pose")) tells(node, node.dataset.t);
+  for (const matrix of document.querySelectorAll(".matrix")) {
+    const names = [...matrix.querySelectorAll(".row")].map((row) => row.textContent);
+    for (const cell of matrix.querySelectorAll(".cell")) {
+      const [j, i] = cell.getAttribute("d").match(/\d+/g).map((v) => v / 10), sign = cell.classList.contains("pos") ? "+" : MINUS;
+      tells(cell, `${names[i]} and ${names[j]}: ${sign}${cell.getAttribute("fill-opacity")}`);
+    }
   }
 
   /* Tables: a click on a head sorts by it, the third click brings back the order of the file. */

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from trihedron.records.sessions import Change, Repeated, Session, SessionsModel, Spread, ThermalModel
-from trihedron.report.axes import BIAS
+from trihedron.report.axes import BIAS, axis_in_print
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
@@ -34,7 +34,10 @@ def sessions_report(model: SessionsModel) -> Document:
         sections.append(Section("Did anything change?", tuple(_changes(model))))
     if model.thermal is not None:
         sections.append(Section("Temperature", tuple(_thermal(model.thermal))))
-    sections.append(Section("Recordings", (_sessions(model),)))
+    recordings = _sessions(model)
+    if len(recordings.head) > 1:
+        # Names alone stand in the title already.
+        sections.append(Section("Recordings", (recordings,)))
     sections.append(Section("Figures", (_picture(model),)))
     usable = f"{how_many(n, 'recording')} were put into one model"
     if changed:
@@ -53,9 +56,9 @@ def sessions_report(model: SessionsModel) -> Document:
 def _lead(model: SessionsModel) -> Picture:
     """Scales and biases alone: what a user carries from one session to the next."""
     chart = partial(sessions_chart, model, DRIFTING, 2)
-    caption = (
-        "Scale and bias of both sensors in every recording, about the common value; the band: how far they repeat."
-    )
+    has_band = model.thermal is None and any(one.within is not None for one in model.repeated)
+    caption = "Scale and bias of both sensors in every recording, about the common value"
+    caption += "; the band: how far they repeat." if has_band else "."
     return Picture("drift", caption, later("chart_figures", "draw_chart", chart), chart)
 
 
@@ -118,7 +121,7 @@ def _row(one: Repeated, grouped: bool) -> list[str]:
         value = 0.0
     elif one.parameter.id.endswith("misalignment"):
         value -= 0.5 * math.pi
-    cells = [f"{one.parameter.id} {one.parameter.name} [{unit}]"]
+    cells = [f"{one.parameter.id} {axis_in_print(one.parameter.name)} [{unit}]"]
     cells.append(
         f"± {plain_number(one.std * factor, 2)}"
         if one.parameter.id.endswith("scale")
@@ -157,7 +160,7 @@ def _said(change: Change) -> str:
     factor, unit = shown(change.unit)
     pairs = [(size * factor, std * factor) for size, std in zip(change.size, change.std, strict=True)]
     cells = [plain_number(v, 2) if change.kind == "scatter" else with_sigma(v, s) for v, s in pairs]
-    sizes = ", ".join(f"{name} {cell}" for name, cell in zip(change.names, cells, strict=True))
+    sizes = ", ".join(f"{axis_in_print(name)} {cell}" for name, cell in zip(change.names, cells, strict=True))
     what = {
         "differs": "second less first",
         "apart": f"{change.where} apart",

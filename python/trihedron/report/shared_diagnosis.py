@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.shared_effects import SharedDiagnosis, SharedEffect
 from trihedron.report.diagnosis_words import p_in_words, printed_unit, value_in_words, verdict_in_words
-from trihedron.report.document import Block, Document, Facts, Paragraph, Section, Table
+from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.numbers import engineering_exponent, listed, plain_number, power_of_ten
+from trihedron.report.shared_diagnosis_charts import shared_chart
 
 
 def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
     """Lay out what recordings share, and what belongs to one of them."""
-    names = [Path(one.recording_source.split(" + ")[0]).stem for one in found.diagnoses]
+    names = _names(found)
     own = [one.id for one in found.effects if one.is_of_instrument]
-    verdict = f"{listed(own)} belongs to the instrument." if own else "The recordings share no missing effect."
-    if len(own) > 1:
-        verdict = f"{listed(own)} belong to the instrument."
+    verdict = "The recordings share no missing effect."
+    if own:
+        verb = "is missing from the model and belongs" if len(own) == 1 else "are missing from the model and belong"
+        verdict = f"{listed(own)} {verb} to the instrument: one size fits all recordings."
+    elif found.effects:
+        verdict = f"{listed([one.id for one in found.effects])} differs from recording to recording."
     return Document(
         title="Diagnosis of several recordings",
         subtitle=", ".join(names),
@@ -33,7 +39,39 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
             ),
         ),
         stated_level="usable" if found.effects else "good",
+        headlines=_headlines(found),
+        lead=_lead(found, names),
+        next_step=_next_step(found, own),
     )
+
+
+def _names(found: SharedDiagnosis) -> list[str]:
+    return [" + ".join(Path(part).stem for part in one.recording_source.split(" + ")) for one in found.diagnoses]
+
+
+def _headlines(found: SharedDiagnosis) -> tuple[Headline, ...]:
+    n_named = sum(bool(alone) for alone in found.of_single_recordings)
+    return (
+        Headline("recordings", str(len(found.diagnoses)), "", f"{n_named} with effects of their own"),
+        Headline("shared effects", str(sum(one.is_of_instrument for one in found.effects)), "", "of the instrument"),
+    )
+
+
+def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
+    """The strongest of what recordings share: whether its sizes agree is seen at a glance."""
+    if not found.effects:
+        return None
+    chart = partial(shared_chart, found.effects[0], names)
+    caption = f"{found.effects[0].id}: its parameters in all recordings together and in each, with 95 % intervals."
+    return Picture("shared", caption, later("chart_figures", "draw_chart", chart), chart)
+
+
+def _next_step(found: SharedDiagnosis, own: list[str]) -> str:
+    if own:
+        return "Store it with the calibration of one recording: trihedron calibrate LOG --extended -o FILE."
+    if any(found.of_single_recordings):
+        return "What single recordings name belongs to their sessions: diagnose each by itself."
+    return "Nothing is to be added: calibrate the recordings together."
 
 
 def _effects(found: SharedDiagnosis, names: list[str]) -> tuple[Block, ...]:

@@ -32,13 +32,14 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
         title="Simulation",
         subtitle=recording.source,
         verdict=f"{how_many(len(truth.poses), 'pose')} and {how_many(len(truth.moves), 'move')} of an instrument with "
-        f"{effects}; the log contains none of what follows.",
+        f"{effects}. The truth below is not in the log.",
         is_trustworthy=True,
         sections=(
             Section("Result", (Facts(facts),)),
             Section("Effects", (_effects(truth.effects),)),
             Section("True parameters", (*_linear(recording, truth), *_noise(truth))),
         ),
+        next_step="Calibrate the log (trihedron calibrate LOG) and compare with the truth (--truth FILE keeps it).",
         headlines=(
             Headline("poses", str(len(truth.poses)), "", how_many(len(truth.moves), "move")),
             Headline("effects", str(n), "", ", ".join(truth.effects) or "the linear model and noise"),

@@ -49,7 +49,9 @@ def required(calibration: Calibration, options: ExportOptions, target: str) -> F
 
 def noise_row(name: str, figure: NoiseFigure, unit: str) -> list[str]:
     """A comment with the unit, then ``name: value``."""
-    said = f"# {unit}" + (", an upper limit: this walk was not seen in the static log" if figure.is_limit else "")
+    said = f"# {unit}"
+    if figure.is_limit:
+        said = f"# {name} [{unit}] is an upper limit: this walk was not seen in the static log"
     return [said, f"{name}: {number(figure.value)}"]
 
 

@@ -28,8 +28,8 @@ ENTRIES = (
         WARNING,
         "The residual of the poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
         "{floor_m_s2:.3g mm/s²} (χ² per degree of freedom {chi2_per_dof:.3g}, {dof:.0f} degrees); the fit "
-        "includes a bias repeatability of {bias_repeatability_m_s2:.2g mm/s²} rms between poses, and so do the "
-        "standard uncertainties.",
+        "includes a bias repeatability of {bias_repeatability_m_s2:.2g mm/s²} rms per axis between poses, level axes "
+        "(which the moves show, and this residual does not) included, and so do the standard uncertainties.",
         _UNQUIET,
         _LOOK,
     ),

@@ -171,7 +171,8 @@ _HOW = (
     "samples are timestamped on arrival|with {timestamp_error_s:.2g ms} rms of jitter}}"
 )
 _BY_MOTION = (
-    "{motion_tells:?of which the readings show {followed:.2f} ± {sigma_followed:.2g}|no motion shows when the "
+    "{motion_tells:?in motion the readings follow {followed:.2g %} ± {sigma_followed:.2g %} of that (0 %: samples were "
+    "taken evenly, 100 %: when timestamped)|no motion shows when the "
     "samples were taken}"
 )
 _WITH_THEM = (

@@ -69,7 +69,7 @@ ENTRIES = (
         "The {sensor}'s resolution is coarser than its noise ({axes:each}, raw units).",
         "Few bits, or values rounded when they were written.",
         "Averaging longer does not help where the noise does not move the last digit; choose a smaller range.",
-        lines=MappingProxyType({"axes": "{v0}: step {v1:.4g}, noise {v2:.2g}"}),
+        lines=MappingProxyType({"axes": "{v0:axis}: step {v1:.4g}, noise {v2:.2g}"}),
     ),
     Entry(
         Code.CLIPPING,
@@ -79,7 +79,7 @@ ENTRIES = (
         "The motion left the measuring range.",
         "Turn more slowly, or set a wider range; angles integrated over clipped moves are too small.",
         numbers=("count", "sample"),
-        lines=MappingProxyType({"walls": "{v0} at {v1:.7g} ({v2} samples in {v3:# stretch})"}),
+        lines=MappingProxyType({"walls": "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# stretch})"}),
     ),
     Entry(
         Code.RAW_STEP,
@@ -88,6 +88,6 @@ ENTRIES = (
         "The {sensor} is in {unit} but steps like counts ({steps:each} {unit}; {per_unit:.5g} per "
         "{is_accelerometer:?g|°/s}).",
         "{is_decimal:?Rounded to so many decimals when it was written.|Counts times a nominal scale.}",
-        lines=MappingProxyType({"steps": "{v0} {v1:.5g}"}),
+        lines=MappingProxyType({"steps": "{v0:axis} {v1:.5g}"}),
     ),
 )
