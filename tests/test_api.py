@@ -18,7 +18,6 @@ import pytest
 from matplotlib.figure import Figure
 
 import trihedron
-from trihedron.cli import COMMANDS
 from trihedron.records import Calibration, Severity
 
 
@@ -49,18 +48,6 @@ def results(recording, result):
     ]
 
 
-def test_dir_shows_the_public_names_and_nothing_else():
-    assert dir(trihedron) == sorted(trihedron.__all__)
-    assert all(getattr(trihedron, name) is not None for name in trihedron.__all__)
-
-
-def test_every_command_is_a_verb():
-    # What the command `noise` finds for a filter has a name that says so in Python.
-    names = {{"noise": "filter_noise"}.get(command.__name__, command.__name__) for command in COMMANDS}
-    assert names <= set(trihedron.__all__)
-    assert {"report", "plot", "twin"} <= set(trihedron.__all__)
-
-
 def test_import_loads_neither_numpy_nor_anything_else_heavy():
     code = "import sys, trihedron; print([m for m in ('numpy', 'scipy', 'polars', 'typer') if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
@@ -78,13 +65,6 @@ def test_results_are_plain_types_frames_figures_and_pieces_of_html(results):
         assert "<img" not in page
         assert len(repr(one)) < 160
         assert trihedron.report(one)
-
-
-def test_a_frame_of_a_calibration_holds_every_parameter(result):
-    frame = result.to_dataframe()
-    assert frame.columns == ["sensor", "parameter", "value", "sigma", "unit"]
-    S = frame.filter((pl.col("sensor") == "gyroscope") & pl.col("parameter").str.starts_with("S"))["value"]
-    assert np.array_equal(S.to_numpy().reshape(3, 3), result.gyroscope.S)
 
 
 def test_names_from_a_file_are_escaped_in_html(recording):
@@ -175,17 +155,6 @@ def test_frames_lists_and_nested_dictionaries_are_logs():
     rows = [{"t": a, "ax": b[0], "ay": b[1], "az": b[2]} for a, b in zip(t, acc, strict=True)]
     for given in (frame, frame.lazy(), rows, {"t": t, "acc": {"x": acc[:, 0], "y": acc[:, 1], "z": acc[:, 2]}}):
         assert np.array_equal(trihedron.read(given).accelerometer, acc)
-
-
-def test_results_take_each_other(result, recording, tmp_path):
-    trihedron.write_calibration(result, tmp_path / "c.json")
-    assert isinstance(trihedron.read_calibration(tmp_path / "c.json"), Calibration)
-    assert trihedron.verify(tmp_path / "c.json", result).recording is recording
-    assert trihedron.read(result) is recording
-    made = trihedron.export(result, "c", output=tmp_path / "c.h")
-    assert (tmp_path / "c.h").read_text() == made[""]
-    assert trihedron.report(result, tmp_path / "r.html")
-    assert "<svg" in (tmp_path / "r.html").read_text()
 
 
 def test_noise_that_was_just_found_goes_into_an_export():
@@ -305,13 +274,6 @@ def test_verbs_say_what_they_return_and_their_examples_run(recording, result):
             run.run(doctest.DocTestParser().get_doctest(said, names, name, None, 0))
     assert run.tries > 30
     assert run.failures == 0
-
-
-def test_every_result_says_what_it_holds():
-    """Attributes, shapes and units; the reference on the site is made of these."""
-    results = [name for name in trihedron.__all__ if name.endswith("Result") or name in ("Noise", "SensorCalibration")]
-    assert len(results) >= 8
-    assert [name for name in results if "Attributes\n" not in inspect.getdoc(getattr(trihedron, name))] == []
 
 
 def test_several_recordings_in_one_call_are_sent_to_the_verb_that_takes_them(recording):

@@ -75,14 +75,6 @@ def test_a_gyro_that_one_side_lacks_is_said_in_the_verdict_and_found(tmp_path, c
         assert lacks in said
 
 
-def test_a_scenario_needs_a_gyro_to_be_moved_by(tmp_path, capsys):
-    bare = without_gyro(tmp_path / "bare.csv", made_once() / "log.csv")
-    given = tmp_path / "mine.toml"
-    given.write_text(GOOD)
-    assert main(["diagnose", str(bare), "--gravity", G, "--against", str(given)]) == 1
-    assert "this recording has no gyro to show how" in " ".join(capsys.readouterr().err.split())
-
-
 def test_a_calibration_in_place_of_a_simulated_log_is_told_where_it_belongs(tmp_path, capsys):
     made = tmp_path / "cal.json"
     assert main(["calibrate", str(made_once() / "log.csv"), "--gravity", G, "-o", str(made)]) == 0

@@ -142,12 +142,6 @@ def test_a_simulation_without_any_noise_has_less_walk_than_a_recording_and_no_nu
         assert all(axis["K"].value < 1e-5 for axis in found.first)
 
 
-def test_slow_noise_is_not_compared_with_few_poses():
-    short = [replace(z, values=z.values[:8], sigma=z.sigma[:8], time_s=z.time_s[:8], length_s=z.length_s[:8])
-             for z in zeros(1, 1e-5)]  # fmt: skip
-    assert compare_slow(short, zeros(2, 1e-5)) is None
-
-
 def test_stamps_that_reading_made_even_still_count_as_scattered():
     from trihedron.comparison.noise import compare_noise, sampled
 

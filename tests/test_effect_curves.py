@@ -6,10 +6,8 @@ import pytest
 from diagnosed_session import diagnosed, simulated
 from trihedron import diagnose
 from trihedron.records.plain import as_plain
-from trihedron.report.chart import Band, Line, Points
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.document import Picture
-from trihedron.report.effect_charts import curve_panels
 
 G = 9.80665
 
@@ -32,18 +30,6 @@ def test_a_quadratic_is_a_parabola_over_the_force_along_each_axis():
         # A pose shows 2 to 5 mm/s^2 beside the curve; it bends by 40 and more.
         assert np.std(curve.data - at) < 0.2 * abs(k2) * G**2
         assert len(curve.data) == len(curve.poses) >= 6
-
-
-def test_g_sensitivity_is_one_panel_a_component_of_force_with_three_lines():
-    matrix = ((3e-4, -2e-4, 1e-4), (1e-4, 4e-4, 0.0), (0.0, -3e-4, 2e-4))
-    curves = accepted("gyro-g-sensitivity", matrix=matrix).curves
-    assert len(curves) == 9
-    for curve in curves:
-        slope = np.polyfit(curve.x, curve.value, 1)[0]
-        assert slope == pytest.approx(matrix[curve.axis][curve.driver_axis], abs=4e-5)  # 0.02 deg/s/g
-    panels = curve_panels(curves)
-    assert [panel.x.label for panel in panels] == ["f_x [m/s²]", "f_y [m/s²]", "f_z [m/s²]"]
-    assert all(sum(isinstance(mark, kind) for mark in panels[0].marks) == 3 for kind in (Line, Points, Band))
 
 
 @pytest.mark.parametrize(
