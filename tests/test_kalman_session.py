@@ -65,16 +65,6 @@ def test_the_same_session_without_its_angles_agrees_up_to_the_frame(head, table)
     assert np.max(np.abs(difference)) < 6 * 2 * np.max(unknown.sigma_S)
 
 
-def test_times_in_the_table_stand_for_the_segmentation(head, table):
-    recording, segments = head
-    start = np.array([recording.time_s[h.start] for h in segments.poses])
-    stop = np.array([recording.time_s[h.stop - 1] for h in segments.poses]) + 1.0 / recording.rate_hz
-    timed = PoseTable(table.specific_force, start_s=start, stop_s=stop)
-    np.testing.assert_allclose(
-        pose_readings(recording, segments, timed).mean, pose_readings(recording, segments, table).mean, rtol=1e-12
-    )
-
-
 def test_hold_numbers_pick_still_poses_and_a_mismatch_is_said(head, table):
     recording, segments = head
     few = PoseTable(table.specific_force[::9], pose=np.arange(0, 324, 9))

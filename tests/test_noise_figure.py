@@ -7,7 +7,6 @@ from noise_series import series
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.report.chart import Line, Note
 from trihedron.report.noise_charts import allan_chart
-from trihedron.report.noise_figures import draw_allan
 
 
 @pytest.fixture(scope="module")
@@ -36,15 +35,3 @@ def test_the_sum_is_made_of_lines_that_are_drawn_and_each_has_a_name(noise):
         assert {name[0] for name in names} >= {term.value for term in axis.terms if axis.terms[term].is_present}
         unnamed += sum("<" in name for name in names)
     assert unnamed > 0
-
-
-def test_every_name_lies_inside_the_picture(noise):
-    for panel in allan_chart(noise.curve, "rad/s", noise.axes).panels:
-        (left, right), (low, high) = panel.x.limits, panel.y.limits
-        for mark in panel.marks:
-            if isinstance(mark, Note):
-                assert left < mark.x < right
-                assert low < mark.y < high
-    for place in draw_allan(noise.curve, [("rad/s", noise.axes)]).axes:
-        (left, right), (low, high) = place.get_xlim(), place.get_ylim()
-        assert all(left < text.xy[0] < right and low < text.xy[1] < high for text in place.texts)
