@@ -7,7 +7,7 @@ import pytest
 from trihedron import _core
 from trihedron.estimate.noise.allan import allan_deviation, stream_allan_deviation
 from trihedron.estimate.noise.degrees import degrees_of_freedom
-from twins_noise import running_sum_in_long_double, weighted_hadamard, weighted_variance
+from twins_noise import overlapping_variance, running_sum_in_long_double, weighted_hadamard, weighted_variance
 
 NINE = [892.0, 809.0, 823.0, 798.0, 671.0, 644.0, 883.0, 903.0, 677.0]
 
@@ -179,3 +179,21 @@ def test_intervals_of_the_total_deviation_hold_the_allan_deviation_under_quantis
         inside += (curve.lower**2 <= truth) & (truth <= curve.upper**2)
     # 95 % of 200, four binomial errors of 1.5 % either way; before, 40 % at the longest.
     assert np.all(np.abs(inside / runs - 0.95) < 0.062), inside / runs
+
+
+def test_overlapping_means_every_start():
+    x = np.random.default_rng(3).normal(size=300).cumsum()
+    curve = allan_deviation(x, 1.0, [1, 2, 7, 50, 149, 150])
+    assert curve.n_terms.tolist() == [299, 297, 287, 201, 3, 1]
+    for m, deviation in zip(curve.clusters, curve.deviation, strict=True):
+        assert deviation**2 == pytest.approx(overlapping_variance(x, m), rel=1e-12)
+
+
+def test_chunks_give_what_the_whole_array_gives():
+    x = 100.0 + np.random.default_rng(8).normal(size=(400_000, 2)).cumsum(axis=0)
+    whole = allan_deviation(x, 100.0)
+    chunks = (x[i : i + 33_333] for i in range(0, len(x), 33_333))
+    streamed = stream_allan_deviation(chunks, 100.0, n_samples=len(x))
+    assert streamed.stride == 1
+    assert streamed.clusters.tolist() == whole.clusters.tolist()
+    assert streamed.deviation == pytest.approx(whole.deviation, rel=1e-11)

@@ -26,6 +26,21 @@ def coning(t: np.ndarray) -> tuple[np.ndarray, Rotation]:
     return rate, tilt.inv() * attitude
 
 
+def test_a_constant_rate_gives_the_closed_form_in_every_form_and_model():
+    t = uneven(400, 7.0)
+    w = np.array([0.7, -1.1, 0.4])
+    truth = Rotation.from_rotvec(np.outer(t, w))
+    for between in ("constant", "linear", "coning"):
+        rate = np.tile(w, (400, 1))
+        # 399 products, some ulp each.
+        np.testing.assert_allclose(trihedron.integrate_rate(t, rate, between=between), truth.as_matrix(), atol=1e-13)
+        quaternions = trihedron.integrate_rate(t, rate, between=between, form="quaternions")
+        assert np.abs(np.diff(quaternions, axis=0)).max() < 0.1  # no jump of sign
+        np.testing.assert_allclose(Rotation.from_quat(quaternions).as_matrix(), truth.as_matrix(), atol=1e-13)
+        vectors = trihedron.integrate_rate(t, rate, between=between, form="vectors")
+        np.testing.assert_allclose(vectors, truth.as_rotvec(), atol=1e-9)  # 1e-9 at half a turn, where the sign flips
+
+
 @pytest.mark.parametrize(("between", "order"), [("constant", 1), ("linear", 2), ("coning", 4)])
 def test_coning_is_integrated_with_the_order_of_the_model_on_uneven_steps(between, order):
     def error(n: int) -> float:
@@ -52,6 +67,18 @@ def test_the_straight_line_model_is_scipys_product_of_rotation_vectors():
         found = trihedron.integrate_rate(t, w, start=given)
         np.testing.assert_allclose(found, truth, atol=2e-13)  # 3000 products
         np.testing.assert_allclose(trihedron.integrate_rate(t, w, start=given, last_only=True), truth[-1], atol=2e-13)
+
+
+def test_any_memory_layout_and_list_gives_the_same():
+    t = uneven(700, 7.0)
+    w = np.random.default_rng(1).standard_normal((700, 3))
+    expected = trihedron.integrate_rate(t, w)
+    wide = np.zeros((1400, 6))
+    wide[::2, ::2] = w
+    for other in (np.asfortranarray(w), wide[::2, ::2], w.tolist()):
+        np.testing.assert_array_equal(trihedron.integrate_rate(t, other), expected)
+    np.testing.assert_array_equal(trihedron.integrate_rate(np.repeat(t, 2)[::2], w), expected)
+    assert trihedron.integrate_rate([0.0], [[1.0, 2.0, 3.0]]).tolist() == [np.eye(3).tolist()]
 
 
 @pytest.mark.parametrize(
