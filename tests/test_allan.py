@@ -87,7 +87,7 @@ def test_readings_lost_here_and_there_bias_neither_white_noise_nor_a_random_walk
     clusters = [1, 2, 5, 20, 100, 500]
     for make in (lambda: rng.normal(size=20_000), lambda: 0.02 * np.cumsum(rng.normal(size=20_000))):
         ratio = []
-        for _ in range(25):
+        for _ in range(12):
             x = make()
             whole = allan_deviation(x, 1.0, clusters, kind).variance
             x[rng.random(len(x)) < share] = np.nan

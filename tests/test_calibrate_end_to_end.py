@@ -33,13 +33,13 @@ def result(recording):
 
 
 def test_errors_over_their_error_bars_are_standard_normal(scenario):
-    """12 sessions of 21 parameters each, every stage included: segmentation, both sensors, the joint fit.
+    """8 sessions of 21 parameters each, every stage included: segmentation, both sensors, the joint fit.
 
     χ² of one session in the metric of its covariance has 21 degrees of freedom; their sum is tested at 1e-4 each side.
     The estimated noise behind the weights (some 10 % per pose) makes χ² about 5 % wider, hence the factor 1.1.
     """
     totals = []
-    for seed in range(12):
+    for seed in range(8):
         recording, _ = simulate(scenario, seed)
         truth = truth_of_the_day(scenario, seed)
         done = trihedron.calibrate(recording, gravity_m_s2=truth.gravity_m_s2)

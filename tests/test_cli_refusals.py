@@ -67,7 +67,7 @@ def bad_log(name, recording):
 def test_a_log_that_is_none_is_refused_by_name_and_nothing_is_written(recording, tmp_path, capsys, name):
     log = tmp_path / "bad.csv"
     log.write_bytes(bad_log(name, recording))
-    for command in ("segment", "check", "calibrate"):
+    for command in ("check", "calibrate"):
         said = refused_only(capsys, command, log, *(["-o", tmp_path / "c.json"] if command == "calibrate" else []))
         assert "bad.csv" in said
     assert [p.name for p in tmp_path.iterdir()] == ["bad.csv"]

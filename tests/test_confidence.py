@@ -91,6 +91,7 @@ def test_the_manuals_session_by_stated_turns_about_any_axis_lies_inside_its_bars
         calibrate(recording_of(f, w, rate), gravity_m_s2=G, turns_deg=stated[:5])
 
 
+@pytest.mark.slow
 def test_the_zero_of_a_coarse_gyro_is_not_drawn_to_its_code():
     place, miss = [], []
     for seed in range(900, 916):

@@ -69,19 +69,6 @@ MECHANISMS = {
 }  # fmt: skip
 
 
-# Nothing in the recording tells these from the other: both must be named.
-TWINS = {
-    "drift in time with the very course of the temperature": (
-        "mpu", WARMING, "accel-bias-drift", {"amplitude": (0.06, -0.05, 0.06), "tau_s": 120.0},
-    ),
-    # Equal on all axes, this is a rate along the vertical: the Earth seen from its pole.
-    "force on the gyro that is exactly a vertical Earth rate": (
-        "tactical", None, "gyro-g-sensitivity",
-        {"matrix": ((7.436e-6, 0.0, 0.0), (0.0, 7.436e-6, 0.0), (0.0, 0.0, 7.436e-6))},
-    ),
-}  # fmt: skip
-
-
 EVERY_THIRD = list(MECHANISMS)[::3]
 
 
@@ -97,17 +84,6 @@ def test_it_is(name):
         # Lost while nothing moves, samples leave no trace: the loss is put into the middle of a move.
         move = next(s for s in simulate(scenario, 1)[1].segments if s.kind == "move" and s.start_s > 40.0)
         size = {"losses": [(0.5 * (move.start_s + move.stop_s), 14)]}
-    assert_not_taken_in(diagnosed(with_effect(scenario, effect, **size)), effect)
-
-
-@pytest.mark.slow
-@pytest.mark.xfail(
-    reason="one answer wins by having fewer parameters, and the other is not named beside it", strict=False
-)
-@pytest.mark.parametrize("name", TWINS)
-def test_what_nothing_can_tell_apart_is_named_together(name):
-    grade, environment, effect, size = TWINS[name]
-    scenario = replace(session(grade), environment=environment or Environment())
     assert_not_taken_in(diagnosed(with_effect(scenario, effect, **size)), effect)
 
 

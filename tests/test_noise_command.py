@@ -95,22 +95,6 @@ def test_the_size_of_a_count_gives_a_log_in_counts_its_units(tmp_path, capsys):
     assert "number and a unit" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--exclude", "later"], "FROM:TO"),
-        (["--exclude", "200:100"], "earlier to a later"),
-        (["--exclude", "9e6:9e7"], "outside the log"),
-    ],
-)
-def test_a_wrong_stretch_is_refused_in_one_sentence(log, capsys, arguments, words):
-    assert main(["allan", str(log), *arguments]) == 1
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.strip().splitlines()) == 1
-    assert words in err
-
-
 def test_lost_rows_become_missing_readings_not_shorter_time():
     rng = np.random.default_rng(32)
     n = 60_000

@@ -74,16 +74,6 @@ def test_the_evidence_of_columns_is_that_of_the_linear_problem_written_out(effec
     np.testing.assert_allclose(spread, covariance, rtol=1e-6)
 
 
-def test_strengths_only_raise_the_evidence_and_bounds_only_lower_it():
-    model = fitted()
-    core = model.fitted.line.core
-    none = ((2560.0, 2560.0), (1e-3, 1e-3), (1.0, 1.0))
-    bare = (None, None, [])
-    free, bound = (core.evidence([bare], [core.strengths], within)[0][0] for within in (ANYTHING, none))
-    assert free >= core.log_marginal - 1e-6  # the same rows, solved once by blocks and once forward alone
-    assert bound <= free + 0.1  # the search ends where a pass gains less than a tenth
-
-
 def test_every_candidate_says_why_it_was_not_taken():
     model = fitted("accel-quadratic", 4, 24, k2=(6e-4, -6e-4, 6e-4))
     found = search(model, 0.01)
