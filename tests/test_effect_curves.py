@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosed_session import diagnosed, simulated
-from trihedron import diagnose
-from trihedron.records.plain import as_plain
-from trihedron.report.diagnosis import diagnosis_report
-from trihedron.report.document import Picture
+from diagnosed_session import diagnosed
 
 G = 9.80665
 
@@ -35,9 +31,7 @@ def test_a_quadratic_is_a_parabola_over_the_force_along_each_axis():
 @pytest.mark.parametrize(
     ("effect_id", "size", "driver", "is_relative"),
     [
-        ("gyro-thermal-bias", {"per_k": (1e-3, -1e-3, 5e-4)}, "temperature", False),
         ("accel-thermal-scale", {"per_k": (1e-3, -1e-3, 2e-3)}, "temperature", True),
-        ("gyro-bias-drift", {"amplitude": (0.01, -0.02, 0.01)}, "time", False),
         ("vibration-rectification", {"sensor": "accelerometer", "coefficient": 0.02}, "vibration", False),
     ],
 )
@@ -48,17 +42,3 @@ def test_what_drives_an_effect_is_found_from_its_columns(effect_id, size, driver
         left = curve.data - np.interp(curve.data_x, curve.x, curve.value)
         # Half of what it adds: the weakest of these is a few times the noise of a pose.
         assert np.std(left) < 0.5 * np.ptp(curve.value)
-
-
-def test_an_effect_of_moves_is_a_curve_beside_the_residual_that_it_explains():
-    recording, truth = simulated("gyro-scale-nonlinearity", n_poses=26, c3=(0.02, 0.02, -0.02))
-    result = diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
-    effect = next(one for one in result.effects if one.id == "gyro-scale-nonlinearity")
-    assert [c.driver for c in effect.curves] == ["rate"] * 3
-    assert not any(len(c.data) for c in effect.curves)
-    blocks = [block for section in diagnosis_report(result).sections for block in section.blocks]
-    drawn = next(b for b in blocks if isinstance(b, Picture) and b.name == "effect-gyro-scale-nonlinearity")
-    assert len(drawn.chart().panels) == 4
-    assert "moves in which it acts" in drawn.caption
-    # Curves are for the page: the machine's answer holds the parameters.
-    assert "curves" not in as_plain(effect)

@@ -96,6 +96,7 @@ def test_intervals_hold_whatever_is_named():
     assert min(inside.values()) >= 51, inside
 
 
+@pytest.mark.slow
 def test_white_and_walk_near_their_limit_do_not_become_flicker_or_a_ramp():
     rng = np.random.default_rng(63)
     invented = slow = 0
@@ -111,8 +112,7 @@ def test_white_and_walk_near_their_limit_do_not_become_flicker_or_a_ramp():
     assert slow >= 25
 
 
-@pytest.mark.parametrize("truth", [{"N": 1e-2, "K": 6e-4}, {"N": 1e-3, "B": 2e-2}, {"N": 1e-3, "K": 2e-2}])
-@pytest.mark.parametrize("share", [0.05, 0.3])
+@pytest.mark.parametrize(("truth", "share"), [({"N": 1e-2, "K": 6e-4}, 0.05), ({"N": 1e-3, "B": 2e-2}, 0.3)])
 def test_scattered_loss_leaves_the_terms_where_they_are(truth, share):
     rng = np.random.default_rng(65)
     inside = 0

@@ -207,8 +207,8 @@ def test_a_reference_clock_that_jumps_is_refused_with_the_place():
         fit_reference(trial.log, replace(trial.motion, time_s=late), G)
 
 
-@pytest.mark.parametrize("seed", [61, *(pytest.param(s, marks=pytest.mark.slow) for s in (62, 63))])
-@pytest.mark.parametrize("by_s", [0.4, -0.25])
+@pytest.mark.parametrize("seed", [61, pytest.param(62, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("by_s", [-0.25])
 def test_a_clock_that_jumps_late_is_refused_with_the_place(seed, by_s):
     # Ten seconds before the end: too little for two stretches of eight seconds, and the fit calls it outliers.
     trial = tracked(seed)
