@@ -138,12 +138,6 @@ def test_a_wrong_argument_is_one_sentence_in_words_of_python(name, result):
     assert not re.search(r"(?<!\w)--\w", str(caught.value))
 
 
-def test_findings_name_parameters_not_flags(recording):
-    said = [f"{f.seen} {f.cause} {f.action}" for f in trihedron.calibrate(recording).findings]
-    assert any("latitude_deg" in text for text in said)
-    assert not any(re.search(r"(?<!\w)--\w", text) for text in said)
-
-
 def test_frames_lists_and_nested_dictionaries_are_logs():
     rng = np.random.default_rng(2)
     t, acc = np.arange(500) / 100, rng.normal([0, 0, 9.8], 0.02, (500, 3))
@@ -151,20 +145,6 @@ def test_frames_lists_and_nested_dictionaries_are_logs():
     rows = [{"t": a, "ax": b[0], "ay": b[1], "az": b[2]} for a, b in zip(t, acc, strict=True)]
     for given in (frame, frame.lazy(), rows, {"t": t, "acc": {"x": acc[:, 0], "y": acc[:, 1], "z": acc[:, 2]}}):
         assert np.array_equal(trihedron.read(given).accelerometer, acc)
-
-
-def test_noise_that_was_just_found_goes_into_an_export():
-    rng = np.random.default_rng(4)
-    acc = rng.normal([0, 0, 9.8], 0.02, (6000, 3))
-    noise = trihedron.allan({"t": np.arange(6000) / 100, "acc": acc, "gyr": rng.normal(0, 0.001, (6000, 3))})
-    S = np.diag([1.01, 0.99, 1.0])
-    from trihedron.records import SensorCalibration
-
-    sensors = [SensorCalibration(S, np.zeros(3), np.zeros((12, 12)), u, u, "given") for u in ("m/s^2", "rad/s")]
-    known = Calibration(*sensors, np.zeros((24, 24)), "lower", 9.81, "given")
-    text = "\n".join(trihedron.export(known, "kalibr", noise=noise).values())
-    density = float(re.search(r"accelerometer_noise_density: (\S+)", text)[1])
-    assert density == pytest.approx(0.02 / np.sqrt(100.0), rel=0.05)
 
 
 def with_sensor(result, **changes):
