@@ -118,15 +118,3 @@ def test_help_fits_the_terminal_and_its_examples_name_real_options(command, colu
         known = capsys.readouterr().out
         for option in re.findall(r" (--?[a-z][a-z-]*)", line):
             assert option in known, (line, option)
-
-
-@pytest.mark.parametrize(
-    ("shell", "words"),
-    [
-        ("bash", {"COMP_WORDS": "trihedron cal", "COMP_CWORD": "1"}),
-        ("zsh", {"_TYPER_COMPLETE_ARGS": "trihedron cal"}),
-        ("fish", {"_TYPER_COMPLETE_ARGS": "trihedron cal", "_TYPER_COMPLETE_FISH_ACTION": "get-args"}),
-    ],
-)
-def test_shells_complete_a_command(shell, words):
-    assert b"calibrate" in run(_TRIHEDRON_COMPLETE=f"complete_{shell}", **words)
