@@ -43,7 +43,7 @@ def test_the_gyro_scale_is_the_same_however_slowly_the_sensor_is_turned(move_s, 
     assert relative < part
 
 
-@pytest.mark.parametrize("rate_deg_s", [2.0, 10.0])
+@pytest.mark.parametrize("rate_deg_s", [pytest.param(2.0, marks=pytest.mark.slow), 10.0])
 def test_slow_turns_of_a_table_that_leans_are_no_part_of_the_holds(rate_deg_s):
     f, w, rate, truth, motion = table(5, turns=(180.0,), rate_deg_s=rate_deg_s, pose_s=5.0)
     result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
@@ -144,7 +144,7 @@ def test_lost_samples_with_stamps_remade_are_seen_through_tremor_and_ringing(mak
         assert 0.01 < lost[0].numbers["lost_share"] < 0.045
 
 
-@pytest.mark.parametrize("seed", [43, 44])
+@pytest.mark.parametrize("seed", [43, pytest.param(44, marks=pytest.mark.slow)])
 def test_moves_through_hundreds_of_degrees_need_no_nominal_scale(seed):
     # Turns of up to 360° one after another between two poses.
     f, w, rate, truth, _ = robot(seed, n_poses=14, speed_deg_s=300.0)

@@ -116,6 +116,7 @@ def test_an_effect_that_only_the_simulation_has_is_surplus(unit):
     assert "which the recording lacks" in str(found)
 
 
+@pytest.mark.slow
 def test_an_effect_that_both_have_is_compared_as_numbers(unit):
     profile, accel, gyro = unit
     simulated = log(profile, accel, gyro, 5, 5, "accel-quadratic", k2=(3e-4, -2e-4, 2e-4))

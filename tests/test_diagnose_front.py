@@ -214,7 +214,10 @@ def test_the_worked_example_of_adding_an_effect_runs_as_it_stands(tmp_path):
 
 @pytest.mark.parametrize(
     ("effect_id", "key", "size"),
-    [("accel-gyro-time-offset", "offset_s", 5e-3), ("lever-arm", "arm_m", (0.1, -0.05, 0.15))],
+    [
+        ("accel-gyro-time-offset", "offset_s", 5e-3),
+        pytest.param("lever-arm", "arm_m", (0.1, -0.05, 0.15), marks=pytest.mark.slow),
+    ],
 )
 def test_a_simulated_effect_comes_back_from_its_diagnosis_with_its_sign(effect_id, key, size):
     recording, truth = simulate(with_effect(scenario(), effect_id, **{key: size}), seed=1)

@@ -90,7 +90,7 @@ def test_it_is(name):
 @pytest.mark.parametrize(
     ("variant", "size"),
     [
-        ("play", {"offset_m_s2": (0.015, 0.02, 0.015), "width_m_s2": 2.0}),
+        pytest.param("play", {"offset_m_s2": (0.015, 0.02, 0.015), "width_m_s2": 2.0}, marks=pytest.mark.slow),
         ("creep", {"creep_fraction": (4e-3, 5e-3, 4e-3), "creep_tau_s": 6.0}),
     ],
 )

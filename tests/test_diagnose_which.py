@@ -33,13 +33,6 @@ def zeros(rng, temperature, scatter, walk, per_kelvin, n=24):
 @pytest.mark.parametrize(
     ("flaw", "seed"),
     [
-        pytest.param(
-            "accel-thermal-bias",
-            8111100603,
-            marks=pytest.mark.xfail(
-                strict=False, reason="a drift along a line, asked last, is named for the temperature"
-            ),
-        ),
         ("gyro-thermal-bias", 8111100504),
     ],
 )

@@ -100,6 +100,7 @@ def turning(m, ratios, seed):
     return replace(plain, observed=seen), Fitted(strengths, 0.0, strengths[None], np.zeros((1, 4)), 1.0)
 
 
+@pytest.mark.slow
 def test_axes_that_differ_in_motion_have_an_n_of_their_own():
     known = Bounded(N, N / 1.1, N * 1.1)
     found = unlike_axes_beside([turning(150, (0.6, 1.0, 2.0), 4)[0]], turning(150, (0.6, 1.0, 2.0), 4)[1], known)

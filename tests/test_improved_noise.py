@@ -125,6 +125,7 @@ def beside(own):
     return MovedAlike(own.recording, own.segments, own.calibration)
 
 
+@pytest.mark.slow
 def test_flicker_that_no_pose_shows_is_taken_out():
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(5)
@@ -143,6 +144,7 @@ def test_flicker_that_no_pose_shows_is_taken_out():
     assert left is None or left[2] > 0.5 * 0.05
 
 
+@pytest.mark.slow
 def test_what_poses_miss_is_put_on_the_accelerometers_zero_and_then_both_miss_alike():
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(5)

@@ -85,15 +85,15 @@ def test_intervals_hold_whatever_is_named():
     rng = np.random.default_rng(62)
     truth = {"N": 1e-2, "B": 3e-3, "K": 6e-4}
     inside = dict.fromkeys("QNBKR", 0)
-    runs = 60
+    runs = 30
     for _ in range(runs):
         axis = identify_noise(in_time(rng, 1 << 15, 100.0, **truth), 100.0).axes[0]
         for s in inside:
             term = axis.terms[TermName(s)]
             assert term.limit == term.upper
             inside[s] += term.lower <= truth.get(s, 0.0) <= term.upper
-    # Of 60 intervals of 95 %: 51 or more with probability 0.999.
-    assert min(inside.values()) >= 51, inside
+    # Of 30 intervals of 95 %: 24 or more with probability 0.999.
+    assert min(inside.values()) >= 24, inside
 
 
 @pytest.mark.slow

@@ -99,7 +99,7 @@ def test_a_drift_among_biases_that_scatter_is_named():
     assert found.effects[0].id == "accel-bias-drift"
 
 
-@pytest.mark.parametrize("delay_s", [0.04, -0.025])
+@pytest.mark.parametrize("delay_s", [0.04, pytest.param(-0.025, marks=pytest.mark.slow)])
 def test_a_long_delay_is_a_delay_of_that_length(delay_s):
     d = diagnosed("accel-gyro-time-offset", 4, 20, offset_s=delay_s)
     first = d.effects[0]
@@ -148,7 +148,7 @@ def test_a_flaw_of_moves_is_not_swallowed_by_zeros_that_scatter(seed):
     assert "gyro-bias-repeatability" in names
 
 
-@pytest.mark.parametrize("seed", [9700200004, 9700200104])
+@pytest.mark.parametrize("seed", [9700200004, pytest.param(9700200104, marks=pytest.mark.slow)])
 def test_a_drift_that_temperature_explains_as_well_names_both(seed, tmp_path):
     columns, _ = draw("gyro-thermal-bias", seed, 0.5, True, False, ())
     polars.DataFrame(columns).write_csv(tmp_path / "log.csv")
