@@ -1,12 +1,7 @@
 """Sessions of an independent generator (benches/confidence): within their bars, or marked, whatever the motion."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 from confidence.machine import robot
 from confidence.motion import G

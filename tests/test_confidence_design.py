@@ -1,12 +1,7 @@
 """Sessions of the many-factor design (benches/confidence/design.py), one weakness a test."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 from confidence.design import drawn, session
 from confidence.motion import G

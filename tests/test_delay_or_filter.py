@@ -1,11 +1,6 @@
 """A delay and a low-pass of the gyro, on sessions of ``benches/confidence``: each is fitted, and said."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 from confidence.motion import G
 from confidence.sessions import hand

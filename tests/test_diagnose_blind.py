@@ -1,12 +1,7 @@
 """The blind trial in small: healthy sessions pass, a handful of drawn flaws is named, the bench itself is sound."""
 
-import sys
-from pathlib import Path
-
 import pytest
 from scipy.stats import binom
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 import trihedron
 from blind_trial.draw import GRADES, Job

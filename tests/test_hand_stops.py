@@ -1,13 +1,9 @@
 """Which stops of a log are poses, with sessions of an independent generator (benches/hand_stops.py)."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 from hand_stops import score, session
 from trihedron.segment import resegment, segment_recording

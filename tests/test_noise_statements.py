@@ -1,13 +1,8 @@
 """Statements about noise terms: intervals that hold whatever is named, names that are not invented."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 from noise_coverage import in_time
 from noise_series import series

@@ -1,15 +1,11 @@
 """The one search by one evidence: what joins, what is swapped, what every candidate's row says."""
 
-import sys
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import polars
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 import trihedron
 from diagnosed_session import diagnosed, simulated

@@ -1,12 +1,7 @@
 """One zero of the accelerometer for a session, and how far 1/f noise carries it from pose to pose."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 from confidence.motion import G
 from confidence.sessions import hand
