@@ -49,7 +49,7 @@ def log(seed, *, axes=(1.0, 1.1, 1.25), uniform=False, size=1.0, step=STEP, tau_
 
 @pytest.fixture(scope="module", autouse=True)
 def _without_corners():
-    """Corners of filters cost nine tenths of a spectrum's time; tests/test_noise_holds.py has them."""
+    """Corners of filters cost nine tenths of a spectrum's time; tests/test_noise_poses.py has them."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("trihedron.estimate.noise.poses.low_passes", lambda s, _: [LowPass(None, RATE_HZ)] * len(s))
         patch.setattr("trihedron.channel_facts.at_rest.undisturbed", lambda spectrum, _: spectrum)
