@@ -49,6 +49,14 @@ def test_reported_variances_are_those_of_the_formula():
     np.testing.assert_allclose(variance[9:], sigma**2 / 6.0, rtol=1e-9)
 
 
+def test_repeats_and_missing_faces_are_taken_as_they_come():
+    faces = np.array([1, -1, 1, 2, 3, 3, 3])
+    sensor, _ = calibrate_faces(face_readings(faces, 0.0, 0), 1e-3, G, raw_unit="m/s^2")
+    np.testing.assert_allclose(other_form(sensor.S, sensor.b)[0], S_A, atol=1e-12)
+    seen = sensor.observability
+    assert (seen.rank, seen.n_parameters, seen.advice) == (12, 12, ("-Y up", "-Z up"))
+
+
 @pytest.mark.parametrize("faces", [[1, -1, 2, -2], [1, 2, 3], [1, -1, 1, -1]])
 def test_faces_that_leave_parameters_free_are_refused_by_name(faces):
     with pytest.raises(ValueError, match=r"missing: .*[+-]Z up"):
