@@ -107,6 +107,17 @@ def test_a_frozen_channel_is_found_with_its_place(tmp_path, column):
     assert stuck.numbers["sample"] == 1500
 
 
+def test_a_channel_that_stands_at_its_limit_is_clipped_and_not_stuck(tmp_path):
+    table = counts()
+    table[:, 4:] = np.minimum(table[:, 4:], 4096.0)
+    recording = read(tmp_path, table)
+    clipped = finding(recording, FindingCode.CLIPPING)
+    assert clipped.numbers["x_high_value"] == 4096.0
+    assert clipped.numbers["x_high_count"] == np.count_nonzero(table[:, 4] == 4096.0)
+    assert "accelerometer" not in clipped.seen
+    assert FindingCode.STUCK_VALUES not in codes(recording)
+
+
 def test_a_quiet_coarse_sensor_resting_on_its_largest_count_is_coarse_and_neither_clipped_nor_stuck(tmp_path):
     rng = np.random.default_rng(4)
     table = counts(moving=False)
