@@ -22,5 +22,7 @@ mod stillness;
 #[path = "kernels/kalman.rs"]
 mod kalman;
 
+#[path = "kernels/allan.rs"]
+mod allan;
 #[path = "kernels/simulate.rs"]
 mod simulate;

@@ -77,6 +77,19 @@ def test_samples_that_share_a_timestamp_do_not_turn_between_them():
         np.testing.assert_allclose(found[300], found[299], atol=1e-15)
 
 
+def test_a_long_log_goes_on_from_any_of_its_samples():
+    # Pieces of 32768 steps are worked on side by side: three of them, and a middle that lies at the end of none.
+    rng = np.random.default_rng(6)
+    t, w = np.cumsum(rng.uniform(0.005, 0.015, 80_000)), rng.standard_normal((80_000, 3))
+    middle = 41_000
+    at = trihedron.integrate_rate(t[: middle + 1], w[: middle + 1], last_only=True, between="constant")
+    whole = trihedron.integrate_rate(t, w, last_only=True, between="constant")
+    rest = trihedron.integrate_rate(t[middle:], w[middle:], start=at, last_only=True, between="constant")
+    # 80000 products, some ulp each, of which errors go with the root.
+    np.testing.assert_allclose(rest, whole, atol=1e-12)
+    np.testing.assert_allclose(trihedron.integrate_rate(t, w, between="constant")[-1], whole, atol=1e-12)
+
+
 def test_any_memory_layout_and_list_gives_the_same():
     t = uneven(700, 7.0)
     w = np.random.default_rng(1).standard_normal((700, 3))

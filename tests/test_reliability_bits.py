@@ -80,13 +80,15 @@ def test_outputs_of_long_logs_do_not_depend_on_threads(long_logs, name):
 FIT = """
 import hashlib
 import numpy as np
+import trihedron
 from trihedron import _core
 rng = np.random.default_rng(3)
 d = rng.standard_normal((60_000, 3))
 raw = 9.81 * d / np.linalg.norm(d, axis=1)[:, None] * [1.01, 0.99, 1.02] + 0.1 + rng.normal(0.0, 1e-2, d.shape)
 fit = _core.fit_norm(raw, 1e-4 * np.eye(3)[None], _core.NormSettings(9.81))
 deviation = _core.allan_variance(raw, [1, 8, 512], _core.AllanKind.Overlapping)[0]
-found = (fit.S, fit.b, fit.covariance, deviation)
+attitude = trihedron.integrate_rate(np.arange(60_000) / 100.0, d)
+found = (fit.S, fit.b, fit.covariance, deviation, attitude)
 print([hashlib.sha256(np.ascontiguousarray(x).tobytes()).hexdigest() for x in found])
 """
 
