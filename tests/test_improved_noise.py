@@ -166,6 +166,7 @@ def test_what_poses_miss_is_put_on_the_accelerometers_zero_and_then_both_miss_al
     assert max(rest) < 0.4 * 0.02
 
 
+@pytest.mark.slow
 def test_one_pose_that_was_pushed_makes_no_scatter_for_all_of_them():
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(5)
