@@ -1,4 +1,4 @@
-//! Allan kernels: every instruction set, every tile; kinds, lengths and streams: tests/test_allan.py.
+//! Allan kernels: every instruction set, every tile; kinds, lengths and streams: `tests/test_allan.py`.
 
 use proptest::prelude::*;
 use trihedron::allan::tiles::{Difference, Kernel, energies};

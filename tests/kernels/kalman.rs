@@ -1,4 +1,4 @@
-//! Kalman kernels: what dither does to rounding, and constants that walk. The filter itself: tests/test_kalman.py.
+//! Kalman kernels: what dither does to rounding, and constants that walk. The filter itself: `tests/test_kalman.py`.
 
 use trihedron::kalman::rounding::undithered_variance;
 use trihedron::kalman::{AxisFilter, NoiseTerms, Pose, Prior, ShapingModel};
