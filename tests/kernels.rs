@@ -1,7 +1,5 @@
 //! Property and derivative tests of the kernels, one module per room.
 
-#[path = "kernels/attitude.rs"]
-mod attitude;
 #[path = "kernels/ellipsoid.rs"]
 mod ellipsoid;
 #[path = "kernels/gauss_newton.rs"]
@@ -28,6 +26,3 @@ mod kalman;
 mod allan;
 #[path = "kernels/simulate.rs"]
 mod simulate;
-
-#[path = "kernels/hostile.rs"]
-mod hostile;

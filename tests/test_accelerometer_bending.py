@@ -28,8 +28,9 @@ def errors(rng, n, name):
     return found / np.sqrt(alone), found / np.sqrt(alone + np.diag(covariance_by_bends(up, residual, sigma, G)))
 
 
-@pytest.mark.parametrize("name", [None, *SHAPES])
-@pytest.mark.parametrize("n", [13, 18, 36])
+@pytest.mark.parametrize(
+    ("n", "name"), [(13, None), (13, "unlike-scales"), (18, "quadratic"), (36, None), (36, "cubic")]
+)
 def test_bars_hold_for_scatter_and_for_bending(name, n):
     rng, n_trials = np.random.default_rng([31, n]), 60
     before, after = (np.array(x) for x in zip(*(errors(rng, n, name) for _ in range(n_trials)), strict=True))

@@ -53,7 +53,8 @@ def test_repeats_and_missing_faces_are_taken_as_they_come():
     faces = np.array([1, -1, 1, 2, 3, 3, 3])
     sensor, _ = calibrate_faces(face_readings(faces, 0.0, 0), 1e-3, G, raw_unit="m/s^2")
     np.testing.assert_allclose(other_form(sensor.S, sensor.b)[0], S_A, atol=1e-12)
-    assert sensor.observability.advice == ("-Y up", "-Z up")
+    seen = sensor.observability
+    assert (seen.rank, seen.n_parameters, seen.advice) == (12, 12, ("-Y up", "-Z up"))
 
 
 @pytest.mark.parametrize("faces", [[1, -1, 2, -2], [1, 2, 3], [1, -1, 1, -1]])
@@ -82,28 +83,28 @@ def test_poses_on_edges_are_left_out_and_counted():
 def test_a_level_table_raises_no_alarm_and_half_a_degree_always_does():
     # 6 degrees of freedom against 1 mg of noise; half a degree is 86 mm/s², eight standard errors.
     false_alarms = caught = 0
-    n = 200
+    n = 100
     for seed in range(n):
         _, level = calibrate_faces(face_readings(SIX, 1e-2, seed), 1e-2, G, raw_unit="m/s^2")
         _, tilted = calibrate_faces(face_readings(SIX, 1e-2, seed, tilt_deg=0.5), 1e-2, G, raw_unit="m/s^2")
         false_alarms += FindingCode.TABLE_TILT in codes(level)
         caught += FindingCode.TABLE_TILT in codes(tilted)
-    # Tested at 1 %: binomial(200, 0.01) exceeds 7 once in a thousand. A tilt pattern that all six degrees of freedom
+    # Tested at 1 %: binomial(100, 0.01) exceeds 5 once in two thousand. A tilt pattern that all six degrees of freedom
     # miss is rare: eight standard errors leave less than 1 %.
-    assert false_alarms <= 7
+    assert false_alarms <= 5
     assert caught >= 0.99 * n
 
 
 def test_the_error_bars_of_tilted_faces_cover_the_truth():
-    n, inside = 200, 0
+    n, inside = 100, 0
     for seed in range(n):
         sensor, _ = calibrate_faces(face_readings(SIX, 1e-3, seed, tilt_deg=1.0), 1e-3, G, raw_unit="m/s^2")
         truth = np.linalg.inv(S_A)
         off = ~np.eye(3, dtype=bool)
         inside += np.mean(np.abs(sensor.S - truth)[off] < 2.45 * sensor.sigma_S[off])
     # The tilt is estimated from six degrees of freedom: Student's t with 6 has 95 % within 2.45. Six entries per seed
-    # share one estimate; the spread of the mean over 200 seeds is below 0.02.
-    assert 0.90 < inside / n < 0.99
+    # share one estimate; the spread of the mean over 100 seeds is below 0.03.
+    assert 0.89 < inside / n < 1.0
 
 
 def test_an_axis_documented_the_wrong_way_round_is_reported():

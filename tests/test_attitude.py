@@ -69,6 +69,27 @@ def test_the_straight_line_model_is_scipys_product_of_rotation_vectors():
         np.testing.assert_allclose(trihedron.integrate_rate(t, w, start=given, last_only=True), truth[-1], atol=2e-13)
 
 
+def test_samples_that_share_a_timestamp_do_not_turn_between_them():
+    t, w = uneven(600, 6.0), np.tile([0.3, -0.2, 0.5], (600, 1))
+    t[300] = t[299]
+    for between in ("constant", "linear", "coning"):
+        found = trihedron.integrate_rate(t, w, between=between)
+        np.testing.assert_allclose(found[300], found[299], atol=1e-15)
+
+
+def test_a_long_log_goes_on_from_any_of_its_samples():
+    # Pieces of 32768 steps are worked on side by side: three of them, and a middle that lies at the end of none.
+    rng = np.random.default_rng(6)
+    t, w = np.cumsum(rng.uniform(0.005, 0.015, 80_000)), rng.standard_normal((80_000, 3))
+    middle = 41_000
+    at = trihedron.integrate_rate(t[: middle + 1], w[: middle + 1], last_only=True, between="constant")
+    whole = trihedron.integrate_rate(t, w, last_only=True, between="constant")
+    rest = trihedron.integrate_rate(t[middle:], w[middle:], start=at, last_only=True, between="constant")
+    # 80000 products, some ulp each, of which errors go with the root.
+    np.testing.assert_allclose(rest, whole, atol=1e-12)
+    np.testing.assert_allclose(trihedron.integrate_rate(t, w, between="constant")[-1], whole, atol=1e-12)
+
+
 def test_any_memory_layout_and_list_gives_the_same():
     t = uneven(700, 7.0)
     w = np.random.default_rng(1).standard_normal((700, 3))

@@ -33,13 +33,13 @@ def result(recording):
 
 
 def test_errors_over_their_error_bars_are_standard_normal(scenario):
-    """12 sessions of 21 parameters each, every stage included: segmentation, both sensors, the joint fit.
+    """8 sessions of 21 parameters each, every stage included: segmentation, both sensors, the joint fit.
 
     χ² of one session in the metric of its covariance has 21 degrees of freedom; their sum is tested at 1e-4 each side.
     The estimated noise behind the weights (some 10 % per pose) makes χ² about 5 % wider, hence the factor 1.1.
     """
     totals = []
-    for seed in range(12):
+    for seed in range(8):
         recording, _ = simulate(scenario, seed)
         truth = truth_of_the_day(scenario, seed)
         done = trihedron.calibrate(recording, gravity_m_s2=truth.gravity_m_s2)
@@ -53,26 +53,6 @@ def test_a_wrong_gravity_goes_into_the_scale_and_nowhere_else(recording, result)
     np.testing.assert_allclose(other.accelerometer.S, 1.002 * result.accelerometer.S, rtol=1e-6, atol=1e-12)
     np.testing.assert_allclose(other.accelerometer.b, 1.002 * result.accelerometer.b, rtol=1e-5)
     np.testing.assert_allclose(other.gyroscope.S, result.gyroscope.S, rtol=1e-6, atol=1e-11)
-
-
-def test_the_result_has_what_a_user_looks_for_and_prints_as_a_report(result):
-    assert result.accelerometer.S.shape == (3, 3)
-    assert result.accelerometer.b.shape == (3,)
-    assert result.accelerometer.covariance.shape == (12, 12)
-    assert result.gyroscope.covariance.shape == (12, 12)
-    assert isinstance(result.findings, tuple)
-    text = str(result)
-    for heading in ("Result", "Findings", "Axes", "Uncertainty", "Residuals"):
-        assert f"\n{heading}\n" in text
-    assert max(map(len, text.splitlines())) < 140
-    assert " at 0x" not in repr(result)
-
-
-def test_held_out_residuals_stand_beside_those_in_sample(result):
-    for sensor in (result.accelerometer, result.gyroscope):
-        assert sensor.quality.held_out is not None
-        assert sensor.quality.held_out.shape == sensor.quality.residual.shape
-        assert sensor.quality.held_out_rms > 0.0
 
 
 def test_both_methods_agree_within_their_error_bars(recording, result):
@@ -137,13 +117,6 @@ def test_a_move_beyond_the_gyros_range_is_left_out_of_what_verification_says_of_
     np.testing.assert_array_equal(judged.moves, np.delete(as_it_was.moves, 4))
     assert judged.angle_rms_deg < 1.5 * as_it_was.angle_rms_deg
     assert "without move 5" in str(trihedron.verify(result, replace(other, gyroscope=beyond)))
-
-
-def test_verification_notices_a_sensor_that_has_changed(scenario, result):
-    changed = replace(scenario, accelerometer=replace(scenario.accelerometer, b=(0.33, -0.3834, 0.1025)))
-    other, _ = simulate(changed, 13)
-    codes = {finding.code.value for finding in trihedron.verify(result, other).findings}
-    assert "residual-above-noise" in codes
 
 
 def test_a_miss_far_beyond_what_was_expected_is_not_to_be_trusted_unless_a_limit_accepts_it(scenario, result):

@@ -16,10 +16,8 @@ from trihedron.files.calibration import (
     schema,
     write_calibration,
 )
-from trihedron.files.output import OutputError
 from trihedron.records.frozen import thawed
 from trihedron.simulate import hand_session, scenario_by_name, simulate
-from trihedron.units import AccelerationUnit
 
 
 @pytest.fixture(scope="module")
@@ -86,24 +84,6 @@ def test_the_equation_written_in_the_file_reproduces_what_apply_does(session):
         S, b = (np.array(document[name][key]) for key in ("S", "b"))
         expected = [S @ row + b for row in getattr(recording, name)[:50]]
         np.testing.assert_allclose(getattr(corrected, name)[:50], expected, rtol=0, atol=1e-12)
-
-
-def test_readings_in_other_units_are_refused_with_both_units_named(session):
-    recording, result = session
-    other = replace(recording, accelerometer_unit=AccelerationUnit.G)
-    with pytest.raises(ValueError, match="accelerometer is in g, and this calibration maps counts"):
-        apply(result, other)
-
-
-def test_an_existing_file_is_left_alone_unless_replacing_is_asked_for(session, tmp_path):
-    path = tmp_path / "c.json"
-    path.write_text("precious")
-    with pytest.raises(OutputError, match="was left alone"):
-        write_calibration(session[1].calibration, path)
-    assert path.read_text() == "precious"
-    write_calibration(session[1].calibration, path, overwrite=True)
-    assert read_calibration(path).frame == "lower"
-    assert [p.name for p in tmp_path.iterdir()] == ["c.json"]
 
 
 def damaged(document, path, value):

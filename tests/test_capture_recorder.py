@@ -109,7 +109,7 @@ def test_an_unplugged_board_goes_on_in_the_same_file_with_the_gap_said(tmp_path)
     assert trihedron.read(tmp_path / "log.csv").n_samples == len(times)
 
 
-@pytest.mark.parametrize("protocol", ["xsens-mtdata2", "xio", "lines"])
+@pytest.mark.parametrize("protocol", ["xio"])
 def test_frames_cut_by_unplugging_are_counted_by_the_device_counter(protocol, tmp_path):
     link = tmp_path / "tty"
     faults = Faults(disconnect_s=(0.8, 1.4), away_s=0.4)

@@ -71,32 +71,6 @@ def test_verify_on_another_session_passes_and_a_limit_turns_the_status(session, 
     assert "NOT VERIFIED" in capsys.readouterr().out
 
 
-def test_verify_says_when_it_is_given_the_recording_the_calibration_was_made_from(session, capsys):
-    main(["verify", str(session / "c.json"), str(session / "log.csv")])
-    assert "proves nothing" in " ".join(capsys.readouterr().out.split())
-
-
-def test_export_writes_to_stdout_or_a_file(session, tmp_path, capsys):
-    assert main(["export", str(session / "c.json"), "--to", "c"]) == 0
-    assert "trihedron_correct" in capsys.readouterr().out
-    size = ["--accel-lsb", "0.061 mg", "--gyro-lsb", "0.0305 deg/s"]
-    words = ["export", str(session / "c.json"), "--to", "basalt", "-o", str(tmp_path / "imu.json")]
-    assert main([*words, *size]) == 0
-    assert "calib_gyro_bias" in (tmp_path / "imu.json").read_text()
-
-
-def test_gravity_that_was_not_given_is_said_with_what_it_may_cost(session, capsys):
-    assert main(["calibrate", str(session / "log.csv")]) == 0
-    out = capsys.readouterr().out
-    assert "Gravity was not given" in out
-    assert "0.4 %" in out
-
-
-def test_latitude_and_height_give_gravity(session, capsys):
-    assert main(["calibrate", str(session / "log.csv"), "--latitude", "45", "--height", "0", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["gravity_m_s2"] == pytest.approx(9.806198, abs=1e-6)
-
-
 @pytest.mark.parametrize("change", ["gzip", "tabs", "milliseconds", "no time"])
 def test_the_same_readings_in_another_dress_give_the_same_calibration(session, recording, tmp_path, change, capsys):
     path, more = tmp_path / "log.csv", []
@@ -163,16 +137,6 @@ def test_calibrating_a_plain_log_loads_no_scipy(session):
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.rstrip().endswith("LOADED []")
-
-
-def test_the_command_as_a_process_ends_with_the_status_and_no_traceback(tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-m", "trihedron", "calibrate", str(tmp_path / "none.csv")], capture_output=True, text=True
-    )
-    assert done.returncode == 1
-    assert done.stdout == ""
-    assert done.stderr.count("\n") == 1
-    assert "no such file" in done.stderr
 
 
 def test_a_reader_that_leaves_early_is_no_error(session):

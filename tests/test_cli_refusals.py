@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trihedron.cli import COMMANDS, main
-from trihedron.cli.examples import EXAMPLES
+from trihedron.cli import main
 from trihedron.records import Recording
 from trihedron.simulate import Motion, MoveTo, Pose
 from written_session import G, log_text, recording, refused, refused_only, session, simulated
@@ -68,7 +67,7 @@ def bad_log(name, recording):
 def test_a_log_that_is_none_is_refused_by_name_and_nothing_is_written(recording, tmp_path, capsys, name):
     log = tmp_path / "bad.csv"
     log.write_bytes(bad_log(name, recording))
-    for command in ("segment", "check", "calibrate"):
+    for command in ("check", "calibrate"):
         said = refused_only(capsys, command, log, *(["-o", tmp_path / "c.json"] if command == "calibrate" else []))
         assert "bad.csv" in said
     assert [p.name for p in tmp_path.iterdir()] == ["bad.csv"]
@@ -145,16 +144,3 @@ def test_too_few_poses_and_a_log_that_never_rests_are_refused_with_the_remedy(tm
     assert "still" in refused(capsys, "calibrate", shaken)
     assert main(["check", str(shaken)]) == 2
     assert "NOT FIT" in capsys.readouterr().out
-
-
-def test_two_logs_of_one_sensor_each_are_told_how_to_be_one_recording(capsys, tmp_path, recording):
-    names = [str(tmp_path / "a.csv"), str(tmp_path / "g.csv")]
-    for name, values in zip(names, (recording.accelerometer, recording.gyroscope), strict=True):
-        np.savetxt(name, np.column_stack([recording.time_s, values]), delimiter=",", header="t,ax,ay,az", comments="")
-    assert "with --accel and --gyro" in refused(capsys, "calibrate", *names)
-
-
-def test_every_command_has_an_example_that_names_it():
-    for command in COMMANDS:
-        for _, line in EXAMPLES[command.__name__]:
-            assert line.startswith(f"trihedron {command.__name__}")

@@ -1,12 +1,7 @@
 """Sessions of an independent generator (benches/confidence): within their bars, or marked, whatever the motion."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 from confidence.machine import robot
 from confidence.motion import G
@@ -43,7 +38,7 @@ def test_the_gyro_scale_is_the_same_however_slowly_the_sensor_is_turned(move_s, 
     assert relative < part
 
 
-@pytest.mark.parametrize("rate_deg_s", [2.0, 10.0])
+@pytest.mark.parametrize("rate_deg_s", [pytest.param(2.0, marks=pytest.mark.slow), 10.0])
 def test_slow_turns_of_a_table_that_leans_are_no_part_of_the_holds(rate_deg_s):
     f, w, rate, truth, motion = table(5, turns=(180.0,), rate_deg_s=rate_deg_s, pose_s=5.0)
     result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
@@ -91,6 +86,7 @@ def test_the_manuals_session_by_stated_turns_about_any_axis_lies_inside_its_bars
         calibrate(recording_of(f, w, rate), gravity_m_s2=G, turns_deg=stated[:5])
 
 
+@pytest.mark.slow
 def test_the_zero_of_a_coarse_gyro_is_not_drawn_to_its_code():
     place, miss = [], []
     for seed in range(900, 916):
@@ -143,7 +139,7 @@ def test_lost_samples_with_stamps_remade_are_seen_through_tremor_and_ringing(mak
         assert 0.01 < lost[0].numbers["lost_share"] < 0.045
 
 
-@pytest.mark.parametrize("seed", [43, 44])
+@pytest.mark.parametrize("seed", [43, pytest.param(44, marks=pytest.mark.slow)])
 def test_moves_through_hundreds_of_degrees_need_no_nominal_scale(seed):
     # Turns of up to 360° one after another between two poses.
     f, w, rate, truth, _ = robot(seed, n_poses=14, speed_deg_s=300.0)

@@ -22,17 +22,7 @@ def refused(given, capsys):
     ("wrong", "place", "remedy"),
     [
         (GOOD.replace("profile", "profil"), "mine.toml: the file has no key 'profil'", "is 'profile' meant?"),
-        (GOOD.replace("[gyroscope]", "[gyroscop]"), "the file has no key 'gyroscop'", "is 'gyroscope' meant?"),
-        (GOOD.replace("b = [0.0", "bb = [0.0"), "gyroscope has no key 'bb'", "it knows S, b"),
-        (GOOD.replace("[0.0, 0.0, 0.0]", "[0.0, 0.0]"), "gyroscope.b must hold 3 values", "got [0.0, 0.0]"),
-        (GOOD.replace('"hand"', '"hands"'), "no session is of kind 'hands'", "there are"),
         (GOOD.replace('"mpu"', '"mpu'), "mine.toml is not a TOML file", "line 2"),
-        (
-            GOOD + '[[effect]]\nid = "gyro-g-sensitivty"\n',
-            "no effect is called 'gyro-g-sensitivty'",
-            "is 'gyro-g-sensitivity' meant?",
-        ),
-        (GOOD.replace('"mpu"', '"mpuu"'), "no profile is called 'mpuu'", "is 'mpu' meant?"),
         (GOOD + '[[effect]]\nid = "accel-quadratic"\nk3 = 1.0\n', "effect accel-quadratic", "'k3'"),
     ],
 )
@@ -73,14 +63,6 @@ def test_a_gyro_that_one_side_lacks_is_said_in_the_verdict_and_found(tmp_path, c
         said = " ".join(capsys.readouterr().out.split())
         assert "the gyro was not compared." in said
         assert lacks in said
-
-
-def test_a_scenario_needs_a_gyro_to_be_moved_by(tmp_path, capsys):
-    bare = without_gyro(tmp_path / "bare.csv", made_once() / "log.csv")
-    given = tmp_path / "mine.toml"
-    given.write_text(GOOD)
-    assert main(["diagnose", str(bare), "--gravity", G, "--against", str(given)]) == 1
-    assert "this recording has no gyro to show how" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_calibration_in_place_of_a_simulated_log_is_told_where_it_belongs(tmp_path, capsys):

@@ -1,6 +1,7 @@
 """Mistakes that simulators have made: units, axes, slow noise; each told by its numbers."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -52,6 +53,7 @@ def test_a_unit_that_the_log_states_and_keeps_is_no_mistake():
     assert not found.differ
 
 
+@cache
 def session_with_world_rates(seed):
     """A simulated log and the same with its rates turned into the world."""
     scenario = replace(scenario_by_name("hand-session"), motion=hand_session(10, pose_s=2.0, layout=4))
@@ -116,10 +118,10 @@ def zeros(seed, walk, flicker=0.0):
 
 
 def test_walks_of_two_sessions_of_one_unit_are_not_told_apart_and_a_walk_without_its_root_is():
-    equal = [compare_slow(zeros(s, 7e-6, 4e-5), zeros(100 + s, 7e-6, 4e-5)).p_value for s in range(5)]
-    # Five pairs: two below 1 % happen in 0.1 %.
+    equal = [compare_slow(zeros(s, 7e-6, 4e-5), zeros(100 + s, 7e-6, 4e-5)).p_value for s in range(3)]
+    # Three pairs: two below 1 % happen in 0.03 %.
     assert np.sum(np.array(equal) < 0.01) <= 1
-    for s in range(2):
+    for s in range(1):
         found = compare_slow(zeros(s, 1e-4), zeros(200 + s, 1e-5))
         assert found.p_value < 1e-3
         assert found.term == "K"
@@ -140,12 +142,6 @@ def test_a_simulation_without_any_noise_has_less_walk_than_a_recording_and_no_nu
         assert found.p_value < 1e-3
         assert all(np.isfinite([r.value for r in axis.values()]).all() for axis in found.ratio)
         assert all(axis["K"].value < 1e-5 for axis in found.first)
-
-
-def test_slow_noise_is_not_compared_with_few_poses():
-    short = [replace(z, values=z.values[:8], sigma=z.sigma[:8], time_s=z.time_s[:8], length_s=z.length_s[:8])
-             for z in zeros(1, 1e-5)]  # fmt: skip
-    assert compare_slow(short, zeros(2, 1e-5)) is None
 
 
 def test_stamps_that_reading_made_even_still_count_as_scattered():

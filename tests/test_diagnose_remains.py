@@ -7,13 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 
 import trihedron
-from trihedron.diagnose.diagnosis import verdict_of
 from trihedron.diagnose.effects.table_tilt import _error_of_mean
 from trihedron.diagnose.residuals import goodness_of_fit
 from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
 from trihedron.diagnose.session.twin import STATIC_ACCEL, STATIC_GYRO
 from trihedron.records import Pose
-from trihedron.records.domains import DomainTest
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
 
 RATE_HZ = 100.0
@@ -70,15 +68,6 @@ def test_the_error_of_a_mean_of_few_turns_covers_it():
         inside += abs(values.mean() - 0.5) < 2.0 * _error_of_mean(values, weights, np.zeros(n))
     # 95.4 % +- 3 sigma of 1000; the plain scatter of a few turns covers 86 to 92.
     assert 0.934 < inside / 1000 < 0.975
-
-
-def test_footnotes_are_no_answer_while_something_else_disagrees():
-    left = DomainTest("static-gyro", 9.0, 30.0, 1e-9, True)
-    footnote = SimpleNamespace(ids={"disturbed-pose"}, are_footnotes=True, are_spread=False)
-    assert verdict_of(footnote, (left,), (left,)) == "unexplained"
-    assert verdict_of(footnote, (left,), ()) == "missing-physics"
-    answer = SimpleNamespace(ids={"accel-cubic"}, are_footnotes=False, are_spread=False)
-    assert verdict_of(answer, (left,), (left,)) == "missing-physics"
 
 
 def test_restless_poses_hide_neither_a_scatter_nor_the_g_sensitivity_beside_it():

@@ -1,13 +1,8 @@
 """Which of several explanations: shapes of one effect, a temperature or a drift, line or ring, codes of two steps."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import polars as pl
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 import trihedron
 from nuisance_trial.draw import G, draw
@@ -33,13 +28,6 @@ def zeros(rng, temperature, scatter, walk, per_kelvin, n=24):
 @pytest.mark.parametrize(
     ("flaw", "seed"),
     [
-        pytest.param(
-            "accel-thermal-bias",
-            8111100603,
-            marks=pytest.mark.xfail(
-                strict=False, reason="a drift along a line, asked last, is named for the temperature"
-            ),
-        ),
         ("gyro-thermal-bias", 8111100504),
     ],
 )

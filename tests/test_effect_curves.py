@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosed_session import diagnosed, simulated
-from trihedron import diagnose
-from trihedron.records.plain import as_plain
-from trihedron.report.chart import Band, Line, Points
-from trihedron.report.diagnosis import diagnosis_report
-from trihedron.report.document import Picture
-from trihedron.report.effect_charts import curve_panels
+from diagnosed_session import diagnosed
 
 G = 9.80665
 
@@ -34,24 +28,10 @@ def test_a_quadratic_is_a_parabola_over_the_force_along_each_axis():
         assert len(curve.data) == len(curve.poses) >= 6
 
 
-def test_g_sensitivity_is_one_panel_a_component_of_force_with_three_lines():
-    matrix = ((3e-4, -2e-4, 1e-4), (1e-4, 4e-4, 0.0), (0.0, -3e-4, 2e-4))
-    curves = accepted("gyro-g-sensitivity", matrix=matrix).curves
-    assert len(curves) == 9
-    for curve in curves:
-        slope = np.polyfit(curve.x, curve.value, 1)[0]
-        assert slope == pytest.approx(matrix[curve.axis][curve.driver_axis], abs=4e-5)  # 0.02 deg/s/g
-    panels = curve_panels(curves)
-    assert [panel.x.label for panel in panels] == ["f_x [m/s²]", "f_y [m/s²]", "f_z [m/s²]"]
-    assert all(sum(isinstance(mark, kind) for mark in panels[0].marks) == 3 for kind in (Line, Points, Band))
-
-
 @pytest.mark.parametrize(
     ("effect_id", "size", "driver", "is_relative"),
     [
-        ("gyro-thermal-bias", {"per_k": (1e-3, -1e-3, 5e-4)}, "temperature", False),
         ("accel-thermal-scale", {"per_k": (1e-3, -1e-3, 2e-3)}, "temperature", True),
-        ("gyro-bias-drift", {"amplitude": (0.01, -0.02, 0.01)}, "time", False),
         ("vibration-rectification", {"sensor": "accelerometer", "coefficient": 0.02}, "vibration", False),
     ],
 )
@@ -62,17 +42,3 @@ def test_what_drives_an_effect_is_found_from_its_columns(effect_id, size, driver
         left = curve.data - np.interp(curve.data_x, curve.x, curve.value)
         # Half of what it adds: the weakest of these is a few times the noise of a pose.
         assert np.std(left) < 0.5 * np.ptp(curve.value)
-
-
-def test_an_effect_of_moves_is_a_curve_beside_the_residual_that_it_explains():
-    recording, truth = simulated("gyro-scale-nonlinearity", n_poses=26, c3=(0.02, 0.02, -0.02))
-    result = diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
-    effect = next(one for one in result.effects if one.id == "gyro-scale-nonlinearity")
-    assert [c.driver for c in effect.curves] == ["rate"] * 3
-    assert not any(len(c.data) for c in effect.curves)
-    blocks = [block for section in diagnosis_report(result).sections for block in section.blocks]
-    drawn = next(b for b in blocks if isinstance(b, Picture) and b.name == "effect-gyro-scale-nonlinearity")
-    assert len(drawn.chart().panels) == 4
-    assert "moves in which it acts" in drawn.caption
-    # Curves are for the page: the machine's answer holds the parameters.
-    assert "curves" not in as_plain(effect)

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import trihedron
-from test_export_simulators import of_unit
 from trihedron.api.calibrating import of_board
 from trihedron.cli import main
 from trihedron.files.calibration import calibration_document, calibration_from_document, write_calibration
-from trihedron.files.formats import ExportOptions, any_calibration, export_calibration
+from trihedron.files.formats import ExportOptions, export_calibration
 from trihedron.files.formats.autopilot import orientation, parameters_in
 from trihedron.records import Calibration, Onboard, SensorCalibration
 
@@ -311,17 +310,6 @@ def test_orientations_are_those_of_mavlink():
         orientation(100)
 
 
-@pytest.mark.parametrize("target", ["ardupilot", "px4"])
-def test_parameters_are_read_back_as_the_calibration_of_raw_readings(tmp_path, target):
-    known = diagonal_in(np.eye(3), log_of(target, {}, "raw"))
-    file = tmp_path / "board.params"
-    file.write_text(export_calibration(known, target))
-    back = any_calibration(file)
-    np.testing.assert_allclose(back.accelerometer.S, known.accelerometer.S, atol=1e-12)
-    np.testing.assert_allclose(back.accelerometer.b, known.accelerometer.b, atol=1e-12)
-    np.testing.assert_allclose(back.gyroscope.b, known.gyroscope.b, atol=1e-12)
-
-
 def inav(text, raw_accel, raw_gyro, accel_count, gyro_count):
     """As INAV's acceleration.c and gyro.c correct, but for their rounding of the result."""
     p = {w[1]: float(w[3]) for w in (line.split() for line in text.splitlines()) if w[:1] == ["set"] and w[3] != "OFF"}
@@ -356,37 +344,3 @@ def test_settings_of_inav_on_raw_counts_are_what_apply_gives(exact):
     si = replace(known, accelerometer=replace(known.accelerometer, S=np.eye(3), raw_unit="m/s^2"))
     with pytest.raises(ValueError, match="debug_mode = ACC"):
         export_calibration(si, "inav")
-
-
-@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
-def test_after_a_training_log_a_test_log_of_other_poses_needs_no_correction(autopilot):
-    """The tutorial's three steps: a board that held wrong parameters is calibrated once and right from then on."""
-    S = {"accelerometer": np.diag([1.012, 0.991, 1.004]), "gyroscope": np.eye(3)}
-    b = {"accelerometer": np.array([0.31, -0.23, 0.14]), "gyroscope": np.array([0.011, -0.007, 0.02])}
-    if autopilot == "ardupilot":
-        held = {f"INS_ACCOFFS_{a}": 0.5 for a in AXES} | {f"INS_ACCSCAL_{a}": 1.03 for a in AXES}
-        held |= {f"INS_GYROFFS_{a}": -0.02 for a in AXES} | {"AHRS_ORIENTATION": 10.0}
-        R, board = turn(180, 0, 90), lambda p, raw: ardupilot(p, *raw, None, 0, R)
-    else:
-        held = {"CAL_ACC0_ID": 1310988.0, "CAL_GYRO0_ID": 2490378.0, "SENS_BOARD_ROT": 2.0}
-        held |= {f"CAL_ACC0_{a}OFF": 0.5 for a in AXES} | {f"CAL_ACC0_{a}SCALE": 1.03 for a in AXES}
-        held |= {f"CAL_GYRO0_{a}OFF": -0.02 for a in AXES}
-        R, board = turn(0, 0, 90), lambda p, raw: px4(p, *raw, None, 0, 0, R)
-
-    def flown(layout, parameters):
-        raw, _ = of_unit(S, b, layout, layout)
-        made = board(parameters, (raw.accelerometer, raw.gyroscope))
-        logged = replace(raw, accelerometer=made[0], gyroscope=made[1])
-        return replace(logged, onboard=Onboard(autopilot, 0, 0, "body", parameters))
-
-    train = trihedron.calibrate(flown(1, held), gravity_m_s2=9.80665)
-    ((_, text),) = trihedron.export(train, autopilot).items()
-    parameters = {**held, **parameters_in(text)}
-    test = trihedron.calibrate(flown(2, parameters), gravity_m_s2=9.80665).calibration
-    assert np.abs(train.calibration.accelerometer.S - np.eye(3)).max() > 0.02
-    for name in ("accelerometer", "gyroscope"):
-        left, known = getattr(test, name), getattr(train.calibration, name)
-        values = np.r_[(left.S - np.eye(3)).ravel(), left.b]
-        # What the training log did not know adds to what the test log does not: one of 24 beyond 4 sigma is 1 in 660.
-        sigma = np.hypot(np.r_[left.sigma_S.ravel(), left.sigma_b], np.r_[known.sigma_S.ravel(), known.sigma_b])
-        assert np.all(np.abs(values) <= 4.0 * sigma), (name, values, sigma)

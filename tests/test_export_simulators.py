@@ -193,7 +193,7 @@ def of_unit(S, b, layout, seed):
 @pytest.mark.parametrize(
     ("target", "S", "b", "lost"),
     [
-        ("imusensor", FULL, BIASED, set()),
+        pytest.param("imusensor", FULL, BIASED, set(), marks=pytest.mark.slow),
         pytest.param("gazebo", PLAIN, BIASED, set(), marks=pytest.mark.slow),
         pytest.param("gazebo", FULL, UNBIASED, SHAPE, marks=pytest.mark.slow),
         pytest.param("gnss-ins-sim", PLAIN, BIASED, set(), marks=pytest.mark.slow),

@@ -32,7 +32,7 @@ def on_a_table(rng, tilt, headings):
 @pytest.mark.parametrize("headings", [(0.0,), (0.0, np.pi / 2.0, 0.0), (0.0, np.pi, 0.0)])
 def test_a_leaning_table_stays_within_the_error_bars_whatever_the_headings(headings):
     rng = np.random.default_rng(5)
-    n, tilt = 120, np.radians(1.5)
+    n, tilt = 60, np.radians(1.5)
     scores = []
     for _ in range(n):
         values, up, S, b = on_a_table(rng, tilt, headings)

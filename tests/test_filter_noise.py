@@ -12,13 +12,11 @@ from scipy.spatial.transform import Rotation
 
 import trihedron
 from reference_rig import FINE_HZ, G, forces, hand, rates_of
-from trihedron.cli import main
 from trihedron.estimate.filter_noise.angle import bias_steps
 from trihedron.estimate.filter_noise.beside_reference import (
     ANGLE,
     _of_axes,
     _without_noise,
-    bounded,
     independent_or_not,
     informed,
     parts_of,
@@ -68,15 +66,11 @@ def test_covariances_are_those_of_the_processes():
 
 
 def test_errors_are_as_large_as_predicted_when_the_strengths_are_right():
-    nees = [errors_over([(drawn(seed), 30)], STRENGTHS[None], 5.0).nees.mean() for seed in range(40)]
-    # 40 runs of about five stretches apart: 3 with a standard error of sqrt(6/200) = 0.17.
-    assert np.mean(nees) == pytest.approx(3.0, abs=0.6)
+    nees = [errors_over([(drawn(seed), 30)], STRENGTHS[None], 5.0).nees.mean() for seed in range(20)]
+    # 20 runs of about five stretches apart: 3 with a standard error of sqrt(6/100) = 0.25.
+    assert np.mean(nees) == pytest.approx(3.0, abs=0.8)
     plain = np.array([N, 0.0, K, 1e-5, 0.0, 0.0, 1.0])
     assert errors_over([(drawn(0), 30)], plain[None], 5.0).nees.mean() > 6.0
-
-
-def test_no_start_has_room_for_a_horizon_that_is_too_long():
-    assert errors_over([(drawn(0), 30)], STRENGTHS[None], 50.0) is None
 
 
 def test_strengths_lie_within_their_intervals():
@@ -106,6 +100,7 @@ def turning(m, ratios, seed):
     return replace(plain, observed=seen), Fitted(strengths, 0.0, strengths[None], np.zeros((1, 4)), 1.0)
 
 
+@pytest.mark.slow
 def test_axes_that_differ_in_motion_have_an_n_of_their_own():
     known = Bounded(N, N / 1.1, N * 1.1)
     found = unlike_axes_beside([turning(150, (0.6, 1.0, 2.0), 4)[0]], turning(150, (0.6, 1.0, 2.0), 4)[1], known)
@@ -130,14 +125,6 @@ def test_a_reference_that_follows_the_sensor_does_not_lower_its_noise():
     assert follows
     assert np.median(fitted.draws[:, 0]) < 0.5 * N
     assert not independent_or_not([drawn(6)], plain, ANGLE)[1]
-
-
-def test_an_interval_over_decades_is_a_limit():
-    assert bounded(np.geomspace(1e-6, 1.0, 99)).is_limit
-    assert bounded(np.geomspace(1e-6, 1.0, 99)).lower == 0.0
-    one = bounded(np.linspace(1.0, 2.0, 101))
-    assert not one.is_limit
-    assert one.lower < one.value == one.filter_value == pytest.approx(1.5)
 
 
 def test_parts_of_an_error_are_the_textbook_ones():
@@ -195,16 +182,6 @@ def test_a_healthy_gyro_before_a_good_truth_keeps_its_static_noise(found):
         assert middle == pytest.approx(1.0, abs=0.25)
 
 
-def test_a_report_a_page_a_frame_and_plain_types(found, tmp_path):
-    text = trihedron.report(found, tmp_path / "noise.html")
-    assert "calibration left over" in text
-    assert "gyroscope K" in text
-    assert "predicted, effective" in (tmp_path / "noise.html").read_text(encoding="utf-8")
-    json.dumps(found.to_dict(), allow_nan=False)
-    assert list(found.to_dataframe()["term"]) == ["N", "K"]
-    assert found.plot("horizon") is not None
-
-
 def both(found):
     """With an accelerometer as a position would give it."""
     b = Bounded(2e-3, 1e-3, 3e-3)
@@ -228,32 +205,6 @@ def test_every_consumer_gets_both_sensors_in_its_own_unit(found, target):
         assert yaml.safe_load(text.replace("%YAML:1.0", ""))
     if target == "basalt":
         assert json.loads(text)["value0"]["accel_bias_std"] == [4e-4] * 3
-
-
-def test_keys_and_values_are_those_of_the_export_with_a_calibration(found):
-    from trihedron.files.formats import ExportOptions, export_files
-    from trihedron.files.formats.contract import NoiseFigure, SensorNoise
-    from trihedron.records import Calibration, SensorCalibration
-
-    whole = both(found)
-    one = {s.sensor: SensorNoise(*(NoiseFigure(x.filter_value, x.is_limit) for x in (s.N, s.K))) for s in whole.sensors}
-    sensors = [
-        SensorCalibration(np.eye(3), np.zeros(3), np.eye(12) * 1e-9, unit, unit, "given") for unit in ("m/s^2", "rad/s")
-    ]
-    known = Calibration(*sensors, np.eye(24) * 1e-9, "lower", G, "given", "log", "", ())
-    options = ExportOptions(one["accelerometer"], one["gyroscope"], whole.rate_hz)
-    for target in ("kalibr", "vins-fusion", "orb-slam3", "fast-lio", "gtsam", "openvins"):
-        (text,) = export_files(known, target, options).values()
-        rows = {line.strip() for line in filter_noise_text(whole, target).splitlines() if line[:1] not in "#%"}
-        numbers = {row for row in rows if any(c.isdigit() for c in row) and "imu0" not in row}
-        assert numbers <= {line.strip() for line in text.splitlines()}, target
-
-
-def test_both_sensors_are_demanded(found):
-    with pytest.raises(ValueError, match="the accelerometer was not estimated"):
-        filter_noise_text(found, "kalibr")
-    with pytest.raises(ValueError, match="there are kalibr"):
-        filter_noise_text(found, "nonsense")
 
 
 def resting(seed=1, seconds=120, n=N):
@@ -296,41 +247,6 @@ def turned_between_rests(scale):
         np.arange(len(rate)) / 100.0, force + 0.01 * rng.normal(size=force.shape), w,
         accelerometer_unit="m/s^2", gyroscope_unit="rad/s",
     )  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("more", "said"),
-    [
-        ({"horizons_s": [0.0]}, "horizons are seconds"),
-        ({"horizons_s": []}, "horizons are seconds"),
-        ({"band_hz": 60.0}, "--band|band_hz"),
-    ],
-)
-def test_impossible_questions_are_one_sentence(moved, more, said):
-    with pytest.raises(ValueError, match=said):
-        trihedron.filter_noise(moved[0], reference=moved[1], **more)
-
-
-def test_a_reference_of_rates_is_refused(moved):
-    log, motion = moved
-    rates = ReferenceMotion(motion.time_s, rate=np.zeros((len(motion.time_s), 3)), source="table.csv")
-    with pytest.raises(ValueError, match="holds rates; give attitudes"):
-        trihedron.filter_noise(log, reference=rates)
-
-
-def test_the_command_on_a_log_at_rest(tmp_path, capsys):
-    log = resting(1, 60)
-    table = np.column_stack([log.time_s, log.accelerometer, log.gyroscope])
-    np.savetxt(
-        tmp_path / "rest.csv", table, delimiter=",", comments="",
-        header="t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]",
-    )  # fmt: skip
-    assert main(["noise", str(tmp_path / "rest.csv"), "--to", "kalibr", "-o", str(tmp_path / "imu.yaml")]) == 0
-    written = yaml.safe_load((tmp_path / "imu.yaml").read_text())
-    assert written["gyroscope_noise_density"] == pytest.approx(N, rel=0.05)
-    assert "factor" in capsys.readouterr().out
-    assert main(["noise", str(tmp_path / "rest.csv"), "--horizon", "1,x"]) == 1
-    assert "--horizon is a list of seconds" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(not EUROC.exists(), reason="the recorded flights are not beside this checkout")

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +14,18 @@ from trihedron.report.findings.page import page
 PACKAGE = Path(__file__).parents[1] / "python" / "trihedron"
 
 
+@cache
+def calls_of(path):
+    return [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)]
+
+
 def _calls(attribute):
     """Calls of ``Finding.of`` (or of ``Finding`` itself) with the file they stand in."""
     for path in sorted(PACKAGE.rglob("*.py")):
         name = str(path.relative_to(PACKAGE))
         if name.startswith("report/"):
             continue
-        for node in ast.walk(ast.parse(path.read_text())):
-            if not isinstance(node, ast.Call):
-                continue
+        for node in calls_of(path):
             called = node.func
             if isinstance(called, ast.Attribute) and isinstance(called.value, ast.Name):
                 is_one = attribute and called.value.id == "Finding" and called.attr == "of"

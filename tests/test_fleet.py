@@ -119,20 +119,6 @@ def test_a_defect_of_the_program_is_a_row_and_is_tried_again(logs, tmp_path, mon
     assert trihedron.fleet(path, tmp_path, workers=0, diagnose=False, gravity_m_s2=G).n_done == 1
 
 
-def test_a_device_outside_the_others_is_an_outlier_and_nobody_else_is(tmp_path):
-    rng = np.random.default_rng(3)
-    rows = []
-    for unit in range(12):
-        for session in range(2):
-            numbers = rng.normal(size=21) * 1e-3
-            numbers[13] += 0.05 if unit == 7 else 0.0
-            rows.append(row(f"u{unit}", f"{unit}-{session}", numbers))
-    summary = summarise(rows, tmp_path).summary
-    assert [(one.serial, one.parameter.id, one.parameter.name) for one in summary.outliers] == [
-        ("u7", "gyro-scale", "y")
-    ]
-
-
 def row(serial, name, numbers, sigma=1e-4):
     """A calibrated log's row as a worker writes it."""
     return {
@@ -222,14 +208,3 @@ def test_a_worker_that_is_killed_loses_nothing(logs, tmp_path):
     assert len(killed) == 1
     assert {row["status"] for row in result.rows if not row["path"].endswith("notes.txt")} == {"done"}
     assert result.n_done == 4
-
-
-def test_the_command_writes_table_and_page_and_says_where(logs, done, capsys):
-    _, out = done
-    status = main(["fleet", str(logs), "--out", str(out), "--workers", "0", "--no-diagnose", "--gravity", str(G)])
-    said = capsys.readouterr()
-    assert status == 0
-    assert "4 of 5 logs of 2 devices were calibrated" in said.out
-    assert "fleet.parquet" in said.err
-    assert main(["fleet", str(Path(out) / "nothing*.csv"), "--out", str(out)]) == 1
-    assert "no log was found" in capsys.readouterr().err

@@ -1,8 +1,6 @@
 """Calibrations of other makers are read as the inverse of how they are written, and real files of theirs are read."""
 
 import json
-import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +8,6 @@ import yaml
 
 import trihedron
 from test_export import NOISE, READINGS, ROUNDING, calibration, corrected, with_g_sensitivity
-from trihedron.cli import main
 from trihedron.files.formats import any_calibration, export_files, formats, is_calibration
 from trihedron.files.formats.parsing import yaml_of
 from trihedron.records import Calibration
@@ -28,34 +25,6 @@ def read_back(known, target, folder):
     return any_calibration(first)
 
 
-@pytest.mark.parametrize("target", READ)
-def test_what_was_written_is_read_back(target, tmp_path):
-    known = in_frame(calibration("si"), "lower")
-    if target in ("px4", "ardupilot"):
-        known = replace(
-            known,
-            accelerometer=replace(known.accelerometer, S=np.diag(np.diag(known.accelerometer.S))),
-            gyroscope=replace(known.gyroscope, S=np.eye(3)),
-        )
-    back = read_back(known, target, tmp_path)
-    assert back.extensions["maker"] == target
-    pairs = [(back.accelerometer, known.accelerometer)]
-    if target != "imu_calib":
-        pairs.append((back.gyroscope, known.gyroscope))
-    # imu_tk turns both sensors into the frame in which the accelerometer's T is upper triangular.
-    turn = back.accelerometer.S @ np.linalg.inv(known.accelerometer.S) if target == "imu_tk" else np.eye(3)
-    for read, sensor in pairs:
-        assert read.raw_unit == sensor.raw_unit
-        np.testing.assert_allclose(READINGS @ read.S.T + read.b, corrected(sensor) @ turn.T, **ROUNDING)
-    assert "without_bias" not in back.extensions
-
-
-@pytest.mark.parametrize("target", ["imu_tk", "xio", "imucal", "pyins"])
-def test_counts_stay_counts(target, tmp_path):
-    back = read_back(calibration("counts"), target, tmp_path)
-    assert (back.accelerometer.raw_unit, back.gyroscope.raw_unit) == ("counts", "counts")
-
-
 @pytest.mark.parametrize("target", ["kalibr", "openvins", "imucal"])
 def test_g_sensitivity_is_read_back_and_applied(target, tmp_path):
     known, G = with_g_sensitivity(in_frame(calibration("si"), "lower"))
@@ -67,19 +36,6 @@ def test_g_sensitivity_is_read_back_and_applied(target, tmp_path):
     made = trihedron.apply(back, log)
     force = corrected(known.accelerometer)
     np.testing.assert_allclose(made.gyroscope, corrected(known.gyroscope) - force @ G.T, **ROUNDING)
-
-
-def test_kalibrs_own_results_hold_no_bias_and_say_so(tmp_path):
-    """As kalibr_calibrate_imu_camera writes its `*-imu.yaml`: under `imu0`, no `b`."""
-    known = in_frame(calibration("si"), "lower")
-    flat = yaml.safe_load(export_files(known, "kalibr", NOISE)[""])
-    for one in ("accelerometers", "gyroscopes"):
-        flat[one].pop("b")
-    (tmp_path / "imu.yaml").write_text(yaml.safe_dump({"imu0": {"T_i_b": np.eye(4).tolist(), **flat}}))
-    back = any_calibration(tmp_path / "imu.yaml")
-    assert tuple(back.extensions["without_bias"]) == ("accelerometer", "gyroscope")
-    np.testing.assert_allclose(back.accelerometer.S, known.accelerometer.S, **ROUNDING)
-    np.testing.assert_allclose(back.gyroscope.S, known.gyroscope.S, **ROUNDING)
 
 
 def test_realsense_stores_the_transpose():
@@ -98,32 +54,6 @@ def test_imucal_calibrates_as_its_own_functions_do():
     np.testing.assert_allclose(acc, corrected(known.accelerometer), **ROUNDING)
     gyr = (READINGS - p["b_g"] - acc @ p["K_ga"].T) @ np.linalg.inv(p["K_g"] @ p["R_g"]).T
     np.testing.assert_allclose(np.radians(gyr), corrected(known.gyroscope) - acc @ G.T, **ROUNDING)
-
-
-def test_imu_calib_multiplies_then_subtracts():
-    known = calibration("si")
-    document = yaml.safe_load(export_files(known, "imu_calib", NOISE)[""])
-    made = READINGS @ np.reshape(document["SM"], (3, 3)).T - document["bias"]
-    np.testing.assert_allclose(made, corrected(known.accelerometer), **ROUNDING)
-
-
-def test_noise_of_estimators_is_continuous_or_of_one_sample_as_each_takes_it():
-    known = calibration("si")
-    orb = yaml.safe_load(export_files(known, "orb-slam3", NOISE)[""].replace("%YAML:1.0", ""))
-    assert [orb[f"IMU.{k}"] for k in ("NoiseAcc", "AccWalk", "NoiseGyro", "GyroWalk", "Frequency")] == [
-        2e-3, 4e-5, 1e-4, 2e-6, 200.0,
-    ]  # fmt: skip
-    lio = yaml.safe_load(export_files(known, "lio-sam", NOISE)[""])
-    assert (lio["imuAccNoise"], lio["imuGyrBiasN"], lio["imuGravity"]) == (2e-3, 2e-6, 9.81)
-    fast = yaml.safe_load(export_files(known, "fast-lio", NOISE)[""])["mapping"]
-    assert fast["acc_cov"] == pytest.approx(2e-3**2 * 200)
-    assert fast["b_gyr_cov"] == pytest.approx(2e-6**2 * 200)
-    scope: dict = {}
-    text = export_files(known, "gtsam", NOISE)[""]
-    exec(text, scope)
-    made = READINGS @ scope["S_GYROSCOPE"].T + scope["B_GYROSCOPE"]
-    np.testing.assert_allclose(made, corrected(known.gyroscope), **ROUNDING)
-    assert float(re.search(r"setBiasAccCovariance\((\S+) ", text)[1]) == pytest.approx(4e-5**2)
 
 
 @pytest.mark.parametrize(
@@ -172,17 +102,6 @@ def test_small_yaml_is_read_as_the_library_reads_it():
     assert {k: small[k] for k in ("model", "rostopic", "update_rate")} == {
         k: whole[k] for k in ("model", "rostopic", "update_rate")
     }
-
-
-def test_several_calibrations_go_into_a_folder(tmp_path, capsys):
-    (tmp_path / "out").mkdir()
-    for name in ("a", "b"):
-        trihedron.write_calibration(calibration("si"), tmp_path / f"{name}.json")
-    ask = ["export", str(tmp_path / "a.json"), str(tmp_path / "b.json"), "--to", "imu_tk", "-o", str(tmp_path / "out")]
-    assert main(ask) == 0
-    assert len(list((tmp_path / "out").iterdir())) == 4
-    assert main(["export", "x", "--to", "list"]) == 0
-    assert "gazebo" in capsys.readouterr().out
 
 
 def test_a_foreign_calibration_is_exported_to_another_program(tmp_path):

@@ -9,7 +9,6 @@ from trihedron.estimate.gyroscope.alignment import MoveOptions
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.gyroscope.moves import calibrate_moves
 from trihedron.records import FindingCode, SensorCalibration
-from trihedron.segment import segment_recording
 from trihedron.simulate import Accelerometer, Gyroscope, Motion, MoveTo, NoiseTerms, Scenario, hand_session, simulate
 from trihedron.simulate import Pose as SimulatedPose
 from true_segments import segments_from_truth
@@ -52,16 +51,6 @@ def quiet():
     return recording, truth, segments_from_truth(recording, truth)
 
 
-def test_the_scale_is_recovered_inside_its_error_bars(quiet):
-    recording, truth, segments = quiet
-    found, findings = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2)
-    # 12 standard normals: the largest exceeds 4 once in 1300 seeds, and the seed is fixed.
-    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
-    # N = 2e-4 rad/√s over moves of 2 s leaves about 3e-4 rad per turn of 1.5 rad: 2e-4 each, less for 17 moves.
-    assert found.sigma_S.max() < 5e-4
-    assert not findings
-
-
 def test_error_bars_of_the_scale_and_zero_cover_the_truth_at_their_stated_rate():
     scores = []
     for seed in range(25):
@@ -75,22 +64,6 @@ def test_error_bars_of_the_scale_and_zero_cover_the_truth_at_their_stated_rate()
     for level, expected in ((1.0, 0.683), (1.96, 0.95)):
         margin = 3.0 * np.sqrt(expected * (1.0 - expected) / 150.0)
         assert abs(np.mean(np.abs(scores) < level) - expected) < margin
-
-
-def test_error_bars_contain_those_of_the_accelerometer():
-    motion = hand_session(14, pose_s=2.0, first_pose_s=3.0)
-    recording, truth = simulate(scenario(motion), seed=3)
-    segments = segments_from_truth(recording, truth)
-    covariance = np.zeros((12, 12))
-    covariance[np.diag_indices(12)] = np.array([3e-3] * 9 + [2e-2] * 3) ** 2
-    loose = given_accelerometer(truth, covariance)
-    tight = given_accelerometer(truth)
-    options = MoveOptions(n_folds=0)
-    with_doubt, _ = calibrate_moves(recording, segments, loose, truth.gravity_m_s2, options)
-    without, _ = calibrate_moves(recording, segments, tight, truth.gravity_m_s2, options)
-    # Misalignments of 3 mrad turn the predicted gravity by as much: the gyro's own part is ten times smaller.
-    off_diagonal = ~np.eye(3, dtype=bool)
-    assert with_doubt.sigma_S[off_diagonal].min() > 5.0 * without.sigma_S.max()
 
 
 def test_a_wrong_accelerometer_inside_its_error_bars_leaves_the_gyro_inside_its_own():
@@ -258,23 +231,6 @@ def test_a_missing_sensor_or_missing_moves_are_refused_in_one_sentence(quiet):
         calibrate_moves(short, segments, given, 9.8)
     with pytest.raises(ValueError, match=r"\(3, 3\)"):
         calibrate_moves(recording, segments, given, 9.8, MoveOptions(nominal_scale=np.ones(3)))
-
-
-@pytest.mark.parametrize("duration_s", [1.5, 4.0, 10.0])
-def test_the_scale_does_not_depend_on_how_long_the_moves_last(duration_s):
-    motion = hand_session(12, pose_s=4.0, move_s=duration_s, first_pose_s=10.0)
-    recording, truth = simulate(scenario(motion), seed=11)
-    segments = segment_recording(recording)
-    found, _ = calibrate_moves(
-        recording, segments, given_accelerometer(truth), truth.gravity_m_s2, MoveOptions(n_folds=0)
-    )
-    # Cut edges of moves would make every scale too large, by 1e-3 and more.
-    error = np.diag(found.S - truth.gyroscope_S)
-    assert np.abs(error / np.diag(found.sigma_S)).max() < 3.5
-    pick = np.zeros(12)
-    pick[[0, 4, 8]] = 1.0 / 3.0
-    assert abs(error.mean()) < 3.0 * np.sqrt(pick @ found.covariance @ pick)
-    assert np.sqrt(pick @ found.covariance @ pick) < 1e-3
 
 
 def test_biases_that_do_not_walk_leave_no_walk_beyond_the_noise_of_their_means():

@@ -147,14 +147,6 @@ def test_a_given_angle_is_believed_and_a_contradiction_is_a_finding():
     assert FindingCode.TURN_NOT_A_MULTIPLE in codes(findings)
 
 
-def test_a_left_handed_gyro_is_reported():
-    S = tuple(map(tuple, np.array(SCALE) @ np.diag([1, 1, -1])))
-    recording, truth, turns, zeros = session(S=S)
-    found, findings = calibrate_turns(recording, turns, zeros, nominal_scale=np.diag([1.0, 1.0, -1.0]))
-    assert FindingCode.LEFT_HANDED in codes(findings)
-    assert np.abs(z_scores(found, truth)).max() < 4.0
-
-
 def test_malformed_turns_are_refused():
     recording, _, turns, zeros = session(turns_deg=(90.0, -90.0))
     with pytest.raises(ValueError, match="two samples"):
@@ -210,7 +202,7 @@ def turned_on_faces(rng, tilt_deg, faces=(1, -1, 2, -2, 3, -3), angles_deg=(180.
     return Recording(time_s, None, raw, rate_hz, gyroscope_unit="rad/s"), turns, zeros
 
 
-@pytest.mark.parametrize("tilt_deg", [0.02, 0.05, 0.1])
+@pytest.mark.parametrize("tilt_deg", [0.02, 0.1])
 def test_faces_out_of_flat_are_in_the_error_bars_and_cost_no_turn(tilt_deg):
     rng = np.random.default_rng(round(1000 * tilt_deg))
     scores, thrown = [], 0

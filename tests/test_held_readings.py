@@ -31,7 +31,7 @@ def held(readings, seed, how):
     return readings[np.maximum.accumulate(np.where(is_new, np.arange(n), 0))]
 
 
-@pytest.mark.parametrize("how", [2, 3, 5, 0.5])
+@pytest.mark.parametrize("how", [2, 5, 0.5])
 def test_a_peak_that_is_written_again_is_no_limit(how):
     for seed in range(8):
         written = held(swung(seed), seed, how)
@@ -41,7 +41,7 @@ def test_a_peak_that_is_written_again_is_no_limit(how):
         assert np.all(np.any(np.diff(written[rows], axis=0) != 0, axis=1))
 
 
-@pytest.mark.parametrize("how", [2, 3, 0.5])
+@pytest.mark.parametrize("how", [2, 0.5])
 def test_limits_of_a_held_sensor_are_found_and_cover_every_row(how):
     found = 0
     for seed in range(8):

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, driven, flicker_of_poses
-from trihedron.api.improving import _unlike
+from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, flicker_of_poses
 from trihedron.channel_facts.low_pass import gain_of
 from trihedron.comparison.noise import _are_even
 from trihedron.estimate.noise.poses import noise_of_poses
@@ -126,6 +125,7 @@ def beside(own):
     return MovedAlike(own.recording, own.segments, own.calibration)
 
 
+@pytest.mark.slow
 def test_flicker_that_no_pose_shows_is_taken_out():
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(5)
@@ -144,18 +144,7 @@ def test_flicker_that_no_pose_shows_is_taken_out():
     assert left is None or left[2] > 0.5 * 0.05
 
 
-def test_poses_and_moves_that_miss_unlike_the_recordings_are_said():
-    def said(poses, moves):
-        recording = SimpleNamespace(poses=4.0, moves=None, missed=lambda _: (poses, moves))
-        return _unlike(None, recording)
-
-    # Squares; of moves the recording says nothing.
-    assert said(9.0, 7.0) == {"poses": 1.5}
-    assert said(4.0 * 1.09**2, 7.0) == {}
-    assert said(4.0 * 0.8**2, None) == {"poses": pytest.approx(0.8)}
-    assert said(None, None) == {}
-
-
+@pytest.mark.slow
 def test_what_poses_miss_is_put_on_the_accelerometers_zero_and_then_both_miss_alike():
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(5)
@@ -177,6 +166,7 @@ def test_what_poses_miss_is_put_on_the_accelerometers_zero_and_then_both_miss_al
     assert max(rest) < 0.4 * 0.02
 
 
+@pytest.mark.slow
 def test_one_pose_that_was_pushed_makes_no_scatter_for_all_of_them():
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(5)
@@ -189,15 +179,6 @@ def test_one_pose_that_was_pushed_makes_no_scatter_for_all_of_them():
     strays = bias_of_poses(clean, beside(pushed))
     # 30 mm/s² in one pose of 24: all of it shared out would be 6 mm/s², what the others take up in the fit is less.
     assert strays is None or max(strays) < 4e-3
-
-
-def test_stamps_that_scatter_in_a_driven_scenario_are_settled_as_those_of_a_file():
-    clean, recording = session(5)
-    own = trihedron.calibrate(recording, gravity_m_s2=9.80665)
-    shaken = replace(clean, clock=replace(clean.clock, timestamp_jitter_s=1.5e-3))
-    made = driven(shaken, recording, own.segments, own.calibration)
-    assert made.sampling.is_even
-    assert np.ptp(np.diff(made.time_s)) < 1e-6
 
 
 @pytest.mark.parametrize(

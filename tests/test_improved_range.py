@@ -58,6 +58,7 @@ def test_the_ends_of_a_recordings_range_are_those_of_the_improved_scenario(clipp
     assert "low" not in table["accelerometer"].get("adc", {})
 
 
+@pytest.mark.slow
 def test_a_scenario_with_the_recordings_range_lacks_no_saturation(clipped, improved):
     _, recording = clipped
     again = trihedron.diagnose(recording, against=improved[1], gravity_m_s2=G)

@@ -7,7 +7,6 @@ import pytest
 from scipy import stats
 
 from trihedron import _core
-from trihedron.estimate.kalman.live import LiveCalibration
 from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
 from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode, PoseTable
@@ -212,42 +211,6 @@ def test_wrong_noise_shows_in_the_innovations_and_right_noise_does_not(believed,
         assert reported[code] >= 27
 
 
-def test_the_direct_form_carries_the_covariance_of_the_inverse_form():
-    table, readings, start, pose = article_readings(9, ARTICLE_MIX)
-    run = {"start_s": start, "pose_s": pose, "with_baselines": False, "raw_unit": "V"}
-    base = calibrate_with_references(readings, table, ARTICLE_MIX, **run)
-    rng = np.random.default_rng(10)
-    draws = []
-    for _ in range(4000):
-        inverse = np.array([rng.multivariate_normal(a.constants, a.covariance) for a in base.axes])
-        S = np.linalg.inv(inverse[:, :3])
-        draws.append(np.concatenate([S.ravel(), -S @ inverse[:, 3]]))
-    got = np.sqrt(np.diag(base.accelerometer.covariance))
-    # Standard deviations of 4000 draws scatter by 1.1 %; 12 of them within 4 of that; second order is negligible.
-    np.testing.assert_allclose(np.std(draws, axis=0) / got, 1.0, atol=0.045)
-    np.testing.assert_allclose(base.accelerometer.S @ base.inverse_S, np.eye(3), atol=1e-12)
-
-
-def test_live_calibration_says_what_the_whole_run_says():
-    table, readings, start, pose = article_readings(11, ARTICLE_MIX)
-    result = calibrate_with_references(
-        readings, table, ARTICLE_MIX, start_s=start, pose_s=pose, with_baselines=False, raw_unit="V"
-    )
-    session_s = float(start[-1] + pose[-1] - start[0])
-    live = LiveCalibration(ARTICLE_MIX, gravity_m_s2=GRAVITY, session_s=session_s, pose_s=5.0)
-    for i in range(324):
-        last = live.add(readings[i], table.specific_force[i], start_s=start[i], pose_s=pose[i], look_ahead=0)
-    np.testing.assert_allclose(last.constants, [a.constants for a in result.axes], rtol=1e-9)
-    np.testing.assert_allclose(last.sigma, [a.sigma for a in result.axes], rtol=1e-9)
-
-
-def test_angles_become_the_specific_force_of_the_dividing_head():
-    assert DIVIDING_HEAD_ANGLES_DEG.shape == (324, 2)
-    table = PoseTable.from_angles([0.0, 90.0, 0.0], [0.0, 0.0, 90.0], gravity_m_s2=GRAVITY, sigma_angle_deg=0.1)
-    np.testing.assert_allclose(table.specific_force / GRAVITY, [[0, 0, 1], [-1, 0, 0], [0, 1, 0]], atol=1e-15)
-    assert table.sigma_m_s2 == pytest.approx(GRAVITY * np.radians(0.1))
-
-
 def test_a_head_with_one_axis_is_enough_with_a_prior():
     table = PoseTable.from_angles(np.arange(0.0, 360.0, 10.0), gravity_m_s2=GRAVITY)
     rng = np.random.default_rng(15)
@@ -287,8 +250,3 @@ def test_malformed_questions_are_refused_in_plain_words(change, message):
     asked = {"readings": readings, "references": table, "noise": ARTICLE_MIX, "start_s": start, "pose_s": pose} | change
     with pytest.raises(ValueError, match=message):
         calibrate_with_references(**asked)
-
-
-def test_a_negative_noise_coefficient_is_refused():
-    with pytest.raises(ValueError, match="flicker must be zero or positive"):
-        AxisNoise(white=1.0, flicker=-1.0)

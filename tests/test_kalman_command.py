@@ -47,26 +47,6 @@ def test_the_report_shows_every_method_and_the_calibration_file_holds_the_truth(
     assert np.max(np.abs(sensor.b - B_TRUE) / sensor.sigma_b) < 5.0
 
 
-def test_json_holds_the_tracks(session, capsys):
-    assert run(session, "--reference", session / "angles.csv", "--json") == 0
-    said = json.loads(capsys.readouterr().out)
-    assert said["constants"] == ["kx", "ky", "kz", "U0"]
-    assert [axis["axis"] for axis in said["axes"]] == ["x", "y", "z"]
-    assert {track["method"] for track in said["axes"][0]["tracks"]} == {
-        "kalman",
-        "recursive least squares",
-        "recursive generalised least squares",
-    }
-    assert len(said["axes"][0]["tracks"][0]["constants"]) == 324
-
-
-def test_without_angles_the_length_of_gravity_is_used_and_pictures_are_drawn(session, tmp_path, capsys):
-    page = tmp_path / "report.html"
-    assert run(session, "--noise", session / "noise.json", "--report", page) == 0
-    assert "unknown attitudes" in capsys.readouterr().out
-    assert page.read_text().count("<figure id=") == 3
-
-
 def test_the_noise_may_be_a_log_of_rest(session, tmp_path, capsys):
     accelerometer = Accelerometer(noise=NoiseTerms(N=(0.01,) * 3, K=(0.001,) * 3))
     scenario = Scenario(motion=long_rest(1200.0), accelerometer=accelerometer, clock=Clock(rate_hz=25.0))
@@ -99,22 +79,6 @@ def test_a_log_of_rest_in_counts_of_another_range_is_refused(session, tmp_path, 
     np.savetxt(rest, half, delimiter=",", header="t,ax [m/s^2],ay [m/s^2],az [m/s^2]", comments="", fmt="%.9g")
     assert run(session, "--reference", session / "angles.csv", "--noise", rest) == 1
     assert "another ADC, range or unit" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--reference", "missing.csv"], "no such file"),
-        (["--frame", "case"], "--frame is one of lower, symmetric"),
-        (["--noise", "missing.json"], "no such file"),
-        (["--gravity", "0"], "gravity"),
-    ],
-)
-def test_what_cannot_be_done_is_said_in_one_sentence(session, capsys, words, message):
-    assert run(session, *words) == 1
-    said = capsys.readouterr().err.strip()
-    assert message in said
-    assert "\n" not in said
 
 
 @pytest.mark.parametrize(

@@ -11,15 +11,13 @@ from trihedron.estimate.kalman.identified import noise_from_identified
 from trihedron.estimate.kalman.norm_invariant import calibrate_without_references
 from trihedron.estimate.kalman.session import (
     calibrate_session,
-    calibrate_session_without_references,
     noise_from_poses,
     pose_readings,
 )
 from trihedron.read import ReadError, read_pose_table
 from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode, PoseTable
 from trihedron.segment import segment_recording
-from trihedron.simulate import Accelerometer, Adc, NoiseTerms, Scenario, dividing_head, hand_session, simulate
-from trihedron.units import AccelerationUnit
+from trihedron.simulate import Accelerometer, Adc, NoiseTerms, Scenario, dividing_head, simulate
 from twins_kalman import normalised_error_squared
 
 GRAVITY = 9.80665
@@ -57,24 +55,6 @@ def test_a_simulated_dividing_head_gives_the_instrument_back(head, table):
     assert {f.code for f in result.findings} == {FindingCode.NOISE_ASSUMED}
 
 
-def test_the_same_session_without_its_angles_agrees_up_to_the_frame(head, table):
-    known = calibrate_session(*head, table).accelerometer
-    unknown = calibrate_session_without_references(*head, gravity_m_s2=GRAVITY).accelerometer
-    # SᵀS is free of the frame. Its entries are about twice those of S; both fits see the same noise.
-    difference = unknown.S.T @ unknown.S - known.S.T @ known.S
-    assert np.max(np.abs(difference)) < 6 * 2 * np.max(unknown.sigma_S)
-
-
-def test_times_in_the_table_stand_for_the_segmentation(head, table):
-    recording, segments = head
-    start = np.array([recording.time_s[h.start] for h in segments.poses])
-    stop = np.array([recording.time_s[h.stop - 1] for h in segments.poses]) + 1.0 / recording.rate_hz
-    timed = PoseTable(table.specific_force, start_s=start, stop_s=stop)
-    np.testing.assert_allclose(
-        pose_readings(recording, segments, timed).mean, pose_readings(recording, segments, table).mean, rtol=1e-12
-    )
-
-
 def test_hold_numbers_pick_still_poses_and_a_mismatch_is_said(head, table):
     recording, segments = head
     few = PoseTable(table.specific_force[::9], pose=np.arange(0, 324, 9))
@@ -98,19 +78,6 @@ def test_a_coarse_converter_is_charged_with_its_step():
     assert noise[0].resolution == pytest.approx(0.37, rel=1e-9)
     fine, _ = head_session(3, adc=0.001)
     assert noise_from_poses(fine, segment_recording(fine))[0].resolution == 0.0
-
-
-def test_the_filter_agrees_with_the_batch_fit_on_a_hand_session_in_counts():
-    accelerometer = Accelerometer(
-        S=((0.0024, 0.0, 0.0), (1e-5, 0.0025, 0.0), (2e-5, -1e-5, 0.0024)),
-        b=(-78.0, -82.0, -77.0),
-        unit=AccelerationUnit.COUNTS,
-        noise=NoiseTerms(N=(0.005,) * 3),
-        adc=Adc(lsb=1.0),
-    )
-    recording = simulate(Scenario(motion=hand_session(), accelerometer=accelerometer), seed=4)[0]
-    segments = segment_recording(recording)
-    assert_agrees_with_batch_fit(*poses_of(recording, segments), GRAVITY)
 
 
 def poses_of(recording, segments):

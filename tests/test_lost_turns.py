@@ -1,12 +1,7 @@
 """Losses that no step shows: believed possible where timestamps may be remade, and carried whatever the fit."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 from confidence.machine import robot
 from confidence.motion import G

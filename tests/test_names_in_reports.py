@@ -6,7 +6,6 @@ import sys
 
 from trihedron.report.document import Document, Section
 from trihedron.report.page import to_html
-from trihedron.report.text import to_text
 
 NAMED = Document(
     title="Calibration of a\nb.csv",
@@ -15,12 +14,6 @@ NAMED = Document(
     is_trustworthy=True,
     sections=(Section("Poses of a\nb", ()),),
 )
-
-
-def test_a_line_end_in_a_name_is_spelled_out_in_headings_of_the_text():
-    title, subtitle, *_ = to_text(NAMED).splitlines()
-    assert title == r"Calibration of a\nb.csv"
-    assert subtitle == r"/logs/a\nNOT TO BE TRUSTED\t.csv"
 
 
 def test_a_line_end_in_a_name_is_spelled_out_in_the_page():

@@ -62,18 +62,6 @@ def test_the_table_names_every_term_and_the_files_hold_the_same(log, tmp_path, c
     assert files["html"].read_text().count("<figure id=") == 3  # both sensors, then each
 
 
-def test_slow_noise_that_is_neither_flicker_nor_walk_is_said_so(tmp_path, capsys):
-    rng = np.random.default_rng(35)
-    path = tmp_path / "rest.npz"
-    # Ten minutes of a walk that begins to show: a pair in about half of all such axes, a name in 2 %.
-    axes = {f"g{a}_rad_s": series(rng, 1 << 16, 100.0, N=1e-2, K=4e-4) for a in "xyz"}
-    np.savez(path, t_s=np.arange(1 << 16) / 100.0, **axes)
-    assert main(["allan", str(path), "--full"]) == 0
-    said = capsys.readouterr().out
-    assert "B and K are not separable here" in said
-    assert "not both zero" in said
-
-
 def test_the_terms_come_back_from_the_written_curve_alone(log, tmp_path, capsys):
     table = tmp_path / "curve.csv"
     main(["allan", str(log), "--csv", str(table)])
@@ -87,16 +75,6 @@ def test_the_terms_come_back_from_the_written_curve_alone(log, tmp_path, capsys)
         assert axis["terms"]["N"]["value"] == pytest.approx(truth_n, rel=0.012)
         term = axis["terms"]["K"]
         assert not term["present"] or term["value"] == pytest.approx(truth_k, abs=4 * term["sigma"])
-
-
-def test_how_long_to_record_is_told_for_the_accuracy_asked(log, capsys):
-    lengths = {}
-    for accuracy in ("2", "1"):
-        assert main(["allan", str(log), "--accuracy", accuracy, "--json"]) == 0
-        terms = json.loads(capsys.readouterr().out)["axes"][0]["terms"]
-        lengths[accuracy] = terms["N"]["recording_length_s"]
-    # Twice the accuracy of white noise takes four times as long.
-    assert lengths["1"] == pytest.approx(4 * lengths["2"], rel=0.1)
 
 
 def test_the_size_of_a_count_gives_a_log_in_counts_its_units(tmp_path, capsys):
@@ -115,22 +93,6 @@ def test_the_size_of_a_count_gives_a_log_in_counts_its_units(tmp_path, capsys):
         assert axes[5]["terms"]["N"]["value"] == pytest.approx(3.33e-3 * 9.80665 * 2.0, rel=0.02)
     assert main(["allan", str(path), *said[:-1], "3.33"]) == 1
     assert "number and a unit" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--exclude", "later"], "FROM:TO"),
-        (["--exclude", "200:100"], "earlier to a later"),
-        (["--exclude", "9e6:9e7"], "outside the log"),
-    ],
-)
-def test_a_wrong_stretch_is_refused_in_one_sentence(log, capsys, arguments, words):
-    assert main(["allan", str(log), *arguments]) == 1
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.strip().splitlines()) == 1
-    assert words in err
 
 
 def test_lost_rows_become_missing_readings_not_shorter_time():

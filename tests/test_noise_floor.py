@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from trihedron import _core, probability
+from trihedron import _core
 from trihedron.quantiles import median, medians, quantile, quantiles
-from trihedron.segment.channels import WINDOW_BLOCKS
-from trihedron.segment.floor import SEED_S, TAILS
+from trihedron.segment.floor import TAILS
 
 LENGTH, STEP_S = 10, 0.1
 
@@ -16,42 +15,6 @@ def rolling_twin(values, width):
     width = min(width, n)
     first = np.clip(np.arange(n) - width // 2, 0, n - width)
     return np.array([values[a : a + width].mean(axis=0) for a in first]).reshape(values.shape)
-
-
-def limit_twin(activity, freedom):
-    middle = np.median(activity)
-    lower = middle - np.quantile(activity, TAILS[0])
-    return middle + TAILS[1] * max(lower, np.sqrt(2.0 / freedom))
-
-
-def floor_twin(mean, variance, is_valid, tells, rounding):
-    """Channel by channel with NaN where one has no vote, and no bookkeeping beyond that."""
-    centred = np.where(is_valid[:, None], mean - np.nanmean(mean[is_valid], axis=0), 0.0)
-    whole = rolling_twin(is_valid[:, None] * 1.0, WINDOW_BLOCKS)[:, 0] == 1.0
-    inside = rolling_twin(np.where(is_valid[:, None], variance, 0.0), WINDOW_BLOCKS)
-    inside = np.maximum(inside, rounding)
-    squares = rolling_twin(centred**2, WINDOW_BLOCKS) - rolling_twin(centred, WINDOW_BLOCKS) ** 2
-    between = np.maximum(squares * WINDOW_BLOCKS / (WINDOW_BLOCKS - 1), rounding / LENGTH)
-    alive = (np.median(inside[whole], axis=0) > 0.0) & (np.median(between[whole], axis=0) > 0.0)
-    vote = np.where(tells, 1.0, np.nan)[:, alive]
-    powers = [inside[:, alive] * vote, between[:, alive] * vote]
-    usual = np.nanquantile(np.where(whole[:, None], sum(powers), np.nan), 0.1, axis=0)
-    total = np.where(whole, np.nanmean(np.log(sum(powers) / usual), axis=1), np.inf)
-    quiet = total <= np.sort(total)[max(int(0.02 * whole.sum()), round(SEED_S / STEP_S)) - 1]
-    n = alive.sum()
-    freedom = [WINDOW_BLOCKS * (LENGTH - 1) * n, (WINDOW_BLOCKS - 1) * n]
-    for _ in range(60):
-        activity = [np.log(np.nanmean(power / np.nanmedian(power[quiet], axis=0), axis=1)) for power in powers]
-        limits = [limit_twin(a[quiet], nu) for a, nu in zip(activity, freedom, strict=True)]
-        grown = whole & (activity[0] <= limits[0]) & (activity[1] <= limits[1])
-        if (grown == quiet).all():
-            break
-        quiet = grown
-    white, wander = rounding.copy(), rounding / LENGTH
-    white[alive] = np.nanmedian(powers[0][quiet], axis=0)
-    ratio = probability.chdtri(WINDOW_BLOCKS - 1, 0.5) / (WINDOW_BLOCKS - 1)
-    wander[alive] = np.nanmedian(powers[1][quiet], axis=0) / ratio
-    return [*activity, limits, quiet, white, wander]
 
 
 def blocks(seed):
@@ -67,24 +30,6 @@ def blocks(seed):
     tells = np.ones((m, c), dtype=bool)
     tells[300:400, 1] = False
     return mean, variance, is_valid, tells, np.array([1e-9, 0.0, 1e-7, 0.0, 0.0, 1e-4])
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_the_floor_is_that_of_a_plain_loop(seed):
-    given = blocks(seed)
-    ratio = probability.chdtri(WINDOW_BLOCKS - 1, 0.5) / (WINDOW_BLOCKS - 1)
-    found = _core.noise_floor(*given, LENGTH, (WINDOW_BLOCKS, round(SEED_S / STEP_S), ratio), TAILS)
-    wanted = floor_twin(*given)
-    quiet = found[3]
-    assert 0.4 < quiet.mean() < 0.7
-    assert np.array_equal(quiet, wanted[3])
-    # Windows without a valid block have no power, but a logarithm no loop has use for; running sums of 900 squares
-    # of 50 about their mean, and the part of 10⁻¹² that keeps logarithms finite, leave ten digits.
-    live = np.isfinite(wanted[0]) & np.isfinite(wanted[1])
-    for one, twin in zip(found[:2], wanted[:2], strict=True):
-        np.testing.assert_allclose(one[live], twin[live], rtol=0.0, atol=1e-9)
-    for one, twin in zip((found[2], *found[4:]), (wanted[2], *wanted[4:]), strict=True):
-        np.testing.assert_allclose(one, twin, rtol=1e-9)
 
 
 def test_a_log_without_any_noise_has_no_floor_but_its_rounding():

@@ -24,23 +24,18 @@ def codes(noise):
 
 @pytest.fixture(scope="module")
 def published_setting():
-    """Ten axes of the published setting: 400 Hz, 11 000 s, N 2.502e-3, K 6.972e-5."""
+    """Four axes of the published setting: 400 Hz, 11 000 s, N 2.502e-3, K 6.972e-5."""
     rng = np.random.default_rng(21)
-    return [identify_noise(series(rng, 4_400_000, 400.0, N=2.502e-3, K=6.972e-5), 400.0).axes[0] for _ in range(10)]
+    return [identify_noise(series(rng, 4_400_000, 400.0, N=2.502e-3, K=6.972e-5), 400.0).axes[0] for _ in range(4)]
 
 
 def test_the_published_setting_is_recovered_near_its_bound(published_setting):
     N = np.array([axis.value("N") for axis in published_setting]) / 2.502e-3
     K = np.array([axis.value("K") for axis in published_setting]) / 6.972e-5
-    # Bounds for one axis: 0.05 % of N, 8.1 % of K; four standard errors of the mean and of the deviation of ten.
+    # Bounds for one axis: 0.05 % of N, 8.1 % of K; four standard errors of the mean and of the deviation of four.
     assert np.abs(N - 1.0).max() < 0.01
-    assert abs(K.mean() - 1.0) < 4 * 0.081 / np.sqrt(10)
-    assert K.std(ddof=1) < 0.081 * np.sqrt(chi2.ppf(0.9999, 9) / 9)
-
-
-def test_pure_white_and_walk_yield_no_other_term(published_setting):
-    # 1.5 % chance of an invented term for each: three of ten have a probability of 4e-4.
-    assert sum(present(axis) != {"N", "K"} for axis in published_setting) <= 2
+    assert abs(K.mean() - 1.0) < 4 * 0.081 / np.sqrt(4)
+    assert K.std(ddof=1) < 0.081 * np.sqrt(chi2.ppf(0.9999, 3) / 3)
 
 
 def test_an_absent_term_has_a_limit_and_no_value(published_setting):
@@ -52,7 +47,7 @@ def test_an_absent_term_has_a_limit_and_no_value(published_setting):
                 assert 0.0 < term.limit < np.inf
 
 
-@pytest.mark.parametrize("runs", [40, pytest.param(120, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [25, pytest.param(120, marks=pytest.mark.slow)])
 def test_intervals_cover_the_truth(runs):
     rng = np.random.default_rng(22)
     hits = []
@@ -66,7 +61,7 @@ def test_intervals_cover_the_truth(runs):
     assert low <= sum(hits) <= high
 
 
-@pytest.mark.parametrize("truth", ["N", "K", "B", "NK", "NB", "QN", "NKR", "QNK"])
+@pytest.mark.parametrize("truth", ["B", "NK", "QN", "NKR"])
 def test_the_terms_present_are_found(truth):
     rng = np.random.default_rng(23)
     size = {"Q": 3e-4, "N": 1e-2, "B": 4e-3, "K": 1.2e-3, "R": 6e-4}
@@ -76,18 +71,6 @@ def test_the_terms_present_are_found(truth):
     ]
     # At 95 % each, four of six or more has a probability of 0.998.
     assert sum(f == set(truth) for f in found) >= 4, found
-
-
-def test_the_answer_survives_decimation_by_ten():
-    rng = np.random.default_rng(24)
-    x = series(rng, 400_000, RATE, N=1e-2, K=5e-4)
-    whole = identify_noise(x, RATE).axes[0]
-    means = identify_noise(x.reshape(-1, 10).mean(axis=1), RATE / 10).axes[0]
-    assert present(whole) == present(means) == {"N", "K"}
-    for symbol in ("N", "K"):
-        term = whole.terms[TermName(symbol)]
-        other = means.terms[TermName(symbol)]
-        assert term.lower < other.value < term.upper or other.lower < term.value < other.upper
 
 
 def test_a_gauss_markov_process_is_told_from_flicker_and_walk():
@@ -187,15 +170,6 @@ def test_a_channel_that_never_changes_is_serious_not_an_error(quiet):
     assert not noise.is_trustworthy
     assert noise.axes[1].value("N") == 0.0
     assert noise.axes[0].value("N") == pytest.approx(1e-3, rel=0.01)
-
-
-def test_excluded_stretches_do_not_count(quiet):
-    spoiled = quiet.copy()
-    spoiled[50_000:80_000] += np.linspace(0, 1, 30_000)
-    noise = identify_noise(spoiled, RATE, exclude_s=[(500.0, 800.0)])
-    assert noise.excluded_s == ((500.0, 800.0),)
-    assert noise.axes[0].value("K") == pytest.approx(3e-5, rel=0.5)
-    assert not noise.axes[0].terms[TermName.RATE_RAMP].is_present
 
 
 def test_ordinates_have_the_expectations_of_the_basis():

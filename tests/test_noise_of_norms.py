@@ -27,7 +27,7 @@ def session(seed, walk, scatter=0.0, poses=POSES):
 def test_sessions_of_one_unit_are_not_told_apart_and_the_walk_is_inside_its_interval():
     inside, p = [], []
     for k, walk in enumerate((0.0, 4e-4, 4e-3, (4e-3, 4e-4, 1e-4))):
-        for seed in range(4):
+        for seed in range(2):
             found = compare_slow_norms(session([k, seed], walk), session([k, 50 + seed], walk, scatter=1e-3))
             p.append(found.p_value)
             inside += [
@@ -35,20 +35,20 @@ def test_sessions_of_one_unit_are_not_told_apart_and_the_walk_is_inside_its_inte
                 for side in (found.first, found.second)
                 for axis, true in zip(side, np.broadcast_to(walk, 3), strict=True)
             ]
-    # Sixteen pairs of one unit: two below 1 % happen in 1 %.
+    # Eight pairs of one unit: two below 1 % happen in 0.3 %.
     assert np.sum(np.array(p) < 0.01) <= 1
-    # 95 % of 96 figures (those of a session hang together a little): fewer than 85 happen in 1 %.
-    assert sum(inside) >= 85
+    # 95 % of 48 figures (those of a session hang together a little): fewer than 41 happen in 1 %.
+    assert sum(inside) >= 41
 
 
 def test_a_walk_ten_times_as_large_is_told_from_the_other_and_scatter_is_no_walk():
     # Seventeen contrasts of one number a pose: most pairs, not all.
-    found = [compare_slow_norms(session(s, 1e-2), session(100 + s, 4e-4)) for s in range(8)]
+    found = [compare_slow_norms(session(s, 1e-2), session(100 + s, 4e-4)) for s in range(5)]
     told = [f for f in found if f.p_value < 0.01]
-    assert len(told) >= 5
+    assert len(told) >= 3
     assert {f.term for f in told} == {"K"}
     assert all(axis["K"].upper < 4e-3 for f in told for axis in f.second)
-    jumps = [compare_slow_norms(session(s, 0.0, scatter=2e-2), session(100 + s, 0.0)).p_value for s in range(8)]
+    jumps = [compare_slow_norms(session(s, 0.0, scatter=2e-2), session(100 + s, 0.0)).p_value for s in range(5)]
     assert np.sum(np.array(jumps) < 0.01) <= 1
 
 

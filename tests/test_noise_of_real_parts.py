@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.signal import butter, lfilter
+from scipy.signal import lfilter
 
 from trihedron import allan
 from trihedron.records import Recording
@@ -18,9 +18,7 @@ def axes_of(x):
     return result, [axis.terms[TermName.WHITE] for axis in result.axes]
 
 
-@pytest.mark.parametrize(
-    "low_pass", [butter(1, 0.4), ([0.2], [1.0, -0.8]), ([0.2] * 5, [1.0])], ids=["RC", "recursive", "mean of five"]
-)
+@pytest.mark.parametrize("low_pass", [([0.2], [1.0, -0.8]), ([0.2] * 5, [1.0])], ids=["recursive", "mean of five"])
 def test_white_noise_behind_a_low_pass_lies_inside_its_interval(low_pass):
     x = lfilter(*low_pass, 1e-3 * np.random.default_rng(100).normal(size=(N, 3)), axis=0)
     for white in axes_of(x)[1]:

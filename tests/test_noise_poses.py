@@ -43,7 +43,7 @@ def of(rng, **options):
     return noise_of_poses(readings, RATE, windows)[0]
 
 
-@pytest.mark.parametrize("options", [{}, {"step": 0.1}, {"step": 0.2}, {"scatter": 0.2}, {"knocks": 2}], ids=str)
+@pytest.mark.parametrize("options", [{"step": 0.2}, {"scatter": 0.2}, {"knocks": 2}], ids=str)
 def test_the_white_density_and_the_ratio_of_two_are_inside_their_intervals(options):
     rng = np.random.default_rng(71)
     inside = covered = false = 0
@@ -57,16 +57,6 @@ def test_the_white_density_and_the_ratio_of_two_are_inside_their_intervals(optio
     assert inside >= 6
     assert covered >= 6
     assert false <= 1
-
-
-def test_octaves_hold_the_density_and_tell_where_two_spectra_differ():
-    rng = np.random.default_rng(72)
-    plain, bent = of(rng, poses=40), of(rng, poses=40, corner=10.0)
-    assert sum(o.density.lower <= 1e-4 <= o.density.upper for o in plain.octaves) >= len(plain.octaves) - 1
-    by_octave = {o.low_hz: o.density for o in bent.octaves}
-    p_values = [ratio_of(o.density, by_octave[o.low_hz]).p_value for o in plain.octaves]
-    assert p_values[-1] < 1e-10
-    assert p_values[0] > 1e-3
 
 
 def test_a_filter_shows_its_corner_and_white_noise_none():
@@ -92,25 +82,6 @@ def test_a_line_common_to_the_holds_is_found_with_its_amplitude():
     assert line.frequency_hz == pytest.approx(17.0, abs=0.4)
     assert line.amplitude.value == pytest.approx(0.03, rel=0.3)
     assert of(rng, poses=40).lines == ()
-
-
-@pytest.mark.parametrize("step", [0.05, 0.1, 1 / 16, 3.0])
-def test_the_step_of_the_converter_is_read_off_the_values_also_where_digits_are_cut(step):
-    rng = np.random.default_rng(75)
-    readings, windows = session(rng, step=step, N=step / 10)
-    axis = noise_of_poses(np.round(readings, 4), RATE, windows)[0]
-    assert axis.step == pytest.approx(step, rel=2e-3)
-    assert of(rng).step == 0.0
-
-
-def test_missing_readings_cut_holds_and_channels_keep_their_names():
-    rng = np.random.default_rng(77)
-    readings, windows = session(rng, poses=10)
-    readings[windows[3][0] + 100] = np.nan
-    two = noise_of_poses(np.column_stack([readings, 2 * readings]), RATE, windows, names=("x", "y"), units=("g", "g"))
-    assert [axis.name for axis in two] == ["x", "y"]
-    assert two[0].n_poses == 11
-    assert two[1].white.value == pytest.approx(2 * two[0].white.value, rel=1e-9)
 
 
 @pytest.mark.parametrize("amplitude", [0.3, 1.0])

@@ -1,13 +1,8 @@
 """Statements about noise terms: intervals that hold whatever is named, names that are not invented."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 from noise_coverage import in_time
 from noise_series import series
@@ -85,17 +80,18 @@ def test_intervals_hold_whatever_is_named():
     rng = np.random.default_rng(62)
     truth = {"N": 1e-2, "B": 3e-3, "K": 6e-4}
     inside = dict.fromkeys("QNBKR", 0)
-    runs = 60
+    runs = 30
     for _ in range(runs):
         axis = identify_noise(in_time(rng, 1 << 15, 100.0, **truth), 100.0).axes[0]
         for s in inside:
             term = axis.terms[TermName(s)]
             assert term.limit == term.upper
             inside[s] += term.lower <= truth.get(s, 0.0) <= term.upper
-    # Of 60 intervals of 95 %: 51 or more with probability 0.999.
-    assert min(inside.values()) >= 51, inside
+    # Of 30 intervals of 95 %: 24 or more with probability 0.999.
+    assert min(inside.values()) >= 24, inside
 
 
+@pytest.mark.slow
 def test_white_and_walk_near_their_limit_do_not_become_flicker_or_a_ramp():
     rng = np.random.default_rng(63)
     invented = slow = 0
@@ -111,8 +107,7 @@ def test_white_and_walk_near_their_limit_do_not_become_flicker_or_a_ramp():
     assert slow >= 25
 
 
-@pytest.mark.parametrize("truth", [{"N": 1e-2, "K": 6e-4}, {"N": 1e-3, "B": 2e-2}, {"N": 1e-3, "K": 2e-2}])
-@pytest.mark.parametrize("share", [0.05, 0.3])
+@pytest.mark.parametrize(("truth", "share"), [({"N": 1e-2, "K": 6e-4}, 0.05), ({"N": 1e-3, "B": 2e-2}, 0.3)])
 def test_scattered_loss_leaves_the_terms_where_they_are(truth, share):
     rng = np.random.default_rng(65)
     inside = 0

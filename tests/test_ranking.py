@@ -67,11 +67,6 @@ def of_massif(real_data, k):
     )
 
 
-def test_five_wrong_files_of_a_board_are_rejected_on_another_session(real_data):
-    known = trihedron.calibrate(of_massif(real_data, 2), gravity_m_s2=9.803).calibration
-    check_ranked(known, of_massif(real_data, 3), 9.803)
-
-
 def test_files_of_other_makers_are_ranked_and_what_they_do_not_hold_is_taken_from_the_log(session, tmp_path, capsys):
     log, known = session
     size = ExportOptions(

@@ -39,26 +39,6 @@ def test_movella_dot_counts_microseconds_where_xsens_mti_counts_hundreds_of_them
     assert recording.rate_hz == pytest.approx(100.0, rel=1e-6)
 
 
-def test_two_devices_in_one_table_are_listed_and_chosen_and_never_merged(tmp_path):
-    table = readings(200)
-    lines = [
-        f"{k * 10000},{i},{','.join(map(repr, map(float, row[1:] + i)))}" for k, row in enumerate(table) for i in (0, 1)
-    ]
-    path = text(tmp_path, "TimeUS,I,AccX,AccY,AccZ,GyrX,GyrY,GyrZ\n" + "\n".join(lines) + "\n")
-    with pytest.raises(
-        ReadError, match=r"column 'I' identifies 2 devices: 0 \(200 rows\), 1 \(200 rows\).*--instance 0"
-    ):
-        read_recording(path)
-    recording = read_recording(path, instance=1)
-    np.testing.assert_allclose(recording.accelerometer, table[:, 1:4] + 1, atol=1e-12)
-    assert recording.rate_hz == pytest.approx(100.0)
-    assert recording.n_samples == 200
-    assert recording.rows_in_file == 400
-    assert accounts(recording)
-    with pytest.raises(ReadError, match="there is no instance 7"):
-        read_recording(path, instance=7)
-
-
 @pytest.mark.parametrize("cut", [2999, 100, 30])
 @pytest.mark.parametrize("change", ["separator", "column"])
 def test_a_layout_that_changes_inside_the_file_is_refused_with_its_lines(tmp_path, cut, change):
@@ -68,13 +48,6 @@ def test_a_layout_that_changes_inside_the_file_is_refused_with_its_lines(tmp_pat
     else:
         lines = rows_of(table[:cut]) + rows_of(table[cut:, :6])
     with pytest.raises(ReadError, match=r"line|layout"):
-        read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n"))
-
-
-def test_a_column_that_disappears_after_a_few_rows_is_refused(tmp_path):
-    table = readings(50)
-    lines = rows_of(table[:13]) + rows_of(table[13:, :6])
-    with pytest.raises(ReadError, match="13 lines of numbers from line 2 on have another layout"):
         read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n"))
 
 

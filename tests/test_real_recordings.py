@@ -56,7 +56,7 @@ def test_xsens_raw_counts_agree_with_the_published_calibration(xsens, real_data,
     assert np.sqrt(np.nanmean(angles**2)) < 0.5
 
 
-@pytest.mark.parametrize("unit", [0, 1, 2])
+@pytest.mark.parametrize("unit", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
 def test_mpu9150_is_at_its_noise_floor_and_predicts_moves_it_has_not_seen(real_data, capsys, unit):
     document = calibrated(capsys, real_data / "mpu9150" / f"imu{unit}.log", "--rate", 100, "--gravity", 9.81)
     assert "residual-above-noise" not in codes(document)

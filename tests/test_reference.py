@@ -13,8 +13,6 @@ from trihedron.estimate.reference.fit import fit_reference
 from trihedron.files.diagnosis import diagnosis_document
 from trihedron.records import FindingCode
 from trihedron.records.reference import ReferenceMotion
-from trihedron.report.chart import Line
-from trihedron.report.reference import calibration_result_report
 
 
 @pytest.fixture(scope="module")
@@ -74,16 +72,6 @@ def test_the_references_error_over_time_is_the_one_that_was_put_in():
     assert np.degrees(left.std(axis=0)).max() < 0.12
     assert np.degrees(found.apart.angle[seen, 2].std()) < 0.03  # nothing was put in about Z
     assert np.degrees(found.apart.angle[seen, :2].std(axis=0)).min() > 0.25
-
-
-def test_a_report_beside_a_reference_leads_with_the_references_error(posed):
-    result = trihedron.calibrate(posed.log, reference=posed.motion, gravity_m_s2=G)
-    document = calibration_result_report(result)
-    assert document.lead.name == "reference-error"
-    assert document.headlines[0].what == "slow error of the reference"
-    assert [one.heading for one in document.sections[:2]] == ["Result", "Against the reference"]
-    (panel,) = document.lead.chart().panels
-    assert [mark.name for mark in panel.marks if isinstance(mark, Line)] == ["X", "Y", "Z"]
 
 
 def test_the_earths_rate_is_told_with_its_direction_and_is_neither_a_zero_nor_a_g_sensitivity():
@@ -219,8 +207,8 @@ def test_a_reference_clock_that_jumps_is_refused_with_the_place():
         fit_reference(trial.log, replace(trial.motion, time_s=late), G)
 
 
-@pytest.mark.parametrize("seed", [61, *(pytest.param(s, marks=pytest.mark.slow) for s in (62, 63))])
-@pytest.mark.parametrize("by_s", [0.4, -0.25])
+@pytest.mark.parametrize("seed", [61, pytest.param(62, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("by_s", [-0.25])
 def test_a_clock_that_jumps_late_is_refused_with_the_place(seed, by_s):
     # Ten seconds before the end: too little for two stretches of eight seconds, and the fit calls it outliers.
     trial = tracked(seed)
@@ -237,28 +225,6 @@ def test_no_part_of_a_sound_reference_is_called_elsewhere_however_noisy():
     for seed in range(70, 72):
         trial = tracked(seed, sigma_deg=0.3)
         assert fit_reference(trial.log, trial.motion, G).overlap_s > 40.0
-
-
-@pytest.mark.parametrize("seed", [52, pytest.param(53, marks=pytest.mark.slow)])
-def test_a_clock_that_jumps_early_is_refused_with_the_place(seed):
-    # One stretch of eight seconds before the jump, the other spoilt by it.
-    trial = tracked(seed, seconds=60)
-    late = trial.motion.time_s + np.where(trial.motion.time_s > 12.0, 0.7, 0.0)
-    with pytest.raises(ValueError, match=r"clock jumps by \+0\.[67]\d* s between \d+ and \d+ s of the log"):
-        fit_reference(trial.log, replace(trial.motion, time_s=late), G)
-
-
-def test_a_clock_that_jumps_in_the_last_seconds_is_mostly_refused():
-    # Five of sixty seconds, less than a stretch: 6 of 8 in seeds 700 to 707; fewer than 3 of 8 has a chance of 0.004.
-    refused = 0
-    for seed in range(708, 716):
-        trial = tracked(seed, seconds=60)
-        late = trial.motion.time_s + np.where(trial.motion.time_s > 55.0, 0.3, 0.0)
-        try:
-            fit_reference(trial.log, replace(trial.motion, time_s=late), G)
-        except ValueError as error:
-            refused += "clock jumps" in str(error)
-    assert refused >= 3
 
 
 def test_a_reference_of_another_motion_is_refused(posed):

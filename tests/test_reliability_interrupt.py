@@ -58,8 +58,9 @@ def interrupted(process, number, after_s):
     return process.returncode, err.decode(), time.monotonic() - began
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-@pytest.mark.parametrize("after_s", [0.0, 0.2, 1.5])
+@pytest.mark.parametrize(
+    ("number", "status", "after_s"), [(signal.SIGINT, 130, 0.0), (signal.SIGTERM, 143, 0.2), (signal.SIGINT, 130, 1.5)]
+)
 def test_a_command_ends_within_a_second_and_says_so(long_log, tmp_path, number, status, after_s):
     target = tmp_path / "c.json"
     target.write_text("old")

@@ -11,10 +11,9 @@ from trihedron.diagnose.session.observations import observe
 from trihedron.records.domains import DOMAINS
 from trihedron.report import to_text
 from trihedron.report.diagnosis import diagnosis_report
-from trihedron.report.simulation import simulation_report
 from trihedron.report.verification import verification_report
 from trihedron.segment import resegment
-from trihedron.simulate import hand_session, scenario_by_name, simulate
+from trihedron.simulate import hand_session
 from written_session import G, simulated
 
 GRAVITY = float(G)
@@ -46,24 +45,6 @@ def test_a_pose_cut_where_it_was_bumped_keeps_its_number(made):
     assert cut.n_poses == segments.n_poses + 1
     assert obs.pose_names(range(3, 8)) == ("pose 4", "pose 5", "pose 5", "pose 6", "pose 7")
     assert obs.move_names(range(3, 6)) == ("move 4", "a disturbance in pose 5", "move 5")
-
-
-def test_figures_of_a_diagnosis_count_poses_as_the_calibration_does_and_name_them_alike(made):
-    recording, result, _ = made
-    pose = result.segments.poses[4]
-    middle = (pose.start + pose.stop) // 2
-    bumped = replace(pose, disturbed=((middle, middle + 10),))
-    poses = (*result.segments.poses[:4], bumped, *result.segments.poses[5:])
-    found = trihedron.diagnose(recording, segments=replace(result.segments, poses=poses), gravity_m_s2=GRAVITY)
-    figures = next(s for s in diagnosis_report(found).sections if s.heading == "Figures").blocks
-    captions = {figure.name: figure.caption for figure in figures}
-    assert "14 poses in 15 intervals" in captions["static-accel"]
-    assert "13 moves and 1 disturbance inside poses" in captions["moves"]
-    names = {one.domain: one.names_before for one in found.residuals}
-    assert names["static-accel"][3:7] == ("pose 4", "pose 5", "pose 5", "pose 6")
-    (panel, *_) = figures[0].chart().panels
-    told = next(mark.said for mark in panel.marks if hasattr(mark, "said"))
-    assert told[6].startswith("pose 6")
 
 
 def test_a_bias_has_one_sign_and_one_value_in_every_report(made):
@@ -112,14 +93,6 @@ def test_a_disturbed_pose_is_named_by_its_number_in_the_recording(made):
 def test_no_report_of_a_diagnosis_names_a_domain_by_its_id(made):
     ids = [name for name in DOMAINS if "-" in name]
     assert not re.search("|".join(ids), to_text(diagnosis_report(made[2])))
-
-
-def test_a_simulation_states_its_parameters_as_a_calibration_does():
-    recording, truth = simulate(scenario_by_name("hand-session"), 3)
-    text = to_text(simulation_report(recording, truth))
-    assert "f_x =" in text
-    assert "S in m/s² per count" in text
-    assert "gyroscope N [rad/s/√Hz]" in text
 
 
 def test_the_filter_has_no_unit_for_the_scale_of_a_log_in_si(made, tmp_path):

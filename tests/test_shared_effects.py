@@ -87,6 +87,7 @@ def test_healthy_recordings_share_nothing():
     assert "share no missing effect" in str(found)
 
 
+@pytest.mark.slow
 def test_values_that_differ_are_not_called_the_instruments():
     found = sessions(4e-4, -4e-4)
     assert all(not one.is_of_instrument for one in found.effects)

@@ -24,9 +24,7 @@ from trihedron.simulate import (
     table_turns,
     with_effect,
 )
-from trihedron.simulate.bias_repeatability import bias_of_poses
 from trihedron.simulate.motion.attitude import attitude_with_up
-from trihedron.simulate.motion.plan import Label
 
 IDEAL = Scenario(hand_session(8, pose_s=1.0, first_pose_s=2.0, arm_m=0.1), "ideal")
 
@@ -275,13 +273,6 @@ def test_the_earth_turns_with_the_attitude():
     assert np.allclose(vertical, 7.292115e-5 * np.sin(np.pi / 3.0))
 
 
-def test_gravity_comes_from_latitude_and_height():
-    scenario = replace(IDEAL, environment=Environment(gravity_m_s2=0.0, latitude_deg=90.0, height_m=0.0))
-    _, truth = simulate(scenario)
-    # WGS84 at the pole.
-    assert abs(truth.gravity_m_s2 - 9.8321849378) < 1e-8
-
-
 def test_a_coarse_converter_rounds_and_a_ratiometric_one_follows_its_supply():
     coarse, truth = both("quantisation", sensor="accelerometer", lsb=0.25)
     assert np.abs(coarse.accelerometer - np.round(truth.specific_force_m_s2 / 0.25) * 0.25).max() == 0.0
@@ -347,15 +338,6 @@ def test_scattered_zeros_are_constant_in_a_pose_and_drawn_anew_after_a_move(effe
     assert np.all(np.abs(np.log(zeros.std(axis=0) / sigma)) < 0.45)
     assert np.abs(np.diff(added, axis=0)).max() < 0.02  # goes over within the move, no step
     assert truth.effects[effect_id]["sigma"] == tuple(sigma)
-
-
-def test_a_pushed_pose_keeps_its_zero():
-    _, truth = simulate(with_effect(IDEAL, "disturbed-pose", poses=[2], tilt_deg=1.0))
-    labels = [Label(s.kind, s.name, s.start_s, s.stop_s, s.axis, s.turn_rad) for s in truth.segments]
-    pushed = next(k for k, label in enumerate(labels) if label.kind == "disturbance")
-    t = np.array([labels[pushed].start_s - 0.1, labels[pushed].stop_s + 0.1])
-    before, after = bias_of_poses(tuple(labels), t, (1.0, 1.0, 1.0), np.random.default_rng(1))
-    assert np.array_equal(before, after)
 
 
 def test_every_effect_id_is_exercised_here():

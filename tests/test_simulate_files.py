@@ -6,7 +6,6 @@ import pytest
 from trihedron.api.reading import read
 from trihedron.cli import main
 from trihedron.files.log import write_recording
-from trihedron.files.output import OutputError
 from trihedron.files.truth import read_truth, write_truth
 from trihedron.simulate import (
     Pose,
@@ -125,19 +124,6 @@ def test_a_log_reads_back_as_it_was_simulated(tmp_path, suffix):
         assert np.abs(again.time_s - recording.time_s).max() < 1e-9
         if recording.temperature_degc is not None:
             assert np.abs(again.temperature_degc - recording.temperature_degc).max() < 1e-9
-
-
-def test_a_log_never_overwrites_and_knows_its_endings(tmp_path):
-    recording, truth = simulate(scenario_by_name("six-faces"))
-    path = tmp_path / "log.csv"
-    write_recording(recording, path)
-    with pytest.raises(OutputError, match="was left alone"):
-        write_recording(recording, path)
-    write_recording(recording, path, overwrite=True)
-    with pytest.raises(OutputError, match=r"\.csv, \.npz, \.parquet"):
-        write_recording(recording, tmp_path / "log.xlsx")
-    with pytest.raises(OutputError, match="truth is written as"):
-        write_truth(truth, tmp_path / "truth.csv")
 
 
 def test_truth_reads_back_as_it_was(tmp_path):

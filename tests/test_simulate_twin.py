@@ -1,13 +1,10 @@
 """A twin repeats its original: pose means, moves, timestamps, noise spectrum, ADC."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import read, segment
-from trihedron.records import Segments
 from trihedron.sensor_model import correct
 from trihedron.simulate import scenario_by_name, simulate, twin_scenario
 
@@ -95,15 +92,3 @@ def test_the_twin_of_a_simulation_has_its_noise_and_poses():
         # A pose mean is known to N/√t = 2e-3 m/s² per axis, and b and S with it.
         assert np.linalg.norm(pair[0] - pair[1]) < 0.02
     assert copy.n_samples == recording.n_samples
-
-
-def test_a_twin_says_what_it_lacks():
-    recording, truth = simulate(scenario_by_name("six-faces"))
-    segments = segment(recording)
-    calibration = calibrate(simulate(scenario_by_name("hand-session"))[0], gravity_m_s2=truth.gravity_m_s2).calibration
-    with pytest.raises(ValueError, match="needs both sensors"):
-        twin_scenario(replace(recording, gyroscope=None), segments, calibration)
-    none = np.zeros((0, 3))
-    empty = Segments((), (), None, None, none, none, none, none, np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
-    with pytest.raises(ValueError, match="at least one pose"):
-        twin_scenario(recording, empty, calibration)

@@ -1,10 +1,8 @@
 """Only the error along the vertical enters |f|: a support that gives does not hide the accelerometer."""
 
 import numpy as np
-import pytest
 
 import trihedron
-from trihedron import _core
 from trihedron.segment.means import upright
 from trihedron.session.noise import along_gradient
 
@@ -69,12 +67,6 @@ def test_upright_finds_the_gradient_through_offset_and_uneven_counts():
     np.testing.assert_allclose(found, gradient, atol=1e-6)  # exact but for the rounding of a least-squares fit
 
 
-def test_few_poses_without_a_unit_have_no_vertical():
-    up = directions(np.random.default_rng(4), 6)
-    assert upright(32768.0 + 4000.0 * up, has_unit=False) is None
-    np.testing.assert_allclose(upright(9.8 * up, has_unit=True), up)
-
-
 def test_errors_along_a_gradient_are_the_verticals_own_and_the_axes_across():
     rng = np.random.default_rng(5)
     up = directions(rng, 5)
@@ -83,12 +75,3 @@ def test_errors_along_a_gradient_are_the_verticals_own_and_the_axes_across():
     known = np.isfinite(along)
     np.testing.assert_allclose(found[known], 2.0 * along[known])
     np.testing.assert_allclose(found[2], 2.0 * np.sqrt((up[2] ** 2 * sigma[2] ** 2).sum()))
-
-
-def test_poses_refuse_fewer_verticals_than_poses():
-    three, one = np.ones((3, 3)), np.ones(3)
-    with pytest.raises(ValueError, match="3 poses"):
-        _core.SessionPoses(
-            time_s=np.arange(3.0), force=three, force_sigma=three, force_density=one, rate=None, rate_sigma=None,
-            rate_density=None, force_along=(np.ones((2, 3)), np.ones(2)),
-        )  # fmt: skip

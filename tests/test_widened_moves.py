@@ -1,13 +1,9 @@
 """Moves that miss more than their samples' noise, or that lost samples: what the uncertainties carry, and what not."""
 
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 import trihedron.estimate.session.solved as solved_session
 from confidence.motion import G

@@ -177,21 +177,6 @@ fn fewer_rows_than_parameters_still_give_all_directions() {
     assert_eq!(sure.directions.shape(), (3, 3));
 }
 
-#[test]
-fn nothing_finite_to_start_from_is_refused_in_words() {
-    let model = |_: &DVector<f64>| -> Result<(DVector<f64>, DMatrix<f64>)> {
-        Ok((DVector::from_element(2, f64::NAN), DMatrix::zeros(2, 1)))
-    };
-    let error = minimise(
-        model,
-        |_| Ok(DVector::zeros(2)),
-        DVector::zeros(1),
-        &Options::default(),
-    )
-    .expect_err("NaN");
-    assert!(error.to_string().contains("not finite"));
-}
-
 proptest! {
     #[test]
     fn the_loss_and_its_derivatives_agree(s in 1e-6..100.0f64, c in 0.3..5.0f64) {

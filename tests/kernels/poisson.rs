@@ -65,23 +65,6 @@ fn scale() -> Matrix3<f64> {
 }
 
 #[test]
-fn a_constant_rate_gives_the_exact_exponential_under_every_model() {
-    let time = timestamps(40, 3.0, 0.3);
-    let w = Vector3::new(0.7, -1.1, 0.4);
-    for model in MODELS {
-        let turn = run(
-            &prepared(&time, &vec![w; 40], model),
-            &scale(),
-            &Vector3::zeros(),
-            &Vector3::zeros(),
-        );
-        let truth = exp(&(-(scale() * w) * 3.0));
-        // 39 products of rotations: some tens of ulp.
-        assert!((turn.rotation - truth).norm() < 1e-13, "{model:?}");
-    }
-}
-
-#[test]
 fn each_model_converges_at_its_order_on_irregular_timestamps() {
     let reference = {
         let time = timestamps(40_001, 2.0, 0.0);
@@ -175,75 +158,6 @@ fn the_same_bias_at_both_anchors_is_a_constant_rate() {
 }
 
 #[test]
-fn a_turn_there_and_back_returns_to_the_identity() {
-    let there: Vec<f64> = timestamps(200, 2.0, 0.0);
-    let n = there.len();
-    let mut raw = sampled(&there, 1.0);
-    let mut time = there.clone();
-    for k in (0..n - 1).rev() {
-        raw.push(-raw[k]);
-        time.push(4.0 - there[k]);
-    }
-    // The reading jumps from w to −w at the turning point: the constant and the linear model see it symmetrically.
-    raw[n - 1] = Vector3::zeros();
-    let turn = run(
-        &prepared(&time, &raw, RateModel::Linear),
-        &scale(),
-        &Vector3::zeros(),
-        &Vector3::zeros(),
-    );
-    assert!((turn.rotation - Matrix3::identity()).norm() < 1e-12);
-}
-
-#[test]
-fn white_noise_of_the_rate_gives_the_predicted_covariance() {
-    let time = timestamps(200, 2.0, 0.0);
-    let h = 2.0 / 199.0;
-    let clean = sampled(&time, 1.0);
-    let sigma = 0.02;
-    let noisy = RateNoise {
-        density: Vector3::repeat(sigma * f64::sqrt(h)),
-        ..QUIET
-    };
-    let p = prepared(&time, &clean, RateModel::Linear);
-    let zero = Vector3::zeros();
-    let predicted = p.integrate(&scale(), &zero, &zero, &noisy);
-    let trials = 2000;
-    let mut sum = Matrix3::zeros();
-    for trial in 0..trials {
-        // Sum of twelve uniforms: variance 12/3, so a standard normal after division by two.
-        let normal = |k: usize| {
-            (0..12)
-                .map(|m| noise(trial * 9973 + k * 13 + m + 1))
-                .sum::<f64>()
-                / 2.0
-        };
-        let raw: Vec<_> = clean
-            .iter()
-            .enumerate()
-            .map(|(k, w)| {
-                w + Vector3::new(normal(3 * k), normal(3 * k + 1), normal(3 * k + 2)) * sigma
-            })
-            .collect();
-        let b = run(
-            &prepared(&time, &raw, RateModel::Linear),
-            &scale(),
-            &zero,
-            &zero,
-        )
-        .rotation;
-        let theta = log(&(predicted.rotation.transpose() * b));
-        sum += theta * theta.transpose();
-    }
-    let seen = sum / f64::from(u32::try_from(trials).expect("small"));
-    for i in 0..3 {
-        let ratio = seen[(i, i)] / predicted.cov_noise[(i, i)];
-        // Relative standard error of a variance from 2000 trials is √(2/2000) = 3.2 %: four of them.
-        assert!((ratio - 1.0).abs() < 0.13, "axis {i}: {ratio}");
-    }
-}
-
-#[test]
 fn lost_rows_and_repeated_timestamps_are_bridged() {
     let time = timestamps(101, 2.0, 0.0);
     let w = Vector3::new(0.4, 0.1, -0.2);
@@ -299,12 +213,6 @@ fn a_range_outside_the_record_is_refused() {
     let mut merged = range(&time);
     merged.anchor_after_s = merged.anchor_before_s;
     assert!(prepare(&time, &raw, None, &merged, RateModel::Linear).is_err());
-}
-
-#[test]
-fn only_three_degrees_of_the_rate_polynomial_exist() {
-    assert!(RateModel::of_degree(1).is_ok_and(|model| model == RateModel::Linear));
-    assert!(RateModel::of_degree(2).is_err());
 }
 
 /// The sums of equation (5.4), one step and one matrix product after the other.

@@ -1,8 +1,8 @@
-//! The joint model of a session: derivatives against differences, the chain against dense algebra, score at the truth.
+//! The joint model of a session: derivatives against differences, score at the truth.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use trihedron::rotation::exp;
-use trihedron::session_model::chain::{Chain, Layout, Rows};
+use trihedron::session_model::chain::Layout;
 use trihedron::session_model::fit::{Fit, fit};
 use trihedron::session_model::move_rows::Weights;
 use trihedron::session_model::moves::{Move, MoveNoise};
@@ -298,60 +298,6 @@ fn strengths_are_sought_within_bounds_and_only_raise_the_likelihood() {
     assert!(found.corner_s.iter().all(|corner| *corner >= 50.0 - 1e-9));
     assert!(found.scatter[0] <= 2.0 + 1e-9 && found.scatter[1..].iter().all(|s| *s <= 0.5 + 1e-9));
     assert!(found.excess.iter().all(|excess| *excess <= 1.0 + 1e-9));
-}
-
-#[test]
-fn the_chain_solves_what_dense_algebra_solves() {
-    let mut random = Uniform(3);
-    let layout = Layout {
-        border: 5,
-        pose: 4,
-        n_poses: 6,
-    };
-    let mut all = Vec::new();
-    for i in 0..layout.n_poses {
-        let mut block = |r: usize, c: usize| DMatrix::from_fn(r, c, |_, _| random.next());
-        let mut rows = Rows::new(DVector::from_element(7, 0.3), layout, i);
-        rows.border = block(7, 5);
-        rows.here = block(7, 4);
-        if i + 1 < layout.n_poses {
-            rows.next = block(7, 4);
-        }
-        all.push(rows);
-    }
-    let n = layout.n();
-    let mut dense = DMatrix::zeros(0, n);
-    for rows in &all {
-        let mut part = DMatrix::zeros(n, 7);
-        rows.add_transposed(layout, &DMatrix::identity(7, 7), &mut part);
-        let at = dense.nrows();
-        dense = dense.insert_rows(at, 7, 0.0);
-        dense.rows_mut(at, 7).copy_from(&part.transpose());
-    }
-    let normal = dense.tr_mul(&dense);
-    let inverse = normal.clone().try_inverse().expect("regular");
-    let factor = Chain::of(layout, &all).factor(0.0, None).expect("factor");
-    let side = DMatrix::from_fn(n, 3, |_, _| random.next());
-    let difference = factor.solve(&side) - &inverse * &side;
-    assert!(
-        difference.amax() < 1e-9 * inverse.amax(),
-        "{}",
-        difference.amax()
-    );
-    let log_det = normal.determinant().ln();
-    assert!((factor.log_det() - log_det).abs() < 1e-9 * log_det.abs().max(1.0));
-    let marginals = factor.marginals();
-    let at = 0;
-    for (i, rows) in all.iter().enumerate() {
-        let own = inverse.view((layout.at(i), layout.at(i)), (4, 4));
-        assert!((&marginals.own[i] - own).amax() < 1e-9 * inverse.amax());
-        let border = inverse.view((layout.at(i), at), (4, 5));
-        assert!((&marginals.border[i] - border).amax() < 1e-9 * inverse.amax());
-        let part = dense.rows(7 * i, 7);
-        let hat = part * &inverse * part.transpose();
-        let leverage = marginals.leverage(rows);
-        assert!((hat.diagonal() - leverage).amax() < 1e-9);
-    }
 }
 
 #[test]

@@ -1,11 +1,9 @@
 //! The simulated instrument against closed forms.
 
-use nalgebra::Vector3;
 use proptest::prelude::*;
 use std::f64::consts::TAU;
-use trihedron::simulate::jet::{Jet, QuaternionJet, progress, window};
+use trihedron::simulate::jet::{Jet, progress, window};
 use trihedron::simulate::mechanism::{Bridge, creep, first_order, play, second_order};
-use trihedron::simulate::motion::Replay;
 use trihedron::simulate::noise::flicker_poles;
 use trihedron::simulate::random::Stream;
 use trihedron::simulate::sampling::{Converter, resample};
@@ -156,30 +154,6 @@ fn equal_plates_read_two_xi_over_four_minus_xi_squared() {
 }
 
 #[test]
-fn the_bridge_bends_a_response_by_the_stated_second_and_third_order() {
-    let (d, second, third) = (1e-3, -0.08, 0.3);
-    let bridge = Bridge {
-        deflection: [d; 3],
-        second: [second; 3],
-        third: [third; 3],
-        mismatch: [0.0; 3],
-    };
-    let (k2, k3) = (-second * d, d * d * (0.25 - third + 2.0 * second * second));
-    let mut x = one_channel((-20..=20).map(f64::from));
-    bridge.respond(&mut x).expect("legal question");
-    for (row, a) in x.iter().zip(-20..=20) {
-        let a = f64::from(a);
-        // Fourth order is left: d³ (5 s2 s3 - 5 s2³ - ¾ s2) a⁴ = -5.7e-11 a⁴, and what follows it.
-        assert!((row[2] - (a + k2 * a * a + k3 * a * a * a)).abs() < 6e-11 * a.powi(4).max(1e-2));
-    }
-    assert!(
-        bridge
-            .respond(&mut one_channel([2000.0].into_iter()))
-            .is_err()
-    );
-}
-
-#[test]
 fn mismatched_plates_keep_rest_at_zero_and_the_small_signal_gain_at_one() {
     let bridge = Bridge {
         deflection: [1e-3; 3],
@@ -193,34 +167,6 @@ fn mismatched_plates_keep_rest_at_zero_and_the_small_signal_gain_at_one() {
     for k in 0..3 {
         assert!(x[0][k].abs() < 1e-12);
         assert!(((x[1][k] - x[2][k]) / (2.0 * h) - 1.0).abs() < 1e-9);
-    }
-}
-
-#[test]
-fn play_remembers_the_way_it_came() {
-    let (w, o) = (2.0, 0.03);
-    // Up by 10, down by 10, up by 1: offsets -o, +o, and half way through the play again.
-    let path = (0..=100)
-        .map(|i| 0.1 * f64::from(i))
-        .chain((0..=100).map(|i| 10.0 - 0.1 * f64::from(i)))
-        .chain((0..=20).map(|i| 0.1 * f64::from(i)));
-    let mut x = one_channel(path);
-    play(&mut x, &[w; 3], &[o; 3]).expect("legal question");
-    assert!((x[100][0] - (10.0 - o)).abs() < 1e-12);
-    assert!((x[201][0] - o).abs() < 1e-12);
-    assert!((x[222][0] - 2.0).abs() < 1e-12);
-}
-
-#[test]
-fn creep_brings_the_rest_of_a_step_with_its_time_constant() {
-    let (dt, tau, part) = (0.01, 3.0, 0.02);
-    let mut x = one_channel((0..1000).map(|i| f64::from(u8::from(i > 0))));
-    creep(&mut x, dt, &[part; 3], &[tau; 3]).expect("legal question");
-    for i in 1..1000 {
-        let t = i as f64 * dt;
-        // The step is a ramp of one dt: averaging the exponential over it.
-        let late = tau / dt * (-t / tau).exp() * ((dt / tau).exp() - 1.0);
-        assert!((x[i][0] - (1.0 - part * late)).abs() < 1e-12);
     }
 }
 
@@ -307,38 +253,4 @@ proptest! {
         }
         prop_assert!((progress(at(1.0), ramp).v - 1.0).abs() < 1e-14);
     }
-
-    #[test]
-    fn a_moving_exponential_has_the_rate_of_its_attitude(
-        a in prop::array::uniform3(-2.0..2.0f64), b in prop::array::uniform3(-2.0..2.0f64),
-        c in prop::array::uniform3(-2.0..2.0f64), scale in prop_oneof![Just(1e-6), Just(1.0)],
-    ) {
-        let q = |t: f64| {
-            let u = [0, 1, 2].map(|k| Jet {
-                v: scale * (a[k] + b[k] * t + c[k] * t * t),
-                d: scale * (b[k] + 2.0 * c[k] * t),
-                dd: scale * 2.0 * c[k],
-            });
-            QuaternionJet::exp(&u)
-        };
-        let h = 1e-4;
-        let (rate, change) = q(0.3).rate_and_acceleration();
-        let (before, after) = (q(0.3 - h), q(0.3 + h));
-        // Central difference of the quaternion: 2 q* (q(t+h) - q(t-h))/2h.
-        let (p, m, o) = (after.value(), before.value(), q(0.3).value());
-        let d: Vec<f64> = (0..4).map(|k| (p[k] - m[k]) / (2.0 * h)).collect();
-        let v = Vector3::new(o[1], o[2], o[3]);
-        let dv = Vector3::new(d[1], d[2], d[3]);
-        let numeric = (dv * o[0] - v * d[0] - v.cross(&dv)) * 2.0;
-        // h²/6 times a third derivative of at most (2+4)³ scale.
-        prop_assert!((numeric - rate).norm() < 1e-6 * scale.max(1e-6));
-        let slope = (after.rate_and_acceleration().0 - before.rate_and_acceleration().0) / (2.0 * h);
-        prop_assert!((slope - change).norm() < 1e-5 * scale.max(1e-6));
-    }
-}
-
-#[test]
-fn a_replay_needs_two_knots() {
-    let one = vec![Vector3::zeros()];
-    assert!(Replay::new([1.0, 0.0, 0.0, 0.0], 1.0, one.clone(), one).is_err());
 }

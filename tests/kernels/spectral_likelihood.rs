@@ -64,24 +64,4 @@ proptest! {
         prop_assert!(wide.rise_without_pair >= alone - 1e-4);
         prop_assert!(wide.line.lower <= wide.line.median && wide.line.median <= wide.line.upper);
     }
-
-    #[test]
-    fn amplitudes_follow_the_unit_of_the_readings(
-        draws in prop::collection::vec(0.05..3.0_f64, 60),
-        scale in 1e-6..1e6_f64,
-    ) {
-        let one = bins([1.0, 0.5, 0.5], &draws);
-        let mut other = one.clone();
-        other.power.iter_mut().for_each(|p| *p *= scale * scale);
-        other.line_cross.iter_mut().for_each(|p| *p *= scale);
-        let (a, b) = (
-            invert(&one, 4.6, (1, 2), 2, 0.025).expect("valid bins"),
-            invert(&other, 4.6, (1, 2), 2, 0.025).expect("valid bins"),
-        );
-        for (x, y) in a.terms.iter().zip(&b.terms) {
-            // The path along a profile is not the same to the last bit: 1 % of an end.
-            prop_assert!((y.upper / scale / x.upper - 1.0).abs() < 1e-2);
-            prop_assert!((y.rise_without - x.rise_without).abs() < 1e-3 * (1.0 + x.rise_without));
-        }
-    }
 }

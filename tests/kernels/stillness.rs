@@ -36,12 +36,6 @@ fn a_large_offset_costs_no_digits_of_the_variance() {
 }
 
 #[test]
-fn a_block_of_one_is_refused() {
-    assert!(block_statistics(&[1.0, 2.0, 3.0], 1).is_err());
-    assert!(block_statistics(&[1.0, 2.0], 2).is_err());
-}
-
-#[test]
 fn every_instruction_set_gives_the_two_pass_statistics_of_any_block_length() {
     let value = |k: usize| {
         9.8 + (12.9898 * k as f64).sin() * 0.3
