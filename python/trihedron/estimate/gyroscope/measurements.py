@@ -99,12 +99,6 @@ class MoveMeasurements:
         return _coarse(recording, segments, self.is_undithered)
 
     @property
-    def edges_in_log(self) -> IntArray:
-        """Half-open ranges (m, 2) of the moves in rows of the recording."""
-        out: IntArray = self.rows[self.edges - np.array([0, 1])] + np.array([0, 1])
-        return out
-
-    @property
     def is_lost(self) -> BoolArray:
         """Moves (m,) in which the gyro was at its limit too long to be bridged."""
         return self.clipped_s > LONGEST_BRIDGE_S
@@ -190,8 +184,10 @@ def measure_moves(
     if np.any(undithered):
         zero, var_bias = _with_hidden_bias(zero, var_bias, segments, quantum, undithered)
         mean = np.where(undithered, zero.mean(axis=0), mean)
-    coarse = _coarse(recording, segments, undithered)
-    hidden = (resting_ends(*coarse, in_log) | resting_axes(*coarse))[rows].astype(np.float64)
+    hidden = np.zeros(rate.shape)
+    if np.any(undithered):
+        coarse = _coarse(recording, segments, undithered)
+        hidden[(resting_ends(*coarse, in_log) | resting_axes(*coarse))[rows]] = 1.0
     seen = rate_noise_density(recording, segments)
     density = density_without_rounding(seen, quantum, 1.0 / recording.rate_hz, undithered)
     steps, nominal, jitter = _steps_of(recording)

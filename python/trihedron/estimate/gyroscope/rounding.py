@@ -20,9 +20,6 @@ in that for the first, and the samples over which what it still turns, rms over 
 a step's uniform error, for each sample that the first step took."""
 CHATTER = 9
 """Readings whose median is free of toggling between neighbouring codes."""
-LONGER = 4
-"""Times what an axis takes to leave the step of its bias, or what chatter hides, for which it must stay in it while
-others turn to count as standing still."""
 QUIETEST = 0.2
 """Quantile of the variances of steady stretches that is their noise's."""
 LEAST_WHITE = 1e-2
@@ -153,8 +150,8 @@ def resting_axes(readings: FloatArray, quantum: FloatArray, rest: FloatArray, ax
 def _standing(
     readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray
 ) -> Iterator[tuple[int, int, int]]:
-    """(axis, begin, end) where an axis stays in the step of its bias, others turning, far longer than it takes to leave
-    it: where all axes turn, each passes that step or leaves it with the others."""
+    """(axis, begin, end) where an axis stays in the step of its bias, others turning, longer than it takes to leave it:
+    where all axes turn, each passes that step or leaves it with the others."""
     turns = np.abs(readings - rest) > 1.75 * quantum
     for axis in np.flatnonzero(axes).tolist():
         others = np.any(turns[:, np.arange(3) != axis], axis=1)
@@ -162,7 +159,7 @@ def _standing(
         for first, last, left, right in _rests(steady, float(quantum[axis]), float(rest[axis])):
             inside = first + left, last - right
             for begin, end in ranges_of(others[inside[0] : inside[1]]):
-                if end - begin > LONGER * max(left, right, CHATTER):
+                if end - begin > max(left, right):
                     yield axis, inside[0] + begin, inside[0] + end
 
 
