@@ -30,6 +30,11 @@ from trihedron.records.segments import Segments
 from trihedron.sensor_model import reframing
 from trihedron.session.averaging import sharpened
 
+_Near = tuple[FloatArray, FloatArray, FloatArray]
+HIDDEN_SAMPLES = 2.0 ** np.arange(6)
+"""Turns that are tried, in LSB of rate held for a sample: what settles unseen stays below one LSB for some tenths of a
+second."""
+
 
 @dataclass(frozen=True, eq=False)
 class SolvedSession:
@@ -57,9 +62,7 @@ class _Log:
     part: AccelerometerPart
     gravity_m_s2: float
 
-    def observed(
-        self, measured: MoveMeasurements, aligned: Aligned, near: tuple[FloatArray, FloatArray, FloatArray]
-    ) -> Observed:
+    def observed(self, measured: MoveMeasurements, aligned: Aligned, near: _Near) -> Observed:
         """The session, ``near`` (S_a, b_a, S_w)."""
         out = arranged(self.recording, self.segments, measured, self.gravity_m_s2, aligned.used)
         return with_prior(out, *near, is_given=self.part.is_given)
@@ -81,6 +84,7 @@ def solved(
     own = (model.S, model.b) if part.is_given else (np.asarray(fit.accelerometer_scale), fit.accelerometer_bias)
     S_a, b_a, R = _lower(*own)
     near = S_a, b_a, R @ np.asarray(fit.gyroscope_scale)
+    measured = _with_hidden_turns(log, measured, aligned, near)
     while True:
         observed = log.observed(measured, aligned, near)
         solution = solve_session(observed, *near)
@@ -117,6 +121,29 @@ def solved(
         observed, solution, covariance, gyroscope, left_out, (*found, *losses.findings(own_sigma)),
         measured.averaging.share,
     )  # fmt: skip
+
+
+def _with_hidden_turns(log: _Log, measured: MoveMeasurements, aligned: Aligned, near: _Near) -> MoveMeasurements:
+    """Every move with a turn that its LSB hides, as a support makes that settles, of the rms that is likeliest.
+
+    Where samples may have been lost unseen these are asked for first: they would be as good a reason for the misses.
+    """
+    if not np.any(measured.is_undithered):
+        return measured
+    plain = solve_session(log.observed(measured, aligned, near), *near)
+    if is_asked_for_losses(log.recording.time_s, measured, aligned, plain.moves_chi2, plain.moves_dof):
+        return measured
+    best, likeliest = measured, plain.core.log_marginal
+    known = np.zeros(measured.rate.shape) if measured.reading_variance is None else measured.reading_variance
+    for samples in HIDDEN_SAMPLES:
+        variance = known.copy()
+        variance[measured.edges[:, 1] - 2] += (samples * measured.quantum.max()) ** 2
+        tried = replace(measured, reading_variance=variance)
+        found = solve_session(log.observed(tried, aligned, near), *near).core.log_marginal
+        if found <= likeliest:
+            break
+        best, likeliest = tried, found
+    return best
 
 
 def in_frame_of(part: AccelerometerPart, found: SolvedSession) -> SensorCalibration:
@@ -164,7 +191,7 @@ def _by_readings(
     measured: MoveMeasurements,
     aligned: Aligned,
     solution: SessionSolution,
-    near: tuple[FloatArray, FloatArray, FloatArray],
+    near: _Near,
 ) -> FloatArray:
     """Covariance (24, 24) by what all moves share: what is not known of the sensor's averaging, and what its steps hide
     in common. Readings off by one standard error, fitted anew.
