@@ -198,3 +198,12 @@ def test_the_published_example_of_an_inertial_message_is_read():
     first, second = decoder.feed(binary + text)
     assert first.ticks == second.ticks == 1_000_000
     assert first.values == second.values == (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("flipped", [b"1.0\x0c", b"1_0"])
+def test_a_flipped_bit_that_python_reads_past_leaves_no_cell_that_the_log_cannot_hold(flipped):
+    line = b"I,1000000,0.0,0.0,0.0,0.0,0.0,1.0\n"
+    decoder = decoder_factory("xio")()
+    frames = [*decoder.feed(line + line.replace(b"1.0\n", flipped + b"\n") + line), *decoder.finish()]
+    assert [frame.text for frame in frames] == ["0.0,0.0,0.0,0.0,0.0,1.0"] * 2
+    assert decoder.corrupt == 1

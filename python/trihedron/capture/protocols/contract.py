@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 
@@ -42,3 +43,18 @@ class Decoder(Protocol):
     def finish(self) -> list[Frame]:
         """Frames that stand in the remaining bytes, when no more will come."""
         ...
+
+
+_PRINTED = frozenset("0123456789+-.eE \tnaNinfINF")
+
+
+def printed_numbers(texts: Sequence[str]) -> list[float] | None:
+    """Numbers as a board prints them; ``None`` where one is none, or holds what Python alone reads past: a bit that
+    flips makes form feeds and underscores.
+    """
+    if not all(map(_PRINTED.issuperset, texts)):
+        return None
+    try:
+        return list(map(float, texts))
+    except ValueError:
+        return None

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from trihedron.capture.protocols.contract import Frame
+from trihedron.capture.protocols.contract import Frame, printed_numbers
 
 LEARN_LINES = 12
 """Lines of numbers from which the layout is learned."""
@@ -233,10 +233,10 @@ class LinesDecoder:
             tokens: list[str] = list(labelled.groups())
         else:
             tokens = line.rstrip(" ,;\t").split(self._separator)
-        if len(tokens) != self._n:
+        numbers = printed_numbers(tokens)
+        if len(tokens) != self._n or numbers is None:
             return None
         try:
-            numbers = list(map(float, tokens))
             counter = None if self._counter is None else int(tokens[self._counter])
             if self._time is not None:
                 ticks = round(numbers[self._time] * self._per_unit)
@@ -244,7 +244,7 @@ class LinesDecoder:
             return None
         keep = self._keep
         if len(keep) == len(tokens):
-            return Frame(counter, ticks, tuple(numbers), ",".join(tokens).replace(" ", ""))
+            return Frame(counter, ticks, tuple(numbers), ",".join(tokens).replace(" ", "").replace("\t", ""))
         text = ",".join([tokens[i].strip() for i in keep])
         return Frame(counter, ticks, tuple([numbers[i] for i in keep]), text)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 
-from trihedron.capture.protocols.contract import Frame
+from trihedron.capture.protocols.contract import Frame, printed_numbers
 from trihedron.capture.protocols.framing import MORE, FramedDecoder, LineFedDecoder
 
 _LENGTH = 16
@@ -83,8 +83,9 @@ class RazorDecoder(LineFedDecoder):
             self._parts = {}
         try:
             texts = [field.decode("ascii").strip() for field in fields]
-            _ = [float(text) for text in texts]
-        except ValueError:
+        except UnicodeDecodeError:
+            texts = []
+        if not texts or printed_numbers(texts) is None:
             self.corrupt += 1
             self._parts = {}
             return None

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import struct
 
-from trihedron.capture.protocols.contract import Frame
+from trihedron.capture.protocols.contract import Frame, printed_numbers
 from trihedron.capture.protocols.framing import LineFedDecoder
 
 _INERTIAL = 0x80 + ord("I")
@@ -67,9 +67,10 @@ class XioDecoder(LineFedDecoder):
             return None
         try:
             ticks = int(fields[1])
-            values = tuple(map(float, fields[2:]))
+            text = b",".join(fields[2:]).decode("ascii")
         except ValueError:
             return None
-        if not all(math.isfinite(v) and abs(v) < _LARGEST for v in values):
+        values = printed_numbers(text.split(","))
+        if values is None or not all(math.isfinite(v) and abs(v) < _LARGEST for v in values):
             return None
-        return Frame(None, ticks, values, b",".join(fields[2:]).decode("ascii"))
+        return Frame(None, ticks, tuple(values), text)

@@ -13,10 +13,12 @@ from trihedron.estimate.gyroscope.alignment import (
     MoveOptions,
     align,
     align_screened,
+    is_astray,
+    missed_deg,
+    usually_missed_deg,
 )
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.gyroscope.start import starts, turned_starts
-from trihedron.estimate.gyroscope.verification import is_astray, missed_deg, usually_missed_deg
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.session.averaging import TRIED, averaging_of, sharpened

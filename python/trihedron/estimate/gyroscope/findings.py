@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.gyroscope.alignment import FALSE_ALARM, Aligned
+from trihedron.estimate.gyroscope.alignment import ASTRAY_DEG, FALSE_ALARM, Aligned
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.gyroscope.observability import observability_findings
-from trihedron.estimate.gyroscope.verification import ASTRAY_DEG
 from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import SessionSolution
 from trihedron.probability import chdtrc

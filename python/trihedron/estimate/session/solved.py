@@ -18,7 +18,7 @@ from trihedron.estimate.gyroscope.lost_turns import (
 )
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.gyroscope.observability import describe
-from trihedron.estimate.gyroscope.rounding import shared_errors
+from trihedron.estimate.gyroscope.rounding import plateau_variance, shared_errors
 from trihedron.estimate.session.carried import Carried, carried
 from trihedron.estimate.session.figures import HeldOut, held_out, move_quality
 from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted, solve_session
@@ -31,9 +31,8 @@ from trihedron.sensor_model import reframing
 from trihedron.session.averaging import sharpened
 
 _Near = tuple[FloatArray, FloatArray, FloatArray]
-HIDDEN_SAMPLES = 2.0 ** np.arange(6)
-"""Turns that are tried, in LSB of rate held for a sample: what settles unseen stays below one LSB for some tenths of a
-second."""
+HIDDEN_S = 0.01 * 2.0 ** np.arange(7)
+"""Turns that are tried, in seconds of a rate of one LSB: what settles unseen stays below it for tenths of a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,11 +132,17 @@ def _with_hidden_turns(log: _Log, measured: MoveMeasurements, aligned: Aligned, 
     plain = solve_session(log.observed(measured, aligned, near), *near)
     if is_asked_for_losses(log.recording.time_s, measured, aligned, plain.moves_chi2, plain.moves_dof):
         return measured
-    best, likeliest = measured, plain.core.log_marginal
     known = np.zeros(measured.rate.shape) if measured.reading_variance is None else measured.reading_variance
-    for samples in HIDDEN_SAMPLES:
+    shared = plateau_variance(*measured.coarse(log.recording, log.segments))
+    if shared is not None:
+        # Moves agree among themselves: what they share where their rate stands still inside a step.
+        known = np.maximum(known, shared[measured.rows])
+        measured = replace(measured, reading_variance=known)
+        plain = solve_session(log.observed(measured, aligned, near), *near)
+    best, likeliest = measured, plain.core.log_marginal
+    for hidden_s in HIDDEN_S:
         variance = known.copy()
-        variance[measured.edges[:, 1] - 2] += (samples * measured.quantum.max()) ** 2
+        variance[measured.edges[:, 1] - 2] += (hidden_s / measured.nominal_step_s * measured.quantum.max()) ** 2
         tried = replace(measured, reading_variance=variance)
         found = solve_session(log.observed(tried, aligned, near), *near).core.log_marginal
         if found <= likeliest:
@@ -151,20 +156,17 @@ def in_frame_of(part: AccelerometerPart, found: SolvedSession) -> SensorCalibrat
 
     Each of the accelerometer's standard errors turns the frame and moves what the session is held to.
     """
-    model, observed = part.model, found.observed
-
-    def gyroscope(S_a: FloatArray, b_a: FloatArray) -> tuple[SessionSolution, FloatArray]:
-        S, b, R = _lower(S_a, b_a)
-        return refitted(with_prior(observed, S, b, found.solution.S_w, is_given=True), found.solution), R.T
-
+    model = part.model
     R = _lower(model.S, model.b)[2].T
     to_frame = np.zeros((12, 12))
     to_frame[:9, :9], to_frame[9:, 9:] = np.kron(R, np.eye(3)), R
     S, b = R @ found.solution.S_w, R @ found.solution.b_w
     covariance = to_frame @ found.gyroscope.covariance @ to_frame.T
     for direction in part.basis.T:
-        other, turned = gyroscope(model.S + direction[:9].reshape(3, 3), model.b + direction[9:])
-        off = np.concatenate([(turned @ other.S_w - S).ravel(), turned @ other.b_w - b])
+        S_a, b_a, into = _lower(model.S + direction[:9].reshape(3, 3), model.b + direction[9:])
+        observed = with_prior(found.observed, S_a, b_a, found.solution.S_w, is_given=True)
+        other = refitted(observed, found.solution)
+        off = np.concatenate([(into.T @ other.S_w - S).ravel(), into.T @ other.b_w - b])
         covariance += np.outer(off, off)
     return replace(found.gyroscope, S=S, b=b, covariance=covariance)
 
@@ -187,11 +189,7 @@ def _losses(
 
 
 def _by_readings(
-    log: _Log,
-    measured: MoveMeasurements,
-    aligned: Aligned,
-    solution: SessionSolution,
-    near: _Near,
+    log: _Log, measured: MoveMeasurements, aligned: Aligned, solution: SessionSolution, near: _Near
 ) -> FloatArray:
     """Covariance (24, 24) by what all moves share: what is not known of the sensor's averaging, and what its steps hide
     in common. Readings off by one standard error, fitted anew.
