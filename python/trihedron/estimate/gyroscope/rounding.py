@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.ranges import ranges_of
 
 UNDITHERED = 0.5
@@ -18,6 +18,12 @@ SETTLING = (0.50, 0.68), (2.5, 1.25)
 """Of a body that settles as exp(-t/τ), then of one that starts as t² does: time for the second step beside its bias's
 in that for the first, and the samples over which what it still turns, rms over where in its step the bias may lie, is
 a step's uniform error, for each sample that the first step took."""
+TURNING = 2.0 / (math.sqrt(2.0) - 1.0)
+"""How many times as long as in the steps beside it a rate stays, at most, in the one in which it turns back as t² does;
+one that stays longer is steady."""
+TURNED = 1.0 / 3.0
+"""Mean square of what such a turn's readings are off together, beside that of a steady rate: ``(2h/3 - 1/2)²`` of a step
+for a turn at ``h`` of it, in the mean over ``h`` of readings, which are as ``√h``."""
 CHATTER = 9
 """Readings whose median is free of toggling between neighbouring codes."""
 QUIETEST = 0.2
@@ -39,8 +45,8 @@ def rounding_variance(
 
     While the rate passes through a step from one side to the other, the errors of the ``n`` readings inside run through
     all values of the step and cancel but for one of them: ``q²/12`` for the run, ``q²/12n`` a reading. Where the rate
-    turns back inside the step, the readings share one error: their sum has the variance ``n² q²/12``, that is
-    ``n q²/12`` a reading. At the ``rest`` reading (3,) the error is that of the bias, which is not charged here but for
+    stands inside the step and turns back, the readings share one error: their sum has the variance ``n² q²/12``, that
+    is ``n q²/12`` a reading, and a third of it where the rate turns at once (:data:`TURNED`). At the ``rest`` reading (3,) the error is that of the bias, which is not charged here but for
     the start and the end of a move that still lie inside the step.
     """
     if not np.any(axes):
@@ -84,6 +90,7 @@ def _of_plateaus(codes: FloatArray, steady: FloatArray, quantum: float, rest: fl
     steady stretches, for those whose rate lies between two codes toggle most with the least noise.
     """
     begins = np.concatenate([[0], np.flatnonzero(steady[1:] != steady[:-1]) + 1, [len(codes)]])
+    at_once = _turns_at_once(np.diff(begins))
     level = steady[begins[:-1]].tolist()
     plateaus, scatters = [], []
     first = 0
@@ -93,8 +100,10 @@ def _of_plateaus(codes: FloatArray, steady: FloatArray, quantum: float, rest: fl
         while last + 1 < len(level) and max(high, level[last + 1]) - min(low, level[last + 1]) < 1.5 * quantum:
             last += 1
             low, high = min(low, level[last]), max(high, level[last])
+        first, last = _turned_back(level, first, last)
         a, b = int(begins[first]), int(begins[last + 1])
-        if b - a >= 2 * CHATTER and math.isfinite(low):
+        is_short = first == last and at_once[first]
+        if b - a >= 2 * CHATTER and not is_short and math.isfinite(low):
             inside = codes[a + CHATTER // 2 : b - CHATTER // 2]
             scatters.append(float(np.var(inside[np.isfinite(inside)])))
             is_zero = low < rest + 0.75 * quantum and high > rest - 0.75 * quantum
@@ -108,6 +117,14 @@ def _of_plateaus(codes: FloatArray, steady: FloatArray, quantum: float, rest: fl
         for a, b in plateaus:
             out[a:b] = (b - a) * hidden
     return out * quantum**2 / 12.0
+
+
+def _turned_back(level: list[float], first: int, last: int) -> tuple[int, int]:
+    """Of runs that pass from one code to the other at most twice, the one in which the rate turns back: no toggling."""
+    if last - first not in (1, 2) or first == 0:
+        return first, last
+    far = first + int(np.argmax(np.abs(np.array(level[first : last + 1]) - level[first - 1])))
+    return far, far
 
 
 def _goes_back(level: list[float], first: int, last: int, low: float, high: float) -> bool:
@@ -128,7 +145,8 @@ def _of_runs(codes: FloatArray, steady: FloatArray, quantum: float, rest: float)
         step = np.sign(np.diff(level))
     is_passed = np.zeros(len(level), dtype=bool)
     is_passed[1:-1] = step[1:] * step[:-1] > 0.0
-    out = np.repeat(np.where(is_passed, 1.0 / count, count).astype(np.float64), count)
+    share = np.where(_turns_at_once(count), TURNED * count, count)
+    out = np.repeat(np.where(is_passed, 1.0 / count, share).astype(np.float64), count)
     for begin, end, left, right in _rests(steady, quantum, rest):
         n = end - begin
         part = np.zeros(n)
@@ -137,6 +155,14 @@ def _of_runs(codes: FloatArray, steady: FloatArray, quantum: float, rest: float)
             part[-right:] = np.maximum(part[-right:], right)
         out[begin:end] = part
     return out * quantum**2 / 12.0
+
+
+def _turns_at_once(count: IntArray) -> BoolArray:
+    """Whether runs of ``count`` readings, all too long for toggling, are as short beside their neighbours as a turn's."""
+    out = np.zeros(len(count), dtype=np.bool_)
+    clean = np.minimum(np.minimum(count[:-2], count[2:]), count[1:-1]) > CHATTER // 2
+    out[1:-1] = clean & (count[1:-1] < 0.5 * TURNING * (count[:-2] + count[2:]))
+    return out
 
 
 def resting_axes(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> BoolArray:
