@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trihedron.estimate.gyroscope.rounding import plateau_variance, rounding_variance
+from trihedron.session.rounding import plateau_variance, rounding_variance
 
 
 def scores_of_ends(rng, noise, ways):

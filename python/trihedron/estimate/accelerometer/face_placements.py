@@ -10,8 +10,8 @@ import numpy.typing as npt
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.accelerometer import face_poses, verdict
-from trihedron.estimate.gyroscope.rounding import undithered_axes
 from trihedron.records.segments import Segments
+from trihedron.session.rounding import undithered_axes
 
 
 @dataclass(frozen=True, eq=False)

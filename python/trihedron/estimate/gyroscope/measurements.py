@@ -15,13 +15,6 @@ from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_d
 from trihedron.estimate.gyroscope.biases import excess_variance, pool_biases, shrink
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, Clipped, bridge_clipping, clipped_time
 from trihedron.estimate.gyroscope.resting_ends import resting_ends
-from trihedron.estimate.gyroscope.rounding import (
-    common_bias,
-    density_without_rounding,
-    resting_axes,
-    rounding_variance,
-    undithered_axes,
-)
 from trihedron.probability import chdtrc
 from trihedron.quantiles import median, medians
 from trihedron.ranges import rows_beside
@@ -29,6 +22,13 @@ from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
 from trihedron.session.averaging import Averaging
+from trihedron.session.rounding import (
+    common_bias,
+    density_without_rounding,
+    resting_axes,
+    rounding_variance,
+    undithered_axes,
+)
 
 GAP_STEPS = 5.0
 """A step of time so much longer than the usual one is a gap: the rate in it is unknown."""

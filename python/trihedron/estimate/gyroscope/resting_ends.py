@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
-from trihedron.estimate.gyroscope.rounding import CHATTER
+from trihedron.session.rounding import CHATTER
 
 HIDDEN = (0.465, 0.567, 0.689, 1.0), (1.156, 0.957, 0.782, 0.500)
 """Of a body that settles as exp(-t/τ), then of those that start as t⁴, t² and t do: time for the second step beside its

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.estimate.gyroscope.rounding import CHATTER, undithered_axes
+from trihedron.session.rounding import CHATTER, undithered_axes
 
 AT_REST = 0.75
 """Steps from the bias within which a reading at the ends of a turn is that of rest: a bias may toggle."""

@@ -18,7 +18,6 @@ from trihedron.estimate.gyroscope.lost_turns import (
 )
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.gyroscope.observability import describe
-from trihedron.estimate.gyroscope.rounding import plateau_variance, shared_errors
 from trihedron.estimate.session.carried import Carried, carried
 from trihedron.estimate.session.figures import HeldOut, held_out, move_quality
 from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted, solve_session
@@ -29,6 +28,7 @@ from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.sensor_model import reframing
 from trihedron.session.averaging import sharpened
+from trihedron.session.rounding import plateau_variance, shared_errors
 
 _Near = tuple[FloatArray, FloatArray, FloatArray]
 HIDDEN_S = 0.01 * 2.0 ** np.arange(7)
