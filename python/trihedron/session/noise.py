@@ -14,6 +14,7 @@ from trihedron.quantiles import medians, quantiles
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.session.aliasing import unresolved_variance
+from trihedron.session.rounding import rounding_of_moves
 
 LEAST_SHARE = 1e-9
 """Where nothing scatters (a simulation without noise) a billionth of a unit stands for the rounding of the log."""
@@ -94,6 +95,9 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
             continue
         quantum = recording.facts.of(("accelerometer", "gyroscope")[k]).step
         variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s, quantum, recording.time_s)
+        if k == 0:
+            # A gyro's rounding is measured with its turns, beside the place of its bias.
+            variances[:, k] += rounding_of_moves(readings, ranges, quantum, segments.accelerometer_sigma) * step_s**2
         if sigma is not None and density is not None:
             halves = _second_halves_minus_first(readings, np.array(spans, dtype=np.int64).reshape(-1, 2))
             variances[:, k] += coloured_variance(sigma, halves, density, lasts, moves_last)

@@ -22,8 +22,8 @@ TURNING = 2.0 / (math.sqrt(2.0) - 1.0)
 """How many times as long as in the steps beside it a rate stays, at most, in the one in which it turns back as t² does;
 one that stays longer is steady."""
 TURNED = 1.0 / 3.0
-"""Mean square of what such a turn's readings are off together, beside that of a steady rate: ``(2h/3 - 1/2)²`` of a step
-for a turn at ``h`` of it, in the mean over ``h`` of readings, which are as ``√h``."""
+"""Mean square of what such a turn's readings are off together, beside that of a steady rate: ``(2h/3 - 1/2)²`` of a
+step for a turn at ``h`` of it, in the mean over ``h`` of readings, which are as ``√h``."""
 CHATTER = 9
 """Readings whose median is free of toggling between neighbouring codes."""
 QUIETEST = 0.2
@@ -46,8 +46,9 @@ def rounding_variance(
     While the rate passes through a step from one side to the other, the errors of the ``n`` readings inside run through
     all values of the step and cancel but for one of them: ``q²/12`` for the run, ``q²/12n`` a reading. Where the rate
     stands inside the step and turns back, the readings share one error: their sum has the variance ``n² q²/12``, that
-    is ``n q²/12`` a reading, and a third of it where the rate turns at once (:data:`TURNED`). At the ``rest`` reading (3,) the error is that of the bias, which is not charged here but for
-    the start and the end of a move that still lie inside the step.
+    is ``n q²/12`` a reading, and a third of it where the rate turns at once (:data:`TURNED`). At the ``rest`` reading
+    (3,) the error is that of the bias, which is not charged here but for the start and the end of a move that still lie
+    inside the step; NaN where there is none.
     """
     if not np.any(axes):
         return None
@@ -59,6 +60,19 @@ def rounding_variance(
         # What of the others' turn reaches an axis that stands still stays inside its step, all along.
         out[begin:end, still] = np.maximum(out[begin:end, still], (end - begin) * quantum[still] ** 2 / 12.0)
     return out
+
+
+def rounding_of_moves(
+    readings: FloatArray, ranges: list[tuple[int, int]], quantum: FloatArray, sigma: FloatArray
+) -> FloatArray:
+    """Variance (moves, 3) of the sums of readings (n, 3) over ``ranges``, of noise ``sigma`` (3,) that may not dither.
+
+    A move begins and ends in the steps of its poses: what it reads there is off by as much as their means.
+    """
+    axes = undithered_axes(quantum, sigma)
+    nowhere = np.full(3, np.nan)
+    found = [rounding_variance(readings[a:b], quantum, nowhere, axes) for a, b in ranges]
+    return np.array([np.zeros(3) if of_move is None else of_move.sum(axis=0) for of_move in found]).reshape(-1, 3)
 
 
 def plateau_variance(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> FloatArray | None:
@@ -158,7 +172,7 @@ def _of_runs(codes: FloatArray, steady: FloatArray, quantum: float, rest: float)
 
 
 def _turns_at_once(count: IntArray) -> BoolArray:
-    """Whether runs of ``count`` readings, all too long for toggling, are as short beside their neighbours as a turn's."""
+    """Whether runs of ``count`` readings, too long for toggling, are as short beside their neighbours as a turn's."""
     out = np.zeros(len(count), dtype=np.bool_)
     clean = np.minimum(np.minimum(count[:-2], count[2:]), count[1:-1]) > CHATTER // 2
     out[1:-1] = clean & (count[1:-1] < 0.5 * TURNING * (count[:-2] + count[2:]))
