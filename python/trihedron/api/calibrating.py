@@ -28,6 +28,7 @@ from trihedron.estimate.gyroscope.moves import calibrate_moves
 from trihedron.estimate.gyroscope.turn_angles import AMBIGUOUS, SCALE_TOLERANCE
 from trihedron.estimate.gyroscope.turn_axes import shared_errors, stated_turns
 from trihedron.estimate.gyroscope.turns import calibrate_turns
+from trihedron.estimate.gyroscope.turntable import on_turntable
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.estimate.pull import pull_allowed, pull_on_accelerometer
 from trihedron.quantiles import median
@@ -72,6 +73,8 @@ def calibrate(
     axis_signs: Sequence[int] | None = None,
     loss: Loss = "linear",
     gyroscope_nominal: float | None = None,
+    turntable_deg_s: Sequence[float] | None = None,
+    turntable_sigma: float = 0.0,
     reference: AnyReference | None = None,
     reference_columns: str | None = None,
     progress: Progress | None = None,
@@ -102,6 +105,9 @@ def calibrate(
         Method 2: how far outlying poses count; other than ``linear`` with ``separate`` or an accelerometer alone.
     gyroscope_nominal : float
         rad/s per raw unit, where readings are counts and too few moves tell it.
+    turntable_deg_s : sequence of float
+        Speeds of a turntable, the unit on it anyhow, °/s: one for all steady turns of the log, or one a turn in order;
+        0 leaves one out. ``turntable_sigma`` is their common relative standard error.
     reference : path, Recording or ReferenceMotion
         Known motion beside the log (rate table, optical tracking, another unit): both sensors are held against it, and
         static poses are not needed. ``reference_columns`` says its columns where their names do not.
@@ -120,8 +126,8 @@ def calibrate(
     Examples
     --------
     >>> result = trihedron.calibrate(recording, latitude_deg=59.94)
-    >>> result.accelerometer.S.shape, result.accelerometer.covariance.shape
-    ((3, 3), (12, 12))
+    >>> result.accelerometer.S.shape
+    (3, 3)
     >>> result.is_trustworthy
     True
     """
@@ -145,9 +151,7 @@ def calibrate(
         if faces is not None:
             raise RefusedError(f"faces belong to method 1: say --method faces, or leave them out of {method}.")
         if loss != "linear" and method == "joint" and recording.gyroscope is not None:
-            raise RefusedError(
-                f"--loss {loss} belongs to --method separate: one fit of both sensors has no robust loss."
-            )
+            raise RefusedError(f"--loss {loss} belongs to --method separate: a fit of both sensors has none.")
         wanted = frame or "lower"
         options = MoveOptions(nominal_scale=gyroscope_nominal)
         try:
@@ -159,13 +163,13 @@ def calibrate(
             grave = [finding.seen for finding in recording.findings if finding.severity is Severity.SERIOUS]
             raise RefusedError(" ".join((*grave, str(error)))) from None
     calibration = in_frame(with_bending(calibration, segments), wanted)
+    if turntable_deg_s is not None:
+        calibration = on_turntable(calibration, recording, segments, turntable_deg_s, turntable_sigma)
     findings = (*said, *recording.findings, *_as_they_weigh(segments), *_of_fit(calibration, recording, segments))
     return _result(calibration, findings, segments, recording)
 
 
-def _result(
-    calibration: Calibration, findings: tuple[Finding, ...], segments: Segments, recording: Recording
-) -> CalibrationResult:
+def _result(calibration: Calibration, findings: Found, segments: Segments, recording: Recording) -> CalibrationResult:
     return CalibrationResult(of_board(replace(calibration, findings=findings), recording), segments, recording)
 
 
@@ -252,7 +256,8 @@ def _by_poses(
             pull = pull_on_accelerometer(accelerometer, both.accelerometer)
             if pull <= pull_allowed(accelerometer):
                 return replace(both, findings=(*_still_said(found, both.accelerometer), *both.findings))
-            alone = replace(alone, findings=(*found, _joint_fit_left(pull)))
+            # Moves that contradict the poses must not pull the accelerometer, which the poses show without them.
+            alone = replace(alone, findings=(*found, Finding.of(FindingCode.JOINT_FIT_LEFT, chi2_increase=pull)))
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, options)
     except REFUSALS as error:
         return _without_gyroscope(alone, str(error))
@@ -264,11 +269,6 @@ def _still_said(found: Found, joint: SensorCalibration) -> Found:
     if joint.quality is None or joint.quality.covariance_scale > 1.0:
         return found
     return tuple(finding for finding in found if finding.code is not FindingCode.RESIDUAL_ABOVE_NOISE)
-
-
-def _joint_fit_left(pull: float) -> Finding:
-    """Moves that contradict the poses must not pull the accelerometer, which the poses show without them."""
-    return Finding.of(FindingCode.JOINT_FIT_LEFT, chi2_increase=pull)
 
 
 def _by_faces(
@@ -334,8 +334,7 @@ def _alone(
 
 
 def _together(alone: Calibration, gyroscope: SensorCalibration, found: Found) -> Calibration:
-    """Both sensors, one after the other: what the accelerometer's error does to the gyro is in the gyro's
-    covariance."""
+    """Both sensors, one after the other: what the accelerometer's error does to the gyro is in the latter's covariance."""
     covariance = np.zeros((24, 24))
     covariance[:12, :12] = alone.accelerometer.covariance
     covariance[12:, 12:] = gyroscope.covariance

@@ -40,6 +40,16 @@ Turns = Annotated[
         help="Angle of each turn on a table in degrees, '90,-90,360', in any pose; 0 leaves one out.",
     ),
 ]
+Turntable = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SPEEDS",
+        help="Speeds of a turntable in deg/s, the unit on it anyhow: one for all steady turns, or one each, '45,90'.",
+    ),
+]
+TurntableError = Annotated[
+    float, typer.Option(metavar="PERCENT", help="Standard error of the turntable's speed, common to all turns.")
+]
 AxisSigns = Annotated[
     str | None,
     typer.Option(metavar="+++", help="Sign with which each raw axis follows its documented direction, e.g. '-++'."),
@@ -72,6 +82,8 @@ def calibrate(
     frame: Frame = None,
     faces: Faces = None,
     turns: Turns = None,
+    turntable: Turntable = None,
+    turntable_error: TurntableError = 0.0,
     axis_signs: AxisSigns = None,
     loss: Loss = "linear",
     gyro_nominal: GyroNominal = None,
@@ -96,6 +108,8 @@ def calibrate(
     needs_stream(checkpoint, stream=stream)
     ending = Ending(output, json, report, full, force)
     choices = _choices(method, frame, faces, turns, axis_signs, loss)
+    if turntable is not None:
+        choices |= {"turntable_deg_s": numbers("--turntable", turntable), "turntable_sigma": turntable_error / 100.0}
     if reference and sources.are_many(by):
         calibrate_beside(sources, reference, reference_columns, place, choices["frame"], ending)
         return

@@ -45,6 +45,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "Six faces of a square case, turns of 90° between:",
             "trihedron calibrate log.csv --method faces --turns 90,-90",
         ),
+        (
+            "On a turntable at 90°/s, the unit taken to another pose between turns:",
+            "trihedron calibrate log.csv --turntable 90 --turntable-error 0.1",
+        ),
     ),
     "kalman": (
         ("With the noise of a static log:", "trihedron kalman log.csv --noise static.csv --report kalman.html"),

@@ -94,6 +94,7 @@ class FindingCode(str, Enum):
     GYRO_G_SENSITIVITY = "gyro-g-sensitivity"
     NOT_CONVERGED = "not-converged"
     JOINT_FIT_LEFT = "joint-fit-left"
+    TURNTABLE = "turntable"
     GYROSCOPE_LEFT_OUT = "gyroscope-left-out"
     # diagnose, extended calibration
     EFFECTS_MODELLED = "effects-modelled"

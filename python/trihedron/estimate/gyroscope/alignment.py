@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -220,9 +221,23 @@ def missed_deg(aligned: Aligned, measured: MoveMeasurements) -> FloatArray:
     return out
 
 
+def usual_deg(angle_deg: FloatArray, measured: MoveMeasurements, S_a: FloatArray, b_a: FloatArray) -> float:
+    """Median of angles (m,) over the moves that bring gravity elsewhere; over all where none does.
+
+    A turn about the vertical carries gravity right whatever the gyro's scale.
+    """
+    forces = measured.reading @ S_a.T + b_a
+    up = forces / np.linalg.norm(forces, axis=1, keepdims=True)
+    chord = np.linalg.norm(up[measured.links[:, 0]] - up[measured.links[:, 1]], axis=1)
+    tells = ~measured.is_lost & (chord > math.radians(ASTRAY_DEG))
+    return median(angle_deg[tells if np.any(tells) else ~measured.is_lost])
+
+
 def usually_missed_deg(aligned: Aligned, measured: MoveMeasurements) -> float:
-    """Median of that angle over all moves that tell."""
-    return median(missed_deg(aligned, measured)[~measured.is_lost])
+    """What the alignment usually misses."""
+    fit = aligned.fit
+    own = np.asarray(fit.accelerometer_scale), np.asarray(fit.accelerometer_bias)
+    return usual_deg(missed_deg(aligned, measured), measured, *own)
 
 
 def is_astray(aligned: Aligned, measured: MoveMeasurements) -> bool:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.gyroscope.alignment import ASTRAY_DEG, FALSE_ALARM, Aligned
+from trihedron.estimate.gyroscope.alignment import ASTRAY_DEG, FALSE_ALARM, Aligned, usual_deg
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.gyroscope.observability import observability_findings
 from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import SessionSolution
 from trihedron.probability import chdtrc
-from trihedron.quantiles import median
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.units import STANDARD_GRAVITY_M_S2, RateUnit, rate_to_si
@@ -38,7 +37,7 @@ def findings_of(
     found += _outlier_findings(aligned, measured)
     if solution.inflation[0] > 1.0:
         # Bars that are widened in proportion say nothing about a minimum elsewhere.
-        is_astray = median(seen.angle_deg[~measured.is_lost]) > ASTRAY_DEG
+        is_astray = usual_deg(seen.angle_deg, measured, solution.S_a, solution.b_a) > ASTRAY_DEG
         found.append(
             Finding.of(
                 FindingCode.RESIDUAL_ABOVE_NOISE,

@@ -17,6 +17,25 @@ _SAME_GRAVITY = "turns about the vertical leave gravity where it was, and a whol
 
 _MOVES = (
     Entry(
+        Code.TURNTABLE,
+        "",
+        NOTE,
+        "{turns:.0f} steady turns of a table at known speed were fitted: |S w′ + b| within {rms_percent:.2g} % rms of "
+        "what was stated.",
+        "The speeds' common uncertainty is in every scale of the gyro.",
+        "",
+    ),
+    Entry(
+        Code.TURNTABLE,
+        "contradicting",
+        WARNING,
+        "the stated speeds of {turns:.0f} steady turns are off by {scatter_percent:.2g} % rms, {common_percent:.2g} % "
+        "too high on average, beside what moves and poses tell: more than noise explains; each was given that "
+        "uncertainty.",
+        "another speed than stated, a table that does not keep it, or a sensor that S and b do not describe",
+        "Count the turns in a minute; state --turntable-error.",
+    ),
+    Entry(
         Code.NOT_CONVERGED,
         "session",
         SERIOUS,

@@ -1,0 +1,215 @@
+"""A table that turns at known speeds, the unit on it anyhow: ``|S w' + b| = W`` while the speed stands still.
+
+The norm fit of an accelerometer's poses with another constant (docs/model-gyroscope.md). It goes into what moves and
+poses of the same log have told as rows of one more kind, so that the axes stay those of the accelerometer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
+from trihedron.probability import fdtrc
+from trihedron.ranges import ranges_of
+from trihedron.records.calibration import Calibration
+from trihedron.records.finding import Finding, FindingCode
+from trihedron.records.recording import Recording
+from trihedron.records.segments import Segments
+from trihedron.session.rounding import undithered_axes
+
+BLOCK_S = 0.2
+"""Of readings that are taken together: noise is small beside the speed, and a table at speed does not change."""
+STEADY = 0.01
+"""Change of a table's speed, relative, that is none: its control. A hand does not turn as evenly for a second."""
+SHORTEST_S = 1.0
+NOISE = 6.0
+"""Standard errors of a block's mean by which a steady rate may be off."""
+SLOWEST = 20.0
+"""Standard errors of a block's mean that a table turns faster than."""
+ITERATIONS = 20
+FALSE_ALARM = 1e-3
+"""Chance that the speeds of a sound table are said to scatter."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plateaus:
+    """Stretches of steady rotation: half-open ``spans`` (k, 2), mean reading (k, 3) raw and its covariance."""
+
+    spans: tuple[tuple[int, int], ...]
+    mean: FloatArray
+    covariance: FloatArray
+
+
+def plateaus(recording: Recording, segments: Segments) -> Plateaus:
+    """Where the unit turns steadily for a second or longer, in the moves between poses."""
+    assert recording.gyroscope is not None
+    assert segments.gyroscope_mean is not None
+    assert segments.gyroscope_sigma is not None
+    rate, quantum = recording.gyroscope, recording.facts.of("gyroscope").step
+    size = max(round(BLOCK_S * recording.rate_hz), 4)
+    noise = np.hypot(segments.gyroscope_sigma, quantum / np.sqrt(12.0))
+    rest = segments.gyroscope_mean.mean(axis=0)
+    spans, means, covariances = [], [], []
+    for move in segments.moves:
+        n = (move.stop - move.start) // size
+        blocks = rate[move.start : move.start + n * size].reshape(n, size, 3).mean(axis=1)
+        for first, last in _steady(blocks, rest, noise / np.sqrt(size)):
+            if (last - first) * size < SHORTEST_S * recording.rate_hz:
+                continue
+            mine = blocks[first:last]
+            spans.append((move.start + first * size, move.start + last * size))
+            means.append(mine.mean(axis=0))
+            white = np.diag(noise**2) / ((last - first) * size)
+            hidden = np.diag(np.where(undithered_axes(quantum, segments.gyroscope_sigma), quantum**2 / 12.0, 0.0))
+            covariances.append(np.maximum(white, np.diag(mine.var(axis=0, ddof=1) / (last - first))) + hidden)
+    return Plateaus(tuple(spans), np.array(means).reshape(-1, 3), np.array(covariances).reshape(-1, 3, 3))
+
+
+def _steady(blocks: FloatArray, rest: FloatArray, sigma: FloatArray) -> list[tuple[int, int]]:
+    """Runs of blocks (n, 3) that differ from their second one by no more than noise and a table's speed do."""
+    away = np.linalg.norm(blocks - rest, axis=1)
+    is_turning = np.all(np.isfinite(blocks), axis=1) & (away > SLOWEST * np.linalg.norm(sigma))
+    out = []
+    for begin, end in ranges_of(is_turning):
+        first = begin
+        while first < end:
+            level = min(first + 1, end - 1)
+            allowed = STEADY * away[level] + NOISE * np.sqrt(2.0) * float(np.linalg.norm(sigma))
+            apart = np.linalg.norm(blocks[first:end] - blocks[level], axis=1) > allowed
+            last = first + max(int(np.argmax(apart)), 1) if np.any(apart) else end
+            # The first and the last block may hold the end of a ramp.
+            if last - first > 3:
+                out.append((first + 1, last - 1))
+            first = last
+    return out
+
+
+def on_turntable(
+    calibration: Calibration,
+    recording: Recording,
+    segments: Segments,
+    speeds_deg_s: Sequence[float],
+    relative_sigma: float = 0.0,
+) -> Calibration:
+    """The calibration with the speeds of a turntable, in whatever orientation the unit lay on it.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        Of the same log, with a gyro.
+    speeds_deg_s : sequence of float
+        One for all steady turns, or one a turn in the order of the log; 0 leaves one out. Signs do not matter.
+    relative_sigma : float
+        Standard error of the table's speed, common to all turns (0.001: one part in a thousand).
+
+    Raises
+    ------
+    ValueError
+        When there is no gyro, no steady turn, or another number of them than of speeds.
+    """
+    gyro = calibration.gyroscope
+    if gyro is None or recording.gyroscope is None:
+        raise RefusedError("a turntable tells the gyro, and none was calibrated here; log poses and moves as well.")
+    found = plateaus(recording, segments)
+    speeds = _speeds(found, speeds_deg_s, recording.rate_hz)
+    used = speeds > 0.0
+    mean, covariance, W = found.mean[used], found.covariance[used], speeds[used]
+    start = np.concatenate([gyro.S.ravel(), gyro.b])
+    n = len(calibration.covariance)
+    own = _variance(mean, covariance, start)
+    of_table = np.outer(W, W) * relative_sigma**2
+    scatter = 0.0
+    while True:
+        noise = np.diag(own + (scatter * W) ** 2) + of_table
+        theta, gain, H, misfit = _updated(calibration.covariance, start, mean, W, noise)
+        innovation = H @ calibration.covariance[n - 12 :, n - 12 :] @ H.T + noise
+        chi2 = float(misfit @ np.linalg.solve(innovation, misfit))
+        if scatter > 0.0 or fdtrc(float(len(W)), 100.0, chi2 / len(W)) >= FALSE_ALARM:
+            break
+        # Speeds of a table that scatters, or a sensor that S and b do not describe: as uncertain as they miss.
+        scatter = float(np.sqrt(np.mean((misfit / W) ** 2)))
+    posterior = calibration.covariance - gain @ H @ calibration.covariance[n - 12 :]
+    posterior = 0.5 * (posterior + posterior.T)
+    shift = gain @ misfit
+    accelerometer = calibration.accelerometer
+    values = np.concatenate([accelerometer.S.ravel(), accelerometer.b]) + shift[:12]
+    said = _said(scatter, misfit / W, float(np.sqrt(np.mean((_model(mean, theta)[0] / W - 1.0) ** 2))), relative_sigma)
+    return replace(
+        calibration,
+        accelerometer=replace(
+            accelerometer, S=values[:9].reshape(3, 3), b=values[9:], covariance=posterior[:12, :12]
+        ),
+        gyroscope=replace(gyro, S=theta[:9].reshape(3, 3), b=theta[9:], covariance=posterior[12:, 12:]),
+        covariance=posterior,
+        findings=(*calibration.findings, said),
+    )  # fmt: skip
+
+
+def _speeds(found: Plateaus, speeds_deg_s: Sequence[float], rate_hz: float) -> FloatArray:
+    n, given = len(found.spans), np.abs(np.radians(np.asarray(speeds_deg_s, dtype=np.float64)))
+    if not np.isfinite(given).all() or not np.any(given > 0.0):
+        raise RefusedError(
+            "speeds of a turntable are numbers in °/s: one for all turns, or one each; 0 leaves one out."
+        )
+    if n == 0:
+        raise RefusedError("no steady turn of a second or longer was found: let the table run at its speed for 5 s.")
+    if len(given) not in (1, n):
+        at = ", ".join(f"{begin / rate_hz:.1f}-{end / rate_hz:.1f}" for begin, end in found.spans[:40])
+        raise RefusedError(
+            f"{len(given)} speeds were given and {n} steady turns were found (seconds {at}): "
+            "give one for all, or one a turn; 0 leaves a turn out."
+        )
+    return np.broadcast_to(given, (n,)).copy()
+
+
+def _model(mean: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Speeds (k,) and their derivatives (k, 12) by S (row by row) and b."""
+    rate = mean @ theta[:9].reshape(3, 3).T + theta[9:]
+    speed = np.linalg.norm(rate, axis=1)
+    along = rate / speed[:, None]
+    return speed, np.concatenate([(along[:, :, None] * mean[:, None, :]).reshape(-1, 9), along], axis=1)
+
+
+def _variance(mean: FloatArray, covariance: FloatArray, theta: FloatArray) -> FloatArray:
+    """(k,) variance of the speeds by the noise of the readings."""
+    S = theta[:9].reshape(3, 3)
+    rate = mean @ S.T + theta[9:]
+    gradient = (rate / np.linalg.norm(rate, axis=1)[:, None]) @ S
+    return np.asarray(np.einsum("ki,kij,kj->k", gradient, covariance, gradient))
+
+
+def _said(scatter: float, missed: FloatArray, rms: float, sigma: float) -> Finding:
+    """What came of the speeds, ``missed`` (k,) relative before the fit and ``rms`` behind it."""
+    common = float(np.mean(missed))
+    figures = {"rms": rms, "scatter": scatter, "sigma": sigma, "common": common}
+    if scatter > 0.0:
+        return Finding.of(
+            FindingCode.TURNTABLE,
+            "contradicting",
+            turns=len(missed),
+            scatter_percent=100.0 * scatter,
+            common_percent=100.0 * common,
+            numbers=figures,
+        )
+    return Finding.of(FindingCode.TURNTABLE, turns=len(missed), rms_percent=100.0 * rms, numbers=figures)
+
+
+def _updated(
+    prior: FloatArray, start: FloatArray, mean: FloatArray, W: FloatArray, noise: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Most likely gyro (12,), gain (n, k), derivatives (k, 12), and what the prior misses by these."""
+    n, theta = len(prior), start
+    for _ in range(ITERATIONS):
+        speed, H = _model(mean, theta)
+        gain = prior[:, n - 12 :] @ H.T @ np.linalg.inv(H @ prior[n - 12 :, n - 12 :] @ H.T + noise)
+        misfit = W - speed + H @ (theta - start)
+        new = start + (gain @ misfit)[n - 12 :]
+        is_there = bool(np.max(np.abs(new - theta)) <= 1e-12 * np.max(np.abs(start)))
+        theta = new
+        if is_there:
+            break
+    return theta, gain, H, misfit
