@@ -334,7 +334,7 @@ def _alone(
 
 
 def _together(alone: Calibration, gyroscope: SensorCalibration, found: Found) -> Calibration:
-    """Both sensors, one after the other: what the accelerometer's error does to the gyro is in the latter's covariance."""
+    """Both sensors, one after the other: the accelerometer's error is in the gyro's covariance."""
     covariance = np.zeros((24, 24))
     covariance[:12, :12] = alone.accelerometer.covariance
     covariance[12:, 12:] = gyroscope.covariance
