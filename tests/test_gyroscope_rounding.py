@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trihedron.session.rounding import plateau_variance, rounding_variance
+from trihedron.session.rounding import plateau_variance, rounding_of_moves, rounding_variance
 
 
 def scores_of_ends(rng, noise, ways):
@@ -57,3 +57,21 @@ def test_steady_rates_that_toggle_between_two_codes_share_one_error(noise):
     assert np.abs(scores).max() < 5.5
     if noise <= 0.1:
         assert np.sqrt(np.mean(np.square(white))) > 3.0, "as if independent it would be far too little"
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_moves_that_begin_and_end_inside_a_step_are_off_by_what_their_poses_are(noise):
+    rng = np.random.default_rng(5)
+    scores = []
+    for _ in range(200):
+        levels = rng.uniform(-40.0, 40.0, (2, 3))
+        still, s = np.zeros(40), np.linspace(0.0, 1.0, 60)
+        share = np.concatenate([still, s**3 * (10.0 - 15.0 * s + 6.0 * s**2), still + 1.0])[:, None]
+        truth = levels[0] + (levels[1] - levels[0]) * share
+        codes = np.round(truth + noise * rng.normal(size=truth.shape))
+        variance = rounding_of_moves(codes, [(0, len(codes))], np.ones(3), np.full(3, noise))[0]
+        scores.append((codes - truth).sum(axis=0) / np.sqrt(variance + len(codes) * noise**2))
+    # An error of 0.3 of a step for 80 readings: 23 of a step, where 140 independent ones make 3.4.
+    assert 0.7 < np.sqrt(np.mean(np.square(scores))) < 1.3
+    # A level at the edge of a step toggles: its readings are taken apart there, one in hundreds by too much.
+    assert np.mean(np.abs(scores) > 4.0) < 0.01
