@@ -22,7 +22,7 @@ _MOVES = (
         NOTE,
         "{turns:.0f} steady turns of a table at known speed were fitted: |S w′ + b| within {rms_percent:.2g} % rms of "
         "what was stated.",
-        "The speeds' common uncertainty is in every scale of the gyro.",
+        "",
         "",
     ),
     Entry(
