@@ -284,6 +284,18 @@ def test_json_lines_lists_and_columns_are_read_alike(tmp_path):
         read_recording(tmp_path / "bad")
 
 
+def test_whole_numbers_of_json_beyond_a_double_are_no_clock(tmp_path):
+    import json
+
+    _, force, rate = motion(n_poses=3)
+    rows = np.hstack([force, rate]).tolist()
+    sensors = [{"name": f"{s}{a}", "units": u} for s, u in (("acc", "m/s2"), ("gyr", "rad/s")) for a in "XYZ"]
+    payload = {"interval_ms": int("9" * 400), "sensors": sensors, "values": [*rows[:9], None, *rows[9:]]}
+    (tmp_path / "edge").write_text(json.dumps({"payload": payload}))
+    recording = read_recording(tmp_path / "edge", rate_hz=100.0)
+    assert recording.rows_in_file == len(rows) + 1
+
+
 @pytest.mark.parametrize("start", [0, 250, 65530])
 @pytest.mark.parametrize("names", [None, ("t", "ax", "ay", "az", "gx", "gy", "gz")])
 def test_a_counter_in_front_of_a_streams_lines_is_no_clock(start, names):
