@@ -20,8 +20,9 @@ COUNTED = [
     *(("xsens-mtdata2",) * 2, ("xio",) * 2, ("xio-text", "xio"), ("sparkfun-6dof",) * 2, ("sparkfun-6dof-text",) * 2),
     *(("lines",) * 2, ("lines-space", "lines"), ("lines-label", "lines"), ("lines-equals", "lines")),
     ("declared", "declared"),
+    ("sbg", "sbg"),
 ]
-UNCOUNTED = [("lines-bare", "lines"), ("razor", "razor"), ("lines-monitor", "lines")]
+UNCOUNTED = [("lines-bare", "lines"), ("razor", "razor"), ("lines-monitor", "lines"), ("vectornav",) * 2]
 
 
 @pytest.fixture
@@ -55,7 +56,7 @@ def stream(protocol, declaration, n, rate_hz, faults):
 
 
 def decoder_of(name, declaration):
-    return decoder_factory(declaration if name == "declared" else name, column_namer())()
+    return decoder_factory(declaration if name == "declared" else name.removesuffix("-clock"), column_namer())()
 
 
 @pytest.mark.parametrize(("board", "name"), [*COUNTED, *UNCOUNTED])
@@ -91,7 +92,7 @@ def test_sent_is_saved_plus_lost_under_every_fault(board, name, rate_hz, declara
     assert sequence.tally.saved >= len(sent.untouched) - sent.faults["cut"] - sent.faults["byte_lost"]
 
 
-@pytest.mark.parametrize("name", ["xsens-mtdata2", "declared", "sparkfun-6dof"])
+@pytest.mark.parametrize("name", ["xsens-mtdata2", "declared", "sparkfun-6dof", "sbg", "witmotion-clock"])
 def test_frames_do_not_depend_on_the_pieces_in_which_bytes_come(name, declaration):
     _, _, data = stream(name, declaration, 500, 100.0, parse_faults("5%"))
     whole = decoder_of(name, declaration)
@@ -144,6 +145,7 @@ def test_checksums_have_their_published_check_values():
     assert CHECKSUM_OF["crc8"](data) == 0xF4
     assert CHECKSUM_OF["crc16-ccitt"](data) == 0x29B1
     assert CHECKSUM_OF["crc16-modbus"](data) == 0x4B37
+    assert CHECKSUM_OF["crc16-kermit"](data) == 0x2189
     assert CHECKSUM_OF["crc32"](data) == 0xCBF43926 == zlib.crc32(data)
 
 

@@ -14,8 +14,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import test_read_ecosystems as ecosystems
 from attacks.cases import Attack
 from attacks.inputs import answered, read_whole
@@ -128,8 +126,7 @@ def _documents() -> dict[str, Any]:
     sensors = [{"name": f"{s}{a}", "units": u} for s, u in (("acc", "m/s2"), ("gyr", "rad/s")) for a in "XYZ"]
     return {
         "rows.json": [{"t": t, "acc": a, "gyro": w} for t, a, w in zip(TABLE[:, 0].tolist(), *triads, strict=True)],
-        "columns.json": {"t": TABLE[:, 0].tolist()}
-        | {k: dict(zip("xyz", v, strict=True)) for k, v in columns.items()},
+        "columns.json": {"t": TABLE[:, 0].tolist()} | {k: dict(zip("xyz", v, strict=True)) for k, v in columns.items()},
         "edge.json": {"payload": {"interval_ms": 10, "sensors": sensors, "values": TABLE[:, 1:].tolist()}},
         "movesense.json": {
             "data": [
