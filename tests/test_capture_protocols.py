@@ -8,6 +8,7 @@ import pytest
 
 from board import DECLARED, counts_recording
 from trihedron.api.capturing import column_namer
+from trihedron.capture.account import Count
 from trihedron.capture.protocols import decoder_factory
 from trihedron.capture.protocols.checksums import CHECKSUM_OF
 from trihedron.capture.protocols.contract import Frame
@@ -127,6 +128,30 @@ def test_what_a_short_counter_counts_over_a_long_pause_is_a_lower_bound(modulus,
     sequence.finish()
     # 350 frames are missing; a counter of one byte has gone round once and shows 94 of them.
     assert (sequence.tally.lost, sequence.tally.uncounted) == (350 - 256 * uncounted, uncounted)
+
+
+@pytest.mark.parametrize("rate_hz", [0.0, 1000.0])
+@pytest.mark.parametrize("lost", [195, 220, 250])
+def test_new_frames_whose_short_counter_looks_like_a_stretch_sent_twice_are_kept(lost, rate_hz):
+    sequence = Sequence(by_counter=True, modulus=256)
+    # Where time says how much is missing, readings may even be those of before.
+    numbers = [*range(500), *range(500 + lost, 580 + lost)]
+    for number in numbers:
+        text = "still" if rate_hz else str(number)
+        sequence.push([Frame(number % 256, None, (0.0,), text)], number / rate_hz if rate_hz else 0.0)
+    sequence.finish()
+    assert sequence.tally.saved == len(numbers)
+    # What is missing cannot be counted, and that is said.
+    assert Count(sequence.tally, counted_by="counter").is_least
+
+
+def test_a_stretch_that_was_sent_twice_is_saved_once():
+    sequence = Sequence(by_counter=True, modulus=256)
+    numbers = [*range(500), *range(470, 600)]
+    placed = sequence.push([Frame(number % 256, None, (0.0,), str(number)) for number in numbers], 0.0)
+    placed += sequence.finish()
+    assert [one.frame.text for one in placed] == list(map(str, range(600)))
+    assert (sequence.tally.repeated, sequence.tally.lost, sequence.tally.restarts) == (30, 0, 0)
 
 
 @pytest.mark.parametrize("modulus", [0, 1 << 16, 1 << 32])
