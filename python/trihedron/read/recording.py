@@ -29,6 +29,7 @@ from trihedron.read.in_turn import by_rows
 from trihedron.read.memory import table_of
 from trihedron.read.sensing import WHOLE, Judged, judge_accelerometer, judge_gyroscope
 from trihedron.read.sensors import Options, Sensors, sensors_of, settled
+from trihedron.read.side_by_side import one_beside
 from trihedron.read.source import read_tables
 from trihedron.read.table import Table
 from trihedron.read.turning import PARTS, turning_of
@@ -135,6 +136,8 @@ def _of_file(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
 
 def of_tables(tables: tuple[Table, ...], sensor: Sensor | None, options: Options) -> Sensors:
     """The sensors of one table, of two (accelerometer, gyro) merged, or of the one of two that is wanted."""
+    if len(tables) == 1 and options.columns is None and not tables[0].is_chosen:
+        tables = (one_beside(tables[0], options.choice.instance),)
     if len(tables) == 1:
         tables = by_rows(tables[0], options.columns, sensor)
     if len(tables) == 1:
