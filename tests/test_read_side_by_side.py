@@ -29,7 +29,7 @@ def test_a_date_before_or_among_labels_is_a_clock_however_it_is_written(tmp_path
 
 @pytest.mark.parametrize("form", ["{d}_{c}", "{c}_{d}", "{d} {c}"])
 @pytest.mark.parametrize("devices", [("A", "B"), ("left", "right"), ("imu0", "imu1"), ("1", "2")])
-def test_devices_side_by_side_are_told_by_the_names_of_their_columns(tmp_path, form, devices):
+def test_devices_side_by_side_are_identified_by_the_names_of_their_columns(tmp_path, form, devices):
     t, force, rate = motion(n_poses=3)
     names = [form.format(d=d, c=c) for d in devices for c in ("ax", "ay", "az", "gx", "gy", "gz")]
     columns = [*table(t, force, rate), *table(t, 2.0 * force, -rate)[1:]]

@@ -1,4 +1,4 @@
-"""Devices side by side in one row, told by the names of their columns: ``A_ax ... B_gz``, ``ax_1 ... gz_2``."""
+"""Devices side by side in one row, identified by the names of their columns: ``A_ax ... B_gz``, ``ax_1 ... gz_2``."""
 
 from __future__ import annotations
 
