@@ -17,6 +17,7 @@ from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, look
 from trihedron.read.audit.pace import audit_pace
 from trihedron.read.audit.readings import audit_readings
+from trihedron.read.audit.seam import audit_seam
 from trihedron.read.audit.steps import audit_steps
 from trihedron.read.audit.timing import audit_counter, audit_timing
 from trihedron.read.clock.rate import mean_rate_hz
@@ -256,12 +257,16 @@ def _judged_gyro(
         is_stated and clear is not None and judged.unit is not RateUnit.COUNTS and turning.fits(RateUnit(judged.unit))
     )
     own, shared = turning.odd_correlation
-    changed = (
-        Finding.of(
-            FindingCode.AXES_CHANGED, part=turning.odd_part, parts=PARTS, correlation=own, correlation_of_all=shared
-        ),
-    )
-    return Judged(judged.unit, (*judged.findings, *(changed if turning.odd_part else ())), fits)
+    changed: list[Finding] = []
+    if turning.odd_part:
+        changed.append(
+            Finding.of(
+                FindingCode.AXES_CHANGED, part=turning.odd_part, parts=PARTS, correlation=own, correlation_of_all=shared
+            )
+        )
+    elif clear is not None and acc is not None:
+        changed = audit_seam(sensors.time_s, acc, sensors.gyroscope, clear, sensors.place)
+    return Judged(judged.unit, (*judged.findings, *changed), fits)
 
 
 def _finite_extremes(triad: FloatArray) -> Extremes:
