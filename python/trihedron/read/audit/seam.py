@@ -41,7 +41,7 @@ def audit_seam(
     turning : Turning
         The scale at which the gyro turns gravity in the rest of the log.
     """
-    step = usual_step(time_s)
+    step = usual_step(time_s[:_BLOCK])
     side = max(round(_SIDE_S / step), _FEWEST)
     if not 0.0 < step < 1.0 / _SLOWEST_HZ or len(time_s) < 4 * side:
         return []
