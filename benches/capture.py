@@ -48,7 +48,7 @@ BOARDS = {
     "xsens-mtdata2": ("xsens-mtdata2", 400.0), "xio": ("xio", 1000.0), "xio-text": ("xio", 400.0),
     "sparkfun-6dof": ("sparkfun-6dof", 100.0), "sparkfun-6dof-text": ("sparkfun-6dof-text", 100.0),
     "lines": ("lines", 1000.0), "lines-space": ("lines", 200.0), "lines-label": ("lines", 100.0),
-    "lines-equals": ("lines", 100.0), "declared": ("declared", 2000.0),
+    "lines-equals": ("lines", 100.0), "declared": ("declared", 2000.0), "sbg": ("sbg", 1000.0),
 }  # fmt: skip
 SHORT_S, LONG_S = 4.0, 14.0
 

@@ -1,9 +1,10 @@
 """The attack: mutated input files and command lines, for as long as you like; docs/evidence.md quotes it.
 
 python benches/fuzz.py inputs 100000 [SEED]     every reader of a file that is ours or binary
+python benches/fuzz.py formats 5000 [SEED]      logs of other formats: libraries', JSON, folders, makers' text
 python benches/fuzz.py commands 5000 [SEED]     command lines, in forked children of one loaded process
 
-Every case is made from SEED and its number alone; `case inputs|commands NUMBER [SEED]` repeats it. A failure is
+Every case is made from SEED and its number alone; `case inputs|formats|commands NUMBER [SEED]` repeats it. A failure is
 a traceback, an exception that is no refusal, an internal error, text of a panic, a control character on a terminal,
 a wait of more than ten seconds, rows that are not accounted for, an input harmed or a file left.
 """
@@ -20,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from attacks.cases import Attack
 from attacks.commands import Commands
+from attacks.formats import Formats
 from attacks.inputs import Inputs
 
 BATCH = 100
@@ -50,7 +52,7 @@ def main() -> None:
 
 def _attack(kind: str, seed: int) -> Attack:
     os.environ.setdefault("COLUMNS", "80")
-    return {"inputs": Inputs, "commands": Commands}[kind](seed)
+    return {"inputs": Inputs, "formats": Formats, "commands": Commands}[kind](seed)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import pytest
 
 from board import DECLARED, counts_recording
 from trihedron.api.capturing import column_namer
+from trihedron.capture.account import Count
 from trihedron.capture.protocols import decoder_factory
 from trihedron.capture.protocols.checksums import CHECKSUM_OF
 from trihedron.capture.protocols.contract import Frame
@@ -20,8 +21,9 @@ COUNTED = [
     *(("xsens-mtdata2",) * 2, ("xio",) * 2, ("xio-text", "xio"), ("sparkfun-6dof",) * 2, ("sparkfun-6dof-text",) * 2),
     *(("lines",) * 2, ("lines-space", "lines"), ("lines-label", "lines"), ("lines-equals", "lines")),
     ("declared", "declared"),
+    ("sbg", "sbg"),
 ]
-UNCOUNTED = [("lines-bare", "lines"), ("razor", "razor"), ("lines-monitor", "lines")]
+UNCOUNTED = [("lines-bare", "lines"), ("razor", "razor"), ("lines-monitor", "lines"), ("vectornav",) * 2]
 
 
 @pytest.fixture
@@ -55,7 +57,7 @@ def stream(protocol, declaration, n, rate_hz, faults):
 
 
 def decoder_of(name, declaration):
-    return decoder_factory(declaration if name == "declared" else name, column_namer())()
+    return decoder_factory(declaration if name == "declared" else name.removesuffix("-clock"), column_namer())()
 
 
 @pytest.mark.parametrize(("board", "name"), [*COUNTED, *UNCOUNTED])
@@ -91,7 +93,7 @@ def test_sent_is_saved_plus_lost_under_every_fault(board, name, rate_hz, declara
     assert sequence.tally.saved >= len(sent.untouched) - sent.faults["cut"] - sent.faults["byte_lost"]
 
 
-@pytest.mark.parametrize("name", ["xsens-mtdata2", "declared", "sparkfun-6dof"])
+@pytest.mark.parametrize("name", ["xsens-mtdata2", "declared", "sparkfun-6dof", "sbg", "witmotion-clock"])
 def test_frames_do_not_depend_on_the_pieces_in_which_bytes_come(name, declaration):
     _, _, data = stream(name, declaration, 500, 100.0, parse_faults("5%"))
     whole = decoder_of(name, declaration)
@@ -128,6 +130,30 @@ def test_what_a_short_counter_counts_over_a_long_pause_is_a_lower_bound(modulus,
     assert (sequence.tally.lost, sequence.tally.uncounted) == (350 - 256 * uncounted, uncounted)
 
 
+@pytest.mark.parametrize("rate_hz", [0.0, 1000.0])
+@pytest.mark.parametrize("lost", [195, 220, 250])
+def test_new_frames_whose_short_counter_looks_like_a_stretch_sent_twice_are_kept(lost, rate_hz):
+    sequence = Sequence(by_counter=True, modulus=256)
+    # Where time says how much is missing, readings may even be those of before.
+    numbers = [*range(500), *range(500 + lost, 580 + lost)]
+    for number in numbers:
+        text = "still" if rate_hz else str(number)
+        sequence.push([Frame(number % 256, None, (0.0,), text)], number / rate_hz if rate_hz else 0.0)
+    sequence.finish()
+    assert sequence.tally.saved == len(numbers)
+    # What is missing cannot be counted, and that is said.
+    assert Count(sequence.tally, counted_by="counter").is_least
+
+
+def test_a_stretch_that_was_sent_twice_is_saved_once():
+    sequence = Sequence(by_counter=True, modulus=256)
+    numbers = [*range(500), *range(470, 600)]
+    placed = sequence.push([Frame(number % 256, None, (0.0,), str(number)) for number in numbers], 0.0)
+    placed += sequence.finish()
+    assert [one.frame.text for one in placed] == list(map(str, range(600)))
+    assert (sequence.tally.repeated, sequence.tally.lost, sequence.tally.restarts) == (30, 0, 0)
+
+
 @pytest.mark.parametrize("modulus", [0, 1 << 16, 1 << 32])
 def test_a_clock_that_wraps_or_stutters_loses_nothing(modulus):
     rng = random.Random(4)
@@ -144,6 +170,7 @@ def test_checksums_have_their_published_check_values():
     assert CHECKSUM_OF["crc8"](data) == 0xF4
     assert CHECKSUM_OF["crc16-ccitt"](data) == 0x29B1
     assert CHECKSUM_OF["crc16-modbus"](data) == 0x4B37
+    assert CHECKSUM_OF["crc16-kermit"](data) == 0x2189
     assert CHECKSUM_OF["crc32"](data) == 0xCBF43926 == zlib.crc32(data)
 
 

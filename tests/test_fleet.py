@@ -179,11 +179,14 @@ def test_what_is_no_file_has_a_row_and_its_reason(logs, tmp_path):
 def test_what_a_log_is_called_sends_nothing_to_a_terminal_from_the_table(tmp_path):
     (tmp_path / "logs").mkdir()
     (tmp_path / "logs" / "a\x1b[2J\x9b\u202eb.csv").write_text("no log\n")
+    Path(os.fsdecode(os.fsencode(tmp_path) + b"/logs/c\xff.csv")).write_text("no log\n")
     trihedron.fleet(tmp_path / "logs", tmp_path / "out", workers=0, diagnose=False, gravity_m_s2=G)
     for name in ("fleet.csv", "fleet.html"):
         text = (tmp_path / "out" / name).read_text()
         assert "a\\x1b[2J\\x9b\\u202eb.csv" in text
         assert printable(text) == text
+    names = [Path(path).name for path in polars.read_parquet(tmp_path / "out" / "fleet.parquet")["path"]]
+    assert names == ["a\\x1b[2J\\x9b\\u202eb.csv", "c\\udcff.csv"]
 
 
 def test_the_diagnosis_of_a_log_is_in_its_row(logs):

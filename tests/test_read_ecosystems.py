@@ -216,7 +216,7 @@ def test_batches_of_raw_samples_of_a_ulog_are_unrolled(tmp_path):
     assert read_recording(path, instance=1).n_samples == len(TABLE)
 
 
-def dataflash(n_imu: int) -> bytes:
+def dataflash(n_imu: int, table=TABLE) -> bytes:
     """A DataFlash log after ArduPilot's AP_Logger: FMT messages describe themselves and IMU with its instance I."""
 
     def fmt(kind: int, length: int, name: str, form: str, labels: str) -> bytes:
@@ -228,7 +228,7 @@ def dataflash(n_imu: int) -> bytes:
     packing = "<QBffffffIIfBBHH"
     out = fmt(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns")
     out += fmt(193, 3 + struct.calcsize(packing), "IMU", form, labels)
-    for row in TABLE:
+    for row in table:
         for i in range(n_imu):
             values = (int(6e7 + 1e6 * row[0]), i, *(row[4:7]), *(row[1:4] + i), 0, 0, 40.0, 1, 1, 2000, 2000)
             out += b"\xa3\x95\xc1" + struct.pack(packing, *values)

@@ -214,6 +214,25 @@ def test_axes_swapped_in_the_middle_of_a_log_are_serious(tmp_path, share):
     assert FindingCode.AXES_CHANGED in serious(swapped)
 
 
+def test_axes_of_both_sensors_that_turn_while_the_part_rests_are_serious(tmp_path):
+    t, force, rate = motion(n_poses=16)
+    # Poses of two seconds every 3.2 s or so: the first row, from a third of the log on, in the middle of one.
+    at = next(k for k in range(len(t) // 3, len(t)) if np.abs(rate[k - 50 : k + 50]).max() < 0.05)
+    turned = [array.copy() for array in (force, rate)]
+    for array in turned:
+        array[at:] = array[at:, [1, 0, 2]] * [1, -1, 1]
+    recording = read_recording(written(tmp_path / "log.csv", *table(t, *turned)))
+    (found,) = [f for f in recording.findings if f.severity is Severity.SERIOUS]
+    assert (found.code, found.numbers["sample"]) == (FindingCode.AXES_CHANGED, at)
+    # A pause in which the part was turned is a gap, and a blow is over at once.
+    later = np.where(np.arange(len(t)) < at, t, t + 3.0)
+    assert FindingCode.AXES_CHANGED not in serious(
+        read_recording(written(tmp_path / "gap.csv", *table(later, *turned)))
+    )
+    force[at] += 15.0
+    assert not serious(read_recording(written(tmp_path / "blow.csv", *table(t, force, rate))))
+
+
 @pytest.mark.parametrize("is_true", [True, False])
 def test_a_clock_that_changes_its_rate_is_serious_unless_gravity_turns_so_too(tmp_path, is_true):
     t, force, rate = motion(n_poses=16)
@@ -282,6 +301,18 @@ def test_json_lines_lists_and_columns_are_read_alike(tmp_path):
     (tmp_path / "bad").write_text(texts["lines"].replace('{"t": 0.05,', "oops", 1))
     with pytest.raises(ReadError, match="line 6 is no JSON"):
         read_recording(tmp_path / "bad")
+
+
+def test_whole_numbers_of_json_beyond_a_double_are_no_clock(tmp_path):
+    import json
+
+    _, force, rate = motion(n_poses=3)
+    rows = np.hstack([force, rate]).tolist()
+    sensors = [{"name": f"{s}{a}", "units": u} for s, u in (("acc", "m/s2"), ("gyr", "rad/s")) for a in "XYZ"]
+    payload = {"interval_ms": int("9" * 400), "sensors": sensors, "values": [*rows[:9], None, *rows[9:]]}
+    (tmp_path / "edge").write_text(json.dumps({"payload": payload}))
+    recording = read_recording(tmp_path / "edge", rate_hz=100.0)
+    assert recording.rows_in_file == len(rows) + 1
 
 
 @pytest.mark.parametrize("start", [0, 250, 65530])

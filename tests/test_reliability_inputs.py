@@ -216,6 +216,13 @@ def test_mutated_inputs_are_taken_or_refused_in_a_sentence(count):
     assert _failures("from attacks.inputs import Inputs as Attack", f"range({count})") == "[]"
 
 
+@pytest.mark.parametrize("count", [120, pytest.param(1000, marks=MANY)])
+def test_mutated_logs_of_other_formats_are_read_or_refused_in_a_sentence(count):
+    for library in ("h5py", "rosbags", "pyulog", "pymavlink"):
+        pytest.importorskip(library)
+    assert _failures("from attacks.formats import Formats as Attack", f"range({count})") == "[]"
+
+
 @pytest.mark.parametrize("count", [8, pytest.param(300, marks=MANY)])
 def test_command_lines_end_with_a_status_and_a_sentence(count):
     assert _failures("from attacks.commands import Commands as Attack", f"range({count})") == "[]"

@@ -7,8 +7,10 @@ import re
 from collections.abc import Iterable
 
 # C0 but for tab and line end, DEL and C1 (of which terminals take 0x9b for an escape), and what turns the direction of
-# writing: a name could hide or forge what stands beside it.
-_UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
+# writing: a name could hide or forge what stands beside it. Bytes that are no text (surrogates) cannot be written.
+_UNSEEN = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
+)
 
 
 def printable(text: str) -> str:

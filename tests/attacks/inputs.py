@@ -6,11 +6,40 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from attacks.cases import Attack
 from attacks.mutations import of_bytes, of_json
+from trihedron.records import Recording
+
+
+def read_whole(*paths: Path, **options: Any) -> Recording:
+    """A recording whose rows are all accounted for."""
+    from trihedron.read import read_recording
+
+    recording = read_recording(*paths, **options)
+    reported = round(sum(finding.numbers.get("rows_left_out", 0.0) for finding in recording.findings))
+    assert recording.rows_in_file == recording.rows_read + reported, "rows are not accounted for"
+    assert np.all(np.isfinite(recording.time_s)), "a time that is not finite"
+    return recording
+
+
+def answered(*readers: Callable[[], object]) -> str:
+    """Whether readers took what they were given, refused it in a sentence, or failed."""
+    try:
+        for reader in readers:
+            with np.errstate(all="ignore"):
+                reader()
+    except AssertionError as error:
+        return f"FAILED: {error}"
+    except ValueError as error:
+        text = str(error)
+        if not text or len(text) > 1500 or "panicked" in text or text.count("\n") > 12:
+            return f"FAILED: the refusal is {text[:300]!r}"
+        return "refused"
+    return "taken"
 
 
 def _readers() -> dict[str, list[Callable[[Path], object]]]:
@@ -20,18 +49,13 @@ def _readers() -> dict[str, list[Callable[[Path], object]]]:
     from trihedron.files.frame_declaration import read_frame_declaration
     from trihedron.files.noise import read_noise
     from trihedron.files.scenario import improved_scenario
-    from trihedron.read import read_recording
     from trihedron.read.allan_table import read_allan_table
     from trihedron.read.axis_noise import read_axis_noise
     from trihedron.read.pose_table import read_pose_table
     from trihedron.simulate.scenario_file import read_scenario
 
     def log(path: Path) -> object:
-        recording = read_recording(path, device=1) if path.name == "a.npz" else read_recording(path)
-        reported = round(sum(finding.numbers.get("rows_left_out", 0.0) for finding in recording.findings))
-        assert recording.rows_in_file == recording.rows_read + reported, "rows are not accounted for"
-        assert np.all(np.isfinite(recording.time_s)), "a time that is not finite"
-        return recording
+        return read_whole(path, device=1) if path.name == "a.npz" else read_whole(path)
 
     def calibration(path: Path) -> object:
         known = read_calibration(path)
@@ -76,15 +100,4 @@ class Inputs(Attack):
         path = self.folder / f"{os.getpid()}" / name
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(data)
-        try:
-            for reader in self.readers[name]:
-                with np.errstate(all="ignore"):
-                    reader(path)
-        except AssertionError as error:
-            return f"FAILED: {error}"
-        except ValueError as error:
-            text = str(error)
-            if not text or len(text) > 1500 or "panicked" in text or text.count("\n") > 12:
-                return f"FAILED: the refusal is {text[:300]!r}"
-            return "refused"
-        return "taken"
+        return answered(*(lambda reader=reader: reader(path) for reader in self.readers[name]))

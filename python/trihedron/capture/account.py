@@ -5,11 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from trihedron.arrivals import ClockLine
-from trihedron.capture.sequence import Tally
 from trihedron.capture.timeline import Timeline
 
 MOST_PPM = 20_000.0
 """Beyond two per cent it is no clock's error: a replay at another speed, or a unit of time that was misread."""
+
+
+@dataclass
+class Tally:
+    """What became of frames: ``lost`` are missing by the device's own counter or clock; ``garbled`` were whole but
+    contradicted their neighbours' (they are among the lost); ``repeated`` came twice. Over ``uncounted`` pauses more
+    may be lost than the count says."""
+
+    saved: int = 0
+    lost: int = 0
+    garbled: int = 0
+    repeated: int = 0
+    restarts: int = 0
+    uncounted: int = 0
 
 
 @dataclass

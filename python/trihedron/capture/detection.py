@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
+from trihedron.capture.foreign import foreign
 from trihedron.capture.protocols import PROTOCOLS, Decoder, decoder_factory
 from trihedron.capture.protocols.contract import Frame
 from trihedron.capture.protocols.lines import NameColumns, name_by_position
@@ -61,14 +62,13 @@ def find_protocol(
     makers = [(_name(name), decoder_factory(name, name_columns)) for name in names]
     if not isinstance(source, SerialSource):
         return _best(source, makers, _listen(source, LISTEN_S, silence_s), silence_s)
-    heard = 0
+    heard: list[bytes] = []
     deadline = time.monotonic() + silence_s
     for candidate in BAUDS if baud is None else (baud,):
         if candidate != source.baud and not source.set_baud(candidate):
             continue
-        wait = max(deadline - time.monotonic(), LISTEN_S) if heard == 0 else LISTEN_S
+        wait = max(deadline - time.monotonic(), LISTEN_S) if not heard else LISTEN_S
         data = _listen(source, LISTEN_S, wait)
-        heard += len(data)
         found = _judged(makers, data)
         if found is None and data and baud is None and len(data) < 200:
             # A slow device: listen longer before this baud is given up.
@@ -78,6 +78,7 @@ def find_protocol(
             return found
         if baud is not None and data:
             return _best(source, makers, data, silence_s)
+        heard += [data] if data else []
     if not heard:
         raise CaptureError(_silent(source, silence_s))
     raise CaptureError(_not_understood(source, heard, makers, at_all_bauds=baud is None))
@@ -90,7 +91,7 @@ def _best(source: Source, makers: list[tuple[str, Callable[[], Decoder]]], data:
         if found is not None:
             return found
         if time.monotonic() - started > LONGEST_LISTEN_S and data:
-            raise CaptureError(_not_understood(source, len(data), makers, at_all_bauds=False))
+            raise CaptureError(_not_understood(source, [data], makers, at_all_bauds=False))
         if time.monotonic() - started > silence_s and not data:
             raise CaptureError(_silent(source, silence_s))
         try:
@@ -100,7 +101,7 @@ def _best(source: Source, makers: list[tuple[str, Callable[[], Decoder]]], data:
                 raise CaptureError(f"{source.name}: it is empty.") from None
             best = max(((share_understood(m, data), n, m) for n, m in makers), key=lambda row: row[0])
             if best[0][1] == 0:
-                raise CaptureError(_not_understood(source, len(data), makers, at_all_bauds=False)) from None
+                raise CaptureError(_not_understood(source, [data], makers, at_all_bauds=False)) from None
             return Found(best[1], best[2], data, best[0][0])
 
 
@@ -145,8 +146,12 @@ def _silent(source: Source, silence_s: float) -> str:
 
 
 def _not_understood(
-    source: Source, n: int, makers: list[tuple[str, Callable[[], Decoder]]], *, at_all_bauds: bool
+    source: Source, heard: list[bytes], makers: list[tuple[str, Callable[[], Decoder]]], *, at_all_bauds: bool
 ) -> str:
+    known = foreign(heard)
+    if known is not None:
+        return f"{source.name}: this is {known[0]}, which is not decoded here; {known[1]}."
+    n = sum(map(len, heard))
     tried = "no known protocol" if len(makers) > 1 else f"no {makers[0][0]} frame"
     if at_all_bauds:
         return (

@@ -6,11 +6,12 @@ by one step therefore waits until its successors say whether frames are missing 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import deque
 from itertools import pairwise
 from statistics import median
 from typing import NamedTuple
 
+from trihedron.capture.account import Tally
 from trihedron.capture.protocols.contract import Frame
 
 LEARN = 8
@@ -37,6 +38,9 @@ single losses are not countable (only holes longer than ``COARSE_SPAN`` ticks)."
 
 COARSE_SPAN = 8
 
+SENT_TWICE = 64
+"""Frames: as far back as a stretch may begin that comes a second time, frame by frame as it came the first."""
+
 _WRAPS = (1 << 8, 1 << 16, 1 << 32)
 
 
@@ -50,20 +54,6 @@ class Placed(NamedTuple):
     host_s: float
     frame: Frame
     is_wrapped: bool = False
-
-
-@dataclass
-class Tally:
-    """What became of frames: ``lost`` are missing by the device's own counter or clock; ``garbled`` were whole but
-    contradicted their neighbours' (they are among the lost); ``repeated`` came twice. Over ``uncounted`` pauses more
-    may be lost than the count says."""
-
-    saved: int = 0
-    lost: int = 0
-    garbled: int = 0
-    repeated: int = 0
-    restarts: int = 0
-    uncounted: int = 0
 
 
 class Sequence:
@@ -86,7 +76,7 @@ class Sequence:
         self._period = 0.0
         self.is_coarse = False
         self._last: int | None = None
-        self._newest: Frame | None = None
+        self._placed: deque[Frame] = deque(maxlen=SENT_TWICE + 1)
         # How far the last timestamp stood after where a steady clock would have put it, in ticks.
         self._late = 0.0
         self._index = -1
@@ -104,7 +94,7 @@ class Sequence:
             self.tally.saved += len(out)
             return out
         for frame in frames:
-            before = self._waiting[-1][1] if self._waiting else self._newest
+            before = self._waiting[-1][1] if self._waiting else self._placed[-1] if self._placed else None
             if frame == before and not self.is_coarse:
                 self.tally.repeated += 1
                 continue
@@ -278,7 +268,8 @@ class Sequence:
 
     def _restart(self, n: int, ahead: int, out: list[Placed]) -> None:
         """Three frames in a row say that the count began anew (or that a stretch came twice)."""
-        if -64 <= ahead <= 0:
+        is_behind = -SENT_TWICE <= ahead <= 0 and not self._may_have_wrapped(self._waiting[-1][0])
+        if is_behind and any(frame in self._placed for _, frame in self._waiting):
             self.tally.repeated += len(self._waiting)
             self._waiting.clear()
             return
@@ -324,7 +315,8 @@ class Sequence:
                 gain = max(1e-3, 1.0 / (LEARN + self.tally.saved))
                 self._period += gain * min(max(surprise / ahead, -limit), limit)
                 self._late = 0.8 * surprise
-        self._last, self._newest = key, frame
+        self._last = key
+        self._placed.append(frame)
         is_wrapped = ahead > 1 and self._may_have_wrapped(host_s)
         if self.tally.saved == 0:
             self._first_host_s = host_s

@@ -40,12 +40,15 @@ def write_tables(rows: Sequence[dict[str, Any]], summary: FleetSummary, folder: 
     buffer = io.BytesIO()
     frame.write_parquet(buffer)
     write_whole(folder / "fleet.parquet", buffer.getvalue(), overwrite=True)
-    write_whole(folder / "fleet.csv", printable(frame.write_csv()), overwrite=True)
+    write_whole(folder / "fleet.csv", frame.write_csv(), overwrite=True)
     write_whole(folder / "fleet.html", to_html(fleet_report(summary)), overwrite=True)
 
 
 def frame_of(rows: Sequence[dict[str, Any]]) -> polars.DataFrame:
-    """One row a log: what it is, what came of it, and the 21 numbers with their standard errors (SI in the names)."""
+    """One row a log: what it is, what came of it, and the 21 numbers with their standard errors (SI in the names).
+
+    Control characters of names are spelled out: a table is shown on terminals.
+    """
     import polars
 
     text = {"path", "serial", "status", "reason", "verdict", "effects", "warnings", "serious"}
@@ -69,7 +72,8 @@ def _cell(row: dict[str, Any], name: str) -> Any:
         return " ".join(effect["id"] for effect in diagnosis.get("effects", ()))
     if name in ("warnings", "serious"):
         return " ".join(row.get(name) or ())
-    return row.get(name)
+    value = row.get(name)
+    return printable(value) if isinstance(value, str) else value
 
 
 def _number(row: dict[str, Any], k: int) -> float | None:

@@ -17,6 +17,7 @@ from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, look
 from trihedron.read.audit.pace import audit_pace
 from trihedron.read.audit.readings import audit_readings
+from trihedron.read.audit.seam import audit_seam
 from trihedron.read.audit.steps import audit_steps
 from trihedron.read.audit.timing import audit_counter, audit_timing
 from trihedron.read.clock.rate import mean_rate_hz
@@ -29,6 +30,7 @@ from trihedron.read.in_turn import by_rows
 from trihedron.read.memory import table_of
 from trihedron.read.sensing import WHOLE, Judged, judge_accelerometer, judge_gyroscope
 from trihedron.read.sensors import Options, Sensors, sensors_of, settled
+from trihedron.read.side_by_side import one_beside
 from trihedron.read.source import read_tables
 from trihedron.read.table import Table
 from trihedron.read.turning import PARTS, turning_of
@@ -135,6 +137,8 @@ def _of_file(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
 
 def of_tables(tables: tuple[Table, ...], sensor: Sensor | None, options: Options) -> Sensors:
     """The sensors of one table, of two (accelerometer, gyro) merged, or of the one of two that is wanted."""
+    if len(tables) == 1 and options.columns is None and not tables[0].is_chosen:
+        tables = (one_beside(tables[0], options.choice.instance),)
     if len(tables) == 1:
         tables = by_rows(tables[0], options.columns, sensor)
     if len(tables) == 1:
@@ -253,12 +257,16 @@ def _judged_gyro(
         is_stated and clear is not None and judged.unit is not RateUnit.COUNTS and turning.fits(RateUnit(judged.unit))
     )
     own, shared = turning.odd_correlation
-    changed = (
-        Finding.of(
-            FindingCode.AXES_CHANGED, part=turning.odd_part, parts=PARTS, correlation=own, correlation_of_all=shared
-        ),
-    )
-    return Judged(judged.unit, (*judged.findings, *(changed if turning.odd_part else ())), fits)
+    changed: list[Finding] = []
+    if turning.odd_part:
+        changed.append(
+            Finding.of(
+                FindingCode.AXES_CHANGED, part=turning.odd_part, parts=PARTS, correlation=own, correlation_of_all=shared
+            )
+        )
+    elif clear is not None and acc is not None:
+        changed = audit_seam(sensors.time_s, acc, sensors.gyroscope, clear, sensors.place)
+    return Judged(judged.unit, (*judged.findings, *changed), fits)
 
 
 def _finite_extremes(triad: FloatArray) -> Extremes:

@@ -12,16 +12,19 @@ FIELD_TYPES: tuple[FieldType, ...] = get_args(FieldType)
 SIZES: dict[str, int] = {name: int(name[1:]) // 8 for name in FIELD_TYPES}
 """Bytes of each type."""
 
-ChecksumKind = Literal["none", "sum8", "sum8-zero", "xor8", "sum16", "crc8", "crc16-ccitt", "crc16-modbus", "crc32"]
+ChecksumKind = Literal[
+    "none", "sum8", "sum8-zero", "xor8", "sum16", "crc8", "crc16-ccitt", "crc16-modbus", "crc16-kermit", "crc32"
+]
 CHECKSUMS: tuple[ChecksumKind, ...] = get_args(ChecksumKind)
 CHECKSUM_SIZES: dict[str, int] = {
     "none": 0,
     **dict.fromkeys(("sum8", "sum8-zero", "xor8", "crc8"), 1),
-    **dict.fromkeys(("sum16", "crc16-ccitt", "crc16-modbus"), 2),
+    **dict.fromkeys(("sum16", "crc16-ccitt", "crc16-modbus", "crc16-kermit"), 2),
     "crc32": 4,
 }
 """``sum8-zero``: all bytes with the checksum add up to zero. ``crc8``: polynomial 0x07. ``crc16-ccitt``: 0x1021, start
-0xFFFF. ``crc16-modbus``: 0xA001 reflected, start 0xFFFF. ``crc32``: as in zip and Ethernet."""
+0xFFFF. ``crc16-modbus``: 0xA001 reflected, start 0xFFFF. ``crc16-kermit``: 0x8408 reflected, start 0. ``crc32``: as in
+zip and Ethernet."""
 
 Role = Literal["value", "counter", "clock"]
 

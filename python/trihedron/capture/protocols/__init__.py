@@ -15,7 +15,10 @@ from trihedron.capture.protocols.lines import (
     name_by_position,
 )
 from trihedron.capture.protocols.mtdata2 import Mtdata2Decoder
+from trihedron.capture.protocols.sbg import SbgDecoder
 from trihedron.capture.protocols.sparkfun import RazorDecoder, SixDofDecoder
+from trihedron.capture.protocols.vectornav import VectorNavDecoder
+from trihedron.capture.protocols.witmotion import WitMotionDecoder
 from trihedron.capture.protocols.xio import XioDecoder
 from trihedron.records.frame_declaration import FrameDeclaration
 
@@ -28,6 +31,9 @@ PROTOCOLS: dict[str, str] = {
     "razor": "SparkFun Razor AHRS, text lines #A-R= #M-R= #G-R=",
     "xsens-mtdata2": "Xsens MTData2 (acceleration, rate of turn, counter, sample time)",
     "xio": "xio x-IMU3 inertial messages, text or binary",
+    "witmotion": "WitMotion packets 0x55 0x51, 0x52 (clock 0x50 where it is sent)",
+    "vectornav": "VectorNav text lines $VNIMU, $VNYMR, $VNQMR, $VNMAR, $VNCMV",
+    "sbg": "SBG Systems sbgECom, IMU data and IMU short",
 }
 """Name and one sentence; a .toml file declares any other binary frame."""
 
@@ -52,6 +58,9 @@ def decoder_factory(
         "razor": RazorDecoder,
         "xsens-mtdata2": Mtdata2Decoder,
         "xio": XioDecoder,
+        "witmotion": WitMotionDecoder,
+        "vectornav": VectorNavDecoder,
+        "sbg": SbgDecoder,
     }
     if protocol not in makers:
         raise CaptureError(f"there is no protocol {protocol!r}; choose {', '.join(makers)}, or a .toml declaration.")

@@ -20,16 +20,16 @@ def _crc8_table() -> tuple[int, ...]:
     return tuple(table)
 
 
-def _modbus_table() -> tuple[int, ...]:
+def _reflected_table(polynomial: int) -> tuple[int, ...]:
     table = []
     for byte in range(256):
         for _ in range(8):
-            byte = (byte >> 1) ^ (0xA001 if byte & 1 else 0)
+            byte = (byte >> 1) ^ (polynomial if byte & 1 else 0)
         table.append(byte)
     return tuple(table)
 
 
-_CRC8, _MODBUS = _crc8_table(), _modbus_table()
+_CRC8, _MODBUS, _KERMIT = _crc8_table(), _reflected_table(0xA001), _reflected_table(0x8408)
 
 
 def _crc8(data: bytes) -> int:
@@ -39,10 +39,9 @@ def _crc8(data: bytes) -> int:
     return crc
 
 
-def _modbus(data: bytes) -> int:
-    crc = 0xFFFF
+def _reflected(data: bytes, table: tuple[int, ...], crc: int) -> int:
     for byte in data:
-        crc = (crc >> 8) ^ _MODBUS[(crc ^ byte) & 0xFF]
+        crc = (crc >> 8) ^ table[(crc ^ byte) & 0xFF]
     return crc
 
 
@@ -53,7 +52,8 @@ CHECKSUM_OF: dict[str, Checksum] = {
     "sum16": lambda data: sum(data) & 0xFFFF,
     "crc8": _crc8,
     "crc16-ccitt": lambda data: binascii.crc_hqx(data, 0xFFFF),
-    "crc16-modbus": _modbus,
+    "crc16-modbus": lambda data: _reflected(data, _MODBUS, 0xFFFF),
+    "crc16-kermit": lambda data: _reflected(data, _KERMIT, 0),
     "crc32": zlib.crc32,
 }
 """Value of each kind over the covered bytes."""

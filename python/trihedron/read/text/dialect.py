@@ -19,15 +19,16 @@ NEARLY_ALL = 0.9
 _SAMPLE_LINES = 400
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _CLOCK = r"\d{1,2}:\d\d:\d\d[.,]\d{1,6}"
+_DATE = r"(?:\d{4}[-/]\d\d?[-/]\d\d?|\d\d?[-/.]\d\d?[-/.]\d{4})[T ]"
 # Arduino IDE and PlatformIO's time filter; dated timestamps of CoolTerm and others; minicom's and Tera Term's in
 # brackets.
 _PREFIXES = (
     re.compile(rf"({_CLOCK}) ?(?:->|>)[ \t]*"),
-    re.compile(rf"(\d{{4}}-\d\d-\d\d {_CLOCK})(?: ?(?:->|>|:))[ \t]*"),
-    re.compile(rf"\[(\d{{4}}-\d\d-\d\d {_CLOCK})\][ \t]*"),
+    re.compile(rf"({_DATE}{_CLOCK})(?: ?(?:->|>|:))[ \t]*"),
+    re.compile(rf"\[({_DATE}{_CLOCK})\][ \t]*"),
     re.compile(rf"\[({_CLOCK})\][ \t]*"),
 )
-_VALUE = rf"\d{{4}}-\d\d-\d\d[T ]{_CLOCK}|{_CLOCK}|{_NUMBER}"
+_VALUE = rf"{_DATE}{_CLOCK}|{_CLOCK}|{_NUMBER}"
 _PAIR = re.compile(
     rf"([^\W\d][\w.\[\]()/^°² -]*?)\s*[:=：]\s*({_VALUE})(?![\d:])"
     r"(?:\s*((?:[^\W\d_]|°)[\w/^°²*]*)(?!\s*[:=：\w\[(]|\.\w))?"

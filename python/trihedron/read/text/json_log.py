@@ -8,6 +8,7 @@ packet's timestamp; ``sensors`` and ``values`` are Edge Impulse's.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -115,12 +116,11 @@ def _edge_impulse(payload: Mapping[str, Any]) -> list[Row]:
         for s in payload["sensors"]
         if isinstance(s, Mapping)
     ]
-    given = payload.get("interval_ms")
-    step = float(given) if isinstance(given, int | float) else 0.0
+    step = _finite(payload.get("interval_ms")) or 0.0
     return [
-        ({"time [ms]": i * step} if step > 0.0 else {}) | dict(zip(names, row, strict=False))
+        ({"time [ms]": i * step} if step > 0.0 else {})
+        | dict(zip(names, row if isinstance(row, list) else [], strict=False))
         for i, row in enumerate(payload["values"])
-        if isinstance(row, list)
     ]
 
 
@@ -137,13 +137,13 @@ def _spread(packets: list[Any]) -> list[list[Row]]:
         stamp = next((k for k in row if k.rsplit(".", 1)[-1].lower() in _TIMESTAMPS), "")
         n = max(map(len, arrays.values()), default=1)
         near = flat[i + 1] if i + 1 < len(flat) else flat[i - 1]
-        both = [float(x) for x in (row.get(stamp), near.get(stamp)) if isinstance(x, int | float)]
-        step = abs(both[1] - both[0]) / n if len(both) == 2 else 0.0
+        start, other = _finite(row.get(stamp)), _finite(near.get(stamp))
+        step = abs(other - start) / n if start is not None and other is not None else 0.0
         rows = []
         for j in range(n):
             one: Row = {k: v for k, v in row.items() if k not in arrays}
-            if step > 0.0:
-                one[stamp] = float(row[stamp]) + j * step
+            if start is not None and step > 0.0:
+                one[stamp] = start + j * step
             for name, values in arrays.items():
                 word = name.rsplit(".", 1)[-1].removeprefix("Array").lower()
                 if j < len(values) and isinstance(values[j], Mapping):
@@ -151,6 +151,14 @@ def _spread(packets: list[Any]) -> list[list[Row]]:
             rows.append(one)
         out.append(rows)
     return out
+
+
+def _finite(value: Any) -> float | None:
+    """A number that a double holds: JSON's whole numbers have as many digits as anyone writes."""
+    try:
+        return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
+    except OverflowError:
+        return None
 
 
 def _are_numbers(values: Iterable[Any]) -> bool:

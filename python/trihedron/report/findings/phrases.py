@@ -80,6 +80,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "column": "column {column}",
         "devices": "{devices:each}",
         "turns": "the turn that rows take",
+        "names": "the line of names",
         "counted": "{words:each}",
         "both": "{one} and {other}",
         "streams": "{streams:each}{has_more:? ...|}",

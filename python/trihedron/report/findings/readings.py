@@ -31,6 +31,15 @@ ENTRIES = (
         "Split the log there, and calibrate the parts one by one.",
     ),
     Entry(
+        Code.AXES_CHANGED,
+        "leap",
+        SERIOUS,
+        "Gravity leaps from one sample to the next while the gyro is at rest (first: {where}; {count} in all).",
+        "The axes of both sensors were turned there, or rows were cut out without a gap in time.",
+        "Split the log there, and calibrate the parts one by one.",
+        numbers=("sample",),
+    ),
+    Entry(
         Code.NON_FINITE,
         "readings",
         WARNING,

@@ -78,6 +78,45 @@ def _razor(_n: int, _t: float, accel: Reading, gyro: Reading) -> bytes:
     return b"".join((f"#{tag}-R=" + ",".join(f"{v:.2f}" for v in values) + "\r\n").encode() for tag, values in lines)
 
 
+def _witmotion(scales: Scales, *, has_clock: bool) -> Encoder:
+    per_g, per_degree = scales.to_m_s2 / 9.80665, scales.to_rad_s * 57.29577951308232
+
+    def counts(values: Reading, per_unit: float, most: float) -> list[int]:
+        return [min(max(round(v * per_unit / most * 32768), -32768), 32767) for v in values]
+
+    def encode(_n: int, t: float, accel: Reading, gyro: Reading) -> bytes:
+        ms = round(1e3 * t)
+        clock = struct.pack("<6BH", 24, 3, 1, 12 + ms // 3_600_000, ms // 60_000 % 60, ms // 1000 % 60, ms % 1000)
+        content = [(0x50, clock)] if has_clock else []
+        content += [(0x51, struct.pack("<4h", *counts(accel, per_g, 16.0), 2525))]
+        content += [(0x52, struct.pack("<4h", *counts(gyro, per_degree, 2000.0), 2525)), (0x53, bytes(8))]
+        packets = (bytes([0x55, kind]) + body for kind, body in content)
+        return b"".join(packet + bytes([sum(packet) % 256]) for packet in packets)
+
+    return encode
+
+
+def _vectornav(scales: Scales) -> Encoder:
+    def encode(_n: int, _t: float, accel: Reading, gyro: Reading) -> bytes:
+        numbers = [f"{v:+08.4f}" for v in (0.2, -0.1, 0.4)]
+        numbers += [f"{v * scales.to_m_s2:+07.3f}" for v in accel]
+        numbers += [f"{v * scales.to_rad_s:+010.6f}" for v in gyro]
+        text = ",".join(["VNIMU", *numbers, "+25.1", "+101.325"]).encode()
+        return b"$%s*%02X\r\n" % (text, _check("xor8", text)[0])
+
+    return encode
+
+
+def _sbg(scales: Scales) -> Encoder:
+    def encode(_n: int, t: float, accel: Reading, gyro: Reading) -> bytes:
+        readings = [*(v * scales.to_m_s2 for v in accel), *(v * scales.to_rad_s for v in gyro)]
+        body = struct.pack("<IH7f", round(1e6 * t) % 2**32, 0x37F, *readings, 25.1) + struct.pack("<6f", *readings)
+        inner = struct.pack("<BBH", 3, 0, len(body)) + body
+        return b"\xff\x5a" + inner + struct.pack("<HB", _check("crc16-kermit", inner)[0], 0x33)
+
+    return encode
+
+
 def _number(value: float) -> str:
     return str(int(value)) if float(value).is_integer() else f"{value:.6g}"
 
@@ -110,6 +149,7 @@ def _lines(style: str) -> Encoder:
 ENCODERS: tuple[str, ...] = (
     *("lines", "lines-space", "lines-bare", "lines-label", "lines-equals", "lines-monitor"),
     *("sparkfun-6dof", "sparkfun-6dof-text", "razor", "xsens-mtdata2", "xio", "xio-text"),
+    *("witmotion", "witmotion-clock", "vectornav", "sbg"),
 )
 """What a simulated board can speak; a declared frame besides."""
 
@@ -136,7 +176,11 @@ def encoder_for(protocol: str | FrameDeclaration, scales: Scales | None = None) 
         return _sparkfun(binary=not protocol.endswith("text"))
     if protocol.startswith("xio"):
         return _xio(scales, binary=not protocol.endswith("text"))
-    return _razor if protocol == "razor" else _mtdata2(scales)
+    if protocol.startswith("witmotion"):
+        return _witmotion(scales, has_clock=protocol.endswith("clock"))
+    if protocol == "razor":
+        return _razor
+    return {"vectornav": _vectornav, "sbg": _sbg, "xsens-mtdata2": _mtdata2}[protocol](scales)
 
 
 def declared(frame: FrameDeclaration) -> Encoder:
@@ -183,8 +227,9 @@ def _check(kind: str, data: bytes) -> tuple[int, int]:
         return value, 1
     if kind == "crc32":
         return zlib.crc32(data), 4
-    if kind == "crc16-modbus":
-        return _bitwise(data, 16, 0x8005, 0xFFFF, reflected=True), 2
+    if kind in ("crc16-modbus", "crc16-kermit"):
+        polynomial, start = (0x8005, 0xFFFF) if kind == "crc16-modbus" else (0x1021, 0)
+        return _bitwise(data, 16, polynomial, start, reflected=True), 2
     width, polynomial, start = (8, 0x07, 0) if kind == "crc8" else (16, 0x1021, 0xFFFF)
     return _bitwise(data, width, polynomial, start, reflected=False), width // 8
 

@@ -1,0 +1,74 @@
+"""SBG Systems' sbgECom: 0xFF 0x5A, message, class, length, content, CRC-16, 0x33; numbers low byte first.
+
+Layout after the maker's firmware manual: message 3 (IMU data, floats in m/s^2 and rad/s) and 44 (IMU short, whole
+numbers), each with a clock of microseconds and the temperature.
+"""
+
+from __future__ import annotations
+
+import struct
+
+from trihedron.capture.protocols.checksums import CHECKSUM_OF
+from trihedron.capture.protocols.contract import Frame
+from trihedron.capture.protocols.framing import MORE, FramedDecoder
+
+_HEAD, _TAIL, _END = 6, 3, 0x33
+_LONGEST = 4086
+_LOGS = 0
+"""The class of messages that the device sends by itself."""
+_DATA, _SHORT = 3, 44
+_LAYOUTS = {_DATA: struct.Struct("<IH7f"), _SHORT: struct.Struct("<IH6ih")}
+_PER_M_S2, _PER_DEGREE_C = 1048576.0, 256.0
+_PER_RAD_S, _PER_RAD_S_WIDE, _IS_WIDE = 67108864.0, 12304174.0, 1 << 10
+"""Counts of message 44; a bit of its status says that the gyro's are the larger ones."""
+
+_COLUMNS = (
+    *(f"acc_{axis} [m/s^2]" for axis in "xyz"),
+    *(f"gyr_{axis} [rad/s]" for axis in "xyz"),
+    "temperature [degC]",
+)
+
+
+class SbgDecoder(FramedDecoder):
+    """Messages of the first kind that holds both sensors; the others pass by."""
+
+    name = "sbg"
+    columns: tuple[str, ...] = _COLUMNS
+    tick_s = 1e-6
+    clock_modulus = 1 << 32
+
+    def __init__(self) -> None:
+        super().__init__(b"\xff\x5a")
+        self._kind: int | None = None
+
+    def adopt(self, other: SbgDecoder) -> None:
+        """Go on with the kind of message of the connection before."""
+        self._kind = other._kind
+
+    def length_at(self, data: bytearray, at: int) -> int:
+        """By the length of the content."""
+        if len(data) - at < _HEAD:
+            return MORE
+        size = data[at + 4] | data[at + 5] << 8
+        return _HEAD + size + _TAIL if size <= _LONGEST else 0
+
+    def is_sound(self, data: bytearray, at: int, length: int) -> bool:
+        """The byte at the end, and the checksum from the message's number on."""
+        end = at + length
+        told = data[end - 3] | data[end - 2] << 8
+        return data[end - 1] == _END and CHECKSUM_OF["crc16-kermit"](bytes(data[at + 2 : end - 3])) == told
+
+    def decode(self, frame: bytes) -> Frame | None:
+        """Readings in SI."""
+        kind, layout = frame[2], _LAYOUTS.get(frame[2])
+        if layout is None or frame[3] != _LOGS or len(frame) < _HEAD + layout.size + _TAIL:
+            return None
+        if self._kind not in (None, kind):
+            return None
+        self._kind = kind
+        ticks, status, *numbers = layout.unpack_from(frame, _HEAD)
+        if kind == _SHORT:
+            per_rad_s = _PER_RAD_S_WIDE if status & _IS_WIDE else _PER_RAD_S
+            sizes = (*(_PER_M_S2,) * 3, *(per_rad_s,) * 3, _PER_DEGREE_C)
+            numbers = [number / size for number, size in zip(numbers, sizes, strict=True)]
+        return Frame(None, ticks, tuple(numbers), ",".join(f"{v:.9g}" for v in numbers))

@@ -1,0 +1,66 @@
+"""VectorNav ASCII: lines ``$VNIMU,...*66`` with magnetometer, acceleration in m/s^2 and rate in rad/s.
+
+Layout after the maker's manuals; the checksum is the XOR of the bytes between ``$`` and ``*``, or a CRC-16 of four
+digits. What comes behind the readings (pressure, a count that the user asked for) is left.
+"""
+
+from __future__ import annotations
+
+import binascii
+from functools import reduce
+from operator import xor
+
+from trihedron.capture.protocols.contract import Frame, printed_numbers
+from trihedron.capture.protocols.framing import LineFedDecoder
+
+_BEFORE = {b"VNIMU": 0, b"VNMAR": 0, b"VNCMV": 0, b"VNYMR": 3, b"VNQMR": 4}
+"""Numbers of the attitude before the magnetometer's."""
+_COLUMNS = (
+    *(f"mag_{axis}" for axis in "xyz"),
+    *(f"acc_{axis} [m/s^2]" for axis in "xyz"),
+    *(f"gyr_{axis} [rad/s]" for axis in "xyz"),
+)
+
+
+class VectorNavDecoder(LineFedDecoder):
+    """Lines of the first kind that holds both sensors; other lines pass by."""
+
+    name = "vectornav"
+    columns: tuple[str, ...] = _COLUMNS
+    tick_s = 0.0
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._kind = b""
+
+    def adopt(self, other: VectorNavDecoder) -> None:
+        """Go on with the kind of line of the connection before."""
+        self._kind = other._kind
+
+    def frame_of(self, line: bytes) -> Frame | None:
+        """The readings of a whole line."""
+        start, mark, check = line.rstrip(b"\r").partition(b"*")
+        kind, *fields = start[1:].split(b",")
+        if not (start.startswith(b"$VN") and mark and _checks(start[1:], check)):
+            self.corrupt += line.startswith(b"$")
+            self.skipped_bytes += len(line) + 1
+            return None
+        if kind not in _BEFORE or (self._kind and kind != self._kind):
+            return None
+        first = _BEFORE[kind]
+        texts = [field.decode("ascii", "replace") for field in fields[first : first + len(_COLUMNS)]]
+        values = printed_numbers(texts)
+        if values is None or len(values) != len(_COLUMNS):
+            self.corrupt += 1
+            self.skipped_bytes += len(line) + 1
+            return None
+        self._kind = kind
+        return Frame(None, None, tuple(values), ",".join(texts))
+
+
+def _checks(content: bytes, check: bytes) -> bool:
+    try:
+        value = int(check, 16)
+    except ValueError:
+        return False
+    return value == (binascii.crc_hqx(content, 0) if len(check) == 4 else reduce(xor, content, 0))

@@ -1,0 +1,109 @@
+"""WitMotion: packets of eleven bytes, 0x55, kind, eight bytes of content, sum of the ten before.
+
+Layout after the maker's data sheets (WT901): 0x50 is the clock, 0x51 acceleration (16 g at 32768) and temperature, 0x52
+rate (2000 deg/s at 32768); 16 bits, low byte first. A sample is the packets from one 0x51 to the next; the clock, where
+the sensor sends it, comes before.
+"""
+
+from __future__ import annotations
+
+import struct
+
+from trihedron.capture.protocols.contract import Frame
+from trihedron.capture.protocols.framing import MORE, FramedDecoder
+
+_LENGTH = 11
+_CLOCK, _ACCELERATION, _RATE = 0x50, 0x51, 0x52
+_LAST_KIND = 0x5F
+_G, _DEGREES = 16.0 / 32768, 2000.0 / 32768
+_DAY_MS = 86_400_000
+
+_COLUMNS = (
+    *(f"acc_{axis} [g]" for axis in "xyz"),
+    *(f"gyr_{axis} [deg/s]" for axis in "xyz"),
+    "temperature [degC]",
+)
+
+
+class WitMotionDecoder(FramedDecoder):
+    """Samples of acceleration and rate; angles, magnetometer and the rest pass by."""
+
+    name = "witmotion"
+    columns: tuple[str, ...] = _COLUMNS
+
+    def __init__(self) -> None:
+        super().__init__(b"\x55")
+        self._parts: dict[int, tuple[int, ...]] = {}
+        self._held: Frame | None = None
+        self._has_clock: bool | None = None
+
+    def adopt(self, other: WitMotionDecoder) -> None:
+        """Go on with the clock of the connection before."""
+        self._has_clock, self.tick_s, self.clock_modulus = other._has_clock, other.tick_s, other.clock_modulus
+
+    def length_at(self, data: bytearray, at: int) -> int:
+        """Always the same."""
+        return _LENGTH if len(data) - at >= _LENGTH else MORE
+
+    def is_sound(self, data: bytearray, at: int, length: int) -> bool:
+        """A kind that there is, and the sum of bytes."""
+        end = at + length - 1
+        return _CLOCK <= data[at + 1] <= _LAST_KIND and sum(data[at:end]) & 0xFF == data[end]
+
+    def decode(self, frame: bytes) -> Frame | None:
+        """The sample that a packet of rates completes.
+
+        Whether there is a clock is told by what comes before the second sample; a first one that was held back for it
+        goes out with the next packet, or was not whole.
+        """
+        kind, parts = frame[1], self._parts
+        if kind == _CLOCK:
+            self._drop()
+            self._has_clock, self._held = True, None
+            self.tick_s, self.clock_modulus = 1e-3, _DAY_MS
+            parts[kind] = (_milliseconds(frame),)
+        elif kind == _ACCELERATION:
+            if _ACCELERATION in parts or (parts and not self._has_clock):
+                self._drop()
+            parts[kind] = struct.unpack_from("<4h", frame, 2)
+            if self._held is not None:
+                held, self._held, self._has_clock = self._held, None, False
+                return held
+        elif kind == _RATE:
+            parts[kind] = struct.unpack_from("<3h", frame, 2)
+            return self._sample()
+        else:
+            self._drop()
+        return None
+
+    def finish(self) -> list[Frame]:
+        """Frames that stand in the remaining bytes, and one that was held back."""
+        frames = super().finish()
+        held, self._held = self._held, None
+        return frames if held is None else [*frames, held]
+
+    def _drop(self) -> None:
+        """Parts of a sample that ended before it was whole."""
+        self.corrupt += bool(self._parts)
+        self._parts.clear()
+
+    def _sample(self) -> Frame | None:
+        parts, wanted = self._parts, {_ACCELERATION, _RATE} | ({_CLOCK} if self._has_clock else set())
+        if parts.keys() != wanted:
+            self._drop()
+            return None
+        *force, warm = parts[_ACCELERATION]
+        values = (*(v * _G for v in force), *(v * _DEGREES for v in parts[_RATE]), warm / 100.0)
+        ticks = parts[_CLOCK][0] if self._has_clock else None
+        sample = Frame(None, ticks, values, ",".join(map(repr, values)))
+        parts.clear()
+        if self._has_clock is None:
+            self._held = sample
+            return None
+        return sample
+
+
+def _milliseconds(frame: bytes) -> int:
+    """Of the day, of a packet of the clock: year, month, day, hour, minute, second, milliseconds."""
+    hour, minute, second, milliseconds = frame[5], frame[6], frame[7], frame[8] | frame[9] << 8
+    return (3_600_000 * hour + 60_000 * minute + 1000 * second + milliseconds) % _DAY_MS

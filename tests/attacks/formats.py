@@ -1,0 +1,175 @@
+"""Mutated logs of every other format that is read: those of libraries, JSON, folders, and the text of makers."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import test_read_ecosystems as ecosystems
+from attacks.cases import Attack
+from attacks.inputs import answered, read_whole
+from attacks.mutations import of_bytes, of_json
+from test_read import readings
+
+sys.path[:0] = [str(Path(__file__).parents[1] / "makers"), str(Path(__file__).parents[2] / "benches" / "formats")]
+
+TABLE = readings(120)
+
+
+@dataclass(frozen=True)
+class Log:
+    """The files of a log by their place below it (``""`` where it is a file itself), and what else is said of it."""
+
+    files: dict[str, bytes]
+    options: dict[str, Any] = field(default_factory=dict)
+    per_sensor: bool = False
+
+
+class Formats(Attack):
+    """One file of a log damaged, and the log given to its reader; half of the cases are libraries' formats."""
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(seed)
+        self.kinds = tuple(map(sorted, kinds := _made_elsewhere()))
+        self.logs = kinds[0] | kinds[1]
+
+    def _case(self, number: int) -> tuple[str, Log]:
+        rng = self.rng(number)
+        names = self.kinds[number % 2]
+        name = names[number // 2 % len(names)]
+        log = self.logs[name]
+        harmed = str(rng.choice(sorted(log.files)))
+        is_document = name.endswith(".json") and rng.random() < 0.6
+        data = (of_json if is_document else of_bytes)(rng, log.files[harmed])
+        return name, Log(log.files | {harmed: data}, log.options, log.per_sensor)
+
+    def describe(self, number: int) -> str:
+        name, log = self._case(number)
+        return f"{name}, {sum(map(len, log.files.values()))} bytes"
+
+    def run(self, number: int) -> str:
+        name, log = self._case(number)
+        path = self.folder / str(os.getpid()) / name
+        shutil.rmtree(path.parent, ignore_errors=True)
+        for place, data in log.files.items():
+            file = path / place if place else path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(data)
+        if log.per_sensor:
+            paths = [path / place for place in log.files]
+            given = {"accelerometer_path": paths[0], "gyroscope_path": paths[1]}
+        else:
+            given = {"path": path / next(iter(log.files)) if name in self.kinds[1] else path}
+        return answered(lambda: read_whole(**given, **log.options))
+
+
+def made() -> tuple[dict[str, Log], dict[str, Log]]:
+    """Logs of libraries' formats, of JSON and folders, and those of makers, by name."""
+    return dict(_logs()), dict(_of_makers())
+
+
+def _made_elsewhere() -> tuple[dict[str, Log], dict[str, Log]]:
+    """The same, by a process of its own: this one has then written no table and can be forked."""
+    code = "import pickle, sys; from attacks.formats import made; sys.stdout.buffer.write(pickle.dumps(made()))"
+    path = os.pathsep.join([str(Path(__file__).parents[1]), *(p for p in sys.path if p)])
+    environment = {**os.environ, "PYTHONPATH": path}
+    done = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, check=True, env=environment)
+    return pickle.loads(done.stdout)
+
+
+def _logs() -> Iterator[tuple[str, Log]]:
+    """A good log of every format that a library reads, of JSON, and of folders."""
+    for name, document in _documents().items():
+        yield name, Log({"": json.dumps(document).encode()})
+    yield "lines.jsonl", Log({"": b"\n".join(json.dumps(row).encode() for row in _documents()["rows.json"])})
+    yield "log.ulg", Log({"": ecosystems.ulog(ecosystems.raw_topics(0, TABLE))})
+    yield "fifo.ulg", Log({"": ecosystems.ulog_of_batches(ecosystems.batches(0, TABLE))})
+    yield "flash.bin", Log({"": ecosystems.dataflash(1, TABLE)})
+    yield "drive", Log(_kitti())
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for kind in ("ros1", "sqlite", "mcap"):
+            ecosystems.write_bag(folder / kind, {"/imu": TABLE}, kind=kind)
+        for inner in [p for kind in ("sqlite", "mcap") for p in (folder / kind).iterdir() if p.suffix != ".yaml"]:
+            shutil.copy(inner, folder / f"inner{inner.suffix}")
+        for write in (_matlab, _hdf5, _parquet):
+            write(folder)
+        for path in sorted(folder.iterdir()):
+            inside = [p for p in path.rglob("*") if p.is_file()] if path.is_dir() else [path]
+            yield path.name, Log({str(p.relative_to(path)).removeprefix("."): p.read_bytes() for p in inside})
+
+
+def _of_makers() -> Iterator[tuple[str, Log]]:
+    """The first five hundred lines of text as makers' programs write it; archives whole."""
+    from table import LAYOUTS
+
+    for name, make in LAYOUTS.items():
+        made = make()
+        files = {k: v if v[:2] == b"PK" else b"\n".join(v.split(b"\n")[:500]) for k, v in made.files.items()}
+        yield name, Log(files, made.options, made.per_sensor)
+
+
+def _documents() -> dict[str, Any]:
+    """JSON as boards and programs write it: rows, columns, packets (Movesense), a payload (Edge Impulse)."""
+    acc, gyr = TABLE[:, 1:4].tolist(), TABLE[:, 4:].tolist()
+    triads = [[dict(zip("xyz", row, strict=True)) for row in sensor] for sensor in (acc, gyr)]
+    columns = {"acc": TABLE[:, 1:4].T.tolist(), "gyro": TABLE[:, 4:].T.tolist()}
+    sensors = [{"name": f"{s}{a}", "units": u} for s, u in (("acc", "m/s2"), ("gyr", "rad/s")) for a in "XYZ"]
+    return {
+        "rows.json": [{"t": t, "acc": a, "gyro": w} for t, a, w in zip(TABLE[:, 0].tolist(), *triads, strict=True)],
+        "columns.json": {"t": TABLE[:, 0].tolist()} | {k: dict(zip("xyz", v, strict=True)) for k, v in columns.items()},
+        "edge.json": {"payload": {"interval_ms": 10, "sensors": sensors, "values": TABLE[:, 1:].tolist()}},
+        "movesense.json": {
+            "data": [
+                {"imu": {"Timestamp": 10 * k, "ArrayAcc": triads[0][k : k + 4], "ArrayGyro": triads[1][k : k + 4]}}
+                for k in range(0, len(TABLE), 4)
+            ]
+        },
+    }
+
+
+def _kitti() -> dict[str, bytes]:
+    stamps = "".join(f"2011-09-26 13:02:{t:012.9f}\n" for t in TABLE[:40, 0])
+    files = {"oxts/timestamps.txt": stamps.encode()}
+    for k, row in enumerate(TABLE[:40]):
+        numbers = [*range(11), *row[1:4], *row[1:4], *row[4:], *row[4:], *range(7)]
+        files[f"oxts/data/{k:010d}.txt"] = " ".join(map(str, numbers)).encode()
+    return files
+
+
+def _matlab(folder: Path) -> None:
+    from scipy.io import savemat
+
+    columns = {"t": TABLE[:, 0], "acc": TABLE[:, 1:4], "gyro": TABLE[:, 4:], "fs": 100.0}
+    savemat(folder / "old.mat", columns)
+    savemat(folder / "packed.mat", {"imu": columns, "note": "x"}, do_compression=True)
+    savemat(folder / "unnamed.mat", {"data": TABLE})
+
+
+def _hdf5(folder: Path) -> None:
+    import h5py
+
+    for name, options in (("plain.h5", {}), ("packed.h5", {"compression": "gzip", "chunks": True})):
+        with h5py.File(folder / name, "w") as file:
+            for key, values in (("t", TABLE[:, 0]), ("accelerometer", TABLE[:, 1:4]), ("gyroscope", TABLE[:, 4:])):
+                file.create_dataset(f"imu/{key}", data=values, **options)
+    with h5py.File(folder / "new.mat", "w", userblock_size=512) as file:
+        for key, values in (("t", TABLE[:, :1]), ("acc", TABLE[:, 1:4]), ("gyro", TABLE[:, 4:])):
+            file[key] = values.T
+    content = (folder / "new.mat").read_bytes()
+    (folder / "new.mat").write_bytes(b"MATLAB 7.3 MAT-file" + content[19:])
+
+
+def _parquet(folder: Path) -> None:
+    import polars as pl
+
+    pl.DataFrame(TABLE, schema=["t", "ax", "ay", "az", "gx", "gy", "gz"]).write_parquet(folder / "log.parquet")
