@@ -101,9 +101,8 @@ def _sensor(
     is_gyro = usual is ANGLE
     prior = informed(usual, stretches, static)
     half, held = halves(stretches)
-    taught, did_follow = independent_or_not(half, prior, usual)
-    near = (None, taught) if did_follow else (taught, None)
-    found, follows = independent_or_not(stretches, prior, usual, near)
+    taught, _ = independent_or_not(half, prior, usual)
+    found, follows = independent_or_not(stretches, prior, usual)
     gain, sigma, tau = forgetting(stretches, found)
     is_gm = gain > PREFERRED
     draws = found.draws
@@ -149,20 +148,17 @@ def informed(usual: Prior, stretches: Sequence[Stretch], static: StaticNoise | N
     return Prior(mean, sigma, is_there)
 
 
-def independent_or_not(
-    stretches: Sequence[Stretch], prior: Prior, usual: Prior, near: tuple[Fitted | None, Fitted | None] = (None, None)
-) -> tuple[Fitted, bool]:
+def independent_or_not(stretches: Sequence[Stretch], prior: Prior, usual: Prior) -> tuple[Fitted, bool]:
     """The fit with noise at rest as a datum, or, where the evidence prefers it, of a reference that follows the sensor.
 
     A smoother over this sensor repeats part of its noise, and what is left of it beside the reference may be any less.
-    ``near`` are fits of a part, of either kind.
     """
-    apart = fit(stretches, prior, near[0])
+    apart = fit(stretches, prior)
     if prior.sigma[0] == usual.sigma[0] or np.log(np.median(apart.draws[:, 0])) > prior.mean[0] - prior.sigma[0]:
         return apart, False
     wide = prior.sigma.copy()
     wide[0] = usual.sigma[0]
-    other = fit(stretches, Prior(prior.mean, wide, prior.is_there), near[1])
+    other = fit(stretches, Prior(prior.mean, wide, prior.is_there))
     follows = 2.0 * (other.evidence - apart.evidence) > PREFERRED
     return (other, True) if follows else (apart, False)
 
