@@ -13,18 +13,16 @@ from scipy.spatial.transform import Rotation
 import trihedron
 from reference_rig import FINE_HZ, G, forces, hand, rates_of
 from trihedron.estimate.filter_noise.angle import bias_steps
+from trihedron.estimate.filter_noise.axes import _of_axes, _without_noise, unlike_axes_beside
 from trihedron.estimate.filter_noise.beside_reference import (
     ANGLE,
-    _of_axes,
-    _without_noise,
     independent_or_not,
     informed,
     parts_of,
-    unlike_axes_beside,
 )
 from trihedron.estimate.filter_noise.held_out import errors_over
 from trihedron.estimate.filter_noise.strengths import Fitted, Prior, fit
-from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, accumulated, matern, walked
+from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, matern, walked
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
 from trihedron.records import Recording
 from trihedron.records.filter_noise import Bounded, StaticNoise
@@ -38,10 +36,10 @@ def still(m=60):
     """A stretch of a body that does not turn: means over blocks of a second, nothing constant but the start."""
     time, eye = np.arange(m) + 0.5, np.eye(3)
     steps = bias_steps(time[:, None, None] * eye)
-    noise = accumulated(np.ones(m)) - np.eye(m) / 6.0
+    noise = accumulated(np.ones(m), BLOCK_ENDS)
     return Stretch(
         time, np.zeros(3 * m), np.tile(0.1 * eye, (m, 1)), np.zeros(3),
-        (noise, 0 * noise, np.eye(m)), walked(steps), steps, None, eye, None, np.zeros(m),
+        (noise, 0 * noise, np.eye(m)), walked(steps), steps, None, eye, np.tile(eye, (m, 1, 1)), np.zeros(m),
     )  # fmt: skip
 
 
@@ -262,3 +260,37 @@ def test_most_of_what_looks_like_noise_in_a_recorded_flight_is_its_truth():
     assert next(s.share.lower for s in gyro.shares if s.cause == "reference") > 0.6
     assert gyro.N.lower < 1.7e-4 * 1.3
     assert math.isfinite(accelerometer.N.value)
+
+
+def warmed(seed, per_kelvin, is_logged=True):
+    """A hand before a tracker while the sensor warms up by six kelvin, its bias along with it."""
+    rng = np.random.default_rng(seed)
+    t, C, _ = hand(rng, 150)
+    step = FINE_HZ // 100
+    n = len(t) // step
+    time = (np.arange(n) * step + (step - 1) / 2) / FINE_HZ
+    w, f = (x[: n * step].reshape(n, step, 3).mean(axis=1) for x in (rates_of(C), forces(C)))
+    degrees = 30.0 - 6.0 * np.exp(-time / 60.0)
+    w = w + 0.01 + (degrees - 30.0)[:, None] * per_kelvin + N * 10 * rng.normal(size=w.shape)
+    log = Recording.from_arrays(
+        time, f + 0.01 * rng.normal(size=f.shape), w, accelerometer_unit="m/s^2", gyroscope_unit="rad/s",
+        temperature_degc=degrees + 0.05 * rng.normal(size=n) if is_logged else None,
+    )  # fmt: skip
+    k = np.arange(0, len(t), FINE_HZ // 50)
+    return log, ReferenceMotion(t[k], attitude=C[k], source="tracker")
+
+
+@pytest.mark.slow
+def test_a_bias_that_follows_a_logged_temperature_has_a_share_of_its_own_and_none_of_the_walk(static):
+    per_kelvin = np.array([1e-3, -7e-4, 5e-4])
+    share, walk = {}, {}
+    for is_logged in (True, False):
+        log, truth = warmed(3, per_kelvin, is_logged)
+        found = trihedron.filter_noise(log, static=static, reference=truth, horizons_s=[10], gravity_m_s2=G)
+        gyro = found.sensor("gyroscope")
+        share[is_logged] = next((s.share for s in gyro.shares if s.cause == "temperature"), None)
+        walk[is_logged] = gyro.K.filter_value
+    assert share[False] is None
+    # At the start a kelvin in 10 s: 1.3e-3 rad/s/K for 5 s against 2e-4 sqrt(30) of noise; on average less.
+    assert share[True].lower > 0.3
+    assert walk[True] < 0.5 * walk[False]

@@ -9,9 +9,10 @@ from trihedron.records.finding import Finding
 from trihedron.records.plain import Plain
 from trihedron.records.presented import Presented
 
-Cause = Literal["rest", "vibration", "bias", "calibration", "g-sensitivity", "reference"]
-CAUSES: tuple[Cause, ...] = ("rest", "vibration", "bias", "calibration", "g-sensitivity", "reference")
-"""Noise as at rest, vibration, wandering bias, what S and g-sensitivity would leave, the reference's own error."""
+Cause = Literal["rest", "vibration", "bias", "temperature", "calibration", "g-sensitivity", "reference"]
+CAUSES: tuple[Cause, ...] = ("rest", "vibration", "bias", "temperature", "calibration", "g-sensitivity", "reference")
+"""Noise as at rest, vibration, wandering bias, its part along a logged temperature,
+what S and g-sensitivity would leave, the reference's own error."""
 
 
 @dataclass(frozen=True)

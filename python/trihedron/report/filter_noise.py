@@ -20,7 +20,8 @@ from trihedron.units import degrees_from_radians
 CAUSE_WORDS = {
     "rest": ("noise as at rest", "a better sensor; nothing else"),
     "vibration": ("vibration", "dampers at the mount, a low-pass filter on the sensor, a higher rate"),
-    "bias": ("bias random walk", "warm up, calibrate the temperature"),
+    "bias": ("bias random walk", "warm up; log the temperature and calibrate it"),
+    "temperature": ("temperature", "trihedron calibrate with a logged temperature: none of it goes into N or K"),
     "calibration": ("calibration left over", "trihedron calibrate: none of it goes into N or K"),
     "g-sensitivity": ("g-sensitivity", "trihedron calibrate with known motion: none of it goes into N or K"),
     "reference": ("error of the reference", "a better reference: none of it goes into N or K"),

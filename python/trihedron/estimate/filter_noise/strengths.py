@@ -11,6 +11,7 @@ from scipy.special import gammaln, logsumexp, ndtr
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
+from trihedron.records.filter_noise import Bounded
 
 COORDINATES = ("noise", "vibration", "bias_walk", "white", "slow", "slow_s", "body")
 """Logarithms of strengths, ``slow`` that of the reference's whole slow error, and last a standard normal number whose
@@ -170,6 +171,13 @@ def _mixture(x: FloatArray, proposals: Sequence[tuple[FloatArray, FloatArray]]) 
         far = np.sum(solve_triangular(root, (x - middle).T, lower=True) ** 2, axis=0)
         each.append(norm - np.sum(np.log(np.diag(root))) - 0.5 * (TAILS + n) * np.log1p(far / TAILS))
     return np.asarray(logsumexp(each, axis=0) - np.log(len(proposals)))
+
+
+def bounded(values: Sequence[float] | FloatArray) -> Bounded:
+    """Median and 95 % interval of draws; only a limit where the interval reaches over a factor of ``ABSENT``."""
+    low, middle, high = (float(v) for v in np.quantile(values, [0.025, 0.5, 0.975]))
+    is_limit = high > 0.0 and low < high / ABSENT
+    return Bounded(middle, 0.0 if is_limit else low, high, is_limit)
 
 
 def forgetting(stretches: Sequence[Stretch], walk: Fitted) -> tuple[float, float, float]:
