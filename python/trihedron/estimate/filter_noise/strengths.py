@@ -17,6 +17,7 @@ COORDINATES = ("noise", "vibration", "bias_walk", "white", "slow", "slow_s", "bo
 """Logarithms of strengths, ``slow`` that of the reference's whole slow error, and last a standard normal number whose
 quantile is the part of its square that turns with the body: two strengths of which either may be nothing would have a
 posterior with a corner."""
+MAY_BE_NOTHING = np.isin(COORDINATES, ("vibration", "bias_walk", "white", "slow"))
 FARTHEST = 4.0
 """Coordinates beyond four prior σ are those of nothing."""
 STEP = 1e-3
@@ -40,7 +41,11 @@ ABSENT = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Of the coordinates: ``mean`` (7,), ``sigma`` (7,); ``is_there`` (7,) those that there are."""
+    """Of the coordinates: ``mean`` (7,), ``sigma`` (7,); ``is_there`` (7,) those that there are.
+
+    A strength that may be nothing has a half-Cauchy prior about ``mean`` (Gelman 2006): flat towards nothing, so that
+    what a log does not show has an upper limit of the log and not of the prior. ``sigma`` then bounds the search.
+    """
 
     mean: FloatArray
     sigma: FloatArray
@@ -90,7 +95,10 @@ def most_likely(stretches: Sequence[Stretch], prior: Prior) -> tuple[FloatArray,
 def _slope(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Derivatives (f,) of the log posterior, and its average information (f, f; Gilmour et al. 1995)."""
     free = prior.is_there > 0.0
-    slope, information = (prior.mean[free] - x) / prior.sigma[free] ** 2, np.diag(1.0 / prior.sigma[free] ** 2)
+    far, sigma = x - prior.mean[free], prior.sigma[free]
+    # A hyperbolic secant of the logarithm, of information 1/2 on average.
+    slope = np.where(MAY_BE_NOTHING[free], -np.tanh(far), -far / sigma**2)
+    information = np.diag(np.where(MAY_BE_NOTHING[free], 0.5, 1.0 / sigma**2))
     at = whole(prior, x)
     others = [whole(prior, x + STEP * e) for e in np.eye(len(x))]
     for one in stretches:
@@ -108,13 +116,16 @@ def _slope(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> tuple[F
 
 
 def height(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> float:
-    """Log posterior of coordinates (f,) that the model has, up to the prior's norm."""
+    """Log evidence and prior of coordinates (f,) that the model has."""
     free = prior.is_there > 0.0
-    far = (x - prior.mean[free]) / prior.sigma[free]
-    if np.any(np.abs(far) > FARTHEST + STEP):
+    far, sigma = x - prior.mean[free], prior.sigma[free]
+    if np.any(np.abs(far) > (FARTHEST + STEP) * sigma):
         return -np.inf
     strengths = whole(prior, x)
-    return float(sum(one.evidence(strengths) for one in stretches) - 0.5 * far @ far)
+    normal = -0.5 * (far / sigma) ** 2 - np.log(np.sqrt(2.0 * np.pi) * sigma)
+    half_cauchy = -np.log(np.pi * np.cosh(far))
+    known = np.sum(np.where(MAY_BE_NOTHING[free], half_cauchy, normal))
+    return float(sum(one.evidence(strengths) for one in stretches) + known)
 
 
 def whole(prior: Prior, x: FloatArray) -> FloatArray:
@@ -151,8 +162,7 @@ def fit(stretches: Sequence[Stretch], prior: Prior) -> Fitted:
         flat = weights if _effective(weights) > LEAST_DRAWS * len(middle) else np.sqrt(weights) / np.sqrt(weights).sum()
         middle = flat @ x
         spread = ((x - middle).T * flat) @ (x - middle) + 0.02 * first
-    norm = 0.5 * len(middle) * np.log(2.0 * np.pi) + np.sum(np.log(prior.sigma[prior.is_there > 0.0]))
-    evidence = float(logs.max() + np.log(np.mean(np.exp(logs - logs.max()))) - norm)
+    evidence = float(logs.max() + np.log(np.mean(np.exp(logs - logs.max()))))
     chosen = np.searchsorted(np.cumsum(weights), (np.arange(DRAWN) + 0.5) / DRAWN).clip(max=len(x) - 1)
     draws = np.array([whole(prior, one) for one in x[chosen]])
     return Fitted(whole(prior, x[np.argmax(heights)]), evidence, draws, _effective(weights))
