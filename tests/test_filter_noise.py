@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -193,13 +194,27 @@ def test_every_consumer_gets_both_sensors_in_its_own_unit(found, target):
     text = filter_noise_text(whole, target)
     gyro, rate = whole.sensors[0].N.filter_value, whole.rate_hz
     wanted = {"fast-lio": gyro**2 * rate, "robot_localization": gyro**2 * rate, "gtsam": gyro**2}.get(target, gyro)
-    assert f"{wanted:.4g}"[:5] in text.replace(f"{wanted!r}", f"{wanted:.4g}")
-    if target != "basalt":
-        assert "static gyroscope: N 0.0002" in text
+    # Four digits, those of N before it is squared or after.
+    numbers = [float(one) for one in re.findall(r"\d+\.\d+(?:e-\d+)?", text)]
+    assert min(abs(one / wanted - 1.0) for one in numbers) < 1e-3
+    assert "static gyroscope: N 0.0002" in text
+    assert "accelerometer: N 0.002 (0.001 to 0.003) m/s^2/sqrt(Hz), K below 0.0004 m/s^2/sqrt(s)" in text
     if target not in ("gtsam", "basalt"):
         assert yaml.safe_load(text.replace("%YAML:1.0", ""))
     if target == "basalt":
         assert json.loads(text)["value0"]["accel_bias_std"] == [4e-4] * 3
+
+
+def test_axes_that_differ_are_written_where_a_consumer_has_one_for_each(found):
+    whole = both(found)
+    axes = tuple(Bounded(n, 0.9 * n, 1.1 * n) for n in (1e-3, 2e-3, 3e-3))
+    unlike = replace(whole, sensors=(whole.sensors[0], replace(whole.sensors[1], axes_N=axes)))
+    assert json.loads(filter_noise_text(unlike, "basalt"))["value0"]["accel_noise_std"] == [1e-3, 2e-3, 3e-3]
+    assert "setAccelerometerCovariance(np.diag([1.0e-06, 4.0e-06, 9.0e-06]))" in filter_noise_text(unlike, "gtsam")
+    assert yaml.safe_load(filter_noise_text(unlike, "robot_localization"))["linear_acceleration_covariance"][4] == (
+        pytest.approx(4e-6 * unlike.rate_hz)
+    )
+    assert "accelerometer N of X, Y, Z" in filter_noise_text(unlike, "kalibr")
 
 
 def resting(seed=1, seconds=120, n=N):
