@@ -24,7 +24,7 @@ STEP = 1e-3
 """Step in a coordinate for derivatives of the covariance."""
 SEARCHES, LONGEST_STEP, ENOUGH = 80, 2.0, 0.01
 """Steps of the search, the longest of them, and the gain of the log posterior at which it ends."""
-ROUNDS, MOST_ROUNDS, PROPOSED, DRAWN = 6, 15, 100, 400
+ROUNDS, MOST_ROUNDS, PROPOSED, DRAWN = 3, 15, 100, 400
 """Rounds of proposals at least and at most, proposals of each, and draws that are made of them."""
 LEAST_DRAWS, ENOUGH_DRAWS = 3, 15
 """Independent draws for each strength below which their covariance is too narrow, or singular, to propose from, and

@@ -76,7 +76,7 @@ class Stretch:
         slow = s["world"] ** 2 * correlation
         if self.slow is not None:
             slow = self.slow @ slow @ self.slow.T
-        for i, j in np.ndindex(3, 3):
+        for i, j in zip(*np.nonzero(np.abs(self.plane) + np.eye(3)), strict=True):
             parted[:, i, :, j] += self.plane[i, j] * slow + (same if i == j else 0.0)
         return np.asarray(out)
 
