@@ -120,9 +120,21 @@ class TiltCheck(Plain):
     predicted: float
 
 
+@dataclass(frozen=True)
+class RestCheck(Plain):
+    """Without a reference: change of the gyro's bias between neighbouring static stretches, rms of an axis [rad/s], and
+    what N and K at rest predict of it; scatter of the length of gravity over ``n`` stretches as a part of it."""
+
+    n: int
+    longest_s: float
+    bias_change: float
+    predicted: float
+    gravity_scatter: float
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class FilterNoise(Presented):
-    """Noise for a filter, of a log: its sensors, and the tilt over moves where there is no reference."""
+    """Noise for a filter, of a log: its sensors, and what its rests tell where there is no reference."""
 
     sensors: tuple[SensorFilterNoise, ...]
     source: str
@@ -131,6 +143,7 @@ class FilterNoise(Presented):
     band_hz: float
     duration_s: float
     tilt: TiltCheck | None = None
+    rests: RestCheck | None = None
     findings: tuple[Finding, ...] = ()
 
     def __repr__(self) -> str:
