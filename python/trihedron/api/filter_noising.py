@@ -216,6 +216,8 @@ def _from_rest_to_rest(
 def _noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
     out = []
     for one in sensors:
+        if not one.is_settled:
+            out.append(Finding.of(FindingCode.FILTER_NOISE_UNSETTLED, sensor=one.sensor))
         if one.static is None:
             out.append(Finding.of(FindingCode.FILTER_NOISE_NO_STATIC, sensor=one.sensor))
         if one.reference is not None and one.reference.follows:

@@ -93,7 +93,8 @@ class ReferenceWorth(Plain):
 class SensorFilterNoise(Plain):
     """One sensor: the filter's ``N`` and ``K``, static values beside them, shares, and what was tested.
 
-    ``N`` holds noise at rest and vibration; ``axes_N`` the density of X, Y and Z where they differ.
+    ``N`` holds noise at rest and vibration; ``axes_N`` the density of X, Y and Z where they differ. Intervals hold
+    where ``is_settled``: enough draws of the posterior count.
     """
 
     sensor: Literal["gyroscope", "accelerometer"]
@@ -108,6 +109,7 @@ class SensorFilterNoise(Plain):
     shares: tuple[Share, ...] = ()
     consistency: tuple[Consistency, ...] = ()
     is_only_static: bool = False
+    is_settled: bool = True
 
 
 @dataclass(frozen=True)

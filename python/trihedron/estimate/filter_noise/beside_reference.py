@@ -133,6 +133,7 @@ def _sensor(
         consistency=tuple(
             one for h in asked.horizons_s if (one := consistency(held, taught, static, h)) is not None
         ),
+        is_settled=found.is_settled and taught.is_settled,
     )  # fmt: skip
 
 

@@ -62,6 +62,11 @@ class Fitted:
     draws: FloatArray
     n_effective: float
 
+    @property
+    def is_settled(self) -> bool:
+        """Whether enough draws count for moments of the strengths."""
+        return bool(self.n_effective > LEAST_DRAWS * np.count_nonzero(np.ptp(self.draws, axis=0)))
+
 
 def most_likely(stretches: Sequence[Stretch], prior: Prior) -> tuple[FloatArray, FloatArray]:
     """Coordinates (f,) that the model has at their greatest posterior, and its information (f, f) there.
