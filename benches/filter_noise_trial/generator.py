@@ -1,5 +1,6 @@
-"""Drones, cars and walks: a strapped gyro with known vibration, calibration left over and bias walk, and a truth whose
-own error is known too. Numpy and scipy only: the parts of an error over a horizon are written out here once more.
+"""Drones, cars and walks: strapped sensors with known vibration, calibration left over, bias walk and warming, and a
+truth of attitude and position whose own error is known too. Numpy and scipy only: the parts of an error over a horizon
+are written out here once more.
 """
 
 from dataclasses import dataclass
@@ -13,19 +14,28 @@ KINDS = ("drone", "car", "walk")
 
 @dataclass(frozen=True)
 class Drawn:
-    """Log (n,) s, (n, 3) m/s² and rad/s; truth (k,) s, (k, 3, 3); the density at rest as told, and what is true."""
+    """Log (n,) s, (n, 3) m/s² and rad/s, (n,) °C; truth (k,) s, (k, 3, 3), (k, 3) m; and what is true."""
 
     t: np.ndarray
     force: np.ndarray
     rate: np.ndarray
     truth_t: np.ndarray
+    degrees: np.ndarray
     truth: np.ndarray
+    position: np.ndarray
+    gyroscope: "Sensor"
+    accelerometer: "Sensor"
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """White density at rest as told, and with vibration as it is [SI/√Hz]; walk [SI/√s]; mean square [rad², (m/s)²] by
+    horizon and cause."""
+
     told_N: float
     N: float
-    """At rest and vibration together [rad/s/√Hz]."""
     K: float
     parts: dict[float, dict[str, float]]
-    """Mean square [rad²] by horizon and cause."""
 
 
 def smooth(rng, n, low, high):
@@ -77,39 +87,94 @@ def drawn(seed, kind, seconds, horizons):
     t = np.arange(0, seconds, 1 / HZ)
     w = rates(rng, kind, t)
     C = turned(w)
-    low, high = np.log([1e-4, 3e-6, 3e-4, 5e-4]), np.log([4e-4, 1e-4, 2e-3, 5e-3])
-    N, K, V, sigma = np.exp(rng.uniform(low, high))
+    N, K, V, sigma = np.exp(rng.uniform(np.log([1e-4, 3e-6, 3e-4, 5e-4]), np.log([4e-4, 1e-4, 2e-3, 5e-3])))
     V = V if kind == "drone" else 0.3 * V
-    tau, white = rng.uniform(3, 15), 3e-4
+    tau, white, steady = rng.uniform(3, 15), 3e-4, 2e-3
     throttle = np.maximum(1 + 0.7 * smooth(rng, len(t), 0.0, 0.05)[:, 0], 0.1)
     throttle = throttle**2 / np.mean(throttle**2)
     shaking = {"drone": 0.1, "car": 0.02, "walk": 0.05}[kind] * smooth(rng, len(t), 30, 48) * np.sqrt(throttle)[:, None]
-    noise = np.sqrt(N**2 + V**2 * throttle)[:, None] * np.sqrt(HZ) * rng.normal(size=w.shape)
-    bias = 0.02 * rng.normal(size=3) + K / np.sqrt(HZ) * np.cumsum(rng.normal(size=w.shape), axis=0)
+    degrees = 25.0 + rng.uniform(0.0, 8.0) * (1 - np.exp(-t / rng.uniform(40, 200)))
+    warm = (degrees - degrees.mean())[:, None] * 3e-4 * rng.normal(size=3)
     M = np.eye(3) + rng.uniform(-0.01, 0.01, (3, 3))
     of_force = np.radians(0.1) / G * rng.normal(size=(3, 3))
     middle = C[:-1] * Rotation.from_rotvec(0.5 * w / HZ)
-    force = middle.inv().apply([0, 0, G]) + 0.3 * smooth(rng, len(t), 0.1, 3)
-    raw = (w + shaking) @ M.T + force @ of_force.T + bias + noise
+    path, pushed = moved(rng, len(t))
+    force = middle.inv().apply(pushed + np.array([0, 0, G]))
+    bias = 0.02 * rng.normal(size=3) + warm
+    raw = (w + shaking) @ M.T + force @ of_force.T + bias + noise(rng, N, V, K, throttle)
     k = np.arange(0, len(t), HZ // TRACK_HZ)
     truth_t = t[k] - 0.5 / HZ
     off = slow_error(rng, truth_t, sigma, tau) + white * rng.normal(size=(len(k), 3))
-    parts = {}
     left = {"calibration": w @ M.T @ left_over(M).T, "g-sensitivity": force @ of_force.T}
+    parts = {}
     for h in horizons:
         x = np.sqrt(3) * h / tau
         parts[h] = {
-            "rest": 3 * N**2 * h,
-            "vibration": 3 * V**2 * h,
-            "bias": K**2 * h**3,
+            **of_noise(N, V, K, h),
+            "temperature": warmed(warm, middle, h),
             "reference": 6 * sigma**2 * (1 - (1 + x) * np.exp(-x)) + 6 * white**2 / TRACK_HZ,
             **{cause: carried(wrong, middle, h) for cause, wrong in left.items()},
         }
+    gyroscope = Sensor(N * np.exp(0.05 * rng.normal()), float(np.hypot(N, V)), K, parts)
     seen = (Rotation.from_rotvec(off) * C[k]).as_matrix()
-    force = force + 0.02 * rng.normal(size=w.shape)
+    N, K, V = np.exp(rng.uniform(np.log([1e-3, 5e-5, 3e-3]), np.log([4e-3, 2e-3, 3e-2])))
+    V = V if kind == "drone" else 0.3 * V
+    M = np.eye(3) + rng.uniform(-0.005, 0.005, (3, 3))
+    shaking = 0.5 * smooth(rng, len(t), 30, 48) * np.sqrt(throttle)[:, None]
+    force = (force + shaking) @ M.T + 0.05 * rng.normal(size=3) + noise(rng, N, V, K, throttle)
+    tilt = {h: 2 * G**2 * sigma**2 * twice_summed(h, tau) for h in horizons}
+    warm = (degrees - degrees.mean())[:, None] * 3e-3 * rng.normal(size=3)
+    force = force + warm
+    parts = {
+        h: {
+            **of_noise(N, V, K, h),
+            "temperature": warmed(warm, middle, h),
+            "reference": 12 * steady**2 / TRACK_HZ + tilt[h],
+        }
+        for h in horizons
+    }
+    accelerometer = Sensor(N * np.exp(0.05 * rng.normal()), float(np.hypot(N, V)), K, parts)
+    where = 0.5 * (path[np.maximum(k - 1, 0)] + path[k]) + steady * rng.normal(size=(len(k), 3))
     return Drawn(
-        t, force, raw, truth_t, seen, N * np.exp(0.05 * rng.normal()), float(np.hypot(N, V)), K, parts
+        t, force, raw, truth_t, degrees + 0.05 * rng.normal(size=len(t)), seen, where, gyroscope, accelerometer
     )  # fmt: skip
+
+
+def noise(rng, N, V, K, throttle):
+    """(n, 3) white at rest, white that follows the throttle, and a walk."""
+    size = (len(throttle), 3)
+    white = np.sqrt(N**2 + V**2 * throttle)[:, None] * np.sqrt(HZ) * rng.normal(size=size)
+    return white + K / np.sqrt(HZ) * np.cumsum(rng.normal(size=size), axis=0)
+
+
+def of_noise(N, V, K, h):
+    """Mean squares over a horizon of the three axes together."""
+    return {"rest": 3 * N**2 * h, "vibration": 3 * V**2 * h, "bias": K**2 * h**3}
+
+
+def moved(rng, n):
+    """(n, 3) a path [m] and its acceleration, both at the samples."""
+    pushed = 0.5 * smooth(rng, n, 0.1, 2.0)
+    f = np.fft.rfftfreq(n, 1 / HZ)
+    spectrum = np.fft.rfft(pushed, axis=0)
+    spectrum[1:] /= -((2 * np.pi * f[1:, None]) ** 2)
+    return np.fft.irfft(spectrum, n, axis=0), pushed
+
+
+def twice_summed(h, tau):
+    """Variance of the integral over h of a Matérn-3/2 process of variance one."""
+    lag = (np.arange(2000) + 0.5) * h / 2000
+    x = np.sqrt(3) * lag / tau
+    return 2 * np.mean((h - lag) * (1 + x) * np.exp(-x)) * h
+
+
+def warmed(wrong, attitude, h):
+    """Mean square angle [rad²] over a horizon of a bias (n, 3) that was right at its start."""
+    ahead = round(h * HZ)
+    so_far = np.cumsum(attitude.as_matrix(), axis=0) / HZ
+    angle = np.cumsum(attitude.apply(wrong), axis=0) / HZ
+    known = np.einsum("nij,nj->ni", so_far[ahead:] - so_far[:-ahead], wrong[:-ahead])
+    return float(np.mean(np.sum((angle[ahead:] - angle[:-ahead] - known) ** 2, axis=1)))
 
 
 def left_over(M):

@@ -14,11 +14,19 @@ from trihedron.api.reading import AnyRecording, read, recording_of, segment
 from trihedron.api.referring import AnyReference, motion_of
 from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.filter_noise.beside_reference import Asked, beside_reference
-from trihedron.estimate.filter_noise.rests import at_rest, tilt_over_moves, unlike_axes
+from trihedron.estimate.filter_noise.rests import at_rest, between_rests, tilt_over_moves, unlike_axes
 from trihedron.files.formats.contract import NoiseFigure
 from trihedron.files.noise import read_noise
 from trihedron.records import Finding, FindingCode, Noise, Recording, Segments
-from trihedron.records.filter_noise import BiasModel, Bounded, FilterNoise, SensorFilterNoise, StaticNoise, TiltCheck
+from trihedron.records.filter_noise import (
+    BiasModel,
+    Bounded,
+    FilterNoise,
+    RestCheck,
+    SensorFilterNoise,
+    StaticNoise,
+    TiltCheck,
+)
 from trihedron.units import rate_to_si
 
 UNITS = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
@@ -92,7 +100,7 @@ def filter_noise(
     own = None if segments is None else _of_rest(recording, segments)
     known = _static(static) if static is not None else _sensors(own)
     findings = (*recording.findings, *(said if reference is not None else ()))
-    tilt, source = None, ""
+    tilt, rests, source = None, None, ""
     if reference is not None:
         motion = motion_of(reference, reference_columns)
         asked = Asked(horizons, band, gravity, known.get("gyroscope"), known.get("accelerometer"))
@@ -105,10 +113,11 @@ def filter_noise(
                 "unknown; give known motion beside it (--reference), or a log that begins static."
             )
         sensors = tuple(_at_rest(own, sensor, known) for sensor in UNITS if at_rest(own.axes, UNITS[sensor]))
-        tilt = None if segments is None else _tilt(recording, segments, known)
+        if segments is not None:
+            tilt, rests = _from_rest_to_rest(recording, segments, known)
         findings = (*findings, Finding.of(FindingCode.FILTER_NOISE_AT_REST))
     return FilterNoise(
-        sensors, recording.source, source, recording.rate_hz, band, recording.duration_s, tilt, tuple(findings)
+        sensors, recording.source, source, recording.rate_hz, band, recording.duration_s, tilt, rests, tuple(findings)
     )
 
 
@@ -193,17 +202,22 @@ def _at_rest(own: Noise, sensor: str, known: Static) -> SensorFilterNoise:
     )  # fmt: skip
 
 
-def _tilt(recording: Recording, segments: Segments, known: Static) -> TiltCheck | None:
+def _from_rest_to_rest(
+    recording: Recording, segments: Segments, known: Static
+) -> tuple[TiltCheck | None, RestCheck | None]:
     scale = rate_to_si(recording.gyroscope_unit)
     if recording.gyroscope is None or scale is None or "gyroscope" not in known:
-        return None
+        return None, None
     rate = np.nan_to_num(recording.gyroscope * scale)
-    return tilt_over_moves(recording.with_distinct_timestamps().time_s, rate, segments, known["gyroscope"])
+    told = (recording.with_distinct_timestamps().time_s, rate, segments, known["gyroscope"])
+    return tilt_over_moves(*told), between_rests(*told)
 
 
 def _noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
     out = []
     for one in sensors:
+        if not one.is_settled:
+            out.append(Finding.of(FindingCode.FILTER_NOISE_UNSETTLED, sensor=one.sensor))
         if one.static is None:
             out.append(Finding.of(FindingCode.FILTER_NOISE_NO_STATIC, sensor=one.sensor))
         if one.reference is not None and one.reference.follows:

@@ -9,9 +9,10 @@ from trihedron.records.finding import Finding
 from trihedron.records.plain import Plain
 from trihedron.records.presented import Presented
 
-Cause = Literal["rest", "vibration", "bias", "calibration", "g-sensitivity", "reference"]
-CAUSES: tuple[Cause, ...] = ("rest", "vibration", "bias", "calibration", "g-sensitivity", "reference")
-"""Noise as at rest, vibration, wandering bias, what S and g-sensitivity would leave, the reference's own error."""
+Cause = Literal["rest", "vibration", "bias", "temperature", "calibration", "g-sensitivity", "reference"]
+CAUSES: tuple[Cause, ...] = ("rest", "vibration", "bias", "temperature", "calibration", "g-sensitivity", "reference")
+"""Noise as at rest, vibration, wandering bias, its part along a logged temperature,
+what S and g-sensitivity would leave, the reference's own error."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,8 @@ class ReferenceWorth(Plain):
 class SensorFilterNoise(Plain):
     """One sensor: the filter's ``N`` and ``K``, static values beside them, shares, and what was tested.
 
-    ``N`` holds noise at rest and vibration; ``axes_N`` the density of X, Y and Z where they differ.
+    ``N`` holds noise at rest and vibration; ``axes_N`` the density of X, Y and Z where they differ. Intervals hold
+    where ``is_settled``: enough draws of the posterior count.
     """
 
     sensor: Literal["gyroscope", "accelerometer"]
@@ -107,6 +109,7 @@ class SensorFilterNoise(Plain):
     shares: tuple[Share, ...] = ()
     consistency: tuple[Consistency, ...] = ()
     is_only_static: bool = False
+    is_settled: bool = True
 
 
 @dataclass(frozen=True)
@@ -119,9 +122,21 @@ class TiltCheck(Plain):
     predicted: float
 
 
+@dataclass(frozen=True)
+class RestCheck(Plain):
+    """Without a reference: change of the gyro's bias between neighbouring static stretches, rms of an axis [rad/s], and
+    what N and K at rest predict of it; scatter of the length of gravity over ``n`` stretches as a part of it."""
+
+    n: int
+    longest_s: float
+    bias_change: float
+    predicted: float
+    gravity_scatter: float
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class FilterNoise(Presented):
-    """Noise for a filter, of a log: its sensors, and the tilt over moves where there is no reference."""
+    """Noise for a filter, of a log: its sensors, and what its rests tell where there is no reference."""
 
     sensors: tuple[SensorFilterNoise, ...]
     source: str
@@ -130,6 +145,7 @@ class FilterNoise(Presented):
     band_hz: float
     duration_s: float
     tilt: TiltCheck | None = None
+    rests: RestCheck | None = None
     findings: tuple[Finding, ...] = ()
 
     def __repr__(self) -> str:

@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from trihedron.arrays import XYZ
-from trihedron.records.filter_noise import Bounded, FilterNoise, SensorFilterNoise, StaticNoise
+from trihedron.records.filter_noise import Bounded, FilterNoise, RestCheck, SensorFilterNoise, StaticNoise
 from trihedron.records.plain import as_plain
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawing import later
@@ -20,7 +20,8 @@ from trihedron.units import degrees_from_radians
 CAUSE_WORDS = {
     "rest": ("noise as at rest", "a better sensor; nothing else"),
     "vibration": ("vibration", "dampers at the mount, a low-pass filter on the sensor, a higher rate"),
-    "bias": ("bias random walk", "warm up, calibrate the temperature"),
+    "bias": ("bias random walk", "warm up; log the temperature and calibrate it"),
+    "temperature": ("temperature", "trihedron calibrate with a logged temperature: none of it goes into N or K"),
     "calibration": ("calibration left over", "trihedron calibrate: none of it goes into N or K"),
     "g-sensitivity": ("g-sensitivity", "trihedron calibrate with known motion: none of it goes into N or K"),
     "reference": ("error of the reference", "a better reference: none of it goes into N or K"),
@@ -33,9 +34,9 @@ def filter_noise_report(found: FilterNoise) -> Document:
     tables: list[Block] = [values_table(found)]
     tables += [Facts(facts)] if (facts := _facts(found)) else []
     sections = [Section("N and K", tuple(tables))]
-    shares = [_shares(one) for one in found.sensors if one.shares]
+    shares: list[Block] = [block for one in found.sensors if one.shares for block in (_shares(one), _advice(one))]
     if shares:
-        sections.append(Section("What the error is made of", (*shares, _advice(found))))
+        sections.append(Section("What the error is made of", tuple(shares)))
     tested = [one for one in found.sensors if one.consistency]
     if tested:
         sections.append(Section("On the half that the fit did not see", tuple(_tested(one) for one in tested)))
@@ -125,7 +126,25 @@ def _facts(found: FilterNoise) -> tuple[tuple[str, str], ...]:
                 "left over, vibration and bias are in the difference; the heading is not seen)",
             )
         )
+    if found.rests is not None:
+        facts += _of_rests(found.rests)
     return tuple(facts)
+
+
+def _of_rests(rests: RestCheck) -> list[tuple[str, str]]:
+    change, predicted = (plain_number(degrees_from_radians(v), 2) for v in (rests.bias_change, rests.predicted))
+    return [
+        (
+            "bias between static stretches",
+            f"changes by {change} °/s rms; N and K at rest predict {predicted} °/s (temperature and g-sensitivity are "
+            "in the difference)",
+        ),
+        (
+            "gravity in static stretches",
+            f"differs by {plain_number(100.0 * rests.gravity_scatter, 2)} % rms over {rests.n} (accelerometer "
+            "calibration left over)",
+        ),
+    ]
 
 
 def _shares(one: SensorFilterNoise) -> Table:
@@ -146,9 +165,8 @@ def _percent(one: Bounded) -> str:
     )  # fmt: skip
 
 
-def _advice(found: FilterNoise) -> Facts:
+def _advice(one: SensorFilterNoise) -> Facts:
     """What would lower the shares, the largest at ten seconds (or the nearest horizon) first."""
-    one = found.sensors[0]
     near = min({share.horizon_s for share in one.shares}, key=lambda h: abs(h - 10.0))
     ranked = sorted((s for s in one.shares if s.horizon_s == near), key=lambda s: -s.share.value)
     return Facts(tuple((CAUSE_WORDS[s.cause][0], CAUSE_WORDS[s.cause][1]) for s in ranked[:3]))
@@ -189,6 +207,7 @@ def filter_noise_record(found: FilterNoise) -> dict[str, Any]:
         "duration_s": found.duration_s,
         "sensors": [as_plain(one) for one in found.sensors],
         "tilt": None if found.tilt is None else as_plain(found.tilt),
+        "rests": None if found.rests is None else as_plain(found.rests),
         "findings": [finding.to_dict() for finding in found.findings],
     }
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.filter_noise.stretch import Stretch, accumulated, walked
+from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, Stretch, accumulated, walked
 from trihedron.estimate.reference.motion import MotionFit
 
 Mask = npt.NDArray[np.bool_]
@@ -78,8 +78,7 @@ def _stretch(table: dict[str, FloatArray], at: slice, h: float, centre: FloatArr
     columns = np.hstack([table["columns"][at].reshape(3 * m, -1), start])
     steps = bias_steps(table["bias"][at])
     quiet, shaken = np.full(m, h), h * table["power"][at]
-    # A mean over a block of a walk has a third of the block's variance, and not half.
-    noise, vibration = (accumulated(q) - np.diag(q) / 6.0 for q in (quiet, shaken))
+    noise, vibration = (accumulated(q, BLOCK_ENDS) for q in (quiet, shaken))
     return Stretch(
         time_s=time,
         observed=table["angle"][at].ravel(),

@@ -7,15 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.integrate import trapezoid
-from scipy.optimize import minimize
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.filter_noise.angle import angle_stretches
+from trihedron.estimate.filter_noise.axes import unlike_axes_beside
 from trihedron.estimate.filter_noise.held_out import Errors, errors_over
 from trihedron.estimate.filter_noise.left_over import Left, left_over
-from trihedron.estimate.filter_noise.strengths import ABSENT, PREFERRED, Fitted, Prior, fit, forgetting
+from trihedron.estimate.filter_noise.strengths import PREFERRED, Fitted, Prior, bounded, fit, forgetting
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, matern
+from trihedron.estimate.filter_noise.temperature import PER_KELVIN, beside_temperature, of_temperature
 from trihedron.estimate.filter_noise.velocity import velocity_stretches
 from trihedron.estimate.reference.fit import laid_beside
 from trihedron.estimate.reference.motion import fit_motion
@@ -23,7 +24,6 @@ from trihedron.records import Recording
 from trihedron.records.filter_noise import (
     CAUSES,
     BiasModel,
-    Bounded,
     Cause,
     Consistency,
     ReferenceWorth,
@@ -76,13 +76,14 @@ def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Asked
     side = laid_beside(recording, motion, asked.gravity_m_s2)
     found = fit_motion([side])
     known = 0.0 if asked.gyroscope is None else asked.gyroscope.N.value
-    stretches = angle_stretches(found, asked.band_hz, known)
+    stretches = beside_temperature(angle_stretches(found, asked.band_hz, known), recording, PER_KELVIN["gyroscope"])
     _refuse_short(stretches, motion)
     left = left_over(found, asked.horizons_s)
     out = [_sensor(stretches, ANGLE, asked, asked.gyroscope, left)]
     if motion.position is not None and side.force is not None:
         known = 0.0 if asked.accelerometer is None else asked.accelerometer.N.value
         more = velocity_stretches(side, found.points[0], asked.band_hz, known, asked.gravity_m_s2)
+        more = beside_temperature(more, recording, PER_KELVIN["accelerometer"])
         out.append(_sensor(more, VELOCITY, asked, asked.accelerometer, {}))
     return tuple(out)
 
@@ -101,9 +102,8 @@ def _sensor(
     is_gyro = usual is ANGLE
     prior = informed(usual, stretches, static)
     half, held = halves(stretches)
-    taught, did_follow = independent_or_not(half, prior, usual)
-    near = (None, taught) if did_follow else (taught, None)
-    found, follows = independent_or_not(stretches, prior, usual, near)
+    taught, _ = independent_or_not(half, prior, usual)
+    found, follows = independent_or_not(stretches, prior, usual)
     gain, sigma, tau = forgetting(stretches, found)
     is_gm = gain > PREFERRED
     draws = found.draws
@@ -112,10 +112,12 @@ def _sensor(
         # What is left beside it is the reference's as much as the sensor's.
         assert static is not None
         N, K = static.N, replace(K, lower=0.0, is_limit=True)
+    tilt = None if is_gyro else asked.gravity_m_s2
+    warm = of_temperature(stretches, found, asked.horizons_s)
     shares = tuple(
         share
         for h in asked.horizons_s
-        for share in shares_over({**parts_of(draws, h, None if is_gyro else asked.gravity_m_s2), **left.get(h, {})}, h)
+        for share in shares_over({**parts_of(draws, h, tilt), **left.get(h, {}), **warm.get(h, {})}, h)
     )
     return SensorFilterNoise(
         sensor="gyroscope" if is_gyro else "accelerometer",
@@ -131,6 +133,7 @@ def _sensor(
         consistency=tuple(
             one for h in asked.horizons_s if (one := consistency(held, taught, static, h)) is not None
         ),
+        is_settled=found.is_settled and taught.is_settled,
     )  # fmt: skip
 
 
@@ -149,20 +152,17 @@ def informed(usual: Prior, stretches: Sequence[Stretch], static: StaticNoise | N
     return Prior(mean, sigma, is_there)
 
 
-def independent_or_not(
-    stretches: Sequence[Stretch], prior: Prior, usual: Prior, near: tuple[Fitted | None, Fitted | None] = (None, None)
-) -> tuple[Fitted, bool]:
+def independent_or_not(stretches: Sequence[Stretch], prior: Prior, usual: Prior) -> tuple[Fitted, bool]:
     """The fit with noise at rest as a datum, or, where the evidence prefers it, of a reference that follows the sensor.
 
     A smoother over this sensor repeats part of its noise, and what is left of it beside the reference may be any less.
-    ``near`` are fits of a part, of either kind.
     """
-    apart = fit(stretches, prior, near[0])
+    apart = fit(stretches, prior)
     if prior.sigma[0] == usual.sigma[0] or np.log(np.median(apart.draws[:, 0])) > prior.mean[0] - prior.sigma[0]:
         return apart, False
     wide = prior.sigma.copy()
     wide[0] = usual.sigma[0]
-    other = fit(stretches, Prior(prior.mean, wide, prior.is_there), near[1])
+    other = fit(stretches, Prior(prior.mean, wide, prior.is_there))
     follows = 2.0 * (other.evidence - apart.evidence) > PREFERRED
     return (other, True) if follows else (apart, False)
 
@@ -196,7 +196,7 @@ def consistency(
         plain = np.zeros(len(NAMES))
         plain[[0, 2]] = static.N.filter_value, static.K.filter_value
         # Of a path only means are compared: its white error cannot be none, and is what it is.
-        plain[3] = 0.0 if held[0][0].attitude is not None else taught.mode[3]
+        plain[3] = 0.0 if held[0][0].slow is None else taught.mode[3]
         beside = errors_over(held, plain[None], horizon_s)
     return Consistency(
         horizon_s,
@@ -243,75 +243,8 @@ def shares_over(parts: dict[Cause, FloatArray], horizon_s: float) -> tuple[Share
     return tuple(Share(name, horizon_s, bounded(parts[name] / total)) for name in CAUSES if name in parts)
 
 
-def bounded(values: Sequence[float] | FloatArray) -> Bounded:
-    """Median and 95 % interval of draws; only a limit where the interval reaches over a factor of ``ABSENT``."""
-    low, middle, high = (float(v) for v in np.quantile(values, [0.025, 0.5, 0.975]))
-    is_limit = high > 0.0 and low < high / ABSENT
-    return Bounded(middle, 0.0 if is_limit else low, high, is_limit)
-
-
 def _twice_summed(h: float, tau_s: FloatArray) -> FloatArray:
     """Variance of the integral over h of a Matérn-3/2 process of variance one."""
     lag = np.linspace(0.0, h, 101)
     kernel = matern(lag[None, :], tau_s[:, None])
     return np.asarray(2.0 * trapezoid((h - lag) * kernel, lag, axis=1))
-
-
-# White noise of X, Y and Z apart, in motion: what each turns into along the reference's axes differs.
-
-STEP = 0.05
-"""Step in the logarithm of an axis' density."""
-AXES_SIGMA = float(np.log(3.0))
-"""Prior σ of that logarithm about the mean of the axes: of one chip they differ by less than a factor of three."""
-
-
-def unlike_axes_beside(stretches: Sequence[Stretch], found: Fitted, N: Bounded) -> tuple[Bounded, ...]:
-    """N of each axis, noise at rest and vibration together, where two intervals do not meet; else nothing.
-
-    The other strengths stay as they are; the interval of N itself is in every axis'.
-    """
-    if N.is_limit or any(one.attitude is None for one in stretches):
-        return ()
-    pairs = [(_without_noise(one, found.mode), _of_axes(one, found.mode)) for one in stretches]
-
-    def low(x: FloatArray) -> float:
-        heights = [
-            one.evidence_under(rest + np.tensordot(np.exp(2.0 * x), axes, axes=1))
-            for one, (rest, axes) in zip(stretches, pairs, strict=True)
-        ]
-        return float(0.5 * x @ x / AXES_SIGMA**2 - sum(heights))
-
-    best = np.asarray(minimize(low, np.zeros(3), method="L-BFGS-B", options={"eps": 1e-4, "ftol": 1e-7}).x)
-    steps = STEP * np.eye(3)
-    here = low(best)
-    curved = np.array([(low(best + e) + low(best - e) - 2.0 * here) / STEP**2 for e in steps])
-    own = 1.0 / np.maximum(curved, 1.0 / AXES_SIGMA**2)
-    common = (0.25 * np.log(N.upper / max(N.lower, N.upper / ABSENT))) ** 2
-    each = []
-    for x, variance in zip(best, own, strict=True):
-        value, factor = N.value * float(np.exp(x)), float(np.exp(1.96 * np.sqrt(variance + common)))
-        each.append(Bounded(value, value / factor, value * factor))
-    return tuple(each) if max(one.lower for one in each) > min(one.upper for one in each) else ()
-
-
-def _without_noise(stretch: Stretch, strengths: FloatArray) -> FloatArray:
-    """Covariance (3 m, 3 m) of everything but noise and vibration."""
-    return stretch.covariance(np.where(np.isin(NAMES, ("noise", "vibration")), 0.0, strengths))
-
-
-def _of_axes(stretch: Stretch, strengths: FloatArray) -> FloatArray:
-    """(3, 3 m, 3 m) covariance of the noise and vibration of each axis, in the reference's world."""
-    assert stretch.attitude is not None
-    m = len(stretch.time_s)
-    h = float(np.median(np.diff(stretch.time_s)))
-    per_block = h * (strengths[0] ** 2 + strengths[1] ** 2 * stretch.power)
-    earlier = np.minimum.outer(np.arange(m), np.arange(m))
-    out = []
-    for axis in range(3):
-        along = stretch.attitude[:, :, axis]
-        added = per_block[:, None, None] * along[:, :, None] * along[:, None, :]
-        walk = (np.cumsum(added, axis=0) - 0.5 * added)[earlier]
-        # A mean over a block has a third of the block's variance, and not half.
-        walk[np.arange(m), np.arange(m)] -= added / 6.0
-        out.append(walk.transpose(0, 2, 1, 3).reshape(3 * m, 3 * m))
-    return np.array(out)

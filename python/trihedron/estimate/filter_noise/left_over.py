@@ -13,6 +13,8 @@ from trihedron.records.filter_noise import Cause
 
 Left = dict[float, dict[Cause, FloatArray]]
 """Mean squares (k,) [rad²] by horizon and cause."""
+SIZES = np.geomspace(1e-5, 0.1, 33)
+"""Of the elements of a scale matrix."""
 
 
 def left_over(found: MotionFit, horizons_s: Sequence[float]) -> Left:
@@ -31,7 +33,7 @@ def left_over(found: MotionFit, horizons_s: Sequence[float]) -> Left:
 
     S, cov = found.value(0, "S"), found.covariance(0, ("S",))
     by: dict[Cause, tuple[FloatArray, FloatArray]] = {
-        "calibration": (carried(grid.gyroscope), drawn_errors(left_of(S), _across(S) @ cov @ _across(S).T))
+        "calibration": (carried(grid.gyroscope), drawn_errors(left_of(S), _across(S) @ cov @ _across(S).T, SIZES))
     }
     name = "gyro-g-sensitivity"
     if side.force is not None and name in found.places[0]:
@@ -39,36 +41,39 @@ def left_over(found: MotionFit, horizons_s: Sequence[float]) -> Left:
         drawn = rng.multivariate_normal(found.value(0, name), found.covariance(0, (name,)), DRAWN)
         by["g-sensitivity"] = (carried(side.force), drawn)
     return {
-        h: {cause: _mean_square(angle, errors, max(1, round(h / grid.step_s))) for cause, (angle, errors) in by.items()}
+        h: {
+            cause: mean_square(_steps(angle, max(1, round(h / grid.step_s))), errors)
+            for cause, (angle, errors) in by.items()
+        }
         for h in horizons_s
     }
 
 
-def _mean_square(angle: FloatArray, errors: FloatArray, ahead: int) -> FloatArray:
-    """(k,) of matrices (k, 9) over so many samples, by what each element does (n, 3, 9)."""
-    if len(angle) <= ahead:
-        return np.zeros(len(errors))
-    steps = angle[ahead:] - angle[:-ahead]
-    square = np.einsum("nai,naj->ij", steps, steps) / len(steps)
+def _steps(angle: FloatArray, ahead: int) -> FloatArray:
+    return angle[ahead:] - angle[:-ahead]
+
+
+def mean_square(steps: FloatArray, errors: FloatArray) -> FloatArray:
+    """(k,) of errors (k, f) over many starts, by what each number does from each start on (n, 3, f)."""
+    square = np.einsum("nai,naj->ij", steps, steps) / max(1, len(steps))
     return np.asarray(np.einsum("ki,ij,kj->k", errors, square, errors))
 
 
-def drawn_errors(seen: FloatArray, cov: FloatArray) -> FloatArray:
-    """(k, 9) errors of a scale matrix seen as ``seen`` (9,) with covariance (9, 9), all elements of one unknown size.
+def drawn_errors(seen: FloatArray, cov: FloatArray, sizes: FloatArray) -> FloatArray:
+    """(k, f) errors of numbers seen as ``seen`` (f,) with covariance (f, f), all of one unknown size among ``sizes``.
 
     What noise alone makes of a perfect matrix is no error: without a common size its square would be twice counted.
     """
-    sizes = np.geomspace(1e-5, 0.1, 33)
-    width = [cov + size**2 * np.eye(9) for size in sizes]
+    width = [cov + size**2 * np.eye(len(seen)) for size in sizes]
     log_p = np.array([-0.5 * (np.linalg.slogdet(V)[1] + seen @ np.linalg.solve(V, seen)) for V in width])
     weight = np.exp(log_p - log_p.max())
     rng = np.random.default_rng(0)
     out = []
     for k in rng.choice(len(sizes), DRAWN, p=weight / weight.sum()):
         gain = sizes[k] ** 2 * np.linalg.inv(width[k])
-        left = sizes[k] ** 2 * (np.eye(9) - gain)
+        left = sizes[k] ** 2 * (np.eye(len(seen)) - gain)
         values, vectors = np.linalg.eigh(0.5 * (left + left.T))
-        out.append(gain @ seen + vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.normal(size=9)))
+        out.append(gain @ seen + vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.normal(size=len(seen))))
     return np.array(out)
 
 

@@ -1,4 +1,4 @@
-"""Without a reference: noise at rest as identified, and the tilt that the gyro carries from rest to rest."""
+"""Without a reference: noise at rest as identified, and what changes from rest to rest."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.records import NoiseAxis, Segments, TermName
-from trihedron.records.filter_noise import Bounded, StaticNoise, TiltCheck
+from trihedron.records.filter_noise import Bounded, RestCheck, StaticNoise, TiltCheck
 
 LONGEST_MOVE_S = 60.0
 """Beyond a minute between two rests the bias may have gone anywhere."""
@@ -74,3 +74,25 @@ def tilt_over_moves(time_s: FloatArray, rate: FloatArray, segments: Segments, st
     if not errors:
         return None
     return TiltCheck(len(errors), longest, _rms(errors), math.sqrt(float(np.mean(predicted))))
+
+
+def between_rests(time_s: FloatArray, rate: FloatArray, segments: Segments, static: StaticNoise) -> RestCheck | None:
+    """The gyro's mean (n, 3) [rad/s] and gravity's length from one static stretch to the next; None of fewer than two.
+
+    A limit of K is taken for K: a change beyond it is no walk that the longest stretch allows.
+    """
+    means, poses = segments.accelerometer_mean, segments.poses
+    if means is None or len(poses) < 2:
+        return None
+    bias = np.array([rate[pose.samples()].mean(axis=0) for pose in poses])
+    ends = np.array([(time_s[pose.start], time_s[pose.stop - 1]) for pose in poses])
+    lasted, apart = np.maximum(ends[:, 1] - ends[:, 0], 1e-9), np.diff(ends.mean(axis=1))
+    predicted = static.N.filter_value**2 * (1.0 / lasted[1:] + 1.0 / lasted[:-1]) + static.K.filter_value**2 * apart
+    gravity = np.linalg.norm(means, axis=1)
+    return RestCheck(
+        n=len(poses),
+        longest_s=float(apart.max()),
+        bias_change=float(np.sqrt(np.mean(np.diff(bias, axis=0) ** 2))),
+        predicted=float(np.sqrt(np.mean(predicted))),
+        gravity_scatter=float(gravity.std() / gravity.mean()),
+    )

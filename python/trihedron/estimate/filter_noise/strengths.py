@@ -6,27 +6,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
-from scipy.optimize import minimize
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.special import gammaln, logsumexp, ndtr
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
+from trihedron.records.filter_noise import Bounded
 
 COORDINATES = ("noise", "vibration", "bias_walk", "white", "slow", "slow_s", "body")
 """Logarithms of strengths, ``slow`` that of the reference's whole slow error, and last a standard normal number whose
 quantile is the part of its square that turns with the body: two strengths of which either may be nothing would have a
 posterior with a corner."""
+MAY_BE_NOTHING = np.isin(COORDINATES, ("vibration", "bias_walk", "white", "slow"))
 FARTHEST = 4.0
 """Coordinates beyond four prior σ are those of nothing."""
-STEP, CURVATURE_STEP = 0.02, 0.3
-"""Steps in a coordinate for the slope, and for the curvature that sampling begins with."""
-LOWEST = -1e7
-"""Stands for the log posterior where a covariance is singular."""
-ROUNDS, PROPOSED, DRAWN = 6, 100, 400
-"""Rounds of proposals, proposals of each, and draws that are made of them."""
-LEAST_DRAWS = 3
-"""Independent draws for each strength below which their covariance is too narrow, or singular, to propose from."""
+STEP = 1e-3
+"""Step in a coordinate for derivatives of the covariance."""
+SEARCHES, LONGEST_STEP, ENOUGH = 80, 2.0, 0.01
+"""Steps of the search, the longest of them, and the gain of the log posterior at which it ends."""
+ROUNDS, MOST_ROUNDS, PROPOSED, DRAWN = 3, 15, 100, 400
+"""Rounds of proposals at least and at most, proposals of each, and draws that are made of them."""
+LEAST_DRAWS, ENOUGH_DRAWS = 3, 15
+"""Independent draws for each strength below which their covariance is too narrow, or singular, to propose from, and
+with which sampling may end."""
 TAILS = 5.0
 """Degrees of freedom of a proposal: heavier tails than a posterior's."""
 TIMES_S = (10.0, 30.0, 100.0)
@@ -39,7 +41,11 @@ ABSENT = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Of the coordinates: ``mean`` (7,), ``sigma`` (7,); ``is_there`` (7,) those that there are."""
+    """Of the coordinates: ``mean`` (7,), ``sigma`` (7,); ``is_there`` (7,) those that there are.
+
+    A strength that may be nothing has a half-Cauchy prior about ``mean`` (Gelman 2006): flat towards nothing, so that
+    what a log does not show has an upper limit of the log and not of the prior. ``sigma`` then bounds the search.
+    """
 
     mean: FloatArray
     sigma: FloatArray
@@ -48,43 +54,83 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Likeliest strengths (7,) in SI, log evidence of the model, draws (k, 7) of the strengths' posterior, the same as
-    coordinates (k, f), and of how many independent ones those are worth."""
+    """Likeliest strengths (7,) in SI, log evidence of the model, draws (k, 7) of the strengths' posterior, and of how
+    many independent ones those are worth."""
 
     mode: FloatArray
     evidence: float
     draws: FloatArray
-    coordinates: FloatArray
     n_effective: float
 
+    @property
+    def is_settled(self) -> bool:
+        """Whether enough draws count for moments of the strengths."""
+        return bool(self.n_effective > LEAST_DRAWS * np.count_nonzero(np.ptp(self.draws, axis=0)))
 
-def most_likely(stretches: Sequence[Stretch], prior: Prior) -> FloatArray:
-    """(f,) coordinates that the model has, at their greatest posterior."""
+
+def most_likely(stretches: Sequence[Stretch], prior: Prior) -> tuple[FloatArray, FloatArray]:
+    """Coordinates (f,) that the model has at their greatest posterior, and its information (f, f) there.
+
+    Steps of Levenberg and Marquardt with the average information: the posterior has ridges along which a search that
+    knows only slopes stops early.
+    """
     free = prior.is_there > 0.0
-    low = prior.mean[free] - FARTHEST * prior.sigma[free]
-    high = prior.mean[free] + FARTHEST * prior.sigma[free]
+    reach = (FARTHEST - 0.1) * prior.sigma[free]
+    x = prior.mean[free]
+    here = height(stretches, prior, x)
+    slope, information = _slope(stretches, prior, x)
+    damping = 0.1
+    for _ in range(SEARCHES):
+        step = np.linalg.solve(information + damping * np.diag(np.diag(information)), slope)
+        step *= min(1.0, LONGEST_STEP / float(np.max(np.abs(step))))
+        tried = np.clip(x + step, prior.mean[free] - reach, prior.mean[free] + reach)
+        there = height(stretches, prior, tried)
+        if there > here:
+            gain, x, here, damping = there - here, tried, there, damping / 5.0
+            slope, information = _slope(stretches, prior, x)
+            if gain < ENOUGH:
+                break
+        elif damping > 1e8:
+            break
+        else:
+            damping = max(5.0 * damping, 1e-3)
+    return x, information
 
-    def descent(x: FloatArray) -> tuple[float, FloatArray]:
-        # Line search turns back from a wall, not from infinity.
-        here = max(height(stretches, prior, x), LOWEST)
-        there = [max(height(stretches, prior, x + STEP * e), LOWEST) for e in np.eye(len(x))]
-        return -here, (here - np.array(there)) / STEP
 
-    found = minimize(
-        descent, prior.mean[free], jac=True, method="L-BFGS-B", bounds=list(zip(low, high, strict=True)),
-        options={"ftol": 1e-5, "maxiter": 50},
-    )  # fmt: skip
-    return np.asarray(found.x)
+def _slope(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Derivatives (f,) of the log posterior, and its average information (f, f; Gilmour et al. 1995)."""
+    free = prior.is_there > 0.0
+    far, sigma = x - prior.mean[free], prior.sigma[free]
+    # A hyperbolic secant of the logarithm, of information 1/2 on average.
+    slope = np.where(MAY_BE_NOTHING[free], -np.tanh(far), -far / sigma**2)
+    information = np.diag(np.where(MAY_BE_NOTHING[free], 0.5, 1.0 / sigma**2))
+    at = whole(prior, x)
+    others = [whole(prior, x + STEP * e) for e in np.eye(len(x))]
+    for one in stretches:
+        V = one.covariance(at)
+        y = one.observed - one.columns @ one.centre
+        inverse = cho_solve(cho_factor(V + one.columns @ one.columns.T, lower=True), np.eye(len(y)))
+        weighed = inverse @ y
+        carried = []
+        for k, other in enumerate(others):
+            change = (one.covariance(other) - V) / STEP
+            carried.append(change @ weighed)
+            slope[k] += 0.5 * (weighed @ carried[k] - np.sum(inverse * change))
+        information += 0.5 * np.array(carried) @ inverse @ np.array(carried).T
+    return slope, information
 
 
 def height(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> float:
-    """Log posterior of coordinates (f,) that the model has, up to the prior's norm."""
+    """Log evidence and prior of coordinates (f,) that the model has."""
     free = prior.is_there > 0.0
-    far = (x - prior.mean[free]) / prior.sigma[free]
-    if np.any(np.abs(far) > FARTHEST + STEP):
+    far, sigma = x - prior.mean[free], prior.sigma[free]
+    if np.any(np.abs(far) > (FARTHEST + STEP) * sigma):
         return -np.inf
     strengths = whole(prior, x)
-    return float(sum(one.evidence(strengths) for one in stretches) - 0.5 * far @ far)
+    normal = -0.5 * (far / sigma) ** 2 - np.log(np.sqrt(2.0 * np.pi) * sigma)
+    half_cauchy = -np.log(np.pi * np.cosh(far))
+    known = np.sum(np.where(MAY_BE_NOTHING[free], half_cauchy, normal))
+    return float(sum(one.evidence(strengths) for one in stretches) + known)
 
 
 def whole(prior: Prior, x: FloatArray) -> FloatArray:
@@ -96,19 +142,16 @@ def whole(prior: Prior, x: FloatArray) -> FloatArray:
     return np.array([*np.exp(every[:4]), slow * np.sqrt(1.0 - body), slow * np.sqrt(body), np.exp(every[5])])
 
 
-def fit(stretches: Sequence[Stretch], prior: Prior, near: Fitted | None = None) -> Fitted:
+def fit(stretches: Sequence[Stretch], prior: Prior) -> Fitted:
     """Posterior of the strengths by importance: each round's proposals are Student's with the moments of all before,
-    and every proposal counts against the mixture of all rounds (Cornuet et al. 2012); ``near`` is a fit of a part.
+    and every proposal counts against the mixture of all rounds (Cornuet et al. 2012).
     """
-    if near is None or near.n_effective < LEAST_DRAWS * near.coordinates.shape[1]:
-        middle = most_likely(stretches, prior)
-        first = np.linalg.inv(_curvature(stretches, prior, middle))
-    else:
-        middle, first = near.coordinates.mean(axis=0), np.cov(near.coordinates.T)
+    middle, information = most_likely(stretches, prior)
+    first = np.linalg.inv(information)
     rng = np.random.default_rng(0)
     spread, proposals = first, []
     x, heights = np.empty((0, len(middle))), np.empty(0)
-    for _ in range(ROUNDS):
+    for drawn in range(1, MOST_ROUNDS + 1):
         root = np.linalg.cholesky(spread)
         proposals.append((middle, root))
         widths = np.sqrt(TAILS / rng.chisquare(TAILS, size=(PROPOSED, 1)))
@@ -118,15 +161,16 @@ def fit(stretches: Sequence[Stretch], prior: Prior, near: Fitted | None = None) 
         logs = heights - _mixture(x, proposals)
         weights = np.exp(logs - logs.max())
         weights /= weights.sum()
+        if drawn >= ROUNDS and _effective(weights) > ENOUGH_DRAWS * len(middle):
+            break
         # Few that count would make the next proposal too narrow: flatter weights until there are enough.
         flat = weights if _effective(weights) > LEAST_DRAWS * len(middle) else np.sqrt(weights) / np.sqrt(weights).sum()
         middle = flat @ x
         spread = ((x - middle).T * flat) @ (x - middle) + 0.02 * first
-    norm = 0.5 * len(middle) * np.log(2.0 * np.pi) + np.sum(np.log(prior.sigma[prior.is_there > 0.0]))
-    evidence = float(logs.max() + np.log(np.mean(np.exp(logs - logs.max()))) - norm)
+    evidence = float(logs.max() + np.log(np.mean(np.exp(logs - logs.max()))))
     chosen = np.searchsorted(np.cumsum(weights), (np.arange(DRAWN) + 0.5) / DRAWN).clip(max=len(x) - 1)
     draws = np.array([whole(prior, one) for one in x[chosen]])
-    return Fitted(whole(prior, x[np.argmax(heights)]), evidence, draws, x[chosen], _effective(weights))
+    return Fitted(whole(prior, x[np.argmax(heights)]), evidence, draws, _effective(weights))
 
 
 def _effective(weights: FloatArray) -> float:
@@ -144,14 +188,11 @@ def _mixture(x: FloatArray, proposals: Sequence[tuple[FloatArray, FloatArray]]) 
     return np.asarray(logsumexp(each, axis=0) - np.log(len(proposals)))
 
 
-def _curvature(stretches: Sequence[Stretch], prior: Prior, at: FloatArray) -> FloatArray:
-    """Minus the second derivatives (f, f) along each axis, no flatter than the prior: sampling learns the rest."""
-    here = height(stretches, prior, at)
-    flat = 1.0 / prior.sigma[prior.is_there > 0.0] ** 2
-    steps = CURVATURE_STEP * np.eye(len(at))
-    both = [height(stretches, prior, at + e) + height(stretches, prior, at - e) for e in steps]
-    curved = (2.0 * here - np.array(both)) / CURVATURE_STEP**2
-    return np.diag(np.maximum(np.where(np.isfinite(curved), curved, flat), flat))
+def bounded(values: Sequence[float] | FloatArray) -> Bounded:
+    """Median and 95 % interval of draws; only a limit where the interval reaches over a factor of ``ABSENT``."""
+    low, middle, high = (float(v) for v in np.quantile(values, [0.025, 0.5, 0.975]))
+    is_limit = high > 0.0 and low < high / ABSENT
+    return Bounded(middle, 0.0 if is_limit else low, high, is_limit)
 
 
 def forgetting(stretches: Sequence[Stretch], walk: Fitted) -> tuple[float, float, float]:

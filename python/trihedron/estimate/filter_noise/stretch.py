@@ -21,6 +21,8 @@ NAMES = ("noise", "vibration", "bias_walk", "white", "world", "body", "slow_s")
 """Strengths of a stretch, in this order."""
 ALIKE = ("noise", "vibration", "white")
 """Those whose errors have the same size along every axis."""
+BLOCK_ENDS, TRIANGLE_ENDS = (1.0 / 6.0, 0.0), (7.0 / 30.0, 1.0 / 120.0)
+"""A mean over a block has a third of the block's variance, and not half; a triangular one over two blocks 4/15."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +32,10 @@ class Stretch:
     ``centre`` (p,) is where that prior stands; ``alike`` the covariances (m, m), the same along every axis, of noise,
     vibration and white error of the reference for strength one, ``bias_walk`` (3 m, 3 m) that of a bias that walks;
     ``slow`` (m, m) integrates a slow error of the world, which ``plane`` (3, 3) turns into the observation;
-    ``attitude`` (m, 3, 3) is the body's, None where the reference's body has no error of its own; ``bias_steps``
-    (3 m, 3 m) is what a bias of each block does to the observations; ``power`` (m,) the vibration's, mean one.
+    ``attitude`` (m, 3, 3) is the body's; ``bias_steps`` (3 m, 3 m) is what a bias of each block does to the
+    observations; ``power`` (m,) the vibration's, mean one; ``ends`` the parts of a block's variance by which a mean of
+    a walk, and two neighbouring ones, have less than min(t, t') of their middles; ``kelvin`` (m,) a logged
+    temperature about its mean, whose bias is the last three columns, in units of ``kelvin_size`` [SI/K].
     """
 
     time_s: FloatArray
@@ -43,13 +47,15 @@ class Stretch:
     bias_steps: FloatArray
     slow: FloatArray | None
     plane: FloatArray
-    attitude: FloatArray | None
+    attitude: FloatArray
     power: FloatArray
+    ends: tuple[float, float] = BLOCK_ENDS
+    kelvin: FloatArray | None = None
+    kelvin_size: float = 0.0
 
     @cached_property
     def turned(self) -> FloatArray:
         """(m, 3, m, 3) the bodies' attitudes to one another."""
-        assert self.attitude is not None
         return np.asarray(np.einsum("kij,lmj->kilm", self.attitude, self.attitude))
 
     @cached_property
@@ -64,13 +70,13 @@ class Stretch:
         correlation = matern(self.lag_s, s["slow_s"])
         out = s["bias_walk"] ** 2 * self.bias_walk
         parted = out.reshape(m, 3, m, 3)
-        if self.attitude is not None and s["body"] > 0.0:
+        if s["body"] > 0.0:
             parted += s["body"] ** 2 * correlation[:, None, :, None] * self.turned
         same = sum(s[name] ** 2 * basis for name, basis in zip(ALIKE, self.alike, strict=True))
         slow = s["world"] ** 2 * correlation
         if self.slow is not None:
             slow = self.slow @ slow @ self.slow.T
-        for i, j in np.ndindex(3, 3):
+        for i, j in zip(*np.nonzero(np.abs(self.plane) + np.eye(3)), strict=True):
             parted[:, i, :, j] += self.plane[i, j] * slow + (same if i == j else 0.0)
         return np.asarray(out)
 
@@ -92,6 +98,14 @@ class Stretch:
         log_det = np.sum(np.log(np.diag(L))) + np.sum(np.log(np.diag(inner)))
         return float(-0.5 * (y @ y - gain @ gain) - log_det - 0.5 * len(y) * np.log(2.0 * np.pi))
 
+    def coefficients(self, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Posterior mean (p,) and covariance (p, p) of the columns' coefficients, beside ``centre``."""
+        L = cholesky(self.covariance(strengths), lower=True, check_finite=False)
+        y = self.observed - self.columns @ self.centre
+        half = solve_triangular(L, np.column_stack([self.columns, y]), lower=True, check_finite=False)
+        covariance = np.asarray(np.linalg.inv(np.eye(self.columns.shape[1]) + half[:, :-1].T @ half[:, :-1]), float)
+        return covariance @ (half[:, :-1].T @ half[:, -1]), covariance
+
     def factor(self, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Cholesky factor (3 m, 3 m) of the covariance with the columns' prior in it, and whitened observations."""
         V = self.covariance(strengths) + self.columns @ self.columns.T
@@ -111,8 +125,9 @@ class Stretch:
             bias_walk=self.bias_walk[rows, rows],
             bias_steps=self.bias_steps[rows],
             slow=None if self.slow is None else self.slow[at, at],
-            attitude=None if self.attitude is None else self.attitude[at],
+            attitude=self.attitude[at],
             power=self.power[at],
+            kelvin=None if self.kelvin is None else self.kelvin[at],
         )
 
     def with_gauss_markov(self, correlation_time_s: float) -> Stretch:
@@ -130,10 +145,13 @@ def matern(lag_s: FloatArray | float, tau_s: FloatArray | float) -> FloatArray:
     return np.asarray((1.0 + x) * np.exp(-x))
 
 
-def accumulated(per_block: FloatArray) -> FloatArray:
-    """(m, m) of min(t, t') with a rate of its own in every block (m,): up to the middle of the earlier one."""
+def accumulated(per_block: FloatArray, ends: tuple[float, float]) -> FloatArray:
+    """(m, m) covariance of means of a walk with a rate of its own in every block (m,): min(t, t') of their middles,
+    less what ``ends`` says."""
     upto = np.cumsum(per_block) - 0.5 * per_block
-    return np.minimum.outer(upto, upto)
+    neighbours = np.eye(len(upto), k=1) + np.eye(len(upto), k=-1)
+    less = np.diag(ends[0] * per_block) + ends[1] * per_block.mean() * neighbours
+    return np.asarray(np.minimum.outer(upto, upto) - less)
 
 
 def walked(steps: FloatArray) -> FloatArray:

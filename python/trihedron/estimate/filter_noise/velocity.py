@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.filter_noise.angle import band_power, bias_steps, relative, runs
-from trihedron.estimate.filter_noise.stretch import Stretch, accumulated, walked
+from trihedron.estimate.filter_noise.stretch import TRIANGLE_ENDS, Stretch, accumulated, walked
 from trihedron.estimate.reference.beside import Beside, Point
 
 SIZES = {"S": 0.05, "b": 0.5, "up": 0.5, "start": 5.0, "arm": 0.3}
@@ -65,7 +65,7 @@ def _stretch(
     quiet = np.full(m, h)
     shaken = 0.5 * h * (vibration[1:] + vibration[:-1])
     eye = np.eye(3)
-    noise, shakes = (_triangular(q) for q in (quiet, shaken))
+    noise, shakes = (accumulated(q, TRIANGLE_ENDS) for q in (quiet, shaken))
     # An attitude wrong by e turns gravity by g e: two axes across the vertical, summed over time.
     return Stretch(
         time_s=time[: m * n].reshape(m, n).mean(axis=1) + 0.5 * h,
@@ -77,20 +77,16 @@ def _stretch(
         bias_steps=steps,
         slow=h * np.tril(np.ones((m, m))),
         plane=gravity**2 * (eye - np.outer(up, up)),
-        attitude=None,
+        # At the edge that two blocks share.
+        attitude=C[n - 1 : m * n : n],
         power=vibration[1:],
+        ends=TRIANGLE_ENDS,
     )
 
 
 def neighbours(m: int) -> FloatArray:
     """(m, m) ones beside the diagonal."""
     return np.eye(m, k=1) + np.eye(m, k=-1)
-
-
-def _triangular(per_block: FloatArray) -> FloatArray:
-    """Covariance of triangular means, two blocks wide, of a walk: min(t, t') less 7/30 of a block, neighbours 1/120."""
-    m = len(per_block)
-    return accumulated(per_block) - np.diag(7.0 / 30.0 * per_block) - neighbours(m) * np.mean(per_block) / 120.0
 
 
 def _differences(samples: FloatArray, n: int) -> FloatArray:

@@ -6,64 +6,90 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from trihedron.errors import RefusedError
-from trihedron.files.formats.contract import NoiseFigure, SensorNoise, number
+from trihedron.files.formats.contract import NoiseFigure, number
 from trihedron.files.formats.kalibr import KEYS
 from trihedron.files.formats.noise_keys import Figures, si_rows
 from trihedron.records.filter_noise import Bounded, FilterNoise, SensorFilterNoise
 
 
-def _rows(names: tuple[str, str, str, str], rate: str = "") -> Callable[[Figures], list[str]]:
+@dataclass(frozen=True)
+class _Written:
+    """What rows are made of: the four figures, and the densities of X, Y and Z of both sensors."""
+
+    figures: Figures
+    accel_axes: tuple[float, ...]
+    gyro_axes: tuple[float, ...]
+
+    @property
+    def rate_hz(self) -> float:
+        """Of the samples."""
+        return self.figures.rate_hz
+
+    def four(self) -> tuple[NoiseFigure, NoiseFigure, NoiseFigure, NoiseFigure]:
+        """Accelerometer N, K, gyro N, K."""
+        f = self.figures
+        return f.accel_N, f.accel_K, f.gyro_N, f.gyro_K
+
+    def by_axis(self) -> tuple[tuple[float, ...], ...]:
+        """The same of X, Y and Z; walks are alike."""
+        f = self.figures
+        return self.accel_axes, (f.accel_K.value,) * 3, self.gyro_axes, (f.gyro_K.value,) * 3
+
+
+def _short(value: float) -> str:
+    """Four digits: intervals are wider than a per cent."""
+    return number(float(f"{value:.4g}"))
+
+
+def _rows(names: tuple[str, str, str, str], rate: str = "") -> Callable[[_Written], list[str]]:
     """Densities and walks in SI, and the rate under its key where there is one."""
-    return lambda f: [*si_rows(f, names), *([f"{rate}: {number(f.rate_hz)}"] if rate else [])]
+    return lambda f: [*si_rows(f.figures, names), *([f"{rate}: {number(f.rate_hz)}"] if rate else [])]
 
 
-def _openvins(f: Figures) -> list[str]:
-    return ["imu0:", *(f"  {line}" for line in [*si_rows(f, KEYS), f"update_rate: {number(f.rate_hz)}"])]
+def _openvins(f: _Written) -> list[str]:
+    return ["imu0:", *(f"  {line}" for line in [*si_rows(f.figures, KEYS), f"update_rate: {number(f.rate_hz)}"])]
 
 
-def _basalt(f: Figures) -> list[str]:
-    keys = zip(("accel_noise_std", "accel_bias_std", "gyro_noise_std", "gyro_bias_std"), _four(f), strict=True)
-    values = [f'    "{key}": [{", ".join([number(one.value)] * 3)}]' for key, one in keys]
-    rows = [f'    "imu_update_rate": {number(f.rate_hz)}', *values]
-    return ["{", '  "value0": {', *(f"{row}," for row in rows[:-1]), rows[-1], "  }", "}"]
+def _basalt(f: _Written) -> list[str]:
+    keys = zip(("accel_noise_std", "accel_bias_std", "gyro_noise_std", "gyro_bias_std"), f.by_axis(), strict=True)
+    rows = [f'    "{key}": [{", ".join(_short(one) for one in axes)}]' for key, axes in keys]
+    return ['  "value0": {', f'    "imu_update_rate": {number(f.rate_hz)},', ",\n".join(rows), "  }"]
 
 
-def _fast_lio(f: Figures) -> list[str]:
-    keys = zip(("acc_cov", "b_acc_cov", "gyr_cov", "b_gyr_cov"), _four(f), strict=True)
-    rows = [f"  {key}: {number(one.value**2 * f.rate_hz)}" for key, one in keys]
+def _fast_lio(f: _Written) -> list[str]:
+    keys = zip(("acc_cov", "b_acc_cov", "gyr_cov", "b_gyr_cov"), f.four(), strict=True)
+    rows = [f"  {key}: {_short(one.value**2 * f.rate_hz)}" for key, one in keys]
     return ["# variances of one sample: N^2 rate and K^2 rate", "mapping:", *rows]
 
 
-def _gtsam(f: Figures) -> list[str]:
+def _gtsam(f: _Written) -> list[str]:
     setters = ("setAccelerometerCovariance", "setBiasAccCovariance", "setGyroscopeCovariance", "setBiasOmegaCovariance")
     return [
         "# import numpy as np; params = gtsam.PreintegrationCombinedParams.MakeSharedU(9.81)",
         *(
-            f"params.{setter}({number(one.value**2)} * np.eye(3))"
-            for setter, one in zip(setters, _four(f), strict=True)
+            f"params.{setter}(np.diag([{', '.join(_short(one**2) for one in axes)}]))"
+            for setter, axes in zip(setters, f.by_axis(), strict=True)
         ),
     ]
 
 
-def _robot_localization(f: Figures) -> list[str]:
+def _robot_localization(f: _Written) -> list[str]:
     """Diagonals of sensor_msgs/Imu, which its filters read from every message; biases are no states of theirs."""
-    accel, gyro = (number(one.value**2 * f.rate_hz) for one in (f.accel_N, f.gyro_N))
+    rows = []
+    for key, axes in (("angular_velocity", f.gyro_axes), ("linear_acceleration", f.accel_axes)):
+        x, y, z = (_short(one**2 * f.rate_hz) for one in axes)
+        rows.append(f"{key}_covariance: [{x}, 0, 0, 0, {y}, 0, 0, 0, {z}]")
     return [
         "# robot_localization takes the covariances of the messages (N^2 rate, row by row); it has no bias states.",
-        f"angular_velocity_covariance: [{gyro}, 0, 0, 0, {gyro}, 0, 0, 0, {gyro}]",
-        f"linear_acceleration_covariance: [{accel}, 0, 0, 0, {accel}, 0, 0, 0, {accel}]",
+        *rows,
     ]
-
-
-def _four(f: Figures) -> tuple[NoiseFigure, NoiseFigure, NoiseFigure, NoiseFigure]:
-    return f.accel_N, f.accel_K, f.gyro_N, f.gyro_K
 
 
 @dataclass(frozen=True)
 class _Target:
     """Rows of a consumer's file, what comments begin with, and its first line where its reader demands one."""
 
-    rows: Callable[[Figures], list[str]]
+    rows: Callable[[_Written], list[str]]
     comment: str = "#"
     first: str = ""
 
@@ -95,37 +121,50 @@ def filter_noise_text(found: FilterNoise, target: str) -> str:
     one = TARGETS.get(target)
     if one is None:
         raise RefusedError(f"noise is not written for {target!r}; there are {', '.join(TARGETS)}.")
-    figures: dict[str, SensorNoise] = {sensor.sensor: _figures(sensor) for sensor in found.sensors}
+    figures = {sensor.sensor: sensor for sensor in found.sensors}
     for name in ("accelerometer", "gyroscope"):
         if name not in figures:
             raise RefusedError(
                 f"{target} needs both sensors, and the {name} was not estimated: give a reference with positions, or "
                 "leave --reference out."
             )
+    accel, gyro = figures["accelerometer"], figures["gyroscope"]
+    four = (_figure(accel.N), _figure(accel.K), _figure(gyro.N), _figure(gyro.K))
+    rows = one.rows(_Written(Figures(*four, found.rate_hz), _of_axes(accel), _of_axes(gyro)))
+    if not one.comment:
+        # JSON has no comments; its reader looks keys up by name and leaves others.
+        said = ",\n".join(f'    "{line}"' for line in _beside(found))
+        return "\n".join(["{", *rows[:-1], f'{rows[-1]},\n  "about": [', said, "  ]", "}", ""])
     lines = [one.first] if one.first else []
-    if one.comment:
-        lines += [f"{one.comment} {line}" for line in _beside(found)]
-    rows = one.rows(_both(figures, found.rate_hz))
-    return "\n".join([*lines, *rows, ""])
-
-
-def _both(of: dict[str, SensorNoise], rate_hz: float) -> Figures:
-    accel, gyro = of["accelerometer"], of["gyroscope"]
-    return Figures(accel.N, accel.K, gyro.N, gyro.K, rate_hz)
-
-
-def _figures(sensor: SensorFilterNoise) -> SensorNoise:
-    return SensorNoise(_figure(sensor.N), _figure(sensor.K))
+    return "\n".join([*lines, *(f"{one.comment} {line}" for line in _beside(found)), *rows, ""])
 
 
 def _figure(one: Bounded) -> NoiseFigure:
-    return NoiseFigure(one.filter_value, one.is_limit)
+    return NoiseFigure(float(f"{one.filter_value:.4g}"), one.is_limit)
+
+
+def _of_axes(sensor: SensorFilterNoise) -> tuple[float, ...]:
+    return tuple(one.filter_value for one in sensor.axes_N or (sensor.N,) * 3)
 
 
 def _beside(found: FilterNoise) -> Sequence[str]:
-    return [
-        f"static {one.sensor}: N {number(one.static.N.filter_value)} {one.unit}/sqrt(Hz), "
-        f"K {'below ' if one.static.K.is_limit else ''}{number(one.static.K.filter_value)} {one.unit}/sqrt(s)"
-        for one in found.sensors
-        if one.static
-    ]
+    """Each sensor's values with their intervals, and the static ones."""
+    out = []
+    for one in found.sensors:
+        units = (f"{one.unit}/sqrt(Hz)", f"{one.unit}/sqrt(s)")
+        pairs = (
+            [("", one.N, one.K)]
+            if one.static is None
+            else [("", one.N, one.K), ("static ", one.static.N, one.static.K)]
+        )
+        for word, N, K in pairs:
+            out.append(f"{word}{one.sensor}: N {_said(N)} {units[0]}, K {_said(K)} {units[1]}")
+        if one.axes_N:
+            out.append(f"{one.sensor} N of X, Y, Z: {', '.join(_said(axis) for axis in one.axes_N)}")
+    return out
+
+
+def _said(one: Bounded) -> str:
+    if one.is_limit:
+        return f"below {_short(one.upper)}"
+    return f"{_short(one.value)} ({_short(one.lower)} to {_short(one.upper)})"

@@ -51,7 +51,7 @@ def noise_row(name: str, figure: NoiseFigure, unit: str) -> list[str]:
     """A comment with the unit, then ``name: value``."""
     said = f"# {unit}"
     if figure.is_limit:
-        said = f"# {name} [{unit}] is an upper limit: this walk was not seen in the static log"
+        said = f"# {name} [{unit}] is an upper limit: none of it was seen"
     return [said, f"{name}: {number(figure.value)}"]
 
 

@@ -54,4 +54,12 @@ ENTRIES = (
         "The two halves differ in noise, vibration or the reference's error.",
         "Treat N and K as those of the whole log only; estimate them from a log of the same kind of motion.",
     ),
+    Entry(
+        Code.FILTER_NOISE_UNSETTLED,
+        "",
+        WARNING,
+        "The search for the {sensor}'s strengths did not settle: its intervals rest on a few draws.",
+        "The log holds too little motion, or noise that none of the causes describes.",
+        "Do not rely on these intervals; give a longer log, or one without shocks.",
+    ),
 )
