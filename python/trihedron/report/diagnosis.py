@@ -12,6 +12,7 @@ from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pictures
+from trihedron.report.diagnosis_candidates import candidates_table
 from trihedron.report.diagnosis_charts import before_after_chart
 from trihedron.report.diagnosis_models import models_blocks
 from trihedron.report.diagnosis_numbers import (
@@ -77,13 +78,13 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         Section("Missing effects", (*effects_blocks(diagnosis), *_physics(diagnosis))),
         Section("Unexplained", (Paragraph(_remaining(diagnosis)), *relations_blocks(diagnosis))),
         Section("Cross-validation: before and after", _held_out(diagnosis)),
-        Section("Candidates", (_candidates(diagnosis),)),
+        Section("Candidates", (candidates_table(diagnosis),)),
         Section("Calibration and noise", models_blocks(diagnosis)),
     ]
     if diagnosis.parameters:
         stages = (*stages_pictures(diagnosis), *stages_blocks(diagnosis, MEANING))
         sections.append(Section("Stage by stage", stages))
-        sections.append(Section("All parameters of the model", numbers_blocks(diagnosis)))
+        sections += [Section("Parameters that agree", (table,)) for table in numbers_blocks(diagnosis)]
     if diagnosis.noise_compared:
         noise = (*ratio_pictures(diagnosis), *noise_blocks(diagnosis), *noise_pictures(diagnosis))
         sections.append(Section("Noise and sampling of the model", noise))
@@ -224,13 +225,13 @@ def _remaining(diagnosis: Diagnosis) -> str:
     left = [d for d in diagnosis.remaining if d.disagrees]
     if not left:
         beside = "beside the relation below" if diagnosis.relations else "in this recording"
-        return f"Unexplained: nothing detectable {beside}."
+        return f"Nothing detectable {beside}."
     said = [
         f"{MEANING[d.domain]}: χ²/dof {plain_number(d.chi2_per_dof)}"
         + (f", {place}" if (place := where_in_words(d)) else "")
         for d in left
     ]
-    return "Unexplained: " + "; ".join(said) + "."
+    return _capital("; ".join(said) + ".")
 
 
 def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -253,22 +254,6 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
     head = ("effect", "residual", "rms before", "rms after", "χ²/dof before", "χ²/dof after")
     caption = "Poses and moves predicted by fits that did not see them (held out); noise alone gives χ²/dof 1"
     return (Table(head, rows, caption),)
-
-
-def _candidates(diagnosis: Diagnosis) -> Block:
-    accepted = {effect.id for effect in diagnosis.effects}
-    tried = [c for c in diagnosis.candidates if c.applicable]
-    tried.sort(key=lambda c: 2.0 if c.p_value is None else c.p_value)
-    rows = [
-        (
-            c.id,
-            "–" if c.p_value is None else p_in_words(c.p_value),
-            "accepted" if c.id in accepted else c.reason,
-        )
-        for c in tried
-    ]
-    rows += [(c.id, "–", f"not applicable: {c.reason}") for c in diagnosis.candidates if not c.applicable]
-    return Table(("effect", "p against the linear model", "outcome"), tuple(rows), "Every effect of the catalogue")
 
 
 def _traces(diagnosis: Diagnosis) -> tuple[Picture, ...]:

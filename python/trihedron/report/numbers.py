@@ -48,6 +48,15 @@ def with_sigma(value: float, sigma: float) -> str:
     return f"{value:.{places}f} ± {sigma:.{places}f}".replace("-", MINUS)
 
 
+def with_sigma_and_power(value: float, sigma: float) -> str:
+    """``value ± σ``, in scientific notation from five digits before or behind the point: ``(8.80 ± 0.13)e−5``."""
+    exponent = math.floor(math.log10(value)) if value > 0.0 else 0
+    if -4 <= exponent <= 4:
+        return with_sigma(value, sigma)
+    scale = 10.0**exponent
+    return f"({with_sigma(value / scale, sigma / scale)})e{exponent}".replace("-", MINUS)
+
+
 def engineering_exponent(size: float) -> int:
     """Power of ten, a multiple of three, that brings a number of this size between 0.2 and 200."""
     if not math.isfinite(size) or size <= 0.0:

@@ -1,4 +1,4 @@
-"""What a page draws of several recordings diagnosed together: the size of a shared effect in each of them."""
+"""What a page draws of several recordings diagnosed together: a shared effect in each of them, or all scores."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trihedron.records.shared_effects import SharedEffect
-from trihedron.report.chart import Chart, Level, Panel, Points, Scale
+from trihedron.records.shared_effects import SharedCandidate, SharedEffect
+from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale
 from trihedron.report.diagnosis_words import printed_unit
-from trihedron.report.numbers import engineering_exponent, power_of_ten, with_sigma
+from trihedron.report.numbers import engineering_exponent, plain_number, power_of_ten, with_sigma
 
 TWO_SIGMA = 2.0
 ROW_PX = 26
 COLUMNS = 3
+BAR = 0.7
+"""Of a row."""
 
 
 def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
@@ -35,3 +37,15 @@ def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
         x = Scale(f"{common.name} [{unit}]", unit, includes=(0.0,))
         panels.append(Panel(x, Scale("", names=rows), marks, title=common.name, height_px=ROW_PX * (len(rows) + 1)))
     return Chart(tuple(panels), columns=min(COLUMNS, len(panels)))
+
+
+def candidates_chart(candidates: Sequence[SharedCandidate]) -> Chart:
+    """A bar an effect: its score in all recordings together."""
+    place = -np.arange(1.0, len(candidates) + 1.0)
+    score = np.array([one.score for one in candidates])
+    told = [f"{one.id}: score {plain_number(one.score)}" for one in candidates]
+    bars = Bars(score, place, BAR, told, "tried in all recordings together", "soft", is_across=True)
+    x = Scale("score", includes=(0.0,))
+    names = tuple(one.id for one in candidates)
+    panel = Panel(x, Scale("", names=names), (bars, Level(x=0.0)), height_px=ROW_PX * (len(names) + 1))
+    return Chart((panel,))
