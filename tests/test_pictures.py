@@ -22,7 +22,7 @@ from trihedron.report.findings.told import told_once
 from trihedron.report.findings.wording import filled
 from trihedron.report.many_charts import sessions_chart
 from trihedron.report.notes import _box, _covered, apart
-from trihedron.report.numbers import with_sigma_and_power
+from trihedron.report.numbers import unit_with_power, with_sigma_and_power
 from trihedron.report.places import Places
 from trihedron.report.segments import signals_picture
 from trihedron.report.sessions import DRIFTING, sessions_report
@@ -182,3 +182,18 @@ def test_a_plan_keeps_what_one_came_for_in_its_tables_at_80_columns(capsys, monk
     monkeypatch.setenv("COLUMNS", "80")
     assert main(["plan"]) == 0
     assert "continued" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("exponent", "unit", "printed"),
+    [
+        (-3, "s", "ms"),
+        (-6, "m", "µm"),
+        (-3, "rad/s", "mrad/s"),
+        (-6, "s²/m", "10⁻⁶ s²/m"),
+        (0, "s", "s"),
+        (-3, "", "10⁻³"),
+    ],
+)
+def test_a_power_of_ten_is_a_prefix_where_the_unit_takes_one(exponent, unit, printed):
+    assert unit_with_power(exponent, unit) == printed

@@ -10,6 +10,7 @@ from functools import partial
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
+from trihedron.report.axes import LETTERS
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pictures
 from trihedron.report.diagnosis_candidates import candidates_table
@@ -50,7 +51,7 @@ from trihedron.report.numbers import (
     how_many,
     listed,
     plain_number,
-    power_of_ten,
+    unit_with_power,
 )
 from trihedron.report.reference import beside_reference
 
@@ -199,11 +200,18 @@ def _parameters(effect: AcceptedEffect) -> str:
         if printed == "°" or -3 < exponent <= 3:
             exponent = 0
         scale = 10.0**-exponent
-        words = [f"{p.name} {value_in_words(scale * p.value, scale * p.std)}" for p in members[:MOST_PARAMETERS]]
+        words = [
+            f"{_parameter(p.name)} {value_in_words(scale * p.value, scale * p.std)}" for p in members[:MOST_PARAMETERS]
+        ]
         more = len(members) - MOST_PARAMETERS
-        shared = " ".join(word for word in (power_of_ten(exponent), printed) if word)
+        shared = unit_with_power(exponent, printed)
         groups.append(", ".join(words) + (f", {more} more" if more > 0 else "") + (f" [{shared}]" if shared else ""))
     return "; ".join(groups)
+
+
+def _parameter(name: str) -> str:
+    """``K2_x`` is a symbol with its axis; ``accelerometer_delay`` is words."""
+    return name if len(name.rpartition("_")[2]) <= LETTERS else name.replace("_", " ")
 
 
 def _evidence(effect: AcceptedEffect) -> str:

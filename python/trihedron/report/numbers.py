@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 MINUS = "−"
 
@@ -69,6 +70,14 @@ def power_of_ten(exponent: int) -> str:
     if exponent == 0:
         return ""
     return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def unit_with_power(exponent: int, unit: str) -> str:
+    """A printed unit at a power of ten: ``ms`` where a prefix says it, else ``10⁻⁶ s²/m``."""
+    prefix = {-9: "n", -6: "µ", -3: "m"}.get(exponent)
+    if prefix is not None and re.match(r"(s|m|rad)(?![\w²³])", unit):
+        return prefix + unit
+    return " ".join(word for word in (power_of_ten(exponent), unit) if word)
 
 
 def unit_in_print(unit: str) -> str:

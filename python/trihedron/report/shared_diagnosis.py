@@ -11,7 +11,7 @@ from trihedron.records.shared_effects import SharedDiagnosis, SharedEffect
 from trihedron.report.diagnosis_words import p_in_words, printed_unit, value_in_words, verdict_in_words
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
-from trihedron.report.numbers import engineering_exponent, listed, plain_number, power_of_ten
+from trihedron.report.numbers import engineering_exponent, listed, plain_number, unit_with_power
 from trihedron.report.shared_diagnosis_charts import candidates_chart, shared_chart
 
 
@@ -105,7 +105,7 @@ def _parameters(effect: SharedEffect, names: list[str]) -> Table:
     for i, common in enumerate(effect.parameters):
         largest = max(abs(one[i].value) for one in (effect.parameters, *effect.each))
         exponent = engineering_exponent(largest) if largest > 0.0 else 0
-        unit = " ".join(word for word in (power_of_ten(exponent), printed_unit(common.unit)) if word)
+        unit = unit_with_power(exponent, printed_unit(common.unit))
         cells = [_cell(one[i], 10.0**-exponent) for one in (effect.parameters, *effect.each)]
         rows.append((common.name, *cells, unit))
     return Table(("parameter", "together", *names, "unit"), tuple(rows), "Parameters together and alone")

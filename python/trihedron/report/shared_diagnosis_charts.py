@@ -9,7 +9,7 @@ import numpy as np
 from trihedron.records.shared_effects import SharedCandidate, SharedEffect
 from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale
 from trihedron.report.diagnosis_words import printed_unit
-from trihedron.report.numbers import engineering_exponent, plain_number, power_of_ten, with_sigma
+from trihedron.report.numbers import engineering_exponent, plain_number, unit_with_power, with_sigma
 
 TWO_SIGMA = 2.0
 ROW_PX = 26
@@ -26,7 +26,7 @@ def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
     for i, common in enumerate(effect.parameters):
         found = [one[i] for one in (effect.parameters, *effect.each)]
         exponent = engineering_exponent(max(abs(one.value) for one in found))
-        unit = " ".join(word for word in (power_of_ten(exponent), printed_unit(common.unit)) if word)
+        unit = unit_with_power(exponent, printed_unit(common.unit))
         value, sigma = 10.0**-exponent * np.array([(one.value, one.std) for one in found]).T
         told = [f"{row}: {with_sigma(v, s)} {unit}" for row, v, s in zip(rows, value, sigma, strict=True)]
         marks = (
