@@ -63,6 +63,19 @@ def rate_to_si(unit: RateUnit) -> float | None:
     return _RATE_TO_SI.get(unit)
 
 
+def ratio_of_units(one: AccelerationUnit | RateUnit, other: AccelerationUnit | RateUnit) -> float | None:
+    """How many of ``other`` one of ``one`` is; ``None`` for counts beside anything but counts."""
+    if one is other:
+        return 1.0
+    if isinstance(one, AccelerationUnit) and isinstance(other, AccelerationUnit):
+        si = acceleration_to_si(one), acceleration_to_si(other)
+    elif isinstance(one, RateUnit) and isinstance(other, RateUnit):
+        si = rate_to_si(one), rate_to_si(other)
+    else:
+        return None
+    return None if si[0] is None or si[1] is None else si[0] / si[1]
+
+
 def rate_lsb_to_si(text: str) -> float:
     """Size of a gyro's count, as in ``0.05 deg/s``, in rad/s.
 

@@ -18,6 +18,7 @@ from trihedron.errors import REFUSALS, RefusedError
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
 from trihedron.records import Frame, Recording, SensorCalibration
 from trihedron.records.progress import Progress
+from trihedron.records.recording import distinct_names
 from trihedron.records.results import CalibrationResult, SessionsResult
 from trihedron.records.sessions import By, Session
 from trihedron.records.words import Words, words
@@ -153,16 +154,10 @@ def sessions_of(results: Sequence[CalibrationResult], groups: Sequence[str]) -> 
     """Calibrations as numbers that do not depend on a frame, counted from the first one's axes."""
     first = in_frame(results[0].calibration, "lower")
     anchor = anchor_of(first.accelerometer.S, None if first.gyroscope is None else first.gyroscope.S)
-    names = _names([result.recording.source for result in results])
+    names = distinct_names([result.recording.source for result in results])
     return tuple(
         session_of(result, anchor, name, group) for result, name, group in zip(results, names, groups, strict=True)
     )
-
-
-def _names(sources: Sequence[str]) -> list[str]:
-    """Names as short as they stay distinct; of two files of one log both."""
-    short = [" + ".join(Path(part).name or part for part in source.split(" + ")) for source in sources]
-    return [name if short.count(name) == 1 else source for name, source in zip(short, sources, strict=True)]
 
 
 def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str) -> Session:

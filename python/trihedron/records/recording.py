@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -266,3 +268,9 @@ class Recording(Presented):
         )
         size = f"{self.n_samples} samples, {self.duration_s:.1f} s at {self.rate_hz:.4g} Hz"
         return f"<Recording {one_line(self.source)}: {size}, {sensors}>"
+
+
+def distinct_names(sources: Sequence[str]) -> list[str]:
+    """Names of recordings as short as they stay distinct; of two files of one log both."""
+    short = [" + ".join(Path(part).name or part for part in source.split(" + ")) for source in sources]
+    return [name if short.count(name) == 1 else source for name, source in zip(short, sources, strict=True)]

@@ -25,6 +25,11 @@ def axis_in_print(name: str) -> str:
     return name.upper() if len(name) <= LETTERS else name
 
 
+def channel_in_print(channel: str) -> str:
+    """``gx`` and ``vx`` as ``X``; what is no axis (``norm``, ``angle``) as it is."""
+    return channel[-1].upper() if len(channel) <= LETTERS else channel
+
+
 @dataclass(frozen=True, eq=False)
 class Axes:
     """What the numbers of one sensor say about its axes.

@@ -10,8 +10,10 @@ from functools import partial
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
+from trihedron.report.axes import LETTERS
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pictures
+from trihedron.report.diagnosis_candidates import candidates_table
 from trihedron.report.diagnosis_charts import before_after_chart
 from trihedron.report.diagnosis_models import models_blocks
 from trihedron.report.diagnosis_numbers import (
@@ -49,7 +51,7 @@ from trihedron.report.numbers import (
     how_many,
     listed,
     plain_number,
-    power_of_ten,
+    unit_with_power,
 )
 from trihedron.report.reference import beside_reference
 
@@ -77,13 +79,13 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         Section("Missing effects", (*effects_blocks(diagnosis), *_physics(diagnosis))),
         Section("Unexplained", (Paragraph(_remaining(diagnosis)), *relations_blocks(diagnosis))),
         Section("Cross-validation: before and after", _held_out(diagnosis)),
-        Section("Candidates", (_candidates(diagnosis),)),
+        Section("Candidates", (candidates_table(diagnosis),)),
         Section("Calibration and noise", models_blocks(diagnosis)),
     ]
     if diagnosis.parameters:
         stages = (*stages_pictures(diagnosis), *stages_blocks(diagnosis, MEANING))
         sections.append(Section("Stage by stage", stages))
-        sections.append(Section("All parameters of the model", numbers_blocks(diagnosis)))
+        sections += [Section("Parameters that agree", (table,)) for table in numbers_blocks(diagnosis)]
     if diagnosis.noise_compared:
         noise = (*ratio_pictures(diagnosis), *noise_blocks(diagnosis), *noise_pictures(diagnosis))
         sections.append(Section("Noise and sampling of the model", noise))
@@ -198,11 +200,18 @@ def _parameters(effect: AcceptedEffect) -> str:
         if printed == "°" or -3 < exponent <= 3:
             exponent = 0
         scale = 10.0**-exponent
-        words = [f"{p.name} {value_in_words(scale * p.value, scale * p.std)}" for p in members[:MOST_PARAMETERS]]
+        words = [
+            f"{_parameter(p.name)} {value_in_words(scale * p.value, scale * p.std)}" for p in members[:MOST_PARAMETERS]
+        ]
         more = len(members) - MOST_PARAMETERS
-        shared = " ".join(word for word in (power_of_ten(exponent), printed) if word)
+        shared = unit_with_power(exponent, printed)
         groups.append(", ".join(words) + (f", {more} more" if more > 0 else "") + (f" [{shared}]" if shared else ""))
     return "; ".join(groups)
+
+
+def _parameter(name: str) -> str:
+    """``K2_x`` is a symbol with its axis; ``accelerometer_delay`` is words."""
+    return name if len(name.rpartition("_")[2]) <= LETTERS else name.replace("_", " ")
 
 
 def _evidence(effect: AcceptedEffect) -> str:
@@ -224,13 +233,13 @@ def _remaining(diagnosis: Diagnosis) -> str:
     left = [d for d in diagnosis.remaining if d.disagrees]
     if not left:
         beside = "beside the relation below" if diagnosis.relations else "in this recording"
-        return f"Unexplained: nothing detectable {beside}."
+        return f"Nothing detectable {beside}."
     said = [
         f"{MEANING[d.domain]}: χ²/dof {plain_number(d.chi2_per_dof)}"
         + (f", {place}" if (place := where_in_words(d)) else "")
         for d in left
     ]
-    return "Unexplained: " + "; ".join(said) + "."
+    return _capital("; ".join(said) + ".")
 
 
 def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -253,22 +262,6 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
     head = ("effect", "residual", "rms before", "rms after", "χ²/dof before", "χ²/dof after")
     caption = "Poses and moves predicted by fits that did not see them (held out); noise alone gives χ²/dof 1"
     return (Table(head, rows, caption),)
-
-
-def _candidates(diagnosis: Diagnosis) -> Block:
-    accepted = {effect.id for effect in diagnosis.effects}
-    tried = [c for c in diagnosis.candidates if c.applicable]
-    tried.sort(key=lambda c: 2.0 if c.p_value is None else c.p_value)
-    rows = [
-        (
-            c.id,
-            "–" if c.p_value is None else p_in_words(c.p_value),
-            "accepted" if c.id in accepted else c.reason,
-        )
-        for c in tried
-    ]
-    rows += [(c.id, "–", f"not applicable: {c.reason}") for c in diagnosis.candidates if not c.applicable]
-    return Table(("effect", "p against the linear model", "outcome"), tuple(rows), "Every effect of the catalogue")
 
 
 def _traces(diagnosis: Diagnosis) -> tuple[Picture, ...]:

@@ -8,10 +8,13 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records.domains import DomainResiduals
+from trihedron.report.axes import channel_in_print
 from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.drawn import said
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
+MOST_OF_A_BAR = 3.0
+"""Times the median of all: up to here a bar of noise is shown whole."""
 PRINTED = {
     "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
     "rad/s": (degrees_from_radians(1.0), "°/s"),
@@ -40,13 +43,15 @@ def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Char
         ),
     ][: 2 if has_effects else 1]
     low, high = _limits(sides, factor, is_angle=residuals.domain == "moves")
-    end = max((float(t.max()) for _, t, *_ in sides if t.size), default=1.0)
+    times = np.concatenate([np.ravel(time_s) for _, time_s, *_ in sides])
+    start, end = (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)
+    room = 0.02 * (end - start) or 1.0
     panels = []
     for title, time_s, value, sigma, names in sides:
         marks = _domain_marks(residuals, (time_s, factor * value, factor * sigma), names, unit)
         panels.append(
             Panel(
-                Scale("time [s]", "s", limits=(-0.02 * end, 1.02 * end)),
+                Scale("time [s]", "s", limits=(max(start - room, min(start, 0.0)), end + room)),
                 Scale(f"{residuals.quantity} [{unit}]", unit, limits=(low, high)),
                 marks,
                 title=title,
@@ -64,7 +69,8 @@ def _limits(sides: Sequence[Side], factor: float, *, is_angle: bool) -> tuple[fl
     bars = np.concatenate([2.0 * factor * sigma for _, _, _, sigma, _ in sides])
     top = float(np.nanmax(seen, initial=0.0))
     # Bars of a pose that hardly anything is known of may leave the picture; what was measured may not.
-    top = 1.08 * max(top, float(np.nanmedian(bars)) if bars.size else 0.0) or 1.0
+    usual = MOST_OF_A_BAR * float(np.nanmedian(bars)) if bars.size else 0.0
+    top = 1.08 * max(top, min(float(np.nanmax(bars, initial=0.0)), usual)) or 1.0
     return (0.0 if is_angle else -top), top
 
 
@@ -76,8 +82,9 @@ def _domain_marks(
     marks: list[Mark] = [Level(y=0.0), _bars_of_noise(time_s, sigma, is_angle=is_angle)]
     for k, channel in enumerate(residuals.channels):
         colour: Colour = AXIS_COLOURS[k] if len(residuals.channels) > 1 else "accent"
-        told = [said(f"{name}, {channel}", "", float(v), unit) for name, v in zip(names, value[:, k], strict=True)]
-        marks.append(Points(time_s, value[:, k], told, None, channel, colour))
+        axis = channel_in_print(channel)
+        told = [said(f"{name}, {axis}", "", float(v), unit) for name, v in zip(names, value[:, k], strict=True)]
+        marks.append(Points(time_s, value[:, k], told, None, axis, colour))
     return tuple(marks)
 
 

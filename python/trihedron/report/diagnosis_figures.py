@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from trihedron.arrays import FloatArray
 from trihedron.records.domains import DomainResiduals
+from trihedron.report.axes import channel_in_print
 from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, panels
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
@@ -54,4 +55,4 @@ def _draw(axis: Axes, time_s: FloatArray, value: FloatArray, sigma: FloatArray, 
     axis.axhline(0.0, color=INK, linewidth=0.8)
     for k, name in enumerate(channels):
         colour = AXIS_COLOURS[k] if len(channels) > 1 else ACCENT
-        axis.plot(time_s, value[:, k], "o", markersize=4.5, color=colour, label=name)
+        axis.plot(time_s, value[:, k], "o", markersize=4.5, color=colour, label=channel_in_print(name))

@@ -23,21 +23,17 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         before, after = getattr(diagnosis.baseline, name), getattr(diagnosis.extended, name)
         if before is None or after is None or before["raw_unit"] == "none":
             continue
+        # Without an effect both models are one.
+        models = (before, after) if diagnosis.effects else (before,)
         rows = [
-            (f"S_{AXES[i]}{AXES[j]}", _both(before, "S", (i, j)), _both(after, "S", (i, j)))
+            (f"S_{AXES[i]}{AXES[j]}", *(_cell(model, "S", (i, j)) for model in models))
             for i in range(3)
             for j in range(3)
             if before["sigma_S"][i][j] > 0.0
         ]
-        rows += [(f"b_{AXES[i]}", _both(before, "b", (i,)), _both(after, "b", (i,))) for i in range(3)]
-        unit = before["raw_unit"]
-        blocks.append(
-            Table(
-                ("", "linear model", "with the effects"),
-                tuple(rows),
-                f"{name.capitalize()}, raw in {unit_in_print(unit)}",
-            )
-        )
+        rows += [(f"b_{AXES[i]}", *(_cell(model, "b", (i,)) for model in models)) for i in range(3)]
+        head = ("", "linear model", "with the effects")[: 1 + len(models)]
+        blocks.append(Table(head, tuple(rows), f"{name.capitalize()}, raw in {unit_in_print(before['raw_unit'])}"))
     gravity = getattr(diagnosis, "gravity_source", "")
     facts = [("gravity", f"{diagnosis.gravity_m_s2:.5f} m/s²" + (f", {gravity}" if gravity else ""))]
     for name in ("accelerometer", "gyroscope"):
@@ -63,7 +59,7 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _both(model: object, key: str, place: tuple[int, ...]) -> str:
+def _cell(model: object, key: str, place: tuple[int, ...]) -> str:
     value, sigma = model[key], model["sigma_" + key]  # type: ignore[index]
     for k in place:
         value, sigma = value[k], sigma[k]

@@ -34,6 +34,7 @@ MOST_NUMBERS, MOST_NOISE = 3, 2
 """Clauses of numbers and of noise in a headline, which is one sentence; a table holds them all."""
 _SENTENCES_FIRST = ("unit", "frame", "range", "rate")
 """What is wrong with every reading of a sensor is said before its noise."""
+_HEAD = ("parameter", "model", "recording", "recording − model", "p of its group")
 _STAGES = {
     "as-given": "as given",
     "numbers": "parameters",
@@ -63,14 +64,13 @@ def differing_numbers(diagnosis: Diagnosis) -> list[str]:
 def differing_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     """The parameters that differ as a table; what they resemble, and noise that differs, as sentences."""
     shown = [p for p in diagnosis.parameters if p.significant]
-    rows = tuple((named(p), _value(p, p.model), _value(p, p.recording), _difference(p)) for p in shown)
+    rows = tuple(map(_row, shown))
     sentences = [*_remarks_in_order(shown), *differing_noise(diagnosis)]
     if not rows and not sentences:
         return (Paragraph("None of the given parameters differs."),)
     blocks: list[Block] = []
     if rows:
-        head = ("parameter", "model", "recording", "recording − model")
-        blocks.append(Table(head, rows, f"Parameters of the groups that differ; a bias is {BIAS}"))
+        blocks.append(Table(_HEAD, rows, f"Parameters of the groups that differ; a bias is {BIAS}"))
     if sentences:
         blocks.append(Facts(tuple(("", one) for one in sentences)))
     return tuple(blocks)
@@ -140,27 +140,28 @@ def differing_noise(diagnosis: Diagnosis) -> list[str]:
 
 
 def numbers_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """Every parameter of the model beside the recording's, groups that differ first."""
-    shown = sorted(diagnosis.parameters, key=lambda p: (not p.significant, p.p_value, p.id))
-    rows = tuple(
-        (p.id, p.name, _value(p, p.model), _value(p, p.recording), _difference(p), plain_number(p.p_value, 2), _mark(p))
-        for p in shown
-    )
-    head = ("parameter", "axis", "model", "recording", "recording − model", "p of the group", "judged")
-    return (Table(head, rows, f"Parameters of the given model and of the recording; a bias is {BIAS}"),)
+    """The parameters of the model that agree with the recording's; those that differ stand apart."""
+    shown = sorted((p for p in diagnosis.parameters if not p.significant), key=lambda p: (p.p_value, p.id))
+    if not shown:
+        return ()
+    return (Table(_HEAD, tuple(map(_row, shown)), f"Parameters of the groups that agree; a bias is {BIAS}"),)
+
+
+def _row(p: ParameterDifference) -> tuple[str, ...]:
+    return named(p), _value(p, p.model), _value(p, p.recording), _difference(p), plain_number(p.p_value, 2)
 
 
 def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     """Noise and sampling of the model beside the recording's."""
     rows = tuple(
         (
-            f"{_sensor(n)} {n.axis}".strip(),
+            f"{_sensor(n)} {n.axis.upper()}".strip(),
             _term(n),
             _plain(n.model),
             _plain(n.recording),
             _ratio(n),
             unit_in_print(n.unit),
-            "differs" if n.significant else "",
+            "differs" if n.significant else "agrees",
         )
         for n in diagnosis.noise_compared
     )
@@ -262,10 +263,6 @@ def _unit(p: ParameterDifference, *, is_difference: bool) -> tuple[float, str]:
     if p.unit == "m/s^2":
         return mm_s2_from_m_s2(1.0), "mm/s²"
     return (mrad_from_radians(1.0), "mrad") if is_difference else (degrees_from_radians(1.0), "°")
-
-
-def _mark(p: ParameterDifference) -> str:
-    return "differs" if p.significant else ""
 
 
 def _sensor(n: NoiseDifference) -> str:

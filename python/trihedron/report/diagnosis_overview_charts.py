@@ -19,6 +19,7 @@ from trihedron.report.document import Block, Picture
 from trihedron.report.drawing import later
 from trihedron.report.drawn import envelope
 from trihedron.report.numbers import plain_number, unit_in_print, with_sigma
+from trihedron.units import ratio_of_units
 
 ROW_PX = 26
 """A row of names on a page."""
@@ -196,15 +197,16 @@ the recording's noise."""
 
 
 def _both_sides(recording: Recording, simulated: Recording, segments: Segments) -> list[Side]:
-    """Sensors that both have in one unit."""
+    """Sensors that both have, the simulation's in the recording's unit; counts beside another unit are not drawn."""
     out: list[Side] = []
     mine_s, theirs_s = (log.time_s - log.time_s[0] for log in (recording, simulated))
     for name, sigma in (("accelerometer", segments.accelerometer_sigma), ("gyroscope", segments.gyroscope_sigma)):
         mine, theirs = getattr(recording, name), getattr(simulated, name)
         unit = getattr(recording, f"{name}_unit")
-        if mine is None or theirs is None or sigma is None or unit is not getattr(simulated, f"{name}_unit"):
+        scale = ratio_of_units(getattr(simulated, f"{name}_unit"), unit)
+        if mine is None or theirs is None or sigma is None or scale is None:
             continue
-        at = np.column_stack([np.interp(mine_s, theirs_s, theirs[:, k]) for k in range(3)])
+        at = scale * np.column_stack([np.interp(mine_s, theirs_s, theirs[:, k]) for k in range(3)])
         at[mine_s > theirs_s[-1]] = math.nan
         noise = np.where(np.asarray(sigma) > 0.0, sigma, 1.0)
         said = "gyro" if name == "gyroscope" else name

@@ -18,7 +18,7 @@ def drawn_disc(disc: Disc, caption: str) -> str:
     cross = f'<path class="rim" d="M-{_RADIUS} 0H{_RADIUS}M0-{_RADIUS}V{_RADIUS}"/>'
     names = "".join(
         f'<text x="{x}" y="{y}">{word}</text>'
-        for word, x, y in (("+X", 113, 4), ("−X", -113, 4), ("+Y", 0, -106), ("−Y", 0, 115))
+        for word, x, y in (("+X", 118, 3), ("−X", -118, 3), ("+Y", 0, -111), ("−Y", 0, 119))
     )
     marks = []
     # What is wanted lies on top.

@@ -27,6 +27,7 @@ from trihedron.report.chart import (
 )
 from trihedron.report.disc import drawn_disc
 from trihedron.report.matrix import drawn_matrix
+from trihedron.report.notes import apart
 from trihedron.report.numbers import plain_number
 from trihedron.report.places import UNITS, Places
 from trihedron.report.sphere import drawn_sphere
@@ -113,7 +114,8 @@ def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
     x_words = "".join(_word(w, f"left:{x / UNITS:.2%}") for x, (_, w) in zip(xs, x_ticks, strict=True) if w)
     y_words = "".join(_word(w, f"top:{y / UNITS:.2%}") for y, (_, w) in zip(ys, y_ticks, strict=True) if w)
     room = max(around[0], _letters(y_ticks))
-    notes = "".join(_note(mark, at) for mark in panel.marks if isinstance(mark, Note))
+    words = apart([mark for mark in panel.marks if isinstance(mark, Note)], at, panel.height_px)
+    notes = "".join(_note(note, at) for note in words)
     back = [_mark(mark, at) for mark in panel.marks if isinstance(mark, Band)] + _spans(panel, at)
     front = [_mark(mark, at) for mark in panel.marks if not isinstance(mark, Band | Span)]
     about = f"{panel.title}: {caption}" if panel.title else caption

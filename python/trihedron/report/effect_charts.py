@@ -10,6 +10,7 @@ from trihedron.arrays import AXES, XYZ, FloatArray
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import AcceptedEffect, EffectCurve
 from trihedron.records.domains import DomainResiduals
+from trihedron.report.axes import channel_in_print
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.diagnosis_charts import PRINTED
 from trihedron.report.drawn import said
@@ -173,7 +174,7 @@ def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> P
     kind = "pose" if seen.kind == "pose" else "move"
     marks: list[Mark] = [Level(y=0.0)]
     is_same = seen.before.shape == seen.after.shape and np.allclose(seen.time_before_s, seen.time_after_s, atol=1e-6)
-    for k, channel in enumerate(seen.channels):
+    for k, channel in enumerate(map(channel_in_print, seen.channels)):
         colour: Colour = AXIS_COLOURS[k] if len(seen.channels) > 1 else "c1"
         data = factor * seen.before[:, k]
         told = [

@@ -54,15 +54,24 @@ def filter_noise_report(found: FilterNoise) -> Document:
         verdict=verdict_of(found.findings, "OK: no problems found.", "Usable", "NOT TO BE TRUSTED"),
         is_trustworthy=not any(f.severity.value == "serious" for f in found.findings),
         sections=tuple(sections),
-        headlines=tuple(_headline(one) for one in found.sensors),
+        headlines=tuple(headline for one in found.sensors for headline in _headlines(one)),
         lead=picture if tested else None,
         next_step="Put these values into your filter: --to TARGET writes them for the common ones.",
     )
 
 
-def _headline(one: SensorFilterNoise) -> Headline:
-    beside = "" if one.static is None else f"static {_number(one.static.N)}"
-    return Headline(f"{one.sensor} N", _number(one.N), f"{unit_in_print(one.unit)}/√Hz", beside)
+def _headlines(one: SensorFilterNoise) -> list[Headline]:
+    """What a filter is given: N and K."""
+    static: tuple[Bounded | None, ...] = (None, None) if one.static is None else (one.static.N, one.static.K)
+    return [
+        Headline(
+            f"{one.sensor} {name}",
+            _number(value),
+            f"{unit_in_print(one.unit)}/{per}",
+            "" if at_rest is None else f"static {_number(at_rest)}",
+        )
+        for name, value, at_rest, per in (("N", one.N, static[0], "√Hz"), ("K", one.K, static[1], "√s"))
+    ]
 
 
 def values_table(found: FilterNoise) -> Table:

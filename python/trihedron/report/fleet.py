@@ -232,4 +232,6 @@ def _logs(summary: FleetSummary) -> Table:
         )
         for log in summary.logs
     )
-    return Table(("log", "device", "status", "verdict", "effects", "poses", "held out [mm/s²]"), rows, "Every log")
+    return Table(
+        ("log", "device", "status", "verdict", "effects", "poses", "held out [mm/s²]"), rows, "What became of every log"
+    )

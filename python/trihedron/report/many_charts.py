@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trihedron.arrays import XYZ
 from trihedron.records.fleet import FleetSummary
 from trihedron.records.sessions import PARAMETERS, SessionsModel
 from trihedron.report.axes import axis_in_print
@@ -62,7 +61,7 @@ def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int 
             if thermal is None and spread is not None:
                 reach = np.full(2, spread.sd * factor)
                 marks.insert(0, Band(np.array([0.5, len(place) + 0.5]), -reach, reach))
-            axis = XYZ[k - picked[0]]
+            axis = axis_in_print(PARAMETERS[k].name)
             marks.append(Points(place + (k - picked[0] - 1) * step, values, told, error, axis, colour))
         x = Scale("temperature [°C]", "°C") if thermal is not None else Scale("recording", whole=True, names=names)
         panels.append(Panel(x, Scale(f"{name}  [{unit}]", unit), tuple(marks), height_px=170))

@@ -14,7 +14,7 @@ from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.noise_charts import allan_chart, sensors_chart
 from trihedron.report.noise_units import TERM_WORDS, customary, unit_of
-from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
+from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma_and_power
 from trihedron.units import degrees_from_radians, micro_g_from_m_s2
 
 _NO_UNIT = (
@@ -139,11 +139,7 @@ def _groups(noise: Noise) -> list[tuple[str, list[NoiseAxis]]]:
 def _value(term: NoiseTerm, factor: float = 1.0) -> str:
     if not term.is_present:
         return f"< {plain_number(factor * term.limit, 2)}"
-    value, sigma = factor * term.value, factor * term.sigma
-    exponent = math.floor(math.log10(value)) if value > 0 else 0
-    if -4 <= exponent <= 4:
-        return with_sigma(value, sigma)
-    return f"({with_sigma(value / 10.0**exponent, sigma / 10.0**exponent)})e{exponent}"
+    return with_sigma_and_power(factor * term.value, factor * term.sigma)
 
 
 def _terms_table(axes: list[NoiseAxis], unit: str) -> Table:
@@ -187,11 +183,7 @@ def _gauss_markov(axis: NoiseAxis) -> str:
     process = axis.gauss_markov
     if process is None:
         return "–"
-    exponent = math.floor(math.log10(process.sigma_process))
-    if -4 <= exponent <= 4:
-        return with_sigma(process.sigma_process, process.sigma)
-    scale = 10.0**exponent
-    return f"({with_sigma(process.sigma_process / scale, process.sigma / scale)})e{exponent}"
+    return with_sigma_and_power(process.sigma_process, process.sigma)
 
 
 def _correlation(axis: NoiseAxis) -> str:

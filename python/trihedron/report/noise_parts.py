@@ -9,7 +9,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.records import AllanCurve, NoiseAxis, TermName
 from trihedron.report.noise_units import unit_of
-from trihedron.report.numbers import plain_number, unit_in_print, with_sigma
+from trihedron.report.numbers import plain_number, unit_in_print, with_sigma_and_power
 
 READ_AT = {TermName.WHITE: 1.0, TermName.RATE_RANDOM_WALK: 3.0}
 """Averaging time [s] at which the line of a term shows its value itself."""
@@ -75,13 +75,9 @@ def _names(axis: NoiseAxis, symbol: str) -> tuple[str, str]:
         return f"{len(axis.lines)} lines", f"lines {at}{' …' if len(axis.lines) > 4 else ''} Hz"
     term, unit = axis.terms[TermName(symbol)], unit_of(TermName(symbol), axis.unit)
     if term.is_present:
-        return f"{symbol} {plain_number(term.value, 2)}", f"{symbol} = {_digits(term.value, term.sigma)} {unit}"
+        return (
+            f"{symbol} {plain_number(term.value, 2)}",
+            f"{symbol} = {with_sigma_and_power(term.value, term.sigma)} {unit}",
+        )
     limit = plain_number(term.limit, 2)
     return f"{symbol} < {limit}", f"{symbol} is in the sum, and does not show by itself: below {limit} {unit}"
-
-
-def _digits(value: float, sigma: float) -> str:
-    exponent = int(np.floor(np.log10(value))) if value > 0 else 0
-    if -4 <= exponent <= 4:
-        return with_sigma(value, sigma)
-    return f"({with_sigma(value / 10.0**exponent, sigma / 10.0**exponent)})e{exponent}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 MINUS = "−"
 
@@ -48,6 +49,15 @@ def with_sigma(value: float, sigma: float) -> str:
     return f"{value:.{places}f} ± {sigma:.{places}f}".replace("-", MINUS)
 
 
+def with_sigma_and_power(value: float, sigma: float) -> str:
+    """``value ± σ``, in scientific notation from five digits before or behind the point: ``(8.80 ± 0.13)e−5``."""
+    exponent = math.floor(math.log10(value)) if value > 0.0 else 0
+    if -4 <= exponent <= 4:
+        return with_sigma(value, sigma)
+    scale = 10.0**exponent
+    return f"({with_sigma(value / scale, sigma / scale)})e{exponent}".replace("-", MINUS)
+
+
 def engineering_exponent(size: float) -> int:
     """Power of ten, a multiple of three, that brings a number of this size between 0.2 and 200."""
     if not math.isfinite(size) or size <= 0.0:
@@ -60,6 +70,14 @@ def power_of_ten(exponent: int) -> str:
     if exponent == 0:
         return ""
     return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def unit_with_power(exponent: int, unit: str) -> str:
+    """A printed unit at a power of ten: ``ms`` where a prefix says it, else ``10⁻⁶ s²/m``."""
+    prefix = {-9: "n", -6: "µ", -3: "m"}.get(exponent)
+    if prefix is not None and re.match(r"(s|m|rad)(?![\w²³])", unit):
+        return prefix + unit
+    return " ".join(word for word in (power_of_ten(exponent), unit) if word)
 
 
 def unit_in_print(unit: str) -> str:

@@ -13,7 +13,7 @@ from trihedron.records.plan import ExperimentPlan, PosePlan
 from trihedron.report.chart import Chart, Line, Panel, Points, Scale
 from trihedron.report.document import Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
-from trihedron.report.numbers import plain_number
+from trihedron.report.numbers import MINUS, plain_number
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
 
 ALL_NUMBERS = 9
@@ -25,7 +25,7 @@ FEWEST_SETS = 2
 def plan_report(plan: ExperimentPlan) -> Document:
     """Lay out the plan: turns by both routes, sets of poses, moves."""
     turns = plan.turns
-    angles = ", ".join(f"{angle:g}°" for angle in turns.angles_deg)
+    angles = ", ".join(f"{angle:g}°" for angle in turns.angles_deg).replace("-", MINUS)
     return Document(
         title="Plan of an experiment",
         subtitle=(
@@ -51,11 +51,11 @@ def plan_report(plan: ExperimentPlan) -> Document:
                 "Moves between poses (method 2)",
                 (
                     Table(
-                        ("moves", "how many", "of 9 parameters", "scale uncertainty (1 σ)"),
+                        ("moves", "number", "of 9", "σ of scale"),
                         tuple(
                             (move.name, f"{move.n_moves}", f"{move.rank}", _percent(move.scale)) for move in plan.moves
                         ),
-                        "What sets of moves determine of the gyro",
+                        "How many of 9 parameters of the gyro moves determine, and its scale's uncertainty (1 σ)",
                     ),
                     Paragraph(
                         "A move determines two parameters, for a turn about the vertical leaves gravity where it was: "
@@ -93,7 +93,7 @@ def poses_chart(poses: tuple[PosePlan, ...]) -> Chart:
     panels = []
     for name, unit, values in (
         ("scale", "%", [100.0 * pose.scale for pose in known]),
-        ("angle between axes", "mrad", [mrad_from_radians(pose.angle) for pose in known]),
+        ("axis angle", "mrad", [mrad_from_radians(pose.angle) for pose in known]),
         ("bias", "mm/s²", [mm_s2_from_m_s2(pose.bias) for pose in known]),
     ):
         y = np.array(values)
@@ -137,7 +137,7 @@ def _poses(poses: tuple[PosePlan, ...]) -> Table:
     rows = []
     for pose in poses:
         if pose.rank < ALL_NUMBERS:
-            rows.append((pose.name, f"{pose.rank}", "not determined", "not determined", "not determined"))
+            rows.append((pose.name, f"{pose.rank}", "–", "–", "–"))
             continue
         rows.append(
             (
@@ -149,9 +149,9 @@ def _poses(poses: tuple[PosePlan, ...]) -> Table:
             )
         )
     return Table(
-        ("largest standard uncertainty (1 σ)", "of 9 parameters", "scale", "angle between axes", "bias"),
+        ("set of poses", "of 9", "scale", "axis angle", "bias"),
         tuple(rows),
-        "What sets of poses determine of the accelerometer",
+        "How many of 9 parameters a set of poses determines, and the largest standard uncertainty (1 σ)",
     )
 
 

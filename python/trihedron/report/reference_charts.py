@@ -58,10 +58,11 @@ def residual_chart(found: AgainstReference) -> Chart:
     left = degrees_from_radians(1.0) * found.residual_rate
     reach = 1.3 * float(np.percentile(np.abs(left), 99.5))
     panels = []
+    x = Scale("time [s]", "s", limits=(float(found.residual_time_s[0]), float(found.residual_time_s[-1])))
     for k in range(3):
         marks = (Level(y=0.0), Line(*envelope(found.residual_time_s, left[:, k]), "", AXIS_COLOURS[k], is_thin=True))
         y = Scale(f"{XYZ[k]}  [°/s]", "°/s", limits=(-reach, reach))
-        panels.append(Panel(Scale("time [s]", "s"), y, marks, height_px=110))
+        panels.append(Panel(x, y, marks, height_px=110))
     return Chart(tuple(panels), is_linked=True, legend=False)
 
 

@@ -101,9 +101,11 @@ def pose_table(recording: Recording, segments: Segments) -> Table:
 def signals_picture(recording: Recording, segments: Segments) -> Picture:
     """The signals with the poses shaded."""
     draw = later("figures", "draw_signals", recording, segments)
+    caption = "The recording; shaded where the sensor stood still"
+    caption += ", orange where a pose was disturbed." if any(pose.disturbed for pose in segments.poses) else "."
     return Picture(
         "signals",
-        "The recording; shaded where the sensor stood still, orange where a pose was disturbed.",
+        caption,
         draw,
         partial(signals_chart, recording, segments),
     )

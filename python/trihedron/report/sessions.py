@@ -38,7 +38,7 @@ def sessions_report(model: SessionsModel) -> Document:
     if len(recordings.head) > 1:
         # Names alone stand in the title already.
         sections.append(Section("Recordings", (recordings,)))
-    sections.append(Section("Figures", (_picture(model),)))
+    sections += [Section("Figures", (picture,)) for picture in _further(model)]
     usable = f"{how_many(n, 'recording')} were put into one model"
     if changed:
         usable = f"{how_many(n, 'recording')} of which {_and([change.id for change in changed])} changed"
@@ -144,9 +144,9 @@ def _changes(model: SessionsModel) -> list[Block]:
     rows = []
     with_group = model.by == "device"
     for change in model.changes:
-        cells = [change.id, *([change.group] if with_group else []), f"{change.p_adjusted:.2g}"]
-        rows.append((*cells, "yes" if change.significant else "no", _said(change) if change.significant else ""))
-    head = ("parameter", *(["device"] if with_group else []), "p", "changed", "how")
+        cells = [change.id, *([change.group] if with_group else []), plain_number(change.p_adjusted, 2)]
+        rows.append((*cells, _said(change) if change.significant else "no"))
+    head = ("parameter", *(["device"] if with_group else []), "p", "changed")
     return [
         Paragraph(
             "Each parameter of all recordings against one common value, by each recording's uncertainty and the drift "
@@ -214,13 +214,13 @@ def _sessions(model: SessionsModel) -> Table:
     )
 
 
-def _picture(model: SessionsModel) -> Picture:
-    return Picture(
-        "sessions",
-        "Every parameter in every recording with its uncertainty (error bars), about the common value.",
-        later("chart_figures", "draw_chart", partial(sessions_chart, model)),
-        partial(sessions_chart, model),
-    )
+def _further(model: SessionsModel) -> list[Picture]:
+    """What the first picture does not show."""
+    others = tuple(name for name in dict.fromkeys(one.parameter.id for one in model.repeated) if name not in DRIFTING)
+    chart = partial(sessions_chart, model, others)
+    caption = "The other parameters in every recording with their uncertainty (error bars), about the common value."
+    draw = later("chart_figures", "draw_chart", chart)
+    return [Picture("sessions", caption, draw, chart)] if others else []
 
 
 def sessions_columns(model: SessionsModel) -> Columns:

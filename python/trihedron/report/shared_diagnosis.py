@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.recording import distinct_names
 from trihedron.records.shared_effects import SharedDiagnosis, SharedEffect
 from trihedron.report.diagnosis_words import p_in_words, printed_unit, value_in_words, verdict_in_words
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
-from trihedron.report.numbers import engineering_exponent, listed, plain_number, power_of_ten
-from trihedron.report.shared_diagnosis_charts import shared_chart
+from trihedron.report.numbers import engineering_exponent, listed, plain_number, unit_with_power
+from trihedron.report.shared_diagnosis_charts import candidates_chart, shared_chart
 
 
 def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
     """Lay out what recordings share, and what belongs to one of them."""
-    names = _names(found)
+    names = distinct_names([one.recording_source for one in found.diagnoses])
     own = [one.id for one in found.effects if one.is_of_instrument]
     verdict = "The recordings share no missing effect."
     if own:
@@ -45,10 +45,6 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
     )
 
 
-def _names(found: SharedDiagnosis) -> list[str]:
-    return [" + ".join(Path(part).stem for part in one.recording_source.split(" + ")) for one in found.diagnoses]
-
-
 def _headlines(found: SharedDiagnosis) -> tuple[Headline, ...]:
     n_named = sum(bool(alone) for alone in found.of_single_recordings)
     return (
@@ -58,11 +54,16 @@ def _headlines(found: SharedDiagnosis) -> tuple[Headline, ...]:
 
 
 def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
-    """The strongest of what recordings share: whether its sizes agree is seen at a glance."""
-    if not found.effects:
+    """The strongest of what recordings share: whether its sizes agree is seen at a glance; else how far all are."""
+    if found.effects:
+        chart = partial(shared_chart, found.effects[0], names)
+        caption = f"{found.effects[0].id}: its parameters in all recordings together and in each, with 95 % intervals."
+    elif found.candidates:
+        chart = partial(candidates_chart, found.candidates)
+        caption = "What each effect would gain with one size in all recordings (twice the log-evidence, less what it "
+        caption += "pays for being one of many): left of 0 nothing."
+    else:
         return None
-    chart = partial(shared_chart, found.effects[0], names)
-    caption = f"{found.effects[0].id}: its parameters in all recordings together and in each, with 95 % intervals."
     return Picture("shared", caption, later("chart_figures", "draw_chart", chart), chart)
 
 
@@ -104,7 +105,7 @@ def _parameters(effect: SharedEffect, names: list[str]) -> Table:
     for i, common in enumerate(effect.parameters):
         largest = max(abs(one[i].value) for one in (effect.parameters, *effect.each))
         exponent = engineering_exponent(largest) if largest > 0.0 else 0
-        unit = " ".join(word for word in (power_of_ten(exponent), printed_unit(common.unit)) if word)
+        unit = unit_with_power(exponent, printed_unit(common.unit))
         cells = [_cell(one[i], 10.0**-exponent) for one in (effect.parameters, *effect.each)]
         rows.append((common.name, *cells, unit))
     return Table(("parameter", "together", *names, "unit"), tuple(rows), "Parameters together and alone")

@@ -1,4 +1,4 @@
-"""What a page draws of several recordings diagnosed together: the size of a shared effect in each of them."""
+"""What a page draws of several recordings diagnosed together: a shared effect in each of them, or all scores."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trihedron.records.shared_effects import SharedEffect
-from trihedron.report.chart import Chart, Level, Panel, Points, Scale
+from trihedron.records.shared_effects import SharedCandidate, SharedEffect
+from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale
 from trihedron.report.diagnosis_words import printed_unit
-from trihedron.report.numbers import engineering_exponent, power_of_ten, with_sigma
+from trihedron.report.numbers import engineering_exponent, plain_number, unit_with_power, with_sigma
 
 TWO_SIGMA = 2.0
 ROW_PX = 26
 COLUMNS = 3
+BAR = 0.7
+"""Of a row."""
 
 
 def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
@@ -24,7 +26,7 @@ def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
     for i, common in enumerate(effect.parameters):
         found = [one[i] for one in (effect.parameters, *effect.each)]
         exponent = engineering_exponent(max(abs(one.value) for one in found))
-        unit = " ".join(word for word in (power_of_ten(exponent), printed_unit(common.unit)) if word)
+        unit = unit_with_power(exponent, printed_unit(common.unit))
         value, sigma = 10.0**-exponent * np.array([(one.value, one.std) for one in found]).T
         told = [f"{row}: {with_sigma(v, s)} {unit}" for row, v, s in zip(rows, value, sigma, strict=True)]
         marks = (
@@ -35,3 +37,15 @@ def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
         x = Scale(f"{common.name} [{unit}]", unit, includes=(0.0,))
         panels.append(Panel(x, Scale("", names=rows), marks, title=common.name, height_px=ROW_PX * (len(rows) + 1)))
     return Chart(tuple(panels), columns=min(COLUMNS, len(panels)))
+
+
+def candidates_chart(candidates: Sequence[SharedCandidate]) -> Chart:
+    """A bar an effect: its score in all recordings together."""
+    place = -np.arange(1.0, len(candidates) + 1.0)
+    score = np.array([one.score for one in candidates])
+    told = [f"{one.id}: score {plain_number(one.score)}" for one in candidates]
+    bars = Bars(score, place, BAR, told, "tried in all recordings together", "soft", is_across=True)
+    x = Scale("score", includes=(0.0,))
+    names = tuple(one.id for one in candidates)
+    panel = Panel(x, Scale("", names=names), (bars, Level(x=0.0)), height_px=ROW_PX * (len(names) + 1))
+    return Chart((panel,))

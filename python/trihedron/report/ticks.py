@@ -34,19 +34,21 @@ def _linear_ticks(low: float, high: float, whole: bool, most: int) -> list[Tick]
 def _log_ticks(low: float, high: float, most: int) -> list[Tick]:
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
     every = max(1, math.ceil((last - first) / most))
-    narrow = math.log10(high / low) < 2.0
+    decades = math.log10(high / low)
+    # Of less than a decade 1, 2 and 5 may leave a single figure, from which no scale is read.
+    marked = (1, 2, 3, 4, 6, 8) if decades < 1.0 else (1, 2, 5) if decades < 2.0 else (1,)
     out = []
     for n in range(first, last + 1):
-        for m in (1, 2, 5) if narrow else (1,):
+        for m in marked:
             value = m * 10.0**n
             if low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
-                word = "" if n % every else _log_word(m, n)
+                word = "" if n % every else _log_word(m, n, is_plain=decades < 2.0)
                 out.append((value, word))
     return out
 
 
-def _log_word(mantissa: int, n: int) -> str:
-    if -2 <= n <= 3:
+def _log_word(mantissa: int, n: int, *, is_plain: bool) -> str:
+    if (-3 if is_plain else -2) <= n <= 3:
         return f"{mantissa * 10.0**n:g}"
     return power_of_ten(n) if mantissa == 1 else f"{mantissa}·{power_of_ten(n)}"
 

@@ -166,8 +166,9 @@ _TERMS = (
         Code.SLOW_NOISE_UNRESOLVED,
         "",
         NOTE,
-        "Slow noise is there; B and K are not separable here: B {flicker_lower:.2g} … {flicker_upper:.2g} {unit}, "
-        "K {walk_lower:.2g} … {walk_upper:.2g} {unit}/√s, not both zero.",
+        "Slow noise is there; B and K are not separable here: B at least "
+        "{flicker_lower:.2g}, at most {flicker_upper:.2g} {unit:unit}, K at least {walk_lower:.2g}, at most "
+        "{walk_upper:.2g} {unit:unit}/√s, not both zero.",
         "the log is short compared with the times over which flicker and walk differ",
         "Variances of means use the most likely sum of both; record longer to separate them.",
         numbers=("evidence",),
@@ -192,7 +193,7 @@ _TERMS = (
         Code.LOG_TOO_SHORT,
         "",
         NOTE,
-        "No minimum before the log's end: K is below {limit:.2g} {unit}/√s (upper limit).",
+        "No minimum before the log's end: K is below {limit:.2g} {unit:unit}/√s (upper limit).",
         "the log is short compared with the sensor's stability",
         "Record longer to find the best averaging time.",
     ),

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 from trihedron.records import Finding, Severity
 from trihedron.report.document import FindingList, Paragraph
-from trihedron.report.numbers import how_many, listed
+from trihedron.report.numbers import MINUS, how_many, listed
 
 _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
 # A number that is a value; one that names a thing (pose 3) is recognised by the word before it.
-_NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+_NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+−-]?\d+)?")
 _NAMED = re.compile(r"^(Move|Pose|Turn) (\d+)(?: \([^)]*\))?,? (.*)$", re.DOTALL)
 _AXIS = re.compile(r"^((?:gyro|accel)(?:\s\w+)?|ch\d+|\w+ [xyz123]): (.*)$", re.DOTALL | re.IGNORECASE)
 
@@ -83,10 +83,14 @@ def _ranged(sentences: Sequence[str]) -> str | None:
     columns = list(zip(*(_NUMBER.findall(text) for text in sentences), strict=True))
     words = []
     for column in columns:
-        low, high = min(column, key=float), max(column, key=float)
+        low, high = min(column, key=_value), max(column, key=_value)
         words.append(low if low == high else f"{low} to {high}")
     pieces = skeleton.split("\0")
     return pieces[0] + "".join(word + piece for word, piece in zip(words, pieces[1:], strict=True))
+
+
+def _value(number: str) -> float:
+    return float(number.replace(MINUS, "-"))
 
 
 def _capital(text: str) -> str:

@@ -12,6 +12,7 @@ A place is a name and, after the colon, how its value becomes words:
 ``together``             ``x, y together with z``
 ``sentences``            ``X. Y.``
 ``clause``               a sentence without its stop
+``unit``                 ``m/s²`` for ``m/s^2``
 ``first 8``              ``3, 5, 6``, with ``...`` behind the eighth
 ``numbered``             several words as ``(1) ...; (2) ...``
 ``axis``                 ``X`` for 1 or ``x``
@@ -28,7 +29,7 @@ from string import Formatter
 from typing import Any
 
 from trihedron.arrays import XYZ
-from trihedron.report.numbers import listed
+from trihedron.report.numbers import MINUS, listed, unit_in_print
 from trihedron.units import cm_from_m, degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, ms_from_s
 
 UNITS: Mapping[str, Callable[[float], float]] = {
@@ -110,6 +111,8 @@ def _in_words(value: Any, how: str, line: str) -> str:
         return " together with ".join([", ".join(value[:-1]), value[-1]] if len(value) > 1 else value)
     if how == "sentences":
         return " ".join(f"{word[:1].upper()}{word[1:]}." for word in value)
+    if how == "unit":
+        return unit_in_print(value)
     if how == "clause":
         return str(value).rstrip(".")
     if how == "numbered":
@@ -135,10 +138,16 @@ def _number(value: float, how: str) -> str:
         value, how = abs(value), how[4:]
     digits, _, unit = how.partition(" ")
     if not unit:
-        return format(value, digits)
+        return _digits(value, digits)
     if unit.startswith("!"):
-        return format(UNITS[unit[1:]](value), digits)
-    return f"{UNITS[unit](value):{digits}} {unit}"
+        return _digits(UNITS[unit[1:]](value), digits)
+    return f"{_digits(UNITS[unit](value), digits)} {unit}"
+
+
+def _digits(value: float, digits: str) -> str:
+    """With an exponent as in tables: ``7.3e−5``."""
+    mantissa, e, power = format(value, digits).partition("e")
+    return f"{mantissa}e{int(power)}".replace("e-", f"e{MINUS}") if e else mantissa
 
 
 def _plural(noun: str) -> str:
