@@ -163,7 +163,7 @@ def calibrate(
             grave = [finding.seen for finding in recording.findings if finding.severity is Severity.SERIOUS]
             raise RefusedError(" ".join((*grave, str(error)))) from None
     calibration = in_frame(with_bending(calibration, segments), wanted)
-    if turntable_deg_s is not None:
+    if turntable_deg_s is not None or turntable_sigma != 0.0:
         calibration = on_turntable(calibration, recording, segments, turntable_deg_s, turntable_sigma)
     findings = (*said, *recording.findings, *_as_they_weigh(segments), *_of_fit(calibration, recording, segments))
     return _result(calibration, findings, segments, recording)

@@ -16,6 +16,7 @@ from trihedron.errors import RefusedError
 from trihedron.probability import fdtrc
 from trihedron.ranges import ranges_of
 from trihedron.records.calibration import Calibration
+from trihedron.records.checked import number_of
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
@@ -92,7 +93,7 @@ def on_turntable(
     calibration: Calibration,
     recording: Recording,
     segments: Segments,
-    speeds_deg_s: Sequence[float],
+    speeds_deg_s: Sequence[float] | None,
     relative_sigma: float = 0.0,
 ) -> Calibration:
     """The calibration with the speeds of a turntable, in whatever orientation the unit lay on it.
@@ -111,6 +112,10 @@ def on_turntable(
     ValueError
         When there is no gyro, no steady turn, or another number of them than of speeds.
     """
+    if not 0.0 <= number_of("turntable_sigma", relative_sigma) < 0.5:
+        raise RefusedError(f"turntable_sigma is a relative error such as 0.001, not {relative_sigma}.")
+    if speeds_deg_s is None:
+        raise RefusedError("turntable_sigma is the error of turntable_deg_s: give the speeds, too.")
     gyro = calibration.gyroscope
     if gyro is None or recording.gyroscope is None:
         raise RefusedError("a turntable tells the gyro, and none was calibrated here; log poses and moves as well.")
