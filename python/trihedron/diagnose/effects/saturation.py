@@ -51,9 +51,11 @@ class _Saturation(DirectEffect):
             return None
         touched = sorted({m for m, (a, b) in enumerate(obs.move_ranges) for r in runs if a <= r.start < b})
         # Turns at one steady speed share a level too. A false reading contradicts gravity or rest after the move, and
-        # does so more than moves that stay within the range.
+        # does so more than moves that stay within the range. A false rate contradicts gravity first: rest alone is
+        # contradicted by an arm between the sensors and the axis of a table as well.
         system = context.fitted.system
-        move_rows = np.isin(system.domain, (MOVES, DYNAMICS)) & (system.walk == 0)
+        domains = (MOVES,) if is_gyro else (MOVES, DYNAMICS)
+        move_rows = np.isin(system.domain, domains) & (system.walk == 0)
         at_limit = np.isin(system.segment, touched)
         squared = system.residual**2
         misfit = float(np.mean(squared[move_rows & at_limit]))

@@ -29,8 +29,8 @@ _MOVES = (
         Code.TURNTABLE,
         "contradicting",
         WARNING,
-        "the stated speeds of {turns:.0f} steady turns are off by {scatter_percent:.2g} % rms, {common_percent:.2g} % "
-        "too high on average, beside what moves and poses tell: more than noise explains; each was given that "
+        "the stated speeds of {turns:.0f} steady turns are off by {scatter_percent:.2g} % rms, {common_percent:+.2g} % "
+        "on average, beside what moves and poses tell: more than noise explains; each was given that "
         "uncertainty.",
         "another speed than stated, a table that does not keep it, or a sensor that S and b do not describe",
         "Count the turns in a minute; state --turntable-error.",
