@@ -262,6 +262,19 @@ def test_a_rotation_beyond_the_gyros_range_is_not_in_the_figure_of_a_verificatio
     assert judged.angle_rms_deg < 0.6
 
 
+def test_a_scale_off_by_a_twentieth_or_a_bias_by_5_degrees_a_second_fails_on_another_session(real_data):
+    first, other = (trihedron.read(real_data / f"mimu4444/exp_{n}.npz", device=5) for n in (2, 3))
+    right = trihedron.calibrate(first, gravity_m_s2=9.8184).calibration
+    gyro, accelerometer = right.gyroscope, right.accelerometer
+    scaled = replace(
+        right,
+        gyroscope=replace(gyro, S=1.05 * gyro.S, b=1.05 * gyro.b),
+        accelerometer=replace(accelerometer, S=1.05 * accelerometer.S, b=1.05 * accelerometer.b),
+    )
+    turning = replace(right, gyroscope=replace(gyro, b=gyro.b + math.radians(5.0)))
+    assert [trihedron.verify(one, other).is_passed for one in (right, scaled, turning)] == [True, False, False]
+
+
 def test_faces_of_a_simulated_case_that_are_out_of_flat_cost_neither_turns_nor_honesty(real_data):
     recording = trihedron.read(real_data / "repro/faces_unflat_180.csv.gz")
     truth = json.loads((real_data / "repro/faces_unflat_180.truth.json").read_text())
