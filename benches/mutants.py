@@ -130,7 +130,7 @@ def nearest(path: Path) -> list[str]:
         near = 8.0 * (f"trihedron.{dotted}" in text) + 3.0 * sum(f"_{name}" in test.stem for name in names)
         near += 2.0 * sum(f".{part}" in text for part in parts) + (path.parts[0] == "rust") * ("_core" in text)
         score[test.name] = near - 1e-5 * len(text)
-    return [f"tests/{name}" for name in sorted(score, key=lambda n: -score[n]) if name != "test_rust.py"]
+    return [f"tests/{name}" for name in sorted(score, key=lambda n: -score[n])]
 
 
 def is_noticed(mutant: Mutant, copy: Path, tests: list[str], seconds: float) -> str:
