@@ -112,6 +112,8 @@ def test_another_number_of_speeds_is_refused_with_the_turns_that_were_found(tabl
     recording, segments, _ = tables[0]
     with pytest.raises(ValueError, match=r"3 speeds were given and 12 steady turns were found \(seconds 5\.3-"):
         calibrate(recording, segments=segments, gravity_m_s2=G, turntable_deg_s=[45.0, 90.0, 180.0])
+    with pytest.raises(ValueError, match="leave them, or the reference, out"):
+        calibrate(recording, segments=segments, gravity_m_s2=G, turntable_deg_s=[45.0], reference=recording)
 
 
 def test_steady_turns_of_a_table_are_no_end_of_the_gyros_range():

@@ -139,10 +139,11 @@ def calibrate(
     if reference is not None:
         from trihedron.api.referring import calibration_by, held_against
 
+        if turntable_deg_s is not None:
+            raise RefusedError("a turntable's speeds belong to poses and moves: leave them, or the reference, out.")
         found = held_against(recording, reference, gravity, columns=reference_columns)
         by_motion = calibration_by(found, recording, gravity, source, frame)
-        result = _result(by_motion, (*said, *by_motion.findings), segments, recording)
-        return replace(result, reference=found)
+        return replace(_result(by_motion, (*said, *by_motion.findings), segments, recording), reference=found)
     _require_poses(recording, segments)
     if method == "faces":
         calibration = _by_faces(recording, segments, gravity, source, faces, turns_deg, gyroscope_nominal)
