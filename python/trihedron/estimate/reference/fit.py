@@ -106,8 +106,8 @@ def fit_references(
     ready = [_prepared(recording, motion, gravity_m_s2) for recording, motion in pairs]
     found, effects = _fitted([one.side for one in ready])
     for k, one in enumerate(ready):
-        refuse_still(one.side.reference.motion, found.value(k, "S"), found.covariance(k, ("S",)))
         refuse_two_clocks(found, k)
+        refuse_still(one.side.reference.motion, found.value(k, "S"), found.covariance(k, ("S",)))
     return tuple(_answer(one, found, k, effects, given) for k, one in enumerate(ready))
 
 

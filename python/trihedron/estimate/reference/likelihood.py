@@ -100,6 +100,12 @@ def together(problems: Sequence[Problem], found: Sequence[Equations]) -> Togethe
     return Together(inverse.T @ half, inverse.T @ inverse, evidence)
 
 
+def at_the_point(problems: Sequence[Problem], found: Sequence[Equations]) -> float:
+    """Log density of the readings and of all parameters at the point of linearisation."""
+    priors = {int(i): float(c) for p in problems for i, c in zip(p.index, p.centre, strict=True)}
+    return sum(one.constant for one in found) - 0.5 * sum(c * c for c in priors.values())
+
+
 @dataclass(frozen=True, eq=False)
 class Fitted:
     """Parameters of one hypothesis with the strengths integrated out: mean (p,) and covariance (p, p) in prior units.

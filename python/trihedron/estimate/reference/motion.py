@@ -10,7 +10,16 @@ from scipy.optimize import brentq
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.reference.beside import BLOCK_S, Beside, Point, SlowError, places
-from trihedron.estimate.reference.likelihood import TYPICAL, Fitted, Problem, equations, fit, most_likely, together
+from trihedron.estimate.reference.likelihood import (
+    TYPICAL,
+    Fitted,
+    Problem,
+    at_the_point,
+    equations,
+    fit,
+    most_likely,
+    together,
+)
 
 ALWAYS = ("S", "b", "clock", "earth", "gyro-g-sensitivity")
 """What every hypothesis holds: g-sensitivity by the size that data sheets give it, named or not."""
@@ -25,6 +34,8 @@ PAID = 2.0 * np.log(len(WIDER) * len(EFFECTS))
 LARGEST = 100.0
 """Effects beyond this many times the size in data sheets are no effects of a working part."""
 RELINEARISED = 3
+SHORTER = 0.5 ** np.arange(6)
+"""Parts of a step that are tried: beyond a quarter of a period of the motion a clock's offset is not linear."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,19 +74,26 @@ def fit_motion(
     where = places(sides, wanted)
     points = [side.start for side in sides] if before is None else before.points
     strengths = np.tile(TYPICAL, (len(sides), 1)) if before is None else before.fitted.strengths
+    problems = _problems(sides, points, where, wider, block_s)
     for turn in range(RELINEARISED if before is None else 1):
-        problems = _problems(sides, points, where, wider, block_s)
         if turn:
             strengths, _ = most_likely(problems, strengths)
-        mean = together(problems, [equations(p, s) for p, s in zip(problems, strengths, strict=True)]).mean
-        points = [
-            replace(
-                side.moved(point, {name: _si(side, name, wider) * mean[at] for name, at in own.items()}),
-                slow=None if side.reference.motion.attitude is None else slow_error(problem, s, mean),
-            )
-            for side, point, own, problem, s in zip(sides, points, where, problems, strengths, strict=True)
-        ]
-    problems = _problems(sides, points, where, wider, block_s)
+        found = [equations(p, s) for p, s in zip(problems, strengths, strict=True)]
+        mean, height = together(problems, found).mean, at_the_point(problems, found)
+        for shorter in SHORTER:
+            ahead = [
+                replace(
+                    side.moved(point, {name: shorter * _si(side, name, wider) * mean[at] for name, at in own.items()}),
+                    slow=None if side.reference.motion.attitude is None else slow_error(problem, s, shorter * mean),
+                )
+                for side, point, own, problem, s in zip(sides, points, where, problems, strengths, strict=True)
+            ]
+            there = _problems(sides, ahead, where, wider, block_s)
+            if at_the_point(there, [equations(p, s) for p, s in zip(there, strengths, strict=True)]) > height:
+                break
+        else:
+            break
+        points, problems = ahead, there
     return MotionFit(sides, points, where, problems, fit(problems, strengths), wider)
 
 
