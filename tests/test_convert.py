@@ -34,3 +34,15 @@ def test_missing_readings_stay_missing_and_python_converts_what_it_reads(tmp_pat
     again = trihedron.read(tmp_path / "out.csv")
     assert np.isnan(again.accelerometer[40:45, 1]).all()
     np.testing.assert_array_equal(recording.accelerometer, again.accelerometer)
+
+
+def test_the_logs_own_time_and_other_columns_stay_where_they_were(tmp_path):
+    """A camera beside the sensor is joined by the log's own clock."""
+    table = readings()
+    table[:, 0] += 1_535_632_344.25
+    log = write(tmp_path / "log.csv", np.column_stack([table, np.arange(len(table))]), HEADER.replace("gz", "gz,exposure"))
+    trihedron.convert(log, tmp_path / "out.csv")
+    first, again = trihedron.read(log), trihedron.read(tmp_path / "out.csv")
+    # Seconds since 1970 are known to a quarter of a microsecond in 64 bits.
+    assert again.start_epoch_s == pytest.approx(first.start_epoch_s, rel=0, abs=1e-6)
+    np.testing.assert_array_equal(again.auxiliary["exposure"], np.arange(len(table)))

@@ -3,17 +3,19 @@
 import csv
 import io
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import trihedron
 from noise_series import series
 from trihedron.api.identifying import allan as noise_of
 from trihedron.cli import main
-from trihedron.records import Recording
+from trihedron.records import Calibration, Recording, SensorCalibration
 from trihedron.report.noise import noise_report
 from trihedron.report.noise_files import curve_csv
-from trihedron.units import RateUnit
+from trihedron.units import AccelerationUnit, RateUnit
 
 RATE = 50.0
 
@@ -108,3 +110,25 @@ def test_lost_rows_become_missing_readings_not_shorter_time():
     assert found.axes[0].value("N") == pytest.approx(np.radians(1e-3), rel=0.02)
     assert "°/√h" in str(noise_report(found))
     assert curve_csv(found).startswith("tau_s,cluster,gyro_x_deviation[rad/s]")
+
+
+def test_a_calibration_gives_a_log_in_counts_its_units_axis_by_axis(log):
+    counts, per_count = trihedron.read(log), np.array([1e-4, 2e-4, 4e-4])
+    raw = replace(
+        counts,
+        gyroscope=counts.gyroscope / per_count,
+        accelerometer=counts.accelerometer / 6e-4,
+        gyroscope_unit=RateUnit.COUNTS,
+        accelerometer_unit=AccelerationUnit.COUNTS,
+    )
+
+    def linear(S, unit):
+        return SensorCalibration(S, np.zeros(3), np.zeros((12, 12)), "counts", unit, "joint")
+
+    known = Calibration(
+        linear(6e-4 * np.eye(3), "m/s^2"), linear(np.diag(per_count), "rad/s"), np.zeros((24, 24)), "lower", 9.81, ""
+    )
+    plain, told = noise_of(counts), noise_of(raw, calibration=known)
+    for one, other in zip(plain.axes, told.axes, strict=True):
+        assert other.unit == one.unit
+        assert other.terms["N"].value == pytest.approx(one.terms["N"].value, rel=1e-6)

@@ -45,8 +45,9 @@ def check_ranked(known, log, gravity):
 
 @pytest.fixture(scope="module")
 def session():
-    log, _ = trihedron.simulate("hand-session", 5)
-    return log, trihedron.calibrate(log, gravity_m_s2=9.81).calibration
+    """A log, and a calibration that was made from another one of the same unit."""
+    (log, _), (before, _) = (trihedron.simulate("hand-session", seed) for seed in (6, 5))
+    return log, trihedron.calibrate(before, gravity_m_s2=9.81).calibration
 
 
 def test_five_wrong_files_of_a_simulated_unit_are_rejected_with_their_mistake(session):
@@ -178,3 +179,13 @@ def test_published_results_of_imu_tk_are_found_to_be_made_with_another_gravity(r
         assert (one.maker, [found.kind for found in one.suspicions]) == ("imu_tk", ["gravity"])
         # Scales repeat to 0.03 % from session to session.
         assert one.suspicions[0].factor == pytest.approx(9.81744 / 9.803, abs=5e-4)
+
+
+def test_the_recording_that_a_calibration_was_made_from_proves_nothing_of_it(session):
+    """It fits best and is rejected; what fits behind it is the best."""
+    log = replace(trihedron.simulate("hand-session", 6)[0], sha256="of this log")
+    own = replace(trihedron.calibrate(log, gravity_m_s2=9.81).calibration, recording_sha256="of this log")
+    assert not trihedron.verify(own, log).is_passed
+    ranking = trihedron.rank([own, session[1]], log, gravity_m_s2=9.81)
+    assert [one.name for one in ranking.candidates] == ["calibration 2", "calibration 1"]
+    assert ranking.best.behind == 0.0

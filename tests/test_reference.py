@@ -181,6 +181,17 @@ def test_two_rigidly_joined_units_show_how_they_are_joined():
     assert shared_log(trial.log, neighbour(42, 40), G) is None
 
 
+def test_a_simulation_moved_as_the_log_was_is_a_model_first_and_a_reference_besides():
+    """A bias that the twin has as well is no turning in its poses: they are poses, and carry the comparison."""
+    log, _ = trihedron.simulate("hand-session", 5)
+    log = replace(log, gyroscope=log.gyroscope + np.array([0.02, -0.03, 0.025]) * np.abs(log.gyroscope).std())
+    known = trihedron.calibrate(log, gravity_m_s2=G)
+    twin, _ = trihedron.twin(log, known)
+    found = trihedron.diagnose(log, against=twin, gravity_m_s2=G)
+    assert found.reference is not None
+    assert {p.id for p in found.parameters} >= {"accel-scale", "gyro-bias"}
+
+
 def test_attitudes_from_world_to_body_are_read_so_and_it_is_said(posed):
     turned = replace(posed.motion, attitude=np.swapaxes(posed.motion.attitude, 1, 2).copy(), position=None)
     found = fit_reference(posed.log, turned, G)

@@ -180,3 +180,15 @@ def test_what_a_scenario_lacks_or_has_in_the_wrong_place_is_named(tmp_path, text
     (tmp_path / "s.toml").write_text(text + "\n")
     with pytest.raises(ValueError, match=said):
         read_scenario(tmp_path / "s.toml")
+
+
+def test_the_scenario_to_begin_with_is_made_one_of_the_users_own_unit(tmp_path, capsys):
+    begun, better, log = tmp_path / "sensor.toml", tmp_path / "better.toml", tmp_path / "log.csv"
+    assert main(["simulate", "--template", str(begun)]) == 0
+    assert main(["simulate", "hand-session", "-o", str(log), "--seed", "5"]) == 0
+    asked = ["diagnose", str(log), "--gravity", "9.80665", "--against", str(begun), "--improved", str(better)]
+    assert main(asked) == 0
+    capsys.readouterr()
+    S = read_scenario(better).accelerometer.S
+    known = scenario_by_name("hand-session").accelerometer.S
+    np.testing.assert_allclose(np.linalg.norm(S, axis=0), np.linalg.norm(known, axis=0), rtol=2e-3)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from trihedron.api.calibrating import calibrate
@@ -18,6 +17,7 @@ from trihedron.api.referring import (
     effects_of,
     held_against,
 )
+from trihedron.api.simulating import names_scenario
 from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.reference.fit import moves_along
 from trihedron.estimate.reference.gyroscope import poses_at_rest
@@ -58,7 +58,7 @@ def beside(
     found = held_against(recording, reference, gravity, columns=columns, given=given)
     segments = segment(recording)
     try:
-        resting = poses_at_rest(segments, found.gyroscope)
+        resting = poses_at_rest(segments, found.gyroscope, has_own_bias=found.kind == ANOTHER_UNIT)
         if resting < FEWEST_POSES:
             raise RefusedError(f"{resting} poses are too few for a model of their own")
         result = ordinary()
@@ -123,7 +123,7 @@ def shared_log(recording: Recording, other: Any, gravity: float | None) -> Recor
     unrelated hands do.
     """
     if isinstance(other, str | os.PathLike):
-        if Path(other).suffix.lower() == ".toml":
+        if names_scenario(other):
             return None
         other = read(other)
     if not isinstance(other, Recording) or other.gyroscope is None or recording.gyroscope is None:

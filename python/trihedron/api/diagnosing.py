@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, fields, replace
 from functools import cache, partial
-from pathlib import Path
 from typing import Any
 
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units, without_effects
@@ -17,6 +16,7 @@ from trihedron.api.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
 from trihedron.api.driving import MovedAlike, driven
 from trihedron.api.reading import AnyRecording, read, recording_of, segment, segments_of
 from trihedron.api.referring import AnyReference
+from trihedron.api.simulating import names_scenario, scenario_of
 from trihedron.comparison.correlation import correlation_times
 from trihedron.comparison.frames import rates_of_world, sign_of_gravity
 from trihedron.comparison.model import compared
@@ -35,7 +35,7 @@ from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.records.progress import Progress
 from trihedron.records.results import DiagnosisResult
 from trihedron.segment import resegment
-from trihedron.simulate import Scenario, read_scenario
+from trihedron.simulate import Scenario
 
 GivenModel = Recording | Scenario | str | os.PathLike[str]
 """A simulated recording or its file, or a scenario or its .toml."""
@@ -243,9 +243,9 @@ def _simulated_log(
         if not isinstance(against, str | os.PathLike):
             kind = type(against).__name__
             raise WrongTypeError(f"against is a simulated recording, a scenario, or the file of one, not {kind}.")
-        if Path(against).suffix.lower() != ".toml":
+        if not names_scenario(against):
             return read(against), None
-        against = read_scenario(Path(against))
+        against = scenario_of(against)
     if recording.gyroscope is None:
         raise RefusedError(
             "a scenario is moved as the recording was, and this recording has no gyro to show how: log both sensors, "

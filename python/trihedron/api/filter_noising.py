@@ -108,9 +108,14 @@ def filter_noise(
         source, findings = motion.source, (*findings, *motion.findings, *_noticed(sensors))
     else:
         if own is None:
+            why = (
+                "its readings are counts of unknown size"
+                if rate_to_si(recording.gyroscope_unit) is None
+                else f"the sensor is not static in it for {SHORTEST_REST_S:.0f} s"
+            )
             raise RefusedError(
-                f"{recording.source}: the sensor is not static in it for {SHORTEST_REST_S:.0f} s, or its units are "
-                "unknown; give known motion beside it (--reference), or a log that begins static."
+                f"{recording.source}: {why}, so that it does not tell its own noise; give known motion beside it "
+                "(--reference), or run `trihedron allan` on a static log of ten minutes or more."
             )
         sensors = tuple(_at_rest(own, sensor, known) for sensor in UNITS if at_rest(own.axes, UNITS[sensor]))
         if segments is not None:
@@ -182,7 +187,9 @@ def _static(given: Noise | str | os.PathLike[str]) -> Static:
         )
     known = _sensors(given)
     if not known:
-        raise RefusedError(f"{given.source}: the static log is in counts; say its units, or the size of a count.")
+        raise RefusedError(
+            f"{given.source}: the static log is in counts; give the JSON of `trihedron allan LOG --calibration FILE`."
+        )
     return known
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.api.applying import AnyCalibration, calibration_of, check_units
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.errors import RefusedError
 from trihedron.estimate.noise.from_curve import identify_curve
@@ -21,7 +22,7 @@ from trihedron.files.checkpoint import Checkpoint, made_of
 from trihedron.read.allan_table import read_allan_table
 from trihedron.read.chunks import open_chunks
 from trihedron.read.errors import ReadError
-from trihedron.records import Noise, TermName
+from trihedron.records import Calibration, Noise, Recording, TermName
 from trihedron.units import (
     AccelerationUnit,
     RateUnit,
@@ -43,6 +44,7 @@ def allan(
     clusters: Sequence[int] | None = None,
     accelerometer_lsb: str | None = None,
     gyroscope_lsb: str | None = None,
+    calibration: AnyCalibration | None = None,
 ) -> Noise:
     """Noise terms of every axis of a static recording, in SI units where the log tells them (docs/noise.md).
 
@@ -58,6 +60,8 @@ def allan(
         Readings per cluster of the Allan curve; evenly spaced in the logarithm when not given.
     accelerometer_lsb, gyroscope_lsb : str, optional
         The size of a count of a log in counts: ``"0.05 deg/s"``.
+    calibration : CalibrationResult, Calibration or path, optional
+        Of the unit: it tells the size of a count of every axis.
 
     Returns
     -------
@@ -76,6 +80,10 @@ def allan(
     >>> found.axis("gyro x").terms  # doctest: +SKIP
     """
     recording = recording_of(recording)
+    if calibration is not None:
+        if accelerometer_lsb is not None or gyroscope_lsb is not None:
+            raise RefusedError("the size of a count is given twice: by a calibration and by itself; give one.")
+        recording = _in_si(recording, calibration_of(calibration))
     readings, names, units = readings_of(
         recording,
         None if gyroscope_lsb is None else rate_lsb_to_si(gyroscope_lsb),
@@ -93,6 +101,25 @@ def allan(
     )
     # What the log is said to be comes before what its noise is.
     return replace(found, findings=(*recording.findings, *found.findings))
+
+
+def _in_si(recording: Recording, known: Calibration) -> Recording:
+    """Every axis divided by its sensitivity; the axes are not turned: a converter's steps stay what they are."""
+    check_units(known, recording)
+    accelerometer, gyroscope = (
+        readings if sensor is None or readings is None else readings / np.linalg.norm(np.linalg.inv(sensor.S), axis=1)
+        for readings, sensor in (
+            (recording.accelerometer, known.accelerometer),
+            (recording.gyroscope, known.gyroscope),
+        )
+    )
+    return replace(
+        recording,
+        accelerometer=accelerometer,
+        gyroscope=gyroscope,
+        accelerometer_unit=AccelerationUnit.M_S2,
+        gyroscope_unit=recording.gyroscope_unit if known.gyroscope is None else RateUnit.RAD_S,
+    )
 
 
 def noise_of_file(

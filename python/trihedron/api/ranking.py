@@ -12,7 +12,7 @@ import numpy as np
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units, doubted, without_effects
 from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
-from trihedron.api.verifying import own_calibration
+from trihedron.api.verifying import own_calibration, same_recording
 from trihedron.errors import RefusedError
 from trihedron.estimate.ranking import densities, rms_interval, suspicions_of, with_bias_of_log
 from trihedron.estimate.verification import verify_calibration
@@ -79,23 +79,27 @@ def rank(
             known = with_bias_of_log(known, segments, gravity)
         judged.append((name, known, _judge(known, recording, segments, gravity, source, own)))
     points = densities([verification for _, _, verification in judged])
-    best = points[int(np.argmax([p.sum() for p in points]))]
-    out = []
-    for (name, known, verification), own_points in zip(judged, points, strict=True):
-        lost = best - own_points
-        out.append(
-            Ranked(
-                name=name,
-                maker=str(known.extensions.get("maker", "trihedron")),
-                verification=verification,
-                behind=float(lost.sum()),
-                behind_sigma=float(np.sqrt(len(lost)) * lost.std()),
-                norm_interval=rms_interval(verification.norm_error),
-                angle_interval=rms_interval(verification.angle_deg),
-                suspicions=() if own is None else suspicions_of(known, own, recording, segments, gravity),
-                without_bias=tuple(known.extensions.get("without_bias", ())),  # type: ignore[arg-type]
-            )
+    out = [
+        Ranked(
+            name=name,
+            maker=str(known.extensions.get("maker", "trihedron")),
+            verification=verification,
+            behind=0.0,
+            behind_sigma=0.0,
+            norm_interval=rms_interval(verification.norm_error),
+            angle_interval=rms_interval(verification.angle_deg),
+            suspicions=() if own is None else suspicions_of(known, own, recording, segments, gravity),
+            without_bias=tuple(known.extensions.get("without_bias", ())),  # type: ignore[arg-type]
         )
+        for name, known, verification in judged
+    ]
+    # One that is rejected is no measure, however well it fits: it may have been made from this very log.
+    best = points[min(range(len(out)), key=lambda k: (out[k].is_rejected, -points[k].sum()))]
+    lost = [best - own_points for own_points in points]
+    out = [
+        replace(one, behind=float(by.sum()), behind_sigma=float(np.sqrt(len(by)) * by.std()))
+        for one, by in zip(out, lost, strict=True)
+    ]
     ordered = sorted(out, key=lambda one: (one.is_rejected, one.behind))
     return Ranking(recording.source, gravity, source, tuple(ordered))
 
@@ -114,7 +118,7 @@ def _judge(
         segments = segments_of(None, recording, None)
         known = with_bias_of_log(known, segments, gravity_m_s2)
     judged = verify_calibration(known, recording, segments, gravity_m_s2, source, own)
-    return replace(judged, findings=(*doubted(known), *judged.findings, *more))
+    return replace(judged, findings=(*doubted(known), *same_recording(known, recording), *judged.findings, *more))
 
 
 def _on_this_log(known: Calibration, recording: Recording) -> Calibration:

@@ -13,7 +13,14 @@ from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.records import Recording, Truth
 from trihedron.segment import segment_recording
-from trihedron.simulate import Scenario, read_scenario, scenario_by_name, twin_scenario, with_diagnosed_effects
+from trihedron.simulate import (
+    Scenario,
+    list_scenarios,
+    read_scenario,
+    scenario_by_name,
+    twin_scenario,
+    with_diagnosed_effects,
+)
 from trihedron.simulate import simulate as run
 
 
@@ -53,6 +60,11 @@ def scenario_of(scenario: str | os.PathLike[str] | Scenario) -> Scenario:
         raise WrongTypeError(f"a scenario is its name or its .toml file, not {type(scenario).__name__}.")
     path = Path(scenario)
     return read_scenario(path) if path.suffix.lower() == ".toml" else scenario_by_name(str(scenario))
+
+
+def names_scenario(given: str | os.PathLike[str]) -> bool:
+    """Whether a scenario is named, by its file or as a ready-made one, and no log."""
+    return str(given) in list_scenarios() or Path(given).suffix.lower() == ".toml"
 
 
 @dataclass(frozen=True)

@@ -71,8 +71,7 @@ def verify(
         for found in judged.findings
     )
     findings = (*recording.findings, *segments.findings, *missed, *more, *_limits(judged, limit_mg, limit_deg))
-    findings = (*doubted(known), *findings)
-    findings += _same_recording(known.recording_sha256, recording.sha256)
+    findings = (*doubted(known), *same_recording(known, recording), *findings)
     return VerificationResult(replace(judged, findings=findings), known, segments, recording)
 
 
@@ -94,7 +93,7 @@ def _limits(judged: Verification, limit_mg: float | None, limit_deg: float | Non
     return tuple(found)
 
 
-def _same_recording(made_from: str, tested_on: str) -> tuple[Finding, ...]:
-    if not made_from or made_from != tested_on:
-        return ()
-    return (Finding.of(FindingCode.SAME_RECORDING),)
+def same_recording(known: Calibration, recording: Recording) -> tuple[Finding, ...]:
+    """What is said of a calibration held against the log that it was made from."""
+    is_same = bool(known.recording_sha256) and known.recording_sha256 == recording.sha256
+    return (Finding.of(FindingCode.SAME_RECORDING),) if is_same else ()

@@ -24,6 +24,10 @@ GyroLsb = Annotated[
 AccelLsb = Annotated[
     str | None, typer.Option("--accel-lsb", metavar="SIZE", help="Size of the accelerometer's count, as in '3.33 mg'.")
 ]
+Of = Annotated[
+    Path | None,
+    typer.Option("--calibration", metavar="FILE", help="Calibration of the unit: it tells the size of a count."),
+]
 Exclude = Annotated[
     list[str] | None,
     typer.Option(
@@ -72,6 +76,7 @@ def allan(
     source: LogSource,
     gyro_lsb: GyroLsb = None,
     accel_lsb: AccelLsb = None,
+    calibration: Of = None,
     exclude: Exclude = None,
     keep_events: KeepEvents = False,
     accuracy: Accuracy = 10.0,
@@ -90,7 +95,9 @@ def allan(
     stretches = [_stretch(text) for text in exclude or []]
     if not 0.0 < accuracy < 1000.0:
         raise typer.BadParameter(f"--accuracy is a positive number of per cent, not {accuracy:g}")
-    check_outputs(json, csv, plot, force=force, report=report, inputs=source.files)
+    check_outputs(json, csv, plot, force=force, report=report, inputs=(*source.files, calibration))
+    if calibration is not None and (curve or stream):
+        raise typer.BadParameter("--calibration goes with a log that is read whole: no --curve, no --stream")
     needs_stream(checkpoint, stream=stream)
     if curve:
         if exclude or stream or keep_events:
@@ -102,6 +109,7 @@ def allan(
             source,
             stream=stream,
             checkpoint=checkpoint,
+            calibration=calibration,
             options=options | {"gyroscope_lsb": gyro_lsb, "accelerometer_lsb": accel_lsb},
         )
     from trihedron.api.identifying import recording_lengths
@@ -129,13 +137,15 @@ def allan(
     leave(all_findings(found))
 
 
-def _of_log(source: LogSource, *, stream: bool, checkpoint: Path | None, options: dict[str, Any]) -> Noise:
+def _of_log(
+    source: LogSource, *, stream: bool, checkpoint: Path | None, calibration: Path | None, options: dict[str, Any]
+) -> Noise:
     from trihedron.api import identifying
 
     if not stream:
         recording = source.read()
         with progress("identifying"):
-            return identifying.allan(recording, **options)
+            return identifying.allan(recording, calibration=calibration, **options)
     if source.log is None or source.columns is None or source.rate is None:
         raise typer.BadParameter("--stream needs LOG, --columns (as in gx,gy,gz,ax,ay,az) and --rate")
     with progress("identifying"):

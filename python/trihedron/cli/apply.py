@@ -43,11 +43,14 @@ def apply(
     known = read_calibration(calibration)
     recording = source.read()
     from trihedron.api import applying
+    from trihedron.records import FindingCode
     from trihedron.report.machine import recording_record
 
     done = applying.apply(known, recording)
     write_recording(done, output, is_corrected=True, overwrite=force)
     if str(output) != "-":
-        say(f"{done.n_samples} samples: {output}")
+        is_even = any(finding.code is FindingCode.EVEN_CLOCK for finding in recording.findings)
+        clock = f", timestamps of an even clock of {done.rate_hz:.6g} Hz" if is_even else ""
+        say(f"{done.n_samples} samples{clock}: {output}")
     write_json(recording_record(done), json, force=force)
     leave(done.findings)

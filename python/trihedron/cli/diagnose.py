@@ -33,7 +33,7 @@ Against = Annotated[
     typer.Option(
         "--against",
         metavar="SIM",
-        help="Your simulation as model: a log or a scenario (.toml).",
+        help="Your simulation as model: a log or a scenario (.toml, or the name of a ready-made one).",
     ),
 ]
 Reference = Annotated[
@@ -77,7 +77,10 @@ def diagnose(
     if updated is not None and calibration is None:
         raise typer.BadParameter("--updated goes with --calibration OLD; without one, use trihedron calibrate")
     if improved is not None and (against is None or against.suffix.lower() != ".toml"):
-        raise typer.BadParameter("--improved goes with --against SCENARIO.toml: that file is what is improved")
+        raise typer.BadParameter(
+            "--improved goes with --against SCENARIO.toml, the file that is improved; trihedron simulate --template "
+            "SCENARIO.toml writes one to begin with"
+        )
     if improved is not None and against is not None and improved.resolve() == against.resolve():
         raise typer.BadParameter("--improved would overwrite the scenario that it improves; give it another name")
     check_outputs(json, updated, improved, force=force, report=report, inputs=(*sources.files, calibration, against))

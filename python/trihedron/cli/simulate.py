@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from trihedron.cli.options import Force, Report
+from trihedron.cli.options import Force, LogSource, ReadingOptions, Report, with_options
 from trihedron.cli.output import check_outputs, leave, say, write_report
+
+if TYPE_CHECKING:
+    from trihedron.records import Recording
+    from trihedron.records.truth import Truth
 
 Scenario = Annotated[
     str | None, typer.Argument(metavar="SCENARIO", help="A .toml file, or the name of a ready-made scenario (--list).")
@@ -16,7 +21,7 @@ Scenario = Annotated[
 Output = Annotated[
     Path | None, typer.Option("--output", "-o", metavar="LOG", help="Log to write: .csv, .npz or .parquet.")
 ]
-Truth = Annotated[
+TruthFile = Annotated[
     Path | None, typer.Option("--truth", metavar="FILE", help="Truth to write: .npz, or .json without the samples.")
 ]
 Seed = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Which accident of noise.")]
@@ -50,12 +55,17 @@ Link = Annotated[
     Path | None, typer.Option("--link", metavar="PATH", help="With --serve PTY: a name that outlives disconnections.")
 ]
 ListThem = Annotated[bool, typer.Option("--list", help="List the ready-made scenarios.")]
+Template = Annotated[
+    Path | None, typer.Option("--template", metavar="FILE.toml", help="Write a scenario to begin with: change it.")
+]
 
 
+@with_options(how=ReadingOptions)
 def simulate(
+    how: ReadingOptions,
     scenario: Scenario = None,
     output: Output = None,
-    truth: Truth = None,
+    truth: TruthFile = None,
     seed: Seed = 0,
     like: Like = None,
     calibration: Calibration = None,
@@ -67,6 +77,7 @@ def simulate(
     baud: Baud = 0,
     link: Link = None,
     list_them: ListThem = False,
+    template: Template = None,
     report: Report = None,
     force: Force = False,
 ) -> None:
@@ -77,6 +88,9 @@ def simulate(
         for name, sentence in list_scenarios().items():
             typer.echo(f"{name:24s}{sentence}")
         return
+    if template is not None:
+        _write_template(template, force=force)
+        return
     if (scenario is None) == (like is None):
         raise typer.BadParameter("give either a SCENARIO (a .toml file or a name) or --like LOG")
     if (like is None) != (calibration is None):
@@ -85,24 +99,19 @@ def simulate(
         raise typer.BadParameter("--with-effects belongs to a SCENARIO; a digital twin repeats its recording as it is")
     if output is None and serve is None:
         raise typer.BadParameter("say where the log goes with -o LOG, or send it with --serve PTY")
-    from trihedron.api.reading import read
     from trihedron.api.simulating import simulate as run
     from trihedron.api.simulating import twin
-    from trihedron.files.log import LOG_SUFFIXES, write_recording
-    from trihedron.files.output import OutputError
+    from trihedron.files.log import write_recording
     from trihedron.files.truth import write_truth
-    from trihedron.report.numbers import how_many
 
-    if output is not None and output.suffix.lower() not in LOG_SUFFIXES:
-        raise OutputError(f"{output}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
-    if truth is not None and truth.suffix.lower() not in (".npz", ".json"):
-        raise OutputError(f"{truth}: truth is written as .npz (everything) or .json (no samples).")
+    _check_endings(output, truth)
     read_from = (None if scenario is None else Path(scenario), like, calibration, with_effects)
     check_outputs(output, truth, force=force, report=report, inputs=read_from)
     if like is not None and calibration is not None:
         from trihedron.files.calibration import read_calibration
 
-        recording, known = twin(read(like), read_calibration(calibration), seed)
+        repeated = LogSource(**asdict(how), log=like).read()
+        recording, known = twin(repeated, read_calibration(calibration), seed)
     else:
         recording, known = run(_scenario(str(scenario), with_effects), seed)
     if output is not None:
@@ -119,18 +128,42 @@ def simulate(
 
         serve_recording(recording, known, serve, protocol, faults, speed=speed, baud=baud, link=link)
         return
-    typer.echo(f"{output}: {recording.n_samples} samples, {recording.duration_s:.1f} s at {recording.rate_hz:.4g} Hz")
-    motion = f"{how_many(len(known.poses), 'pose')}, {how_many(len(known.moves), 'move')}"
-    typer.echo(f"{motion}, |g| {known.gravity_m_s2:.6g} m/s²")
-    for name, parameters in known.effects.items():
-        from trihedron.report.simulation import in_rows
-
-        typer.echo(f"effect {name}: " + ", ".join(f"{key} {in_rows(value)}" for key, value in parameters.items()))
+    _show(output, recording, known)
     if calibration is not None:
         from trihedron.api.applying import doubted
         from trihedron.files.calibration import read_calibration
 
-        leave(doubted(read_calibration(calibration)))
+        leave((*repeated.findings, *doubted(read_calibration(calibration))))
+
+
+def _check_endings(output: Path | None, truth: Path | None) -> None:
+    from trihedron.files.log import LOG_SUFFIXES
+    from trihedron.files.output import OutputError
+
+    if output is not None and output.suffix.lower() not in LOG_SUFFIXES:
+        raise OutputError(f"{output}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
+    if truth is not None and truth.suffix.lower() not in (".npz", ".json"):
+        raise OutputError(f"{truth}: truth is written as .npz (everything) or .json (no samples).")
+
+
+def _show(output: Path | None, recording: Recording, known: Truth) -> None:
+    """What was made, in a few lines."""
+    from trihedron.report.numbers import how_many
+    from trihedron.report.simulation import in_rows
+
+    typer.echo(f"{output}: {recording.n_samples} samples, {recording.duration_s:.1f} s at {recording.rate_hz:.4g} Hz")
+    motion = f"{how_many(len(known.poses), 'pose')}, {how_many(len(known.moves), 'move')}"
+    typer.echo(f"{motion}, |g| {known.gravity_m_s2:.6g} m/s²")
+    for name, parameters in known.effects.items():
+        typer.echo(f"effect {name}: " + ", ".join(f"{key} {in_rows(value)}" for key, value in parameters.items()))
+
+
+def _write_template(path: Path, *, force: bool) -> None:
+    from trihedron.files.scenario import TEMPLATE, write_scenario
+
+    check_outputs(path, force=force)
+    write_scenario(TEMPLATE, path, overwrite=force)
+    typer.echo(f"{path}: an ordinary sensor turned by hand; change what you know of yours.")
 
 
 def _scenario(name: str, diagnosis: Path | None) -> Any:

@@ -34,7 +34,7 @@ def check_format(path: str | os.PathLike[str]) -> None:
 def write_recording(
     recording: Recording, path: str | os.PathLike[str], *, is_corrected: bool = False, overwrite: bool = False
 ) -> None:
-    """Write time [s], the sensors in their own units, temperature and supply where there are; units in the names.
+    """Write time [s] as the log counts it, the sensors in their own units, and every other column; units in the names.
 
     What was corrected (``is_corrected``) is in SI: ``time_s``, ``acc_x … acc_z``, ``gyr_x … gyr_z``, all digits. ``-``
     is CSV on stdout.
@@ -64,13 +64,19 @@ def write_recording(
 
 def _columns(recording: Recording) -> dict[str, FloatArray]:
     # Nanoseconds: finer digits are rounding of 1/rate, and long in text.
-    columns: dict[str, FloatArray] = {"t [s]": np.round(recording.time_s, 9)}
+    columns: dict[str, FloatArray] = {"t [s]": np.round(recording.start_epoch_s + recording.time_s, 9)}
     for letter, sensor, unit in (
         ("a", recording.accelerometer, recording.accelerometer_unit),
         ("g", recording.gyroscope, recording.gyroscope_unit),
     ):
         if sensor is not None:
             columns |= {f"{letter}{axis} [{unit.value}]": sensor[:, k] for k, axis in enumerate(AXES)}
+    return columns | _others(recording)
+
+
+def _others(recording: Recording) -> dict[str, FloatArray]:
+    """Temperature, supply, and what the log holds besides, under its own names."""
+    columns: dict[str, FloatArray] = dict(recording.auxiliary)
     if recording.temperature_degc is not None:
         columns["temperature [degC]"] = recording.temperature_degc
     if recording.supply_v is not None:
@@ -79,11 +85,11 @@ def _columns(recording: Recording) -> dict[str, FloatArray]:
 
 
 def _corrected_columns(recording: Recording) -> dict[str, FloatArray]:
-    columns: dict[str, FloatArray] = {"time_s": recording.time_s}
+    columns: dict[str, FloatArray] = {"time_s": recording.start_epoch_s + recording.time_s}
     for name, readings in (("acc", recording.accelerometer), ("gyr", recording.gyroscope)):
         if readings is not None:
             columns |= {f"{name}_{axis}": readings[:, k] for k, axis in enumerate(AXES)}
-    return columns
+    return columns | _others(recording)
 
 
 def _frame(columns: dict[str, FloatArray]) -> pl.DataFrame:

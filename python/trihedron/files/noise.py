@@ -62,7 +62,7 @@ def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict
         ) from None
     if not out:
         raise NoiseFileError(
-            f"{source}: its noise is in raw units; run `trihedron allan` with the units or on SI readings."
+            f"{source}: its noise is in raw units; say what a count is: `trihedron allan LOG --calibration FILE`."
         )
     return out, rate
 

@@ -15,6 +15,37 @@ from trihedron.documents import DocumentError, of_path, read_text
 from trihedron.errors import RefusedError
 from trihedron.files.output import write_whole
 
+TEMPLATE = """# A simulation to begin with: an ordinary sensor that reads m/s² and rad/s, turned by hand.
+# Every key: docs/simulation.md. What a file does not say is the profile's.
+name = "my-sensor"
+profile = "mpu"
+
+[environment]
+gravity_m_s2 = 9.80665
+
+[session]
+kind = "hand"
+
+[clock]
+rate_hz = 100.0
+
+[accelerometer]
+unit = "m/s^2"
+S = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+b = [0, 0, 0]
+
+[accelerometer.adc]
+lsb = 0
+
+[gyroscope]
+unit = "rad/s"
+S = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+b = [0, 0, 0]
+
+[gyroscope.adc]
+lsb = 0
+"""
+
 
 def improved_scenario(
     path: str | os.PathLike[str],

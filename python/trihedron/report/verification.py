@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
 import numpy as np
@@ -80,9 +81,14 @@ def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:
             ),
             ("  expected", f"{plain_number(v.angle_expected_deg)}° rms from noise and the calibration's uncertainty"),
         ]
-    if len(v.rest_rate):
-        shift = [plain_number(degrees_from_radians(float(r)), 2) for r in np.mean(v.rest_rate, axis=0)]
-        facts.append(("gyro bias", f"changed by {', '.join(shift)} °/s (X, Y, Z) since the calibration"))
+    biases = [one for one in v.parameters if one.id == "gyro-bias"]
+    if biases:
+        sigmas = [math.hypot(one.sigma_file, one.sigma_log) for one in biases]
+        changes = ", ".join(
+            with_sigma(degrees_from_radians(-one.difference), degrees_from_radians(sigma))
+            for one, sigma in zip(biases, sigmas, strict=True)
+        )
+        facts.append(("gyro bias", f"changed by {changes} °/s (X, Y, Z) since the calibration"))
     return tuple(facts)
 
 

@@ -121,9 +121,14 @@ def _vector(D: FloatArray) -> FloatArray:
     return np.asarray(out, dtype=np.float64)
 
 
-def poses_at_rest(segments: Segments, gyroscope: FitToReference) -> int:
-    """Poses in which the unit rested: a vehicle in steady flight reads as evenly as one on a table, and turns."""
+def poses_at_rest(segments: Segments, gyroscope: FitToReference, has_own_bias: bool) -> int:
+    """Poses in which the unit rested: a vehicle in steady flight reads as evenly as one on a table, and turns.
+
+    A reference that is another gyro ``has_own_bias``: what all poses read alike beside it is no turning.
+    """
     if segments.gyroscope_mean is None:
         return segments.n_poses
     rate = segments.gyroscope_mean @ gyroscope.S.T + gyroscope.b
+    if has_own_bias:
+        rate = rate - np.median(rate, axis=0)
     return int(np.count_nonzero(np.linalg.norm(rate, axis=1) < TURNING_RAD_S))

@@ -183,7 +183,7 @@ _USE = (
     Entry(
         Code.SAME_RECORDING,
         "",
-        WARNING,
+        SERIOUS,
         "This is the recording that the calibration was made from: a verification with it proves nothing.",
         "The same file was named twice.",
         "Verify on another session; the calibration report already has cross-validated errors.",
