@@ -147,7 +147,7 @@ def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[dic
         # Half of a chi-square with one degree of freedom: the strength lies at its boundary without it.
         p = float(np.exp(-0.5 * max(one.gain, 0.0)))
         held = held_out_records(one.without, model)
-        rivals = explain_as_much(one, model, answer.found.tried.values())
+        rivals = tuple(other.term.effect.id for other in explain_as_much(one, model, answer.found.tried.values()))
         record = _record(one.effect, one.parameters, one.statement, p, one.score, rivals, held, **extra)
         out.append(record | {"curves": curves})
     return out

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.candidates import NEAR, Tried
+from trihedron.diagnose.candidates import NEAR, Tried, price_of_choice
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.hypothesis import Hypothesis, again
@@ -41,6 +41,8 @@ class BiasStrength:
     parameters: tuple[EffectParameter, ...]
     statement: Words
     without: Hypothesis
+    price: float
+    """What an effect of the catalogue pays for being chosen, and a process that is named owes."""
     is_large: bool
     """Whether it carries the bias farther than 1/f noise does that no pose shows."""
 
@@ -81,15 +83,20 @@ def noise_bounds(model: Hypothesis, but: tuple[BiasProcess, ...] = ()) -> Bounds
     return (corner[0], corner[1]), (scatter[0], scatter[1]), ANYTHING[2]
 
 
-def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
+def bounds_without(model: Hypothesis, effect: BiasProcess) -> Bounds:
+    """The hypothesis' bounds of strengths, that of one process no larger than the part's noise makes it."""
     s = effect.sensor
     corner, scatter = list(model.within[0]), list(model.within[1])
     if effect.walks:
         corner[s] = NOISE_CORNER_S
     else:
         scatter[s] = float(_flicker(model)[s])
-    within: Bounds = ((corner[0], corner[1]), (scatter[0], scatter[1]), model.within[2])
-    without = again(model, model.terms, within)
+    return (corner[0], corner[1]), (scatter[0], scatter[1]), model.within[2]
+
+
+def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
+    s = effect.sensor
+    without = again(model, model.terms, bounds_without(model, effect))
     gain = 2.0 * (model.log_evidence - without.log_evidence)
     size, std = _size(model, effect)
     is_large = not effect.walks or _walked(model, s) > LEAST_WALK
@@ -98,7 +105,8 @@ def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
     # one more that was fitted, known to 1/sqrt(2n) in its logarithm: it pays for that as a parameter does.
     n_strengths = 3 if effect.sensor == 1 and not effect.walks else 1
     paid = (n_strengths - 1) * float(np.log(2.0 * max(model.obs.n_poses, 1)))
-    return BiasStrength(effect, gain, gain - paid, size, std, parameters, statement, without, is_large)
+    price = price_of_choice(other.unavailable(model.context) for other in catalogue())
+    return BiasStrength(effect, gain, gain - paid, size, std, parameters, statement, without, price, is_large)
 
 
 def _flicker(model: Hypothesis) -> FloatArray:
@@ -140,11 +148,11 @@ def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArra
     return np.ptp(path, axis=0), np.asarray(np.sqrt(2.0) * error)
 
 
-def explain_as_much(one: BiasStrength, model: Hypothesis, tried: Iterable[Tried]) -> tuple[str, ...]:
-    """Effects of the same sensor that leave the process no stronger than the part's noise, and cost little more.
+def explain_as_much(one: BiasStrength, model: Hypothesis, tried: Iterable[Tried]) -> list[Tried]:
+    """Effects of the same sensor that leave the process no stronger than the part's noise, at odds of twenty to one or
+    better; likeliest first.
 
-    The strengths of noise are in every hypothesis, an effect in its place pays for its choice: within odds of twenty to
-    one the session does not tell which of the two it is.
+    A process that is named was chosen from the catalogue as an effect is, and owes the same price for it.
     """
     s = one.effect.sensor
     corner, scatter, _ = noise_bounds(model)
@@ -154,6 +162,11 @@ def explain_as_much(one: BiasStrength, model: Hypothesis, tried: Iterable[Tried]
         corners, scatters, _, _ = other.asked.strengths
         own = scatters[1:] if s else scatters[:1]
         is_noise = corners[s] >= corner[s] if one.effect.walks else max(own) <= scatter[s]
-        if columns is not None and is_noise and other.score > -NEAR and other.term.effect.id != one.effect.id:
-            out.append(other.term.effect.id)
-    return tuple(out)
+        if (
+            columns is not None
+            and is_noise
+            and other.score + one.price > -NEAR
+            and other.term.effect.id != one.effect.id
+        ):
+            out.append(other)
+    return sorted(out, key=lambda other: -other.score)

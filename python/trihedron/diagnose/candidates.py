@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,20 +94,23 @@ def terms_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term
     context = model.context
     held = {t.effect.id for t in model.terms if not t.effect.repeatable} | set(exclude)
     places = {(t.effect.id, t.variant.label) for t in model.terms}
-    terms, missing = [], {}
-    applying = []
+    reasons = {effect.id: effect.unavailable(context) for effect in catalogue()}
+    terms, missing = [], {key: reason for key, reason in reasons.items() if reason is not None and key not in held}
+    price = price_of_choice(reasons.values())
     for effect in catalogue():
-        reason = None if effect.id in held else effect.unavailable(context)
-        if reason is not None:
-            missing[effect.id] = reason
-        elif effect.id not in held:
-            applying.append(effect)
-    for effect in applying:
+        if effect.id in held or reasons[effect.id] is not None:
+            continue
         variants = [v for v in effect.variants(context) if (effect.id, v.label) not in places]
-        paid = 2.0 * float(np.log(max(len(variants), 1) * len(PRIOR_SCALES)) + np.log(len(applying)))
+        paid = price + 2.0 * float(np.log(max(len(variants), 1) * len(PRIOR_SCALES)))
         # A shape that stands for a family, a filter of any order, costs as much again as one that stands for itself.
         terms += [Term(effect, v, effect.sizes(context, v), paid + FAMILY * v.stands_for_many) for v in variants]
     return terms, missing
+
+
+def price_of_choice(reasons: Iterable[str | None]) -> float:
+    """What one effect pays for being chosen from those that apply, in twice a log-likelihood: alike for all of them,
+    in whatever order they are asked."""
+    return 2.0 * float(np.log(max(sum(reason is None for reason in reasons), 1)))
 
 
 def _leaders(model: Hypothesis, terms: list[Term]) -> list[Term]:

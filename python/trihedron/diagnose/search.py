@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.diagnose.bias_strengths import bias_strengths, bounds_without, explain_as_much
 from trihedron.diagnose.candidates import NEAR, Tried, all_beside, candidates_beside
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
@@ -32,6 +33,7 @@ WORTH_FITTING = 20.0
 """Difference of scores, one linear step from the fit, within which rivals are fitted in full."""
 N_RIVALS = 3
 """Rivals fitted in full."""
+N_SENSORS = 2
 MOST_EFFECTS = 4
 """Mechanisms of one session at most; poses that were pushed are none."""
 MOST_STEPS = 8
@@ -82,10 +84,46 @@ def threshold(alpha: float) -> float:
 
 def search(base: Hypothesis, alpha: float) -> Found:
     """The effects that a session demands: the best is added, again; then each is dropped, or swapped, if that gains."""
+    found = _sought(_State(_Judged(base, ())), alpha)
+    for _ in range(N_SENSORS):
+        instead = _instead_of_a_process(found, alpha)
+        if instead is None:
+            break
+        found = _sought(instead, alpha)
+    return found
+
+
+def _sought(state: _State, alpha: float) -> Found:
     drifts = {one.id for one in catalogue() if isinstance(one, BiasProcess)}
-    mechanisms = _added(_State(_Judged(base, ())), alpha, drifts)
+    mechanisms = _added(state, alpha, drifts)
     # A bias that drifts is in every hypothesis as a walk: a smooth curve is asked beside what explains more than time.
     return _concluded(_added(mechanisms, alpha, {one.id for one in catalogue()} - drifts), alpha)
+
+
+def _instead_of_a_process(found: Found, alpha: float) -> _State | None:
+    """The hypothesis with an effect in the place of a process of the bias that would be named, where that is likelier.
+
+    Beside an effect that explains what a bias does by itself the bias does no more than the part's noise makes it do.
+    """
+    model = found.model
+    tried = [one for one in found.tried.values() if not isinstance(one.term.effect, BiasProcess)]
+    tried = [one for one in tried if one.score > -WORTH_FITTING]
+    if not tried:
+        return None
+    for process in bias_strengths(model, alpha)[0]:
+        standing = explain_as_much(process, model, tried)
+        larger, chosen = _with_best(model, standing) if standing else (model, None)
+        if chosen is None:
+            continue
+        bounded = again(larger, larger.terms, bounds_without(larger, process.effect))
+        judged = _Judged(bounded, without_each(bounded))
+        least = judged.without[-1]
+        is_likelier = 2.0 * (bounded.log_evidence - model.log_evidence) - chosen.paid > -process.price
+        gained = 2.0 * (bounded.log_evidence - least.log_evidence) - chosen.paid
+        if is_likelier and gained > threshold(alpha) and _is_shown(bounded, least, len(bounded.terms) - 1):
+            curve = found.tried.get(process.effect.id)
+            return _State(judged, rivals={} if curve is None else {chosen.effect.id: [curve]})
+    return None
 
 
 def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
