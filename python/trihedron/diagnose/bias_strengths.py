@@ -21,9 +21,10 @@ from trihedron.records.words import Words
 from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, Bounds, scatter_unit
 from trihedron.threads import side_by_side
 
-LEAST_WALK = 1.5
-"""Rms of a bias over the error of a pose's mean from which its walk is called drift: of 120 healthy sessions, half of
-them with 1/f noise as consumer parts have it, 1.3 was the most."""
+LEAST_TIMES = 1.5
+"""Rms of a bias over the error of a pose's mean from which what it does has a name. 1/f noise that hides under the
+white noise inside poses carries it as far as that error, or a little farther: of 220 healthy sessions of three grades,
+60 of them with the 1/f noise of consumer parts, 1.3 was the most."""
 FLICKER_WITHIN = 1.5
 """Factor within which the scatter that 1/f noise makes is told from inside the poses."""
 
@@ -95,11 +96,10 @@ def bounds_without(model: Hypothesis, effect: BiasProcess) -> Bounds:
 
 
 def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
-    s = effect.sensor
     without = again(model, model.terms, bounds_without(model, effect))
     gain = 2.0 * (model.log_evidence - without.log_evidence)
     size, std = _size(model, effect)
-    is_large = not effect.walks or _walked(model, s) > LEAST_WALK
+    is_large = _times_error(model, effect) > LEAST_TIMES
     parameters, statement = effect.of_strength(size, std)
     # Strengths of noise are in every hypothesis: none is searched for among mechanisms. Each axis beyond the first is
     # one more that was fitted, known to 1/sqrt(2n) in its logarithm: it pays for that as a parameter does.
@@ -117,12 +117,15 @@ def _flicker(model: Hypothesis) -> FloatArray:
     return np.asarray(FLICKER_WITHIN * expected / unit[:, 0])
 
 
-def _walked(model: Hypothesis, sensor: int) -> float:
-    """Rms of a bias about its mean over the poses, over the usual error of a pose's mean."""
-    twin, obs = model.fitted.twin, model.obs
+def _times_error(model: Hypothesis, effect: BiasProcess) -> float:
+    """Rms of a bias about its mean over the poses over the error of a pose's mean."""
+    sensor, scatter = effect.sensor, model.strengths[1]
+    if not effect.walks:
+        return float(max(scatter[1:] if sensor else scatter[:1]))
+    twin = model.fitted.twin
     path = (twin.accel_bias, twin.gyro_bias)[sensor]
     unit = _units(model)[sensor] * model.context.si_per_raw(("accelerometer", "gyroscope")[sensor])
-    return float(np.sqrt(np.mean(path.var(axis=0)) / np.mean(unit**2))) if obs.n_poses else 0.0
+    return float(np.sqrt(np.mean(path.var(axis=0)) / np.mean(unit**2))) if model.obs.n_poses else 0.0
 
 
 def _units(model: Hypothesis) -> FloatArray:
