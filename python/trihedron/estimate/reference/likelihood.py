@@ -100,8 +100,9 @@ def together(problems: Sequence[Problem], found: Sequence[Equations]) -> Togethe
     return Together(inverse.T @ half, inverse.T @ inverse, evidence)
 
 
-def at_the_point(problems: Sequence[Problem], found: Sequence[Equations]) -> float:
+def at_the_point(problems: Sequence[Problem], strengths: FloatArray) -> float:
     """Log density of the readings and of all parameters at the point of linearisation."""
+    found = [equations(p, s) for p, s in zip(problems, strengths, strict=True)]
     priors = {int(i): float(c) for p in problems for i, c in zip(p.index, p.centre, strict=True)}
     return sum(one.constant for one in found) - 0.5 * sum(c * c for c in priors.values())
 

@@ -78,18 +78,21 @@ def fit_motion(
     for turn in range(RELINEARISED if before is None else 1):
         if turn:
             strengths, _ = most_likely(problems, strengths)
-        found = [equations(p, s) for p, s in zip(problems, strengths, strict=True)]
-        mean, height = together(problems, found).mean, at_the_point(problems, found)
+        mean = together(problems, [equations(p, s) for p, s in zip(problems, strengths, strict=True)]).mean
+        # A linear model about another slow error is another model: heights are compared about the same.
+        points = [
+            point if side.reference.motion.attitude is None else replace(point, slow=slow_error(problem, s, mean))
+            for side, point, problem, s in zip(sides, points, problems, strengths, strict=True)
+        ]
+        problems = _problems(sides, points, where, wider, block_s)
+        height = at_the_point(problems, strengths)
         for shorter in SHORTER:
             ahead = [
-                replace(
-                    side.moved(point, {name: shorter * _si(side, name, wider) * mean[at] for name, at in own.items()}),
-                    slow=None if side.reference.motion.attitude is None else slow_error(problem, s, shorter * mean),
-                )
-                for side, point, own, problem, s in zip(sides, points, where, problems, strengths, strict=True)
+                side.moved(point, {name: shorter * _si(side, name, wider) * mean[at] for name, at in own.items()})
+                for side, point, own in zip(sides, points, where, strict=True)
             ]
             there = _problems(sides, ahead, where, wider, block_s)
-            if at_the_point(there, [equations(p, s) for p, s in zip(there, strengths, strict=True)]) > height:
+            if at_the_point(there, strengths) > height:
                 break
         else:
             break
