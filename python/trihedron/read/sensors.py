@@ -10,24 +10,20 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.read.captured import with_arrivals
 from trihedron.read.clock.base import Clock, build_clock
 from trihedron.read.clock.order import in_order
-from trihedron.read.clock.rate import mean_rate_hz
+from trihedron.read.clock.rate import mean_rate_hz, steps_of
 from trihedron.read.clock.settle import settle_clock
-from trihedron.read.clock.steps import steps_of
 from trihedron.read.clock.unit import TICKS, Witness, counts_rows
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
-from trihedron.read.constant import refuse_constant
-from trihedron.read.copies import copied_rows
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
 from trihedron.read.names import is_rate
+from trihedron.read.repeated import copied_rows, refuse_constant
 from trihedron.read.sensing import order_of_triads
 from trihedron.read.table import Table
 from trihedron.read.text.store import side_by_side
-from trihedron.read.time_steps import summed_steps
-from trihedron.read.unread_time import refuse_unread_time
+from trihedron.read.time_column import refuse_unread_time, summed_steps, with_arrivals
 from trihedron.records import Finding, FindingCode, Sampling
 from trihedron.records.progress import Progress
 from trihedron.records.sampling import UNJUDGED
