@@ -52,8 +52,7 @@ def polar_rotation(axes: FloatArray) -> FloatArray:
 
 def triad_rotation(accel: Invariants, gyro: Invariants) -> FloatArray:
     """(3, 3) ``U_g U_aᵀ``: the gyro triad as seen from the accelerometer triad, the same in every frame."""
-    out: FloatArray = polar_rotation(gyro.axes) @ polar_rotation(accel.axes).T
-    return out
+    return polar_rotation(gyro.axes) @ polar_rotation(accel.axes).T
 
 
 def rotation_vector(R: FloatArray) -> FloatArray:
@@ -65,8 +64,7 @@ def rotation_vector(R: FloatArray) -> FloatArray:
     if angle < 1e-6:
         return skew
     sine = float(np.sin(angle))
-    out: FloatArray = skew * (angle / sine if sine > 1e-9 else 1.0)
-    return out
+    return skew * (angle / sine if sine > 1e-9 else 1.0)
 
 
 def jacobian(S: FloatArray, b: FloatArray) -> FloatArray:
@@ -207,8 +205,7 @@ def _lower_axes(angle: FloatArray, signs: FloatArray) -> FloatArray:
     """(3, 3) unit rows, lower triangular with the given signs on the diagonal, at the given angles."""
     factor = np.linalg.cholesky(_gram(angle))
     # Cholesky's diagonal is positive: a column of the other sign is turned round.
-    out: FloatArray = factor * signs
-    return out
+    return factor * signs
 
 
 def _rotation(vector: FloatArray) -> FloatArray:

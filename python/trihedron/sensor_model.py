@@ -132,16 +132,14 @@ def _lower_tilt(turned: FloatArray, new: FloatArray) -> FloatArray:
 def _symmetric_tilt(turned: FloatArray, new: FloatArray) -> FloatArray:
     """ω with ``turned + [ω]× new`` symmetric, new being symmetric: ``(tr(P) I - P) ω = -vee(turned - turnedᵀ)``."""
     skewness = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
-    tilt: FloatArray = -np.linalg.solve(np.trace(new) * np.eye(3) - new, skewness)
-    return tilt
+    return -np.linalg.solve(np.trace(new) * np.eye(3) - new, skewness)
 
 
 def _nearest_proper(q: FloatArray) -> FloatArray:
     """Signs (3,) of q's columns that make it a proper rotation with the largest trace."""
     wanted = np.sign(np.linalg.det(q))
     choices = [np.array(signs) for signs in product((1.0, -1.0), repeat=3) if np.prod(signs) == wanted]
-    best: FloatArray = max(choices, key=lambda signs: float(np.sum(np.diag(q) * signs)))
-    return best
+    return max(choices, key=lambda signs: float(np.sum(np.diag(q) * signs)))
 
 
 def rotated(sensor: SensorCalibration, rotation: FloatArray) -> SensorCalibration:
@@ -196,8 +194,7 @@ def _exactly_in_frame(S: FloatArray, frame: Frame) -> FloatArray:
     if frame == "lower":
         return np.tril(S)
     signs = np.sign(np.diag(S))
-    symmetric: FloatArray = 0.5 * (S * signs + (S * signs).T) * signs
-    return symmetric
+    return 0.5 * (S * signs + (S * signs).T) * signs
 
 
 def _skew(v: FloatArray) -> FloatArray:

@@ -68,8 +68,7 @@ def move_rows(path: FloatArray, up_after: FloatArray) -> FloatArray:
         total += np.einsum("ai,k->aik", rotation, step).reshape(3, 9)
         rotation = rotation @ _rotation(step).T
     across = np.linalg.svd(up_after[None, :])[2][1:]
-    rows: FloatArray = across @ total
-    return rows
+    return across @ total
 
 
 def _rotation(vector: FloatArray) -> FloatArray:
@@ -78,8 +77,8 @@ def _rotation(vector: FloatArray) -> FloatArray:
         return np.eye(3)
     x, y, z = vector / angle
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turned: FloatArray = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-    return turned
+    out: FloatArray = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    return out
 
 
 def sigma_of(known: Known) -> FloatArray:
@@ -101,8 +100,7 @@ def _with_pose(known: Known, direction: FloatArray) -> Known:
 def _updated(covariance: FloatArray, rows: FloatArray, sigma: float) -> FloatArray:
     seen = covariance @ rows.T
     gain = np.linalg.solve(rows @ seen + sigma**2 * np.eye(len(rows)), seen.T)
-    out: FloatArray = covariance - seen @ gain
-    return out
+    return covariance - seen @ gain
 
 
 def best_next(known: Known, wanted: FloatArray, factor: FloatArray) -> tuple[FloatArray, Known]:

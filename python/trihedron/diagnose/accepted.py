@@ -103,11 +103,7 @@ def accepted_effects(answer: Answer, residuals: Sequence[DomainResiduals]) -> tu
         is_behind = effect.is_spread or (own is not None and share < HEADLINE)
         is_beside = any(one.effect is effect and not one.reobserves for one in answer.seen)
         rows.append(((is_behind, -share, is_beside), record, share))
-    return tuple(_shared(record, share) for _, record, share in sorted(rows, key=lambda row: row[0]))
-
-
-def _shared(record: dict[str, Any], share: float) -> AcceptedEffect:
-    return AcceptedEffect(**record, share=share)
+    return tuple(AcceptedEffect(**record, share=share) for _, record, share in sorted(rows, key=lambda row: row[0]))
 
 
 def _of_terms(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[dict[str, Any]]:

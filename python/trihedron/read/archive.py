@@ -132,8 +132,7 @@ def _pick_device(path: Path, name: str, block: npt.NDArray[np.generic], device: 
         )
     if not 1 <= device <= n_units:
         raise ReadError(f"{path}: there is no device {device}; array '{name}' holds devices 1 to {n_units}.")
-    chosen: npt.NDArray[np.generic] = block[:, device - 1, :]
-    return chosen
+    return block[:, device - 1, :]
 
 
 def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], device: int | None) -> Table:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.errors import RefusedError
-from trihedron.files.temporary import Temporary, clear_leftovers
+from trihedron.files.output import Temporary, clear_leftovers
 from trihedron.read.archive import DAMAGE, header
 from trihedron.read.errors import ReadError, check_readable, from_os_error, panics_unprinted, refuse_after_fork
 from trihedron.read.text.layout import MISSING, Layout, detect

@@ -130,7 +130,14 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         raise ReadError(f"{path}: the file holds one row of numbers only ({table.place(0)}); a recording needs many.")
     if chosen.time is None and options.columns is None and options.rate_hz is None:
         table, chosen = summed_steps(table, chosen)
-    findings = [*table.findings, *chosen.findings, *_words_left_out(table)]
+    findings = [
+        *table.findings,
+        *chosen.findings,
+        *(
+            Finding.of(FindingCode.COLUMN_LEFT_OUT, "words", column=table.label(i), example=example[:40])
+            for i, example in table.words.items()
+        ),
+    ]
     if chosen.time is None:
         refuse_unread_time(table, chosen, options.columns, options.rate_hz or _stated_rate(table))
     clock, rate = _time_base(table, chosen, options, findings)
@@ -178,13 +185,6 @@ def _without_used(table: Table, chosen: Columns) -> Table:
     done = {chosen.time, *(chosen.accelerometer or ()), *(chosen.gyroscope or ())} - kept
     columns = tuple(np.empty(0) if i in done else column for i, column in enumerate(table.columns))
     return replace(table, columns=columns, rows_in_file=table.n_in_file)
-
-
-def _words_left_out(table: Table) -> list[Finding]:
-    return [
-        Finding.of(FindingCode.COLUMN_LEFT_OUT, "words", column=table.label(i), example=example[:40])
-        for i, example in table.words.items()
-    ]
 
 
 def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[Finding]) -> Clock:

@@ -152,8 +152,7 @@ class Prediction:
     @property
     def per_row(self) -> FloatArray:
         """(domains,) innovation chi-square per row."""
-        out: FloatArray = self.chi2 / np.maximum(self.n_rows, 1e-9)
-        return out
+        return self.chi2 / np.maximum(self.n_rows, 1e-9)
 
 
 def folds_of(fitted: Fit, n_folds: int = 8) -> list[npt.NDArray[np.bool_]]:

@@ -165,8 +165,7 @@ def are_far(distance: FloatArray, dof: float) -> BoolArray:
     # Residuals of fitted parameters are smaller.
     shrink = max(dof / (2.0 * n), LEAST_SHRINK)
     typical = max(1.0, median(distance) / (MEDIAN_CHI2[2] * shrink))
-    far: BoolArray = distance > chdtri(2, FALSE_ALARM / n) * typical
-    return far
+    return distance > chdtri(2, FALSE_ALARM / n) * typical
 
 
 def _core_align(

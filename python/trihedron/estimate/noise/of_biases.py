@@ -118,8 +118,7 @@ def levels(sizes: Sequence[float]) -> FloatArray:
     """Strengths to be tried, zero first, for biases spreading by ``sizes`` (what one unit of strength makes of it)."""
     low, high = LOWEST * min(sizes), HIGHEST * max(sizes)
     n = math.ceil(math.log(high / low) / math.log(SPACING)) + 1
-    out: FloatArray = np.concatenate([[0.0], np.geomspace(low, high, n)])
-    return out
+    return np.concatenate([[0.0], np.geomspace(low, high, n)])
 
 
 def _table(zeros: PoseBiases, b: FloatArray, k: FloatArray) -> FloatArray:
@@ -205,8 +204,7 @@ def kernels(zeros: PoseBiases) -> tuple[FloatArray, FloatArray]:
 def _twice_integrated(x: FloatArray) -> FloatArray:
     """The second integral of ln|x|: x²/2 ln|x| - 3x²/4."""
     size = np.maximum(np.abs(x), 1e-300)
-    out: FloatArray = size**2 * (0.5 * np.log(size) - 0.75)
-    return out
+    return size**2 * (0.5 * np.log(size) - 0.75)
 
 
 def _log_likelihood(

@@ -59,8 +59,7 @@ class PoseNorms:
         design = np.column_stack([x, y, z, x * x, y * y, z * z, x * y, x * z, y * z])
         u, size, _ = np.linalg.svd(design)
         rank = int((size > 1e-6 * size[0]).sum())
-        out: FloatArray = u[:, rank:]
-        return out
+        return u[:, rank:]
 
 
 def compare_slow_norms(first: PoseNorms, second: PoseNorms) -> SlowDifference | None:
@@ -149,8 +148,7 @@ def _quantiles(values: FloatArray, weight: FloatArray, places: FloatArray) -> Fl
     """Values (k,) below which shares ``places`` (k,) of the weight lie."""
     order = np.argsort(values)
     reached = np.cumsum(weight[order]) / max(float(weight.sum()), 1e-300)
-    out: FloatArray = values[order[np.minimum(np.searchsorted(reached, places), len(order) - 1)]]
-    return out
+    return values[order[np.minimum(np.searchsorted(reached, places), len(order) - 1)]]
 
 
 def _measured(values: FloatArray, weight: FloatArray) -> Measured:

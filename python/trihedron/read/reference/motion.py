@@ -218,7 +218,7 @@ def _settled(
         findings = (*findings, *settled.findings)
     keep = np.concatenate([[True], np.diff(time_s) > SHORTEST_STEP * float(np.median(np.diff(time_s)))])
     if stepwise:
-        findings = (*findings, _commands(len(time_s)))
+        findings = (*findings, Finding.of(FindingCode.COLUMNS_ASSUMED, "commands", n_rows=len(time_s)))
     motion = ReferenceMotion(
         time_s[keep],
         attitude=None if attitude is None else attitude[keep],
@@ -231,10 +231,6 @@ def _settled(
     )
     said = tuple(replace(f, seen=f"Reference: {f.seen[0].lower()}{f.seen[1:]}") for f in findings)
     return replace(motion, findings=said)
-
-
-def _commands(n: int) -> Finding:
-    return Finding.of(FindingCode.COLUMNS_ASSUMED, "commands", n_rows=n)
 
 
 # Columns of attitude as rotation matrices, body → world, with what cannot be a rotation refused.
