@@ -20,6 +20,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.records.calibration import Calibration, Frame, SensorCalibration
+from trihedron.transforms import cross_matrix
 
 
 def correct(readings: FloatArray, S: FloatArray, b: FloatArray) -> FloatArray:
@@ -79,7 +80,7 @@ class Reframing:
         moved = np.column_stack([self.rotation @ S, self.rotation @ b])
         through = np.zeros((12, 12))
         for k in range(12):
-            through[:, k] = _flatten(_skew(self.tilt[:, k]) @ moved)
+            through[:, k] = _flatten(cross_matrix(self.tilt[:, k]) @ moved)
         return own, through
 
 
@@ -195,10 +196,6 @@ def _exactly_in_frame(S: FloatArray, frame: Frame) -> FloatArray:
         return np.tril(S)
     signs = np.sign(np.diag(S))
     return 0.5 * (S * signs + (S * signs).T) * signs
-
-
-def _skew(v: FloatArray) -> FloatArray:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
 
 
 def _flatten(S_and_b: FloatArray) -> FloatArray:

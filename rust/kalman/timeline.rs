@@ -17,7 +17,6 @@ pub struct Timeline {
 }
 
 impl Timeline {
-
     /// Poses seen.
     #[must_use]
     pub fn n_poses(&self) -> usize {

@@ -9,6 +9,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.poses import CANDIDATES, design_rows
 from trihedron.records import Recording, Segments
+from trihedron.transforms import rotation_by
 
 NEAR = 0.9
 """Cosine above which a pose is no move from the one before."""
@@ -66,19 +67,9 @@ def move_rows(path: FloatArray, up_after: FloatArray) -> FloatArray:
     total = np.zeros((3, 9))
     for step in path[::-1]:
         total += np.einsum("ai,k->aik", rotation, step).reshape(3, 9)
-        rotation = rotation @ _rotation(step).T
+        rotation = rotation @ rotation_by(step).T
     across = np.linalg.svd(up_after[None, :])[2][1:]
     return across @ total
-
-
-def _rotation(vector: FloatArray) -> FloatArray:
-    angle = float(np.linalg.norm(vector))
-    if angle < 1e-12:
-        return np.eye(3)
-    x, y, z = vector / angle
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    out: FloatArray = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-    return out
 
 
 def sigma_of(known: Known) -> FloatArray:

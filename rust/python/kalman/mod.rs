@@ -8,7 +8,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use self::poses::KalmanPoses;
-use crate::kalman::axis::{self, N_CONSTANTS, Pose, Prior};
+use crate::kalman::axis::{self, N_CONSTANTS, Prior};
 use crate::kalman::shaping::{NoiseTerms, ShapingModel};
 use crate::kalman::smoother;
 use crate::python::arrays::matrix;

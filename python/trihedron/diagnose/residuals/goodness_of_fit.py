@@ -12,7 +12,7 @@ from scipy.special import fdtrc, ndtr
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.jumps import jumps_in_poses
-from trihedron.diagnose.session.solve import Fit, leverage
+from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
 from trihedron.records.domains import Domain, DomainTest, Where
 from trihedron.session.noise import NOISE_CORNER_S
@@ -87,7 +87,7 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
 
     ``alpha`` is the chance that a healthy recording disagrees in any domain; it is shared by six domains.
     """
-    used = leverage(fitted)
+    used = fitted.leverage
     physical, rms_unit = physical_rms(fitted)
     tests = []
     for label, name in ROW_DOMAINS.items():

@@ -52,8 +52,8 @@ class Fit:
         )  # fmt: skip
 
     @cached_property
-    def used(self) -> FloatArray:
-        """(rows,) share of every row that the fit used up."""
+    def leverage(self) -> FloatArray:
+        """(rows,) share of every row that the fit used up; a block has the sum of 1 minus it as degrees of freedom."""
         return self.line.core.leverage()
 
     @property
@@ -90,9 +90,10 @@ class Fit:
         return core.linear_covariance(np.ascontiguousarray(obs.force_origin), np.ascontiguousarray(obs.rate_origin))
 
 
-def _fitted(
-    obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None, within: Bounds | None = None
+def fit(
+    obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None = None, within: Bounds | None = None
 ) -> Fit:
+    """Gauss-Newton on every row to convergence, noise corners as they are (eq. 11.9), or free ``within`` bounds."""
     if len(start.effect) != distortion.n_parameters:
         start = replace(start, effect=np.zeros(distortion.n_parameters))
     core = core_model(obs, start.gravity, prior).fit(
@@ -106,14 +107,9 @@ def _fitted(
     return Fit(twin, Linearisation(obs, twin, distortion, prior, core))
 
 
-def fit(obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None = None) -> Fit:
-    """Gauss-Newton on every row to convergence, noise corners as they are (eq. 11.9)."""
-    return _fitted(obs, start, distortion, prior)
-
-
 def tune_noise(obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None) -> Fit:
     """The same with walks as strong as is likeliest, no stronger than the noise of parts makes them (eq. 11.18)."""
-    return _fitted(obs, start, distortion, prior, PART_NOISE)
+    return fit(obs, start, distortion, prior, PART_NOISE)
 
 
 def move_misfit(obs: Observations, twin: Twin) -> FloatArray:
@@ -121,11 +117,6 @@ def move_misfit(obs: Observations, twin: Twin) -> FloatArray:
     residual = core_model(obs, twin.gravity, None).move_residuals(core_state(twin))
     out: FloatArray = (residual**2).sum(axis=1)
     return out
-
-
-def leverage(fitted: Fit) -> FloatArray:
-    """(rows,) share of every row that the fit used up; degrees of freedom of a block are the sum of one minus it."""
-    return fitted.used
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -104,7 +105,7 @@ def consistency_findings(axis: int | None, seen: Consistency) -> list[Finding]:
     """What an inconsistent filter tells about the noise it was given; ``axis`` None stands for all three."""
     out: list[Finding] = []
     case, name = ("norm", "") if axis is None else ("axis", AXES[axis])
-    size = {"axis": name, "nis_mean": seen.nis_mean, "nis_low": seen.nis_low, "nis_high": seen.nis_high}
+    size: dict[str, Any] = {"axis": name, "nis_mean": seen.nis_mean, "nis_low": seen.nis_low, "nis_high": seen.nis_high}
     if seen.n and seen.nis_mean > seen.nis_high:
         out.append(Finding.of(FindingCode.INNOVATIONS_TOO_LARGE, case, **size, widening=np.sqrt(seen.nis_mean)))
     elif seen.n and seen.nis_mean < seen.nis_low:

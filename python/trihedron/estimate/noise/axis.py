@@ -17,7 +17,7 @@ from trihedron.estimate.noise.screening import Event, Readout
 from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, select
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.estimate.noise.terms import SYMBOLS
-from trihedron.records.finding import Finding
+from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.noise import AllanCurve, GaussMarkov, NoiseAxis, NoiseTerm, SlowPair, TermName
 
 FALLS = np.linspace(-0.3, 0.6, 37)
@@ -165,7 +165,7 @@ def identify_axis(
         selection, bend = straightened(selection)
     selection, scale, worst = _tempered(selection)
     if worst is not None:
-        findings.append(remarks.unexplained(*worst))
+        findings.append(Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, deviation=worst[0], frequency_hz=worst[1]))
     usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
     found = invert(selection)
     pair = slow_pair_of(found)
