@@ -147,9 +147,7 @@ def _of_poses(
     recording_used, segments_used = recording, segments
     # Where the poses leave the model open the twin starts from nominal values, for the gyro too.
     if recording.gyroscope is not None and used.gyroscope is None and not (free and is_open(used)):
-        findings += [f for f in used.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT] or [
-            Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "model-has-none")
-        ]
+        findings += [f for f in used.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT] or [_gyroscope_left_out()]
         recording_used, segments_used = _accelerometer_only(recording, segments)
     found = diagnose_recording(
         recording_used,
@@ -307,6 +305,10 @@ def _both_sensors(
         return (replace(theirs, gyroscope=None), scenario), recording, segments, (finding,)
     finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "simulation-has-none")
     return logged, *_accelerometer_only(recording, segments), (finding,)
+
+
+def _gyroscope_left_out() -> Finding:
+    return Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "model-has-none")
 
 
 def _accelerometer_only(recording: Recording, segments: Segments) -> tuple[Recording, Segments]:

@@ -65,7 +65,7 @@ def refuse_foreign(path: Path, magic: bytes) -> None:
         raise ReadError(f"{path}: this is XML, which is not read here; {_CSV}.")
 
 
-def read_table(path: Path, device: int | None = None, progress: Progress | None = None) -> Table:
+def read_table(path: Path) -> Table:
     """The one table of a file.
 
     Raises
@@ -73,7 +73,7 @@ def read_table(path: Path, device: int | None = None, progress: Progress | None 
     ReadError
         When the file cannot be read, is no log, or holds one table per sensor.
     """
-    tables = read_tables(path, Choice(device=device), progress)
+    tables = read_tables(path, Choice())
     if len(tables) > 1:
         raise ReadError(f"{path}: the file holds one table per sensor, and one table is wanted here.")
     return tables[0]

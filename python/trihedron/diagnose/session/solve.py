@@ -30,6 +30,9 @@ from trihedron.diagnose.session.twin import (
 )
 from trihedron.session.noise import PART_NOISE, START_STRENGTHS, Bounds
 
+FOLDS = 8
+"""Blocks of poses, and of moves, that are held out in turn."""
+
 
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -146,13 +149,13 @@ class Prediction:
         return self.chi2 / np.maximum(self.n_rows, 1e-9)
 
 
-def folds_of(fitted: Fit, n_folds: int = 8) -> list[npt.NDArray[np.bool_]]:
+def folds_of(fitted: Fit) -> list[npt.NDArray[np.bool_]]:
     """Blocks of neighbouring poses, then of neighbouring moves, whose rows are held out together."""
     system, obs = fitted.system, fitted.line.obs
     direct = system.walk == 0
     out = []
     for labels, count in (((STATIC_ACCEL, STATIC_GYRO), obs.n_poses), ((MOVES, DYNAMICS), obs.n_moves)):
-        for block in np.array_split(np.arange(count), min(n_folds, max(count // 2, 1))):
+        for block in np.array_split(np.arange(count), min(FOLDS, max(count // 2, 1))):
             held = np.isin(system.domain, labels) & direct & np.isin(system.segment, block)
             if held.any():
                 out.append(held)

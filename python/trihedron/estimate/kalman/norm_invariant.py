@@ -52,11 +52,6 @@ class NormStart:
         object.__setattr__(self, "zero", zero)
 
     @classmethod
-    def nominal(cls, si_per_raw: float, zero: npt.ArrayLike = (0.0, 0.0, 0.0)) -> NormStart:
-        """The data sheet: one scale [m/s² per raw unit] for all axes, and the bias."""
-        return cls(si_per_raw * np.eye(3), np.asarray(zero, dtype=np.float64))
-
-    @classmethod
     def from_range(cls, readings: npt.ArrayLike, gravity_m_s2: float) -> NormStart:
         """A guess from mean readings (n, 3) alone: each axis has been near the vertical, both ways up.
 

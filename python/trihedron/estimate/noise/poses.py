@@ -129,14 +129,7 @@ LEVEL_KNOWN = 1.0
 """Standard error of the logarithm of a density below a corner, from which on the differences of readings say more."""
 
 
-def noise_of_poses(
-    readings: npt.ArrayLike,
-    rate_hz: float,
-    poses: Sequence[tuple[int, int]],
-    *,
-    names: Sequence[str] = (),
-    units: Sequence[str] = (),
-) -> tuple[PoseNoise, ...]:
+def noise_of_poses(readings: npt.ArrayLike, rate_hz: float, poses: Sequence[tuple[int, int]]) -> tuple[PoseNoise, ...]:
     """Noise of every axis inside the poses of a session, each figure with its interval.
 
     The channels are those of one sensor: they share a low-pass unless their spectra deny it.
@@ -147,10 +140,8 @@ def noise_of_poses(
         Raw readings; NaN marks a missing one (holds are cut there).
     rate_hz : float
         Samples per second.
-    holds : sequence of (start, stop)
+    poses : sequence of (start, stop)
         Windows of stillness, in readings.
-    names, units
-        One per channel.
 
     Raises
     ------
@@ -172,19 +163,13 @@ def noise_of_poses(
     for start, stop in poses:
         if not 0 <= start < stop <= len(x):
             raise RefusedError(f"a pose runs from an earlier to a later of {len(x)} readings, got {start} to {stop}")
-    channels = x.shape[1]
-    names = tuple(names) or tuple(f"channel {c + 1}" for c in range(channels))
-    units = tuple(units) or ("",) * channels
-    axes = [AxisAtRest.of(x[:, c], rate_hz, poses, names[c]) for c in range(channels)]
+    axes = [AxisAtRest.of(column, rate_hz, poses, f"channel {c + 1}") for c, column in enumerate(x.T)]
     filters = low_passes([axis.spectrum for axis in axes], rate_hz)
     white = _white(axes, filters, rate_hz)
     return tuple(
         PoseNoise(
-            name=name,
-            unit=unit,
             rate_hz=rate_hz,
             n_poses=len(axis.parts),
-            n_readings=sum(len(part) for part in axis.parts),
             white=density,
             reading_sigma=math.sqrt(max(axis.total - axis.rounding, 0.0)) if axis.is_dithered else 0.0,
             step=axis.step,
@@ -195,7 +180,7 @@ def noise_of_poses(
             scatter=axis.pooled.scatter,
             corner_shape=one.shape,
         )
-        for axis, one, density, name, unit in zip(axes, filters, white, names, units, strict=True)
+        for axis, one, density in zip(axes, filters, white, strict=True)
     )
 
 
