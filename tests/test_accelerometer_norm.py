@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from trihedron import _core
-from trihedron.estimate.accelerometer.ellipsoid import ellipsoid
-from trihedron.estimate.accelerometer.norm import calibrate_norm
+from trihedron.estimate.accelerometer.norm import calibrate_norm, ellipsoid
 from trihedron.records import FindingCode, Severity
 from trihedron.sensor_model import distort
 
@@ -190,7 +189,7 @@ def test_very_many_readings_are_fitted_as_carefully_as_few(n, loss):
 
 
 def test_the_documented_call_of_the_ellipsoid_gives_its_own_answer():
-    found = doctest.testmod(importlib.import_module("trihedron.estimate.accelerometer.ellipsoid"))
+    found = doctest.testmod(importlib.import_module("trihedron.estimate.accelerometer.norm"))
     assert (found.attempted, found.failed) == (6, 0)
     with pytest.raises(ValueError, match="nine"):
         ellipsoid(np.r_[np.eye(3), -np.eye(3)], 9.81)

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from trihedron import _core
-from trihedron.estimate.noise.allan import allan_deviation, stream_allan_deviation
-from trihedron.estimate.noise.degrees import degrees_of_freedom
+from trihedron.estimate.noise.allan import allan_deviation
+from trihedron.estimate.noise.degrees import KINDS, TYPES
+from trihedron.estimate.noise.streamed import stream_noise
 from twins_noise import overlapping_variance, running_sum_in_long_double, weighted_hadamard, weighted_variance
 
 NINE = [892.0, 809.0, 823.0, 798.0, 671.0, 644.0, 883.0, 903.0, 677.0]
@@ -100,7 +101,7 @@ def test_readings_lost_here_and_there_bias_neither_white_noise_nor_a_random_walk
 def test_a_stream_beyond_its_memory_thins_only_the_long_clusters():
     x = np.random.default_rng(9).normal(size=1_500_000)
     clusters = [1, 100, 65536, 100_000, 300_000]
-    streamed = stream_allan_deviation([x], 100.0, clusters, budget_bytes=8 << 18)
+    streamed = stream_noise([x[:, None]], 100.0, clusters=clusters, budget_bytes=8 << 18).curve
     whole = allan_deviation(x[:, np.newaxis], 100.0, streamed.clusters)
     assert streamed.stride == 8
     assert streamed.deviation[:3] == pytest.approx(whole.deviation[:3], rel=1e-11)
@@ -125,7 +126,7 @@ def test_degrees_of_freedom_agree_with_an_independent_implementation(kind, alpha
             verbose=False,
         )
         # The oracle's closed approximations for long sums are good to 2 %; ours are the sums themselves.
-        assert degrees_of_freedom(10000, m, alpha, kind) == pytest.approx(oracle, rel=0.02)
+        assert _core.allan_degrees(10000, m, TYPES[alpha], KINDS[kind]) == pytest.approx(oracle, rel=0.02)
 
 
 @pytest.mark.parametrize("alpha", [2, 0, -2])
@@ -144,7 +145,7 @@ def test_degrees_of_freedom_of_readings_are_those_of_the_quadratic_form(alpha, k
             covariance = covariance[::m, ::m]
         # V = zᵀz has mean tr C and variance 2 tr C²; the tool adds only rounding.
         exact = np.trace(covariance) ** 2 / np.sum(covariance**2)
-        assert degrees_of_freedom(n, m, alpha, kind) == pytest.approx(max(1.0, exact), rel=1e-9)
+        assert _core.allan_degrees(n, m, TYPES[alpha], KINDS[kind]) == pytest.approx(max(1.0, exact), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -159,8 +160,8 @@ def test_degrees_of_freedom_of_readings_are_those_of_the_quadratic_form(alpha, k
         (lambda: allan_deviation([np.nan] * 9, 1.0), "no finite reading"),
         (lambda: allan_deviation([*NINE, np.nan], 1.0, kind="modified"), "not defined where readings are missing"),
         (lambda: allan_deviation(np.zeros((3, 3, 3)), 1.0), "shape"),
-        (lambda: stream_allan_deviation([], 1.0), "no chunk"),
-        (lambda: stream_allan_deviation([[1.0, np.inf, 2.0]], 1.0), "reading 1"),
+        (lambda: stream_noise([], 1.0), "no chunk"),
+        (lambda: stream_noise([[1.0, np.inf, 2.0]], 1.0), "reading 1"),
     ],
 )
 def test_a_malformed_question_is_refused_in_words(question, words):
@@ -193,7 +194,7 @@ def test_chunks_give_what_the_whole_array_gives():
     x = 100.0 + np.random.default_rng(8).normal(size=(400_000, 2)).cumsum(axis=0)
     whole = allan_deviation(x, 100.0)
     chunks = (x[i : i + 33_333] for i in range(0, len(x), 33_333))
-    streamed = stream_allan_deviation(chunks, 100.0, n_samples=len(x))
+    streamed = stream_noise(chunks, 100.0, n_samples=len(x)).curve
     assert streamed.stride == 1
     assert streamed.clusters.tolist() == whole.clusters.tolist()
     assert streamed.deviation == pytest.approx(whole.deviation, rel=1e-11)

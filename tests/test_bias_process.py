@@ -5,7 +5,7 @@ import pytest
 
 from bias_sessions import Session, draw, readings_of
 from trihedron import _core
-from trihedron.diagnose.rest.curve import slow_change, smooth_curve
+from trihedron.diagnose.rest.heat import slow_change, smooth_curve
 from trihedron.diagnose.rest.process import BiasProcess
 
 ALL = [0, 1, 2, 3, 4]

@@ -84,7 +84,7 @@ def test_the_lines_of_a_vectornav_are_checked_by_either_checksum(check):
 
 @pytest.mark.parametrize(("status", "per_rad_s"), [(0x3FF, 67108864), (0x7FF, 12304174)])
 def test_counts_of_an_sbg_are_as_large_as_its_status_says(status, per_rad_s):
-    from trihedron.capture.protocols.checksums import CHECKSUM_OF
+    from trihedron.capture.protocols.framing import CHECKSUM_OF
 
     counts = [1048576, -2097152, 9 * 1048576, per_rad_s, -per_rad_s // 2, 0, 6400]
     inner = struct.pack("<BBHIH6ih", 44, 0, 32, 5000, status, *counts)
@@ -127,7 +127,7 @@ def test_a_stream_that_is_not_decoded_is_refused_by_its_name_with_the_way_in(kin
 
 
 def test_noise_is_given_no_name():
-    from trihedron.capture.foreign import foreign
+    from trihedron.capture.detection import foreign
 
     rng = np.random.default_rng(7)
     assert foreign(rng.bytes(n) for n in (200, 3000, 200_000) * 20) is None

@@ -10,8 +10,8 @@ from board import DECLARED, counts_recording
 from trihedron.api.capturing import column_namer
 from trihedron.capture.account import Count
 from trihedron.capture.protocols import decoder_factory
-from trihedron.capture.protocols.checksums import CHECKSUM_OF
 from trihedron.capture.protocols.contract import Frame
+from trihedron.capture.protocols.framing import CHECKSUM_OF
 from trihedron.capture.sequence import Sequence
 from trihedron.files.frame_declaration import read_frame_declaration
 from trihedron.simulate.device.faults import Faults, Sent, parse_faults
@@ -189,7 +189,7 @@ def test_a_declared_frame_is_read_with_any_checksum_and_byte_order(kind, endian,
     [
         (("sync", "synk"), "no key 'synk'"),
         (('"AA 55"', '"XY"'), "not hexadecimal"),
-        (("sync", "length = " + "9" * 5000 + "\nsync"), "is not TOML"),
+        (("sync", "length = " + "9" * 5000 + "\nsync"), "is not a TOML file"),
         (('"u16"', '"u17"'), "no type 'u17'"),
         (('"crc16-ccitt"', '"md5"'), "no checksum 'md5'"),
         (('unit = "us"', ""), "needs its step"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.comparison.moved import AIMED_AT, missed_alike
+from trihedron.comparison.frames import AIMED_AT, missed_alike
 from trihedron.probability import bdtrc
 from trihedron.simulate import hand_session, profile_by_name
 from trihedron.simulate.scenario import Scenario

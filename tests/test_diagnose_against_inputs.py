@@ -22,7 +22,7 @@ def refused(given, capsys):
     ("wrong", "place", "remedy"),
     [
         (GOOD.replace("profile", "profil"), "mine.toml: the file has no key 'profil'", "is 'profile' meant?"),
-        (GOOD.replace('"mpu"', '"mpu'), "mine.toml is not a TOML file", "line 2"),
+        (GOOD.replace('"mpu"', '"mpu'), "mine.toml: this is not a TOML file", "line 2"),
         (GOOD + '[[effect]]\nid = "accel-quadratic"\nk3 = 1.0\n', "effect accel-quadratic", "'k3'"),
     ],
 )

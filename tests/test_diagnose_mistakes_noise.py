@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from trihedron.comparison.correlation import correlation_times
 from trihedron.comparison.noise import compare_noise, sampled
+from trihedron.comparison.slow import correlation_times
 from trihedron.diagnose.against.fitted import FittedModel
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.records import Pose, Recording

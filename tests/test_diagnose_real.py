@@ -8,7 +8,7 @@ import pytest
 
 from trihedron import calibrate, diagnose
 from trihedron.diagnose import diagnose_recording
-from trihedron.diagnose.effects.timestamp_errors import timestamp_errors
+from trihedron.diagnose.effects.timing_jitter import timestamp_errors
 from trihedron.diagnose.session.observations import observe
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint

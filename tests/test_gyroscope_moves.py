@@ -7,7 +7,7 @@ import pytest
 
 from trihedron.estimate.gyroscope.alignment import MoveOptions
 from trihedron.estimate.gyroscope.measurements import measure_moves
-from trihedron.estimate.gyroscope.moves import calibrate_moves
+from trihedron.estimate.session.solved import calibrate_moves
 from trihedron.records import FindingCode, SensorCalibration
 from trihedron.simulate import Accelerometer, Gyroscope, Motion, MoveTo, NoiseTerms, Scenario, hand_session, simulate
 from trihedron.simulate import Pose as SimulatedPose

@@ -5,8 +5,8 @@ import pytest
 
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.gyroscope.alignment import MoveOptions
-from trihedron.estimate.gyroscope.moves import calibrate_moves
 from trihedron.estimate.joint import calibrate_joint, free_directions
+from trihedron.estimate.session.solved import calibrate_moves
 from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
 from true_segments import segments_from_truth
 

@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 
 from trihedron import _core
+from trihedron.estimate.kalman.model import ShapingOptions, shaping_model
 from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
-from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode, PoseTable
 from twins_kalman import (
     ARTICLE_CONSTANTS,

@@ -5,7 +5,7 @@ import pytest
 
 from noise_series import series
 from trihedron.estimate.noise.allan import allan_deviation
-from trihedron.estimate.noise.curve_covariance import CurveCovariance
+from trihedron.estimate.noise.curve_terms import CurveCovariance
 from trihedron.estimate.noise.from_curve import identify_curve
 from trihedron.records.finding import FindingCode
 from trihedron.records.noise import TermName

@@ -7,7 +7,7 @@ import pytest
 
 from test_read import HEADER, readings, text_module, write
 from trihedron.read import ReadError, read_recording
-from trihedron.read.memory_limit import check_memory
+from trihedron.read.memory import check_memory
 
 ROWS = [",".join(map(repr, map(float, row))) for row in readings(300)]
 TEXT = HEADER + "\n".join(ROWS) + "\n"

@@ -338,7 +338,7 @@ def test_what_matlab_writes_passes_the_walk_and_damage_does_not_reach_scipy(tmp_
     from scipy.io import savemat
     from scipy.sparse import eye
 
-    from trihedron.read.matlab_check import DamagedError, check_matlab
+    from trihedron.read.matlab import DamagedError, check_matlab
 
     rng = np.random.default_rng(8)
     content = {

@@ -7,7 +7,7 @@ import pytest
 
 from test_read_in_silence import motion, table, written
 from trihedron.read import ReadError, read_recording
-from trihedron.read.side_by_side import _devices
+from trihedron.read.devices import _devices
 
 
 @pytest.mark.parametrize("form", ["%Y/%m/%d", "%d/%m/%Y", "%d.%m.%Y", "%Y-%m-%d"])

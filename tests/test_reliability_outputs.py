@@ -13,8 +13,7 @@ import pytest
 
 from small_session import G, copied, leftovers, made_once, run, started
 from trihedron.cli import COMMANDS, main
-from trihedron.files.output import OutputError, check_free, write_whole
-from trihedron.files.temporary import MARK
+from trihedron.files.output import MARK, OutputError, check_free, write_whole
 
 
 @pytest.fixture
@@ -205,7 +204,7 @@ def test_a_reader_that_leaves_early_does_not_cost_the_files_that_were_asked_for(
 
 @pytest.mark.parametrize("overwrite", [False, True])
 def test_a_file_that_appears_while_another_is_written_is_replaced_only_with_leave(tmp_path, overwrite):
-    from trihedron.files.temporary import Temporary
+    from trihedron.files.output import Temporary
 
     target = tmp_path / "one.json"
     with Temporary(target) as slow:
@@ -221,7 +220,7 @@ def test_a_file_that_appears_while_another_is_written_is_replaced_only_with_leav
 
 
 def test_what_a_killed_run_left_is_cleared_by_the_next_and_a_live_one_is_not_harmed(tmp_path):
-    from trihedron.files.temporary import Temporary
+    from trihedron.files.output import Temporary
 
     left = tmp_path / f".old.json{MARK}99999-abcdef01"
     left.write_text("half")

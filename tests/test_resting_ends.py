@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trihedron.estimate.gyroscope.resting_ends import resting_ends
+from trihedron.estimate.gyroscope.turn_rounding import resting_ends
 
 AXES = np.array([True, True, True])
 

@@ -9,7 +9,7 @@ import pytest
 
 from trihedron import calibrate
 from trihedron.diagnose.session.observations import observe
-from trihedron.diagnose.session.solve import folds_of, leverage, predict_held_out, tune_noise
+from trihedron.diagnose.session.solve import folds_of, predict_held_out, tune_noise
 from trihedron.diagnose.session.starting_point import start_twin
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, NO_DISTORTION, core_model, core_state
 from trihedron.estimate.accelerometer.norm import calibrate_norm
@@ -105,7 +105,7 @@ def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_an
     covariance = inverse / np.outer(size, size)
     # Two factorisations of one matrix of condition 1e6: ten digits are left, the ridge takes the rest.
     np.testing.assert_allclose(fitted.covariance(), covariance[:18, :18], rtol=1e-6, atol=0)
-    np.testing.assert_allclose(leverage(fitted), np.einsum("ri,ij,rj->r", scaled, inverse, scaled), atol=1e-8)
+    np.testing.assert_allclose(fitted.leverage, np.einsum("ri,ij,rj->r", scaled, inverse, scaled), atol=1e-8)
     columns = np.random.default_rng(1).standard_normal((len(r), 3))
     np.testing.assert_allclose(
         fitted.line.core.project(columns), columns - scaled @ (inverse @ (scaled.T @ columns)), atol=1e-8

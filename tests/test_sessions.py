@@ -10,8 +10,7 @@ import trihedron
 from hand_made_sessions import G, Instrument, recorded
 from trihedron.cli import main
 from trihedron.estimate.sessions.changes import changes_among
-from trihedron.estimate.sessions.repeatability import next_session, repeated_parameters
-from trihedron.estimate.sessions.spread import spread_between, spread_within
+from trihedron.estimate.sessions.spread import next_session, repeated_parameters, spread_between, spread_within
 from trihedron.estimate.sessions.thermal import thermal_model
 from trihedron.files.calibration import read_calibration
 from trihedron.invariants import anchor_of, model_jacobian, model_of_numbers, numbers_jacobian, numbers_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trihedron.estimate.accelerometer.norm import calibrate_norm
-from trihedron.estimate.gyroscope.moves import calibrate_moves
+from trihedron.estimate.session.solved import calibrate_moves
 from trihedron.simulate import Clock, scenario_by_name, simulate
 from true_segments import segments_from_truth
 

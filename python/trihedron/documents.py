@@ -5,12 +5,18 @@ from __future__ import annotations
 import json
 import os
 import stat
+import sys
 from collections import Counter
 from pathlib import Path
 from typing import Any
 
 from trihedron.errors import RefusedError
 from trihedron.sanitise import one_line
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 MOST_BYTES = 64_000_000
 """A diagnosis of a day's log with all its curves has 3 MB."""
@@ -80,6 +86,25 @@ def parse_json(text: str) -> Any:
         raise DocumentError("this is not JSON of ours (nested too deeply)") from None
     check_values(document)
     return document
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """TOML of sane depth, with numbers that a float holds.
+
+    Raises
+    ------
+    DocumentError
+        When it is not; the line is said where the text breaks.
+    """
+    try:
+        table = tomllib.loads(text)
+    except RecursionError:
+        raise DocumentError("this is nested too deeply.") from None
+    # A whole number of thousands of digits is a ValueError that is no TOMLDecodeError.
+    except ValueError as error:
+        raise DocumentError(f"this is not a TOML file: {str(error).split(';')[0][:200]}.") from None
+    check_values(table)
+    return table
 
 
 def check_values(document: Any) -> None:

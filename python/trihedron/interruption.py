@@ -72,7 +72,7 @@ def _end_in_time(heard: int) -> None:
 
 def end_now(status: int) -> None:
     """End the process here: its unfinished files removed, its terminal as it was, its reason said."""
-    temporary = sys.modules.get("trihedron.files.temporary")
+    temporary = sys.modules.get("trihedron.files.output")
     if temporary is not None:
         temporary.remove_unfinished()
     shown = "\x1b[?25h\r\x1b[K" if os.isatty(2) else ""

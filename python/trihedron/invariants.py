@@ -13,6 +13,7 @@ from itertools import permutations
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.transforms import rotation_by
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
 STEP = 1e-6
@@ -52,8 +53,7 @@ def polar_rotation(axes: FloatArray) -> FloatArray:
 
 def triad_rotation(accel: Invariants, gyro: Invariants) -> FloatArray:
     """(3, 3) ``U_g U_aᵀ``: the gyro triad as seen from the accelerometer triad, the same in every frame."""
-    out: FloatArray = polar_rotation(gyro.axes) @ polar_rotation(accel.axes).T
-    return out
+    return polar_rotation(gyro.axes) @ polar_rotation(accel.axes).T
 
 
 def rotation_vector(R: FloatArray) -> FloatArray:
@@ -65,8 +65,7 @@ def rotation_vector(R: FloatArray) -> FloatArray:
     if angle < 1e-6:
         return skew
     sine = float(np.sin(angle))
-    out: FloatArray = skew * (angle / sine if sine > 1e-9 else 1.0)
-    return out
+    return skew * (angle / sine if sine > 1e-9 else 1.0)
 
 
 def jacobian(S: FloatArray, b: FloatArray) -> FloatArray:
@@ -163,7 +162,7 @@ def model_of_numbers(
     S_a, b_a = _direct(numbers[:3], numbers[3:6], N_a)
     if len(numbers) < 21 or anchor.triad is None:
         return np.tril(S_a), b_a, None, None
-    R = _rotation(numbers[18:21]) @ anchor.triad
+    R = rotation_by(numbers[18:21]) @ anchor.triad
     values, vectors = np.linalg.eigh(_gram(numbers[15:18]))
     N_g = vectors @ np.diag(np.sqrt(values)) @ vectors.T @ R @ polar_rotation(N_a)
     return np.tril(S_a), b_a, *_direct(numbers[9:12], numbers[12:15], N_g)
@@ -207,16 +206,4 @@ def _lower_axes(angle: FloatArray, signs: FloatArray) -> FloatArray:
     """(3, 3) unit rows, lower triangular with the given signs on the diagonal, at the given angles."""
     factor = np.linalg.cholesky(_gram(angle))
     # Cholesky's diagonal is positive: a column of the other sign is turned round.
-    out: FloatArray = factor * signs
-    return out
-
-
-def _rotation(vector: FloatArray) -> FloatArray:
-    """(3, 3) exp([v]×), Rodrigues."""
-    angle = float(np.linalg.norm(vector))
-    x, y, z = vector
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    if angle < 1e-8:
-        return np.asarray(np.eye(3) + cross + 0.5 * cross @ cross, dtype=np.float64)
-    out: FloatArray = np.eye(3) + np.sin(angle) / angle * cross + (1.0 - np.cos(angle)) / angle**2 * cross @ cross
-    return out
+    return factor * signs

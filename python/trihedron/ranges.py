@@ -11,8 +11,7 @@ def edges_of(mask: BoolArray) -> IntArray:
     """(k, 2) first index of every run of true values in ``mask`` (n,), and the index after its last."""
     padded = np.zeros(len(mask) + 2, dtype=np.bool_)
     padded[1:-1] = mask
-    edges: IntArray = np.flatnonzero(padded[1:] != padded[:-1]).astype(np.int64).reshape(-1, 2)
-    return edges
+    return np.flatnonzero(padded[1:] != padded[:-1]).astype(np.int64).reshape(-1, 2)
 
 
 def ranges_of(mask: BoolArray) -> list[Range]:

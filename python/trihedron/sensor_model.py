@@ -20,6 +20,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.records.calibration import Calibration, Frame, SensorCalibration
+from trihedron.transforms import cross_matrix
 
 
 def correct(readings: FloatArray, S: FloatArray, b: FloatArray) -> FloatArray:
@@ -79,7 +80,7 @@ class Reframing:
         moved = np.column_stack([self.rotation @ S, self.rotation @ b])
         through = np.zeros((12, 12))
         for k in range(12):
-            through[:, k] = _flatten(_skew(self.tilt[:, k]) @ moved)
+            through[:, k] = _flatten(cross_matrix(self.tilt[:, k]) @ moved)
         return own, through
 
 
@@ -132,16 +133,14 @@ def _lower_tilt(turned: FloatArray, new: FloatArray) -> FloatArray:
 def _symmetric_tilt(turned: FloatArray, new: FloatArray) -> FloatArray:
     """ω with ``turned + [ω]× new`` symmetric, new being symmetric: ``(tr(P) I - P) ω = -vee(turned - turnedᵀ)``."""
     skewness = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
-    tilt: FloatArray = -np.linalg.solve(np.trace(new) * np.eye(3) - new, skewness)
-    return tilt
+    return -np.linalg.solve(np.trace(new) * np.eye(3) - new, skewness)
 
 
 def _nearest_proper(q: FloatArray) -> FloatArray:
     """Signs (3,) of q's columns that make it a proper rotation with the largest trace."""
     wanted = np.sign(np.linalg.det(q))
     choices = [np.array(signs) for signs in product((1.0, -1.0), repeat=3) if np.prod(signs) == wanted]
-    best: FloatArray = max(choices, key=lambda signs: float(np.sum(np.diag(q) * signs)))
-    return best
+    return max(choices, key=lambda signs: float(np.sum(np.diag(q) * signs)))
 
 
 def rotated(sensor: SensorCalibration, rotation: FloatArray) -> SensorCalibration:
@@ -196,12 +195,7 @@ def _exactly_in_frame(S: FloatArray, frame: Frame) -> FloatArray:
     if frame == "lower":
         return np.tril(S)
     signs = np.sign(np.diag(S))
-    symmetric: FloatArray = 0.5 * (S * signs + (S * signs).T) * signs
-    return symmetric
-
-
-def _skew(v: FloatArray) -> FloatArray:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    return 0.5 * (S * signs + (S * signs).T) * signs
 
 
 def _flatten(S_and_b: FloatArray) -> FloatArray:

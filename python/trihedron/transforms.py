@@ -31,3 +31,17 @@ def _turns(n: int) -> npt.NDArray[np.complex128]:
     turns[0] = np.sqrt(1.0 / n)
     turns.setflags(write=False)
     return turns
+
+
+def cross_matrix(v: FloatArray) -> FloatArray:
+    """(3, 3) matrix [v]× of the vector product with ``v`` (3,)."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def rotation_by(vector: FloatArray) -> FloatArray:
+    """(3, 3) exp([v]×) of a rotation vector (3,), Rodrigues."""
+    angle, cross = float(np.linalg.norm(vector)), cross_matrix(vector)
+    if angle < 1e-8:
+        return np.asarray(np.eye(3) + cross + 0.5 * cross @ cross, dtype=np.float64)
+    out: FloatArray = np.eye(3) + np.sin(angle) / angle * cross + (1.0 - np.cos(angle)) / angle**2 * cross @ cross
+    return out

@@ -136,12 +136,6 @@ impl AxisFilter {
         self.timeline.n_poses()
     }
 
-    /// End of the last hold, s.
-    #[must_use]
-    pub fn end(&self) -> Option<f64> {
-        self.timeline.end()
-    }
-
     /// Row of the slow noise over all states.
     #[must_use]
     pub fn slow_row(&self) -> DVector<f64> {
@@ -219,17 +213,6 @@ impl AxisFilter {
         })
     }
 
-    /// What a future pose would do to the covariance, whatever it will read.
-    ///
-    /// # Errors
-    /// As [`Self::add`].
-    pub fn imagine(&mut self, reference: [f64; 3], start: f64, hold: f64) -> Result<()> {
-        self.advance(reference, start, hold)?;
-        let r = self.model.white_variance(hold);
-        self.filter.update_with_innovation(&self.row, 0.0, r);
-        Ok(())
-    }
-
     /// `(kx, ky, kz, U0)`.
     #[must_use]
     pub fn constants(&self) -> [f64; N_CONSTANTS] {
@@ -247,13 +230,6 @@ impl AxisFilter {
     #[must_use]
     pub fn sigma(&self) -> [f64; N_CONSTANTS] {
         self.filter.factors.last_variances().map(f64::sqrt)
-    }
-
-    /// Slow noise at the end of the last hold, and its standard error.
-    #[must_use]
-    pub fn drift(&self) -> (f64, f64) {
-        let (value, variance) = self.drift_and_variance();
-        (value, variance.sqrt())
     }
 
     fn drift_and_variance(&self) -> (f64, f64) {

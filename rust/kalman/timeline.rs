@@ -17,12 +17,6 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// End of the last hold, s.
-    #[must_use]
-    pub fn end(&self) -> Option<f64> {
-        self.end
-    }
-
     /// Poses seen.
     #[must_use]
     pub fn n_poses(&self) -> usize {

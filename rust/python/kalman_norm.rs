@@ -122,27 +122,6 @@ impl NormKalman {
         super::run_long(py, || filter.relinearise(most))
     }
 
-    /// Pass a reading that has not been made: the covariance changes, the estimate does not.
-    fn imagine(
-        &mut self,
-        py: Python<'_>,
-        reading: [f64; 3],
-        start_s: f64,
-        pose_s: f64,
-    ) -> PyResult<()> {
-        let filter = &mut self.inner;
-        super::run(py, || {
-            filter.imagine(&pose(reading, start_s, pose_s, [0.0; 3]))
-        })
-    }
-
-    /// An independent filter in the same state.
-    fn copy(&self) -> Self {
-        Self {
-            inner: self.inner.clone(),
-        }
-    }
-
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.inner.parameters().to_pyarray(py)
@@ -163,15 +142,5 @@ impl NormKalman {
             .flat_map(|seen| [seen.value, seen.variance])
             .collect();
         flat.to_pyarray(py).reshape([flat.len() / 2, 2])
-    }
-
-    #[getter]
-    fn n_poses(&self) -> usize {
-        self.inner.n_poses()
-    }
-
-    #[getter]
-    fn end_s(&self) -> Option<f64> {
-        self.inner.end()
     }
 }

@@ -106,7 +106,7 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
     findings = (*recording.findings, *more, *doubted(known), *check_range(known, recording))
     if gyroscope is not None and known.gyroscope is None:
         gyroscope = None
-        findings = (*findings, _left_out())
+        findings = (*findings, Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "calibration-has-none"))
     if accelerometer is None and gyroscope is None:
         raise RefusedError(f"{recording.source}: only a gyro was logged, and this calibration has none.")
     followed = thermally_corrected(known, recording)
@@ -178,10 +178,6 @@ def _corrected(readings: FloatArray | None, sensor: SensorCalibration | None) ->
     return None if readings is None or sensor is None else correct(readings, sensor.S, sensor.b)
 
 
-def _left_out() -> Finding:
-    return Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "calibration-has-none")
-
-
 def doubted(calibration: Calibration) -> tuple[Finding, ...]:
     """What the calibration said of itself goes with everything that it is applied to."""
     grave = [finding for finding in calibration.findings if finding.severity is Severity.SERIOUS]
@@ -222,7 +218,8 @@ def check_range(calibration: Calibration, recording: Recording) -> tuple[Finding
         raise RefusedError("the calibration's valid_range is not two temperatures: calibrate again.") from None
     T = recording.temperature_degc
     if T is None or not np.isfinite(T).any():
-        return (_missing(low, high),) if "thermal" in calibration.extensions else ()
+        missing = Finding.of(FindingCode.TEMPERATURE_MISSING, low_degc=low, high_degc=high)
+        return (missing,) if "thermal" in calibration.extensions else ()
     known = T[np.isfinite(T)]
     outside = int(np.sum((known < low - TOLERANCE_DEGC) | (known > high + TOLERANCE_DEGC)))
     if outside == 0:
@@ -239,10 +236,6 @@ def check_range(calibration: Calibration, recording: Recording) -> tuple[Finding
             log_high_degc=known.max(),
         ),
     )
-
-
-def _missing(low: float, high: float) -> Finding:
-    return Finding.of(FindingCode.TEMPERATURE_MISSING, low_degc=low, high_degc=high)
 
 
 def thermally_corrected(

@@ -4,13 +4,216 @@ from __future__ import annotations
 
 import functools
 import inspect
+import math
+import os
 from collections.abc import Callable
 from importlib import import_module
+from numbers import Integral, Real
 from typing import Any, TypeVar
 
-from trihedron.api.arguments import settled
-from trihedron.records.checked import WrongTypeError
+from trihedron.errors import RefusedError
+from trihedron.records.checked import WrongTypeError, number_of, numbers_of, said
 from trihedron.report.in_python import in_python, result_in_python
+
+MOST_WHOLE = 2**63 - 1
+"""What the core takes as a whole number."""
+LONGEST_NAME = 4096
+"""No system takes a longer path, and no option of ours has a longer value."""
+
+RANGES: dict[str, tuple[float, float, str]] = {
+    "gravity_m_s2": (1.0, 100.0, "m/s², about 9.8 on Earth"),
+    "latitude_deg": (-90.0, 90.0, "degrees"),
+    "height_m": (-12_000.0, 100_000.0, "m above sea level"),
+    "rate_hz": (1e-6, 1e9, "samples per second"),
+    "gyroscope_nominal": (1e-12, 1e12, "a unit of the gyro in rad/s, a positive number"),
+    "alpha": (1e-12, 1.0 - 1e-12, "a chance between 0 and 1"),
+    "confidence": (1e-12, 1.0 - 1e-12, "a part between 0 and 1"),
+    "limit_mg": (1e-9, 1e9, "mg, a positive number"),
+    "limit_deg": (1e-9, 1e9, "degrees, a positive number"),
+    "sigma_angle_deg": (0.0, 180.0, "degrees"),
+    "sigma_turn_rad": (0.0, 3.2, "rad"),
+    "turn_s": (1e-3, 1e6, "s"),
+    "pose_s": (1e-3, 1e6, "s"),
+    "seconds": (1e-3, 1e9, "s"),
+    "wait_s": (0.0, 1e9, "s"),
+    "gyroscope_density": (1e-15, 1e3, "rad/s/√Hz, a positive number"),
+    "accelerometer_density": (1e-15, 1e5, "m/s²/√Hz, a positive number"),
+    "baud": (1, 100_000_000, "bits per second"),
+    "device": (0, MOST_WHOLE, "the number of a device"),
+    "seed": (0, MOST_WHOLE, "the start of a series of random numbers"),
+    "workers": (0, 100_000, "a number of processes"),
+}
+"""Smallest and largest value of a quantity, both possible, and what it is."""
+
+
+def settled(verb: str, name: str, value: Any, annotation: str) -> Any:
+    """The argument in the plain type of its annotation (numbers of any library become Python's).
+
+    Raises
+    ------
+    WrongTypeError
+        (a ``TypeError`` and a ``ValueError``) when it is something else.
+    ValueError
+        When a number is not finite, or no such quantity.
+    """
+    kinds = set(_alternatives(annotation))
+    for alias in kinds & set(_ALIASES):
+        kinds = kinds - {alias} | _ALIASES[alias]
+    if value is None and "None" in kinds:
+        return None
+    kinds.discard("None")
+    where = f"{verb}: {name}"
+    if len(kinds) == 1:
+        kind = next(iter(kinds))
+        if kind in _PLAIN:
+            return _PLAIN[kind](where, name, value)
+        if kind.startswith("Callable[") or kind in ("Progress", "Tell"):
+            return _callable(where, value)
+        if kind.startswith("Sequence["):
+            return _listed(where, value, kind.removeprefix("Sequence[").removesuffix("]"))
+    if kinds == _PATH:
+        return _path(where, value)
+    if kinds == {"Sequence[int]", "npt.NDArray[np.int64]"}:
+        return _listed(where, value, "int")
+    if kinds == {"npt.ArrayLike"}:
+        return numbers_of(where, value)
+    if "str" in kinds and kinds <= {"str", "int", "AccelerationUnit", "RateUnit"}:
+        return _whole(where, name, value) if "int" in kinds and isinstance(value, int) else _text(where, name, value)
+    listed = [kind for kind in kinds if kind.startswith("Sequence[")]
+    if listed and not isinstance(value, str | os.PathLike):
+        return _listed(where, value, listed[0].removeprefix("Sequence[").removesuffix("]"))
+    if kinds > _PATH and not kinds & _JUDGED_BY_THE_VERB:
+        # A name of a file or one of ours, which the verb looks at itself: here only what is neither.
+        if isinstance(value, str | bytes | os.PathLike):
+            return _path(where, value)
+        if not kinds & {one.__name__ for one in type(value).__mro__}:
+            raise WrongTypeError(f"{where} is the name of a file or {_ours(kinds)}, not {said(value)}.")
+    return value
+
+
+def _alternatives(annotation: str) -> list[str]:
+    """The parts of a union, whatever their brackets hold."""
+    parts, depth = [""], 0
+    for letter in annotation:
+        depth += (letter == "[") - (letter == "]")
+        if letter == "|" and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return [part.strip() for part in parts]
+
+
+def _number(where: str, name: str, value: Any) -> float:
+    number = number_of(where, value)
+    _check_range(where, name, number)
+    return number
+
+
+def _whole(where: str, name: str, value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise WrongTypeError(f"{where} is a whole number, not {said(value)}.")
+    if not -MOST_WHOLE <= int(value) <= MOST_WHOLE:
+        raise RefusedError(f"{where} is a whole number of at most 19 digits, not {said(value)}.")
+    _check_range(where, name, int(value))
+    return int(value)
+
+
+def _check_range(where: str, name: str, number: float) -> None:
+    low, high, what = RANGES.get(name, (-math.inf, math.inf, ""))
+    if not low <= number <= high:
+        bound = f"at least {low:g}" if number < low else f"at most {high:g}"
+        raise RefusedError(f"{where} is {what}, {bound}, and cannot be {number:g}.")
+
+
+def _text(where: str, _name: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise WrongTypeError(f"{where} is a text, not {said(value)}.")
+    if len(value) > LONGEST_NAME:
+        raise RefusedError(f"{where} is a text of at most {LONGEST_NAME} characters, not of {len(value)}.")
+    if "\0" in value:
+        raise RefusedError(f"{where} is a text without a zero byte, not {said(value)}.")
+    return value
+
+
+def _word(where: str, name: str, value: Any) -> str:
+    if not _text(where, name, value):
+        raise RefusedError(f"{where} is a word of a list, and empty.")
+    return str(value)
+
+
+def _switch(where: str, _name: str, value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise WrongTypeError(f"{where} is True or False, not {said(value)}.")
+    return value
+
+
+def _callable(where: str, value: Any) -> Any:
+    if not callable(value) or isinstance(value, type):
+        raise WrongTypeError(f"{where} is a function that is told how far the work is, not {said(value)}.")
+    return value
+
+
+def _path(where: str, value: Any) -> Any:
+    try:
+        text = os.fspath(value)
+    except TypeError:
+        text = None
+    if not isinstance(text, str):
+        raise WrongTypeError(f"{where} is the name of a file, not {said(value)}.")
+    if not text or "\0" in text or len(text) > LONGEST_NAME:
+        raise RefusedError(f"{where} is the name of a file, and {said(text)} cannot be one.")
+    return value
+
+
+def _listed(where: str, value: Any, inner: str) -> Any:
+    if isinstance(value, str | bytes | dict) or not hasattr(value, "__getitem__") or not hasattr(value, "__len__"):
+        raise WrongTypeError(f"{where} is a list{_LISTED.get(inner, '')}, not {said(value)}.")
+    try:
+        items = [item.item() if hasattr(item, "item") and not hasattr(item, "columns") else item for item in value]
+    except (TypeError, ValueError):
+        raise WrongTypeError(
+            f"{where} is a list{_LISTED.get(inner, '')} in one dimension, not {said(value)}."
+        ) from None
+    if inner == "tuple[float, float]":
+        return [_pair(where, item) for item in items]
+    if inner in ("float", "str"):
+        return [_PLAIN[inner](f"{where}[{k}]", "", item) for k, item in enumerate(items)]
+    if set(_alternatives(inner)) == _PATH:
+        return [_path(f"{where}[{k}]", item) for k, item in enumerate(items)]
+    if inner == "int":
+        return [_whole_of_any(f"{where}[{k}]", item) for k, item in enumerate(items)]
+    return value
+
+
+def _whole_of_any(where: str, value: Any) -> int:
+    """Cluster sizes come out of logspace as floats."""
+    is_whole = isinstance(value, float) and value.is_integer() and abs(value) < MOST_WHOLE
+    return _whole(where, "", int(value) if is_whole else value)
+
+
+def _pair(where: str, value: Any) -> tuple[float, float]:
+    if isinstance(value, str | bytes | dict) or not hasattr(value, "__len__") or len(value) != len(("from", "to")):
+        raise WrongTypeError(f"{where} is a list of pairs (from, to) in seconds, and {said(value)} is none.")
+    start, stop = value
+    for edge in (start, stop):
+        if isinstance(edge, bool) or not isinstance(edge, Real) or math.isnan(edge):
+            raise WrongTypeError(f"{where} is a list of pairs (from, to) in seconds, and {said(value)} is none.")
+    return float(start), float(stop)
+
+
+def _ours(kinds: set[str]) -> str:
+    names = sorted(kinds - _PATH)
+    return "a " + " or a ".join(names) if names else "a record"
+
+
+_PATH = {"str", "os.PathLike[str]"}
+_JUDGED_BY_THE_VERB = {"Any", "Scenario"}
+_ALIASES = {"AnyReference": {"ReferenceMotion", "Recording", *_PATH}}
+_PLAIN: dict[str, Callable[[str, str, Any], Any]] = {"float": _number, "int": _whole, "str": _text, "bool": _switch}
+# Words of a closed list: the verb names them, here only what is no word.
+_PLAIN |= dict.fromkeys(("AllanKind", "By", "Form", "Frame", "Loss", "Method", "NormFrame", "RateShape"), _word)
+_LISTED = {"float": " of numbers", "int": " of whole numbers", "str": " of texts", "tuple[float, float]": " of pairs"}
+
 
 __all__ = ["WrongTypeError", "asked_in_python"]
 

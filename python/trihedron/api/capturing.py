@@ -19,10 +19,9 @@ import numpy.typing as npt
 from trihedron.api.reading import read
 from trihedron.arrays import AXES
 from trihedron.capture.detection import Found, find_protocol
-from trihedron.capture.ports import Port, list_ports
 from trihedron.capture.protocols import LineColumns, NameColumns
 from trihedron.capture.recorder import Block, Recorder
-from trihedron.capture.sources import Source, open_source
+from trihedron.capture.sources import Port, Source, list_ports, open_source
 from trihedron.errors import RefusedError
 from trihedron.files.frame_declaration import read_frame_declaration
 from trihedron.files.output import check_free

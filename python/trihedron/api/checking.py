@@ -8,7 +8,7 @@ from trihedron.errors import REFUSALS
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress
 from trihedron.records.results import CheckResult
-from trihedron.records.words import Words, words
+from trihedron.records.words import words
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 
@@ -39,10 +39,6 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
             recording,
             segments,
             None,
-            (*recording.findings, *segments.findings, _impossible(why)),
+            (*recording.findings, *segments.findings, Finding.of(FindingCode.NOT_FIT, "no-calibration", why=why)),
         )
     return CheckResult(recording, segments, result.calibration, result.findings)
-
-
-def _impossible(why: Words) -> Finding:
-    return Finding.of(FindingCode.NOT_FIT, "no-calibration", why=why)

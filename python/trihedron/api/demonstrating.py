@@ -168,8 +168,8 @@ def truth_of_the_day(scenario: Scenario, seed: int) -> Truth:
 def _mean_change(readings: FloatArray | None, without: FloatArray | None) -> FloatArray:
     assert readings is not None
     assert without is not None
-    mean: FloatArray = np.mean(readings - without, axis=0)
-    return mean
+    out: FloatArray = np.mean(readings - without, axis=0)
+    return out
 
 
 def _scenario(layout: int) -> Scenario:

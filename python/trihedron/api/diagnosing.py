@@ -17,15 +17,12 @@ from trihedron.api.driving import MovedAlike, driven
 from trihedron.api.reading import AnyRecording, read, recording_of, segment, segments_of
 from trihedron.api.referring import AnyReference
 from trihedron.api.simulating import names_scenario, scenario_of
-from trihedron.comparison.correlation import correlation_times
-from trihedron.comparison.frames import rates_of_world, sign_of_gravity
-from trihedron.comparison.model import compared
-from trihedron.comparison.moved import judged_by_motion
+from trihedron.comparison.frames import judged_by_motion, rates_of_world, sign_of_gravity
+from trihedron.comparison.model import compared, with_noise_stage
 from trihedron.comparison.noise import Sampled, compare_noise, sampled
 from trihedron.comparison.quantisation import quantisation_noise
 from trihedron.comparison.ranges import stated_ranges
-from trihedron.comparison.slow import slow_noise
-from trihedron.comparison.stages import with_noise_stage
+from trihedron.comparison.slow import correlation_times, slow_noise
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.against.fitted import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open

@@ -190,8 +190,7 @@ def _rough_model(
 
 def _unit(vectors: FloatArray) -> FloatArray:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    out: FloatArray = vectors / np.where(length > 0.0, length, 1.0)
-    return out
+    return vectors / np.where(length > 0.0, length, 1.0)
 
 
 def _known(

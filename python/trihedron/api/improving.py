@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import tomllib
 
 from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, flicker_of_poses
 from trihedron.arrays import AXES
 from trihedron.channel_facts.low_pass import gain_of
-from trihedron.comparison.moved import AIMED_AT
+from trihedron.comparison.frames import AIMED_AT
 from trihedron.comparison.noise import Sampled, sampled
 from trihedron.comparison.quantisation import white_and_quantisation
 from trihedron.comparison.ranges import SENSOR
 from trihedron.diagnose.against.fitted import model_of_diagnosis
+from trihedron.documents import parse_toml
 from trihedron.files.scenario import improved_scenario
 from trihedron.records.diagnosis import AcceptedEffect
 from trihedron.records.pose_noise import PoseNoise
@@ -93,11 +93,11 @@ def improve(
             ("accelerometer", "electronics", "bias_repeatability", bias_of_poses),
             ("gyroscope", "electronics", "bias_in_moves", bias_in_moves),
         ):
-            found_value = of(scenario_from_table(tomllib.loads(text)), beside)
+            found_value = of(scenario_from_table(parse_toml(text)), beside)
             if found_value is not None:
                 tables[sensor].setdefault(table, {})[key] = list(found_value)
                 text = improved_scenario(scenario, tables, sizes, surplus)
-        return Improvement(text, left_out, _unlike(scenario_from_table(tomllib.loads(text)), beside))
+        return Improvement(text, left_out, _unlike(scenario_from_table(parse_toml(text)), beside))
     return Improvement(text, left_out)
 
 

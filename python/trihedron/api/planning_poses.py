@@ -9,6 +9,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.poses import CANDIDATES, design_rows
 from trihedron.records import Recording, Segments
+from trihedron.transforms import rotation_by
 
 NEAR = 0.9
 """Cosine above which a pose is no move from the one before."""
@@ -66,20 +67,9 @@ def move_rows(path: FloatArray, up_after: FloatArray) -> FloatArray:
     total = np.zeros((3, 9))
     for step in path[::-1]:
         total += np.einsum("ai,k->aik", rotation, step).reshape(3, 9)
-        rotation = rotation @ _rotation(step).T
+        rotation = rotation @ rotation_by(step).T
     across = np.linalg.svd(up_after[None, :])[2][1:]
-    rows: FloatArray = across @ total
-    return rows
-
-
-def _rotation(vector: FloatArray) -> FloatArray:
-    angle = float(np.linalg.norm(vector))
-    if angle < 1e-12:
-        return np.eye(3)
-    x, y, z = vector / angle
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turned: FloatArray = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-    return turned
+    return across @ total
 
 
 def sigma_of(known: Known) -> FloatArray:
@@ -101,8 +91,7 @@ def _with_pose(known: Known, direction: FloatArray) -> Known:
 def _updated(covariance: FloatArray, rows: FloatArray, sigma: float) -> FloatArray:
     seen = covariance @ rows.T
     gain = np.linalg.solve(rows @ seen + sigma**2 * np.eye(len(rows)), seen.T)
-    out: FloatArray = covariance - seen @ gain
-    return out
+    return covariance - seen @ gain
 
 
 def best_next(known: Known, wanted: FloatArray, factor: FloatArray) -> tuple[FloatArray, Known]:

@@ -85,12 +85,8 @@ def held_against(
     known = None if given is None or given.gyroscope is None else (given.gyroscope.S, given.gyroscope.b)
     found = fit_reference(recording, motion, gravity, given=known)
     if is_own or (motion.sha256 and motion.sha256 == recording.sha256):
-        found = replace(found, findings=(*found.findings, _own_file()))
+        found = replace(found, findings=(*found.findings, Finding.of(FindingCode.REFERENCE_OF_ITSELF)))
     return found
-
-
-def _own_file() -> Finding:
-    return Finding.of(FindingCode.REFERENCE_OF_ITSELF)
 
 
 def calibration_by(

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.estimate.sessions.changes import changes_among
-from trihedron.estimate.sessions.repeatability import next_session, repeated_parameters
-from trihedron.estimate.sessions.spread import spread_of_next
+from trihedron.estimate.sessions.spread import next_session, repeated_parameters, spread_of_next
 from trihedron.estimate.sessions.thermal import thermal_model
 from trihedron.invariants import Anchor, anchor_of, model_jacobian, model_vector
 from trihedron.records import Calibration, Finding, FindingCode, Frame, SensorCalibration

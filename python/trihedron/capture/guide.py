@@ -186,8 +186,8 @@ class Guide:
         seen = np.array([*known, *self._checks])
         if len(seen) == 0:
             seen = np.array([[0.0, 0.0, 1.0]])
-        far: FloatArray = unit[int(np.argmin((unit @ seen.T).max(axis=1)))]
-        return far
+        out: FloatArray = unit[int(np.argmin((unit @ seen.T).max(axis=1)))]
+        return out
 
     def _up(self) -> FloatArray | None:
         mean = self._stillness.mean

@@ -6,9 +6,119 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from datetime import datetime, timezone
 
+from trihedron.arrivals import ClockLine
+from trihedron.capture.account import Count, clock_sentence
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
+from trihedron.capture.log import GrowingLog
+from trihedron.capture.protocols import Decoder
+from trihedron.capture.sequence import Placed
 from trihedron.capture.sources import Source
+from trihedron.capture.timeline import Timeline
+
+
+class Rows:
+    """What a recording has become so far; without a log (None) only times, indices and remarks are made.
+
+    Parameters
+    ----------
+    log : GrowingLog or None
+    source : Source
+    rate_hz : float, optional
+        Rate of a device without a clock, where it is known.
+    """
+
+    def __init__(self, log: GrowingLog | None, source: Source, rate_hz: float | None) -> None:
+        self.is_begun = False
+        self._log, self._source, self._rate_hz = log, source, rate_hz
+        self._started = datetime.now(timezone.utc)
+        self._has_time = self._has_device_clock = False
+        self._offset = self._next_index = 0
+        self._remarks: list[str] = []
+
+    def index(self, one: Placed) -> int:
+        """The frame's index in the log: it goes on where the connection before ended."""
+        return one.place + self._offset
+
+    def begin(self, decoder: Decoder, timeline: Timeline) -> None:
+        """The header, once the first frame has told what there is."""
+        if self.is_begun:
+            return
+        self.is_begun = True
+        self._has_device_clock = timeline.has_device_clock
+        self._has_time = timeline.has_device_clock or self._source.is_live or self._rate_hz is not None
+        if self._log is None:
+            return
+        names = ["time [s]"] if self._has_time else []
+        names += ["host_s"] if self._source.is_live else []
+        names += ["frame", *(["device_ticks"] if self._has_device_clock else [])]
+        facts = {
+            "protocol": decoder.name,
+            "source": self._source.name,
+            "started": self._started.isoformat(timespec="milliseconds"),
+            "device clock": f"{timeline.tick_s:g} s per tick" if self._has_device_clock else "none",
+        }
+        self._log.begin(facts, [*names, *decoder.columns])
+
+    def add(self, one: Placed, timeline: Timeline, *, is_first: bool, lost_while_away: int = 0) -> float:
+        """One row, and what is to be said of it; its time in seconds."""
+        if is_first and self._next_index:
+            self._offset = self._next_index + lost_while_away - one.place
+        index = self.index(one)
+        time_s = timeline.place(index, one.frame.ticks, one.host_s, restarted=one.restarted or is_first)
+        lost = one.lost + lost_while_away
+        if lost:
+            least = "at least " if one.is_wrapped else ""
+            self.say(f"lost {least}{lost} before frame {index} at {time_s:.6f} s")
+        if one.restarted:
+            self.say(f"the device began to count anew before frame {index} at {time_s:.6f} s")
+        self._next_index = index + 1
+        if self._log is not None:
+            parts = [f"{time_s:.6f}"] if self._has_time else []
+            if self._source.is_live:
+                parts.append(f"{one.host_s:.6f}")
+            parts.append(str(index))
+            if self._has_device_clock:
+                parts.append(str(one.frame.ticks))
+            self._log.row(",".join(parts) + "," + one.frame.text, time_s)
+        return time_s
+
+    def say(self, text: str) -> None:
+        """A remark, in the log where it has begun and with the next block."""
+        self._remarks.append(text)
+        if self._log is not None and self.is_begun:
+            self._log.remark(text)
+
+    def take_remarks(self) -> tuple[str, ...]:
+        """The remarks since the last call."""
+        remarks, self._remarks = tuple(self._remarks), []
+        return remarks
+
+    def say_facts(self, count: Count, clock: ClockLine | None, timeline: Timeline | None) -> None:
+        """Say the header's lines on frames and clocks anew."""
+        if self._log is not None and self.is_begun:
+            self._log.fill("frames", count.sentence())
+            self._log.fill("clock", clock_sentence(clock, timeline))
+
+    def flush(self, *, force: bool = False) -> None:
+        """Hand waiting rows to the disk: when it is time, or now."""
+        if self._log is not None:
+            self._log.flush(force=force)
+
+    def abandon(self) -> None:
+        """Close after a failure; what can be saved is."""
+        if self._log is not None:
+            self._log.abandon()
+
+    def close(self) -> None:
+        """The end: everything is written, and a log without a row is not left behind."""
+        if self._log is None:
+            return
+        self._log.close()
+        if not self.is_begun:
+            self._log.path.unlink(missing_ok=True)
+
 
 RETRY_S = 0.25
 MOST_QUEUED_BYTES = 512 * 1024 * 1024

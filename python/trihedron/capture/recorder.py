@@ -17,8 +17,7 @@ from trihedron.capture.account import Count, Tally, clock_sentence
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
 from trihedron.capture.log import GrowingLog
 from trihedron.capture.protocols import Decoder
-from trihedron.capture.reading import ReadingThread, SourceReturned, Stopped
-from trihedron.capture.rows import Rows
+from trihedron.capture.reading import ReadingThread, Rows, SourceReturned, Stopped
 from trihedron.capture.sequence import Placed, Sequence
 from trihedron.capture.sources import Source
 from trihedron.capture.timeline import Timeline

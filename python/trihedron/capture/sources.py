@@ -1,4 +1,4 @@
-"""Where bytes come from: a serial port, a TCP connection, a file, standard input."""
+"""Where bytes come from: a serial port (and which there are), a TCP connection, a file, standard input."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import socket
 import stat
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -16,6 +17,37 @@ from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostE
 
 if TYPE_CHECKING:
     import serial
+
+
+@dataclass(frozen=True)
+class Port:
+    """One port: its name, what the system says of it, and whether this user may open it."""
+
+    device: str
+    description: str
+    usb: str
+    is_permitted: bool
+
+
+def list_ports() -> list[Port]:
+    """Ports in the order of their names; those of USB devices first.
+
+    Raises
+    ------
+    CaptureError
+        When pyserial is not installed.
+    """
+    import_serial()
+    from serial.tools.list_ports import comports
+
+    found = []
+    for port in comports():
+        usb = f"{port.vid:04x}:{port.pid:04x}" if port.vid is not None else ""
+        description = port.description if port.description not in (None, "n/a") else ""
+        permitted = not port.device.startswith("/") or os.access(port.device, os.R_OK | os.W_OK)
+        found.append(Port(port.device, description, usb, permitted))
+    return sorted(found, key=lambda port: (not port.usb, port.device))
+
 
 GATHER_S = 0.008
 """After the first byte of a piece, how long to wait for more: at 1 kHz it saves nine wake-ups of ten."""

@@ -13,11 +13,65 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts.low_pass import Spectrum, undisturbed
 from trihedron.channel_facts.pooled import Pooled, as_measured, pooled_logarithm, robust_poses, root_of
-from trihedron.channel_facts.step import converter_step
 from trihedron.errors import RefusedError
 from trihedron.ranges import ranges_of
 from trihedron.records.pose_noise import PoseLine
 from trihedron.transforms import cosine_transform
+
+PROBED = 1 << 14
+"""Readings, evenly spread over a channel, whose values are looked at: sorting them takes half a millisecond."""
+TESTABLE = 8
+"""Gaps within reach, of many, that are evidence (``rust/converter_grid.rs``, where the grid's own limits stand)."""
+REPEATS = 2
+"""Readings must repeat where they are few, so many times a value."""
+PARTS = 8
+"""Where the whole log has no grid its parts may: a range was changed, or another sensor took over."""
+
+
+def probe(readings: FloatArray) -> FloatArray:
+    """The readings (k, ...) of (n, ...) that are looked at."""
+    return readings[:: probe_stride(len(readings))]
+
+
+def probe_stride(n: int) -> int:
+    """Every which of n readings is looked at."""
+    return max(1, -(-n // PROBED))
+
+
+def converter_step(readings: FloatArray) -> float:
+    """Spacing of the grid on which readings (n,) lie, in their unit; 0 where they lie on none that can be seen.
+
+    Readings in counts, in units converted from counts, and decimals as written are told alike. Without a code between
+    them visited values are several steps apart; then the step is what all gaps are multiples of. Of a log that changes
+    its step, the one of most of its parts is returned; of two that are multiples of a third, the third.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> noise = np.random.default_rng(1).normal(size=2000)
+    >>> converter_step(0.25 * np.round(2.0 * noise)), converter_step(noise)
+    (0.25, 0.0)
+    """
+    seen = np.ascontiguousarray(probe(readings))
+    levels, n = _core.levels_of(seen)
+    step = _grid(levels, n)
+    # Where most values occur once, no step matters beside the noise.
+    if step or len(levels) < TESTABLE or REPEATS * len(levels) > n:
+        return step
+    parts = [_core.levels_of(part) for part in np.array_split(seen, PARTS)]
+    steps = [_grid(*part) for part in parts if len(part[0]) > TESTABLE]
+    return float(np.median(steps)) if steps and all(steps) else 0.0
+
+
+def converter_steps(readings: FloatArray) -> FloatArray:
+    """The same of every column of (n, c), (c,)."""
+    return np.array([converter_step(column) for column in readings.T], dtype=np.float64)
+
+
+def _grid(levels: FloatArray, n: int) -> float:
+    """The step of a grid on which all ``levels`` (k,) of ``n`` readings lie, 0 where they lie on none."""
+    return _core.converter_grid(levels, n) or 0.0
+
 
 SHORTEST = 32
 """Readings of a pose that is used: fewer hold no octave below the uppermost two."""
@@ -208,5 +262,5 @@ def _less(part: FloatArray, per_sample: float) -> FloatArray:
     angle = 2.0 * np.pi * per_sample * np.arange(n)
     design = np.column_stack([np.ones(n), np.cos(angle), np.sin(angle)])
     found = np.linalg.lstsq(design, part, rcond=None)[0]
-    left: FloatArray = found[0] + (part - design @ found) * math.sqrt(n / (n - 2.0))
-    return left
+    out: FloatArray = found[0] + (part - design @ found) * math.sqrt(n / (n - 2.0))
+    return out

@@ -51,8 +51,7 @@ class End:
     @property
     def column(self) -> FloatArray:
         """(n,) readings of the axis."""
-        out: FloatArray = self.readings[:, self.axis]
-        return out
+        return self.readings[:, self.axis]
 
     def near(self, depth: float) -> tuple[int, float]:
         """How many other readings lie within ``depth`` of the end, and how far away the nearest is."""

@@ -36,13 +36,11 @@ class Windows:
 
     def quiet_mean(self, sensor: str) -> FloatArray:
         """(k, 3) mean readings of the quiet windows."""
-        out: FloatArray = self.mean[sensor][self.quiet]
-        return out
+        return self.mean[sensor][self.quiet]
 
     def quiet_noise(self, sensor: str) -> FloatArray:
         """(3,) median noise of one sample over the quiet windows."""
-        out: FloatArray = medians(self.noise[sensor][self.quiet])
-        return out
+        return medians(self.noise[sensor][self.quiet])
 
 
 def look(sensors: dict[str, FloatArray], rate_hz: float, *, in_a_row: int = 1) -> Windows | None:

@@ -207,7 +207,7 @@ def _make_writable() -> None:
 
 
 def _memory_sentence() -> str:
-    from trihedron.read.memory_limit import KEPT_FREE, available_memory_bytes, rows_that_fit
+    from trihedron.read.memory import KEPT_FREE, available_memory_bytes, rows_that_fit
 
     left = available_memory_bytes()
     if left is None:

@@ -7,7 +7,7 @@ import typer
 
 def ports() -> None:
     """List the serial ports that are plugged in."""
-    from trihedron.capture.ports import list_ports
+    from trihedron.capture.sources import list_ports
 
     found = list_ports()
     if not found:

@@ -1,17 +1,123 @@
-"""Axes along which a simulated log reads: rates of the world instead of the body's, gravity with the other sign."""
+"""Axes along which a simulated log reads (rates of the world, gravity upside down), and gravity missed in motion."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from trihedron.probability import fdtrc, stdtrit
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.records.diagnosis import NoiseDifference
+from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.sensor_model import correct
+from trihedron.simulate import Scenario
 from trihedron.units import degrees_from_radians, rate_to_si
+
+AIMED_AT = (0.9, 1.1)
+"""Ratio of what poses and moves miss, simulation over recording, within which the two are called alike."""
+FIRST_SEED = 60
+"""None of those by which scatter is matched: a scenario is not judged by the draws that it was made to fit."""
+FEW, MANY = 8, 24
+"""Simulations drawn, and those drawn where the first few leave it open: their spread is then known to a seventh."""
+OPEN_P = 0.1
+"""Chance of so large a ratio, from few simulations, above which no further ones are drawn."""
+
+What = Literal["poses", "moves"]
+
+
+class Moved(Protocol):
+    """What poses [(m/s²)²] and moves [rad²] of a recording miss, and of a scenario that is moved as it was."""
+
+    poses: float | None
+    moves: float | None
+
+    def missed_by(self, scenario: Scenario, seed: int) -> tuple[float | None, float | None]:
+        """The same of one simulation with its own calibration."""
+
+
+def judged_by_motion(found: Diagnosis, scenario: Scenario, beside: Moved, alpha: float) -> Diagnosis:
+    """A ``consistent`` diagnosis of a scenario, held against simulations of its instrument moved as the recording was.
+
+    Noise inside poses says nothing of what happens between them. A ratio that chance does not explain makes it
+    ``parameters-differ``; other verdicts stand, and are not held up by simulations.
+    """
+    if found.verdict != "consistent":
+        return found
+    rows = missed_alike(scenario, beside, alpha)
+    if not rows:
+        return found
+    verdict = "parameters-differ" if any(row.significant for row in rows) else found.verdict
+    return replace(found, verdict=verdict, noise_compared=(*found.noise_compared, *rows))
+
+
+def missed_alike(scenario: Scenario, beside: Moved, alpha: float) -> tuple[NoiseDifference, ...]:
+    """What poses and moves of a scenario miss over what the recording's do, each with its interval.
+
+    The recording is one draw more of the same kind where both are alike: the logarithm of its root mean square then
+    lies from the mean of K simulations by s √(1 + 1/K) times Student's t of K − 1 degrees of freedom, s their standard
+    deviation. ``p_value``: one-sided, against the nearer end of ``AIMED_AT``; ``interval``: of 1 − 2 ``alpha``, so that
+    a ratio is significant exactly where its interval lies outside.
+    """
+    made = [beside.missed_by(scenario, FIRST_SEED + k) for k in range(FEW)]
+    rows = _rows(made, beside, alpha)
+    if any(row.p_value is not None and row.p_value < OPEN_P for row in rows):
+        made += [beside.missed_by(scenario, FIRST_SEED + k) for k in range(FEW, MANY)]
+        rows = _rows(made, beside, alpha)
+    return rows
+
+
+def _rows(made: list[tuple[float | None, float | None]], beside: Moved, alpha: float) -> tuple[NoiseDifference, ...]:
+    poses = _row("poses", [one for one, _ in made], beside.poses, alpha)
+    moves = _row("moves", [one for _, one in made], beside.moves, alpha)
+    return tuple(row for row in (poses, moves) if row is not None)
+
+
+def _row(what: What, squares: list[float | None], seen: float | None, alpha: float) -> NoiseDifference | None:
+    known = [one for one in squares if one is not None and one > 0.0]
+    # As many as were refused are unlike the recording in another way than this one.
+    if seen is None or seen <= 0.0 or 2 * len(known) <= len(squares):
+        return None
+    logs = 0.5 * np.log(known)
+    k = len(known)
+    deviation = float(np.std(logs, ddof=1)) * math.sqrt(1.0 + 1.0 / k)
+    apart = float(np.mean(logs)) - 0.5 * math.log(seen)
+    half = float(stdtrit(k - 1, 1.0 - alpha)) * deviation
+    beyond = max(math.log(AIMED_AT[0]) - apart, apart - math.log(AIMED_AT[1]))
+    # t² is an F variate of one and K − 1 degrees of freedom.
+    tail = 0.5 * fdtrc(1.0, k - 1.0, (beyond / max(deviation, 1e-12)) ** 2)
+    p = tail if beyond > 0.0 else 1.0 - tail
+    differs = beyond > half
+    interval = (math.exp(apart - half), math.exp(apart + half))
+    model, recording = math.exp(float(np.mean(logs))), math.sqrt(seen)
+    unit: Literal["m/s^2", "rad"] = "m/s^2" if what == "poses" else "rad"
+    remark = _remark(what, math.exp(apart), interval, k, alpha) if differs else ""
+    sensor: Literal["accelerometer", "gyroscope"] = "accelerometer" if what == "poses" else "gyroscope"
+    return NoiseDifference(
+        sensor, "", what, model, recording, model / recording, interval, unit, p, differs, remark
+    )  # fmt: skip
+
+
+_CAUSE = {
+    ("poses", True): "noise inside the poses (a tremor, a line) does not go on between them as the model's does",
+    ("poses", False): "the bias changes from pose to pose by more than the model's noise",
+    ("moves", True): "the gyro of the model strays more in moves than this one",
+    ("moves", False): "the gyro's bias changes during moves, or motion is faster than the samples",
+}
+
+
+def _remark(what: What, ratio: float, interval: tuple[float, float], k: int, alpha: float) -> str:
+    of = "The gravity errors in poses" if what == "poses" else "The tilt errors after rotations"
+    verb = "miss" if what == "poses" else "misses"
+    return (
+        f"{of} of the model, moved as the log was, {verb} {ratio:.2f} times as far as the log's "
+        f"({100.0 * (1.0 - 2.0 * alpha):g} % {interval[0]:.2f} to {interval[1]:.2f}, {k} simulations); "
+        f"{_CAUSE[what, ratio > 1.0]}."
+    )
+
 
 OPPOSITE = -0.9
 """Mean cosine between gravity in the poses of both logs below which they are one protocol with the sign turned."""
@@ -53,7 +159,7 @@ def _gravity(segments: Segments, calibration: Calibration) -> npt.NDArray[np.flo
     if mean is None:
         return None
     force = correct(mean, calibration.accelerometer.S, calibration.accelerometer.b)
-    out: npt.NDArray[np.float64] = force / np.linalg.norm(force, axis=1, keepdims=True)
+    out: npt.NDArray[np.float64] | None = force / np.linalg.norm(force, axis=1, keepdims=True)
     return out
 
 

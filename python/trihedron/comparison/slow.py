@@ -10,8 +10,10 @@ from types import MappingProxyType
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
-from trihedron.comparison.noise import Sensor
+from trihedron.channel_facts.pooled import ratio_of
+from trihedron.comparison.noise import Sampled, Sensor
 from trihedron.diagnose.against.mechanisms import FREE_CURVES
+from trihedron.estimate.noise.correlation_time import correlation_time
 from trihedron.estimate.noise.of_biases import PoseBiases, SlowDifference, compare_slow
 from trihedron.estimate.noise.of_norms import PoseNorms, compare_slow_norms
 from trihedron.records import Recording, Segments
@@ -21,11 +23,61 @@ from trihedron.records.pose_noise import Measured
 from trihedron.segment import resegment
 from trihedron.sensor_model import correct
 
+TESTS = 48.0
+"""Shares of alpha: what numbers (a half), noise (three eighths) and slow noise (a twelfth) leave, for two sensors."""
+LEAST_TIME_RATIO = 2.0
+"""Times of parts of one reel differ by half; makers state none."""
+ALIKE = 1.25
+"""Two sensors of one part whose times agree within a quarter have one and the same."""
+SENSORS: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
+
+
+def correlation_times(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
+    """A row for each sensor whose noise forgets within the poses of both logs; a time used for both is named."""
+    times = {
+        sensor: (correlation_time(model.noise[sensor]), correlation_time(recording.noise[sensor]))
+        for sensor in SENSORS
+        if sensor in model.noise and sensor in recording.noise
+    }
+    both = {sensor: (m, r) for sensor, (m, r) in times.items() if m is not None and r is not None}
+    shared = _one_for_both(both, alpha)
+    out = []
+    for sensor, (m, r) in both.items():
+        ratio = ratio_of(m, r)
+        differs = ratio.p_value < alpha / TESTS and max(ratio.value, 1.0 / ratio.value) > LEAST_TIME_RATIO
+        name = "gyro" if sensor == "gyroscope" else sensor
+        remark = shared or f"The noise of the {name} forgets in {m.value:.2g} s, the recording's in {r.value:.2g} s."
+        out.append(
+            NoiseDifference(
+                sensor, "", "correlation-time", m.value, r.value, ratio.value, (ratio.lower, ratio.upper), "s",
+                ratio.p_value, differs, remark if differs else "",
+            )
+        )  # fmt: skip
+    return tuple(out)
+
+
+def _one_for_both(both: Mapping[Sensor, tuple[Measured, Measured]], alpha: float) -> str:
+    """The words for a simulation that gives both sensors one time where the recording's differ; empty elsewhere."""
+    if len(both) < len(SENSORS):
+        return ""
+    (m_a, r_a), (m_g, r_g) = (both[sensor] for sensor in SENSORS)
+    model, recording = ratio_of(m_a, m_g), ratio_of(r_a, r_g)
+    is_one = model.lower <= 1.0 <= model.upper and max(model.value, 1.0 / model.value) < ALIKE
+    differ = recording.p_value < alpha / TESTS and max(recording.value, 1.0 / recording.value) > LEAST_TIME_RATIO
+    if not (is_one and differ):
+        return ""
+    return (
+        f"The noise of both sensors of the model forgets in the same time, {math.sqrt(m_a.value * m_g.value):.2g} s; "
+        f"the recording's accelerometer in {r_a.value:.2g} s, its gyro in {r_g.value:.2g} s: one time constant was "
+        "used for both."
+    )
+
+
 LEAST_SLOW_RATIO = 2.0
 """Bias instability differs by half from one part of a reel to the next and with the day; makers state no spread."""
 RESEMBLES_SLOW = 1.5
 """A session tells a walk to some 30 %: a ratio this near to the root of the rate is taken for it."""
-TESTS = 24.0
+OF_ALPHA = 24.0
 """Shares of alpha: a twelfth is spent on slow noise, half of it on either sensor."""
 NO_SHAPE = frozenset({"gyro-bias-repeatability", "accel-bias-repeatability", "disturbed-pose", "periodic-interference"})
 """Effects that leave the course of a bias from pose to pose as it is."""
@@ -61,7 +113,7 @@ def _rows(
     if found is None:
         return []
     common = math.exp(float(np.mean([math.log(r[found.term].value) for r in found.ratio])))
-    differs = not is_open and found.p_value < alpha / TESTS and max(common, 1.0 / common) > LEAST_SLOW_RATIO
+    differs = not is_open and found.p_value < alpha / OF_ALPHA and max(common, 1.0 / common) > LEAST_SLOW_RATIO
     out = []
     terms: tuple[NoiseTerm, NoiseTerm] = ("B", "K")
     for term in terms:

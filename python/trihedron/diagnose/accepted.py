@@ -20,7 +20,7 @@ from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curve
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
 from trihedron.diagnose.sample_evidence import Seen
 from trihedron.diagnose.search import Found
-from trihedron.diagnose.session.solve import Fit, leverage
+from trihedron.diagnose.session.solve import Fit
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectCurve, EffectParameter, Stage, StageDomain
 from trihedron.records.domains import DomainResiduals, HeldOut
 
@@ -85,7 +85,7 @@ class Answer:
 
 def excess(fitted: Fit) -> float:
     """Chi-square beyond its degrees of freedom, over the domains that have more than they should."""
-    used, out = leverage(fitted), 0.0
+    used, out = fitted.leverage, 0.0
     for domain in ROW_DOMAINS:
         rows = fitted.system.domain == domain
         out += max(float((fitted.system.residual[rows] ** 2).sum() - (1.0 - used[rows]).sum()), 0.0)
@@ -103,11 +103,7 @@ def accepted_effects(answer: Answer, residuals: Sequence[DomainResiduals]) -> tu
         is_behind = effect.is_spread or (own is not None and share < HEADLINE)
         is_beside = any(one.effect is effect and not one.reobserves for one in answer.seen)
         rows.append(((is_behind, -share, is_beside), record, share))
-    return tuple(_shared(record, share) for _, record, share in sorted(rows, key=lambda row: row[0]))
-
-
-def _shared(record: dict[str, Any], share: float) -> AcceptedEffect:
-    return AcceptedEffect(**record, share=share)
+    return tuple(AcceptedEffect(**record, share=share) for _, record, share in sorted(rows, key=lambda row: row[0]))
 
 
 def _of_terms(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[dict[str, Any]]:

@@ -12,8 +12,8 @@ from scipy.ndimage import convolve1d, uniform_filter1d
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.slopes import smoothed_slope
 from trihedron.diagnose.session.solve import Fit
+from trihedron.diagnose.session.twin import smoothed_slope
 
 TEMPERATURE_WINDOW_S = 10.0
 """Over which a logged temperature is smoothed before its rate of change is taken: its steps are a tenth of a kelvin."""
@@ -117,14 +117,12 @@ class Context:
     @cached_property
     def axis_force(self) -> FloatArray:
         """(points, 3) specific force along each accelerometer's own axis."""
-        out: FloatArray = self.force @ np.linalg.inv(self.accel_axes).T
-        return out
+        return self.force @ np.linalg.inv(self.accel_axes).T
 
     @cached_property
     def axis_rate(self) -> FloatArray:
         """(points, 3) angular rate along each gyro's own axis."""
-        out: FloatArray = self.rate @ np.linalg.inv(self.gyro_axes).T
-        return out
+        return self.rate @ np.linalg.inv(self.gyro_axes).T
 
     def on_accelerometers(self, values: FloatArray) -> FloatArray:
         """(points, 3, 3) columns: parameter j times ``values[:, j]`` added to the reading of accelerometer j."""
@@ -289,5 +287,4 @@ def _on_axes(axes: FloatArray, values: FloatArray) -> FloatArray:
     """(n, 3, 3) ``axes[i, j] · values[:, j]``, as one product of matrices: rows of three are slow one by one."""
     spread = np.zeros((3, 3, 3))
     spread[range(3), :, range(3)] = axes.T
-    out: FloatArray = (values @ spread.reshape(3, 9)).reshape(-1, 3, 3)
-    return out
+    return (values @ spread.reshape(3, 9)).reshape(-1, 3, 3)

@@ -18,10 +18,9 @@ from trihedron.diagnose.effects.sample_steps import step_errors
 from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_error
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.relation_records import records
-from trihedron.diagnose.residuals.before_after import residuals_before_after, with_covariance
 from trihedron.diagnose.residuals.creep import settling, with_settling
-from trihedron.diagnose.residuals.goodness_of_fit import hidden_biases, judge_rows
-from trihedron.diagnose.residuals.timing import judge_timing
+from trihedron.diagnose.residuals.effect_curves import residuals_before_after, with_covariance
+from trihedron.diagnose.residuals.goodness_of_fit import hidden_biases, judge_rows, judge_timing
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
 from trihedron.diagnose.sample_evidence import Observed, look
 from trihedron.diagnose.search import Found, search, with_shapes

@@ -110,7 +110,7 @@ def _explained(before: Fit, after: Fit) -> float:
 def _per_row(fitted: Fit, domain: int) -> tuple[float, float]:
     """Chi-square per degree of freedom of one domain, and those degrees."""
     rows = fitted.system.domain == domain
-    dof = float((1.0 - fitted.used[rows]).sum())
+    dof = float((1.0 - fitted.leverage[rows]).sum())
     return float((fitted.system.residual[rows] ** 2).sum()) / max(dof, 1.0), dof
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
-from trihedron.documents import DocumentError, check_values, of_path, read_text
+from trihedron.documents import DocumentError, of_path, parse_toml, read_text
 from trihedron.errors import RefusedError
 from trihedron.records.frame_declaration import (
     CHECKSUM_SIZES,
@@ -17,11 +16,6 @@ from trihedron.records.frame_declaration import (
     FrameField,
     Role,
 )
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 _TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _KEYS = {"name", "sync", "length", "endian", "checksum", "field"}
@@ -39,15 +33,9 @@ def read_frame_declaration(path: str | Path) -> FrameDeclaration:
     """
     path = Path(path)
     try:
-        table = tomllib.loads(read_text(path, "declaration of a frame"))
-        check_values(table)
+        table = parse_toml(read_text(path, "declaration of a frame"))
     except DocumentError as error:
         raise RefusedError(of_path(path, error)) from None
-    except RecursionError:
-        raise RefusedError(f"{path}: this is nested too deeply.") from None
-    # A whole number of thousands of digits is a ValueError that is no TOMLDecodeError.
-    except ValueError as error:
-        raise RefusedError(f"{path} is not TOML: {str(error).split(';')[0][:200]}.") from None
     try:
         return _declaration(table, path.stem)
     except OverflowError:

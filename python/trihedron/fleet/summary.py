@@ -13,7 +13,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.sessions.changes import changes_among
-from trihedron.estimate.sessions.repeatability import repeated_parameters
+from trihedron.estimate.sessions.spread import repeated_parameters
 from trihedron.fleet.table import frame_of
 from trihedron.probability import betaincinv, fdtrc, ndtr
 from trihedron.records.fleet import FleetLog, FleetSummary, MixedLogs, Outlier, SharedEffect
@@ -165,7 +165,7 @@ def _outliers(by_device: dict[str, list[Session]]) -> tuple[Outlier, ...]:
         kept = list(range(len(names)))
         while len(kept) >= FEWEST:
             column = means[kept, k]
-            worst = _farthest(column)
+            worst = int(np.argmax(np.abs(column - np.median(column))))
             others = np.delete(column, worst)
             dof = len(others) - 1
             variance = (prior_dof * prior[k] + dof * float(others.var(ddof=1))) / (prior_dof + dof)
@@ -181,10 +181,6 @@ def _outliers(by_device: dict[str, list[Session]]) -> tuple[Outlier, ...]:
             found.append(Outlier(serial, PARAMETERS[k], float(column[worst]), away, sigmas, p))
             kept.pop(worst)
     return tuple(sorted(found, key=lambda one: one.p_adjusted))
-
-
-def _farthest(column: FloatArray) -> int:
-    return int(np.argmax(np.abs(column - np.median(column))))
 
 
 def _spread_of_axes(means: FloatArray) -> tuple[FloatArray, float]:

@@ -4,7 +4,7 @@ The file's first bytes tell its format; names, then readings tell its columns an
 stated as a finding. A file that cannot become a recording raises :class:`ReadError` with one sentence.
 """
 
-from trihedron.read.archived_devices import devices_of
+from trihedron.read.archive import devices_of
 from trihedron.read.axis_noise import read_axis_noise
 from trihedron.read.chunks import ChunkedLog, open_chunks
 from trihedron.read.errors import ReadError

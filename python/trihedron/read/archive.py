@@ -12,13 +12,35 @@ from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib import format as npy_format
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError, from_os_error
-from trihedron.read.memory_limit import check_memory, check_unpacked
+from trihedron.read.memory import check_memory, check_unpacked
 from trihedron.read.table import Table
+
+
+def devices_of(path: Path) -> int:
+    """Devices of a ``.npz`` archive with a block (n, devices, columns); 1 for every other file, readable or not."""
+    if path.suffix.lower() != ".npz":
+        return 1
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return max((_devices(archive, name) for name in archive.namelist()), default=1)
+    except (OSError, ValueError, zipfile.BadZipFile):
+        # Reading it will say what is wrong.
+        return 1
+
+
+def _devices(archive: zipfile.ZipFile, name: str) -> int:
+    with archive.open(name) as stream:
+        version = npy_format.read_magic(stream)
+        read = npy_format.read_array_header_1_0 if version == (1, 0) else npy_format.read_array_header_2_0
+        shape, _, dtype = read(stream)
+    return int(shape[1]) if len(shape) == 3 and dtype.kind in "iuf" else 1
+
 
 _BLOCK_NAMES = ("counts", "data", "imu", "raw", "samples", "arr_0")
 # NumPy evaluates a header as Python text, so a damaged one fails in the ways of a parser.
@@ -110,8 +132,7 @@ def _pick_device(path: Path, name: str, block: npt.NDArray[np.generic], device: 
         )
     if not 1 <= device <= n_units:
         raise ReadError(f"{path}: there is no device {device}; array '{name}' holds devices 1 to {n_units}.")
-    chosen: npt.NDArray[np.generic] = block[:, device - 1, :]
-    return chosen
+    return block[:, device - 1, :]
 
 
 def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], device: int | None) -> Table:

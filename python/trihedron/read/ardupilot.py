@@ -17,8 +17,8 @@ from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError
 from trihedron.read.onboard import Parameters, said_of
+from trihedron.read.ros import Stream, choice_note, first_line, missing_extra, pick
 from trihedron.read.table import StatedClock, Table
-from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
 from trihedron.records import Finding, FindingCode, Onboard
 
 _PARAMETERS = re.compile(r"INS_(ACC|GYR|TCAL)|AHRS_(ORIENTATION|CUSTOM_)")

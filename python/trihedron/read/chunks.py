@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import tempfile
+import weakref
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,10 +13,157 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.errors import ReadError, check_readable, from_os_error, refuse_after_fork
-from trihedron.read.panics import panics_unprinted
-from trihedron.read.rows_on_disk import RowsOnDisk, rows_on_disk
-from trihedron.read.text_on_disk import TextOnDisk
+from trihedron.errors import RefusedError
+from trihedron.files.output import Temporary, clear_leftovers
+from trihedron.read.archive import DAMAGE, header
+from trihedron.read.errors import ReadError, check_readable, from_os_error, panics_unprinted, refuse_after_fork
+from trihedron.read.text.layout import MISSING, Layout, detect
+
+
+@dataclass(frozen=True, eq=False)
+class RowsOnDisk:
+    """An array (n, k) of numbers in a file; ``by_columns`` says that it lies column after column."""
+
+    path: Path
+    shape: tuple[int, int]
+    dtype: np.dtype[Any]
+    offset: int
+    by_columns: bool
+
+    def read(self, start: int, stop: int) -> npt.NDArray[Any]:
+        """Rows ``[start, stop)`` (stop - start, k) in the type of the file.
+
+        Raises
+        ------
+        ReadError
+            When the file became shorter, or the system cannot read it.
+        """
+        n, width = self.shape
+        start, stop = min(max(start, 0), n), min(stop, n)
+        rows = max(stop - start, 0)
+        try:
+            with self.path.open("rb") as stream:
+                if not self.by_columns:
+                    return self._taken(stream, start * width, rows * width).reshape(rows, width)
+                out = np.empty((rows, width), self.dtype)
+                for k in range(width):
+                    out[:, k] = self._taken(stream, k * n + start, rows)
+                return out
+        except OSError as error:
+            raise from_os_error(self.path, error) from None
+
+    def _taken(self, stream: Any, first: int, count: int) -> npt.NDArray[Any]:
+        stream.seek(self.offset + first * self.dtype.itemsize)
+        part = np.fromfile(stream, dtype=self.dtype, count=count)
+        if len(part) < count:
+            raise ReadError(f"{self.path}: the file became shorter while it was read; copy it again.")
+        return part
+
+
+def rows_on_disk(path: Path) -> RowsOnDisk:
+    """The rows of a .npy file.
+
+    Raises
+    ------
+    ReadError
+        When the file is damaged, or its array is no table of numbers.
+    """
+    try:
+        with path.open("rb") as stream:
+            shape, by_columns, dtype = header(stream)
+            offset = stream.tell()
+            if min(shape, default=1) < 0 or dtype.itemsize * math.prod(shape) != path.stat().st_size - offset:
+                raise RefusedError(f"its header says {dtype} of shape {shape}, and it has another length")
+    except OSError as error:
+        raise from_os_error(path, error) from None
+    except DAMAGE as error:
+        why = (str(error).splitlines() or [type(error).__name__])[0]
+        raise ReadError(f"{path}: this .npy file is damaged ({why}); write it again.") from None
+    if dtype.kind not in "iuf" or len(shape) != len(("rows", "columns")):
+        raise ReadError(f"{path}: only arrays of numbers, rows x columns, are read in pieces; got {dtype} {shape}.")
+    return RowsOnDisk(path, (shape[0], shape[1]), dtype, offset, by_columns)
+
+
+HEAD_BYTES = 1 << 16
+"""Lines that the layout is told from, as for a log that is read whole."""
+
+
+class TextOnDisk:
+    """The table of a text log's numbers under ``path``, in the folder for temporary files; gone with this object."""
+
+    def __init__(self, log: Path) -> None:
+        layout = _layout_of(log)
+        folder = Path(tempfile.gettempdir())
+        clear_leftovers(folder)
+        held = Temporary(folder / f"{log.name}.parquet")
+        self._end = weakref.finalize(self, held.__exit__, None, None, None)
+        self.path = Path(held.path)
+        try:
+            _convert(log, layout, self.path)
+        except BaseException:
+            self._end()
+            raise
+
+
+def _layout_of(log: Path) -> Layout:
+    """How the text is laid out.
+
+    Raises
+    ------
+    ReadError
+        When this is no text of numbers that can be read in pieces.
+    """
+    ways = "only .npy, Parquet and plain text tables are read in pieces; write the log as one of these."
+    try:
+        with log.open("rb") as stream:
+            head = stream.read(HEAD_BYTES)
+    except OSError as error:
+        raise from_os_error(log, error) from None
+    if b"\0" in head:
+        raise ReadError(f"{log}: {ways}")
+    text = head.decode("utf-8-sig", errors="replace")
+    layout = detect(text if len(head) < HEAD_BYTES else text[: text.rfind("\n") + 1])
+    if layout is None or layout.separator in (" ", "\0"):
+        raise ReadError(f"{log}: {ways} A table's separator is a comma, a semicolon or a tab.")
+    if layout.stray or layout.remarks:
+        raise ReadError(
+            f"{log}: line {(*layout.stray, *layout.remarks)[0]} above the rows is neither names nor a row; remove what "
+            "stands there, or read the log whole (without --stream)."
+        )
+    return layout
+
+
+def _convert(log: Path, layout: Layout, target: Path) -> None:
+    import polars
+
+    refuse_after_fork(log)
+    names = [f"column {k + 1}" for k in range(layout.n_fields + layout.trailing_separator)]
+    try:
+        with panics_unprinted():
+            polars.scan_csv(
+                log,
+                has_header=False,
+                schema=dict.fromkeys(names, polars.Float64),
+                separator=layout.separator,
+                skip_lines=layout.first_line - 1,
+                decimal_comma=layout.decimal_comma,
+                null_values=[word for word in MISSING if word],
+                encoding="utf8",
+            ).select(names[: layout.n_fields]).sink_parquet(target, compression="lz4")
+    except polars.exceptions.PolarsError as error:
+        raise ReadError(
+            f"{log}: not every row is {layout.n_fields} numbers ({_said(error)}); repair it, or read the log whole "
+            "(without --stream), which says which rows."
+        ) from None
+    except OSError as error:
+        raise ReadError(
+            f"{log}: there is no room to make a table of it in {target.parent} ({error.strerror or error}); set TMPDIR."
+        ) from None
+
+
+def _said(error: Exception) -> str:
+    return str(error).splitlines()[0].split(". ")[0][:120]
+
 
 ROWS = 1 << 18
 ROLES = ("ax", "ay", "az", "gx", "gy", "gz")

@@ -9,9 +9,8 @@ import polars as pl
 
 from trihedron.arrays import FloatArray
 from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, from_os_error, refuse_after_fork
-from trihedron.read.memory_limit import check_memory
-from trihedron.read.panics import panics_unprinted
+from trihedron.read.errors import ReadError, from_os_error, panics_unprinted, refuse_after_fork
+from trihedron.read.memory import check_memory
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
 

@@ -15,26 +15,23 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts import facts_in
 from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, look
-from trihedron.read.audit.pace import audit_pace
-from trihedron.read.audit.readings import audit_readings
+from trihedron.read.audit.readings import audit_readings, audit_steps
 from trihedron.read.audit.seam import audit_seam
-from trihedron.read.audit.steps import audit_steps
-from trihedron.read.audit.timing import audit_counter, audit_timing
+from trihedron.read.audit.timing import audit_counter, audit_pace, audit_timing
 from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.clock.unit import was_weighed, with_gyro
 from trihedron.read.columns import Sensor
-from trihedron.read.devices import Choice, by_sensor
+from trihedron.read.devices import Choice, by_sensor, one_beside
 from trihedron.read.digest import LateSha256, hexdigest
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.in_turn import by_rows
 from trihedron.read.memory import table_of
+from trihedron.read.merge import merge_sensors
 from trihedron.read.sensing import WHOLE, Judged, judge_accelerometer, judge_gyroscope
 from trihedron.read.sensors import Options, Sensors, sensors_of, settled
-from trihedron.read.side_by_side import one_beside
 from trihedron.read.source import read_tables
 from trihedron.read.table import Table
 from trihedron.read.turning import PARTS, turning_of
-from trihedron.read.two_files import merge_sensors
 from trihedron.read.unnamed_gyro import unnamed_gyro
 from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.progress import Progress

@@ -99,7 +99,7 @@ def judge_accelerometer(
         told = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-at-rest", rest_norm=norm, unit=nearest.value)
         return Judged(nearest, (told,))
     if norm < 1.0 and not whole:
-        return Judged(AccelerationUnit.M_S2, (_gravity_missing(norm),))
+        return Judged(AccelerationUnit.M_S2, (Finding.of(FindingCode.GRAVITY_MISSING, rest_norm=norm),))
     return Judged(
         AccelerationUnit.COUNTS,
         (Finding.of(FindingCode.UNIT_ASSUMED, "never-whole" if math.isnan(norm) else "no-gravity", rest_norm=norm),),
@@ -108,10 +108,6 @@ def judge_accelerometer(
 
 def _is_near(value: float, target: float) -> bool:
     return abs(value - target) <= NEAR_GRAVITY * target
-
-
-def _gravity_missing(norm: float) -> Finding:
-    return Finding.of(FindingCode.GRAVITY_MISSING, rest_norm=norm)
 
 
 def _contradiction_accelerometer(unit: AccelerationUnit, norm: float, *, is_given: bool) -> Finding | None:

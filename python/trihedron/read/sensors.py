@@ -10,24 +10,20 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.read.captured import with_arrivals
 from trihedron.read.clock.base import Clock, build_clock
 from trihedron.read.clock.order import in_order
-from trihedron.read.clock.rate import mean_rate_hz
+from trihedron.read.clock.rate import mean_rate_hz, steps_of
 from trihedron.read.clock.settle import settle_clock
-from trihedron.read.clock.steps import steps_of
 from trihedron.read.clock.unit import TICKS, Witness, counts_rows
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
-from trihedron.read.constant import refuse_constant
-from trihedron.read.copies import copied_rows
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
 from trihedron.read.names import is_rate
+from trihedron.read.repeated import copied_rows, refuse_constant
 from trihedron.read.sensing import order_of_triads
 from trihedron.read.table import Table
 from trihedron.read.text.store import side_by_side
-from trihedron.read.time_steps import summed_steps
-from trihedron.read.unread_time import refuse_unread_time
+from trihedron.read.time_column import refuse_unread_time, summed_steps, with_arrivals
 from trihedron.records import Finding, FindingCode, Sampling
 from trihedron.records.progress import Progress
 from trihedron.records.sampling import UNJUDGED
@@ -134,7 +130,14 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         raise ReadError(f"{path}: the file holds one row of numbers only ({table.place(0)}); a recording needs many.")
     if chosen.time is None and options.columns is None and options.rate_hz is None:
         table, chosen = summed_steps(table, chosen)
-    findings = [*table.findings, *chosen.findings, *_words_left_out(table)]
+    findings = [
+        *table.findings,
+        *chosen.findings,
+        *(
+            Finding.of(FindingCode.COLUMN_LEFT_OUT, "words", column=table.label(i), example=example[:40])
+            for i, example in table.words.items()
+        ),
+    ]
     if chosen.time is None:
         refuse_unread_time(table, chosen, options.columns, options.rate_hz or _stated_rate(table))
     clock, rate = _time_base(table, chosen, options, findings)
@@ -182,13 +185,6 @@ def _without_used(table: Table, chosen: Columns) -> Table:
     done = {chosen.time, *(chosen.accelerometer or ()), *(chosen.gyroscope or ())} - kept
     columns = tuple(np.empty(0) if i in done else column for i, column in enumerate(table.columns))
     return replace(table, columns=columns, rows_in_file=table.n_in_file)
-
-
-def _words_left_out(table: Table) -> list[Finding]:
-    return [
-        Finding.of(FindingCode.COLUMN_LEFT_OUT, "words", column=table.label(i), example=example[:40])
-        for i, example in table.words.items()
-    ]
 
 
 def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[Finding]) -> Clock:

@@ -15,11 +15,10 @@ from trihedron.read.columns import find_columns
 from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError, from_os_error
-from trihedron.read.matlab_check import DamagedError, check_matlab
-from trihedron.read.matlab_objects import read_objects
+from trihedron.read.matlab import DamagedError, check_matlab, read_objects
 from trihedron.read.memory import columns_table
+from trihedron.read.ros import Stream, choice_note, first_line, missing_extra, pick
 from trihedron.read.table import Table
-from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
 
 Groups = dict[str, dict[str, npt.NDArray[Any]]]
 MIN_ROWS = 8

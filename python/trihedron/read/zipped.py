@@ -12,7 +12,7 @@ from trihedron.read.archive import read_npz
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError, from_os_error
-from trihedron.read.memory_limit import check_unpacked
+from trihedron.read.memory import check_unpacked
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress

@@ -20,7 +20,6 @@ from trihedron.records.kalman import (
     Consistency,
     ConstantsTrack,
     KalmanCalibration,
-    LiveEstimate,
     NormKalmanCalibration,
     PoseTable,
 )
@@ -58,7 +57,6 @@ __all__ = [
     "Frame",
     "GaussMarkov",
     "KalmanCalibration",
-    "LiveEstimate",
     "Move",
     "Noise",
     "NoiseAxis",

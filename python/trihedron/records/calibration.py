@@ -117,14 +117,12 @@ class SensorCalibration(Frozen):
     @property
     def sigma_S(self) -> FloatArray:
         """(3, 3) standard errors of S."""
-        sigma: FloatArray = np.sqrt(np.maximum(np.diag(self.covariance)[:9], 0.0)).reshape(3, 3)
-        return sigma
+        return np.sqrt(np.maximum(np.diag(self.covariance)[:9], 0.0)).reshape(3, 3)
 
     @property
     def sigma_b(self) -> FloatArray:
         """(3,) standard errors of b."""
-        sigma: FloatArray = np.sqrt(np.maximum(np.diag(self.covariance)[9:], 0.0))
-        return sigma
+        return np.sqrt(np.maximum(np.diag(self.covariance)[9:], 0.0))
 
     def __repr__(self) -> str:
         return f"<SensorCalibration {self.raw_unit} to {self.si_unit}, by {self.method}>"

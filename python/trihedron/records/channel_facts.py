@@ -91,8 +91,7 @@ class RecordingFacts(Frozen):
     @property
     def steps(self) -> FloatArray:
         """(3,) or (6,) steps of all channels that there are, the accelerometer's first."""
-        out: FloatArray = np.concatenate([one.step for one in (self.accelerometer, self.gyroscope) if one is not None])
-        return out
+        return np.concatenate([one.step for one in (self.accelerometer, self.gyroscope) if one is not None])
 
     def moved(self, to: IntArray) -> RecordingFacts:
         """The facts of a log into which samples were put (:meth:`ChannelFacts.moved`)."""

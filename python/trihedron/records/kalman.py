@@ -174,14 +174,12 @@ class AxisKalmanResult:
     @property
     def sigma(self) -> FloatArray:
         """(4,) standard errors of the constants."""
-        out: FloatArray = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        return out
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     @property
     def nis(self) -> FloatArray:
         """(n,) normalised innovation squared."""
-        out: FloatArray = (self.innovation / self.innovation_sigma) ** 2
-        return out
+        return (self.innovation / self.innovation_sigma) ** 2
 
     def track(self, method: str) -> ConstantsTrack:
         """The track of one method."""
@@ -232,8 +230,7 @@ class KalmanCalibration(Frozen):
     def residual_without_drift_m_s2(self) -> FloatArray:
         """(n, 3) the same after the smoothed slow noise was taken out of the readings."""
         drift = np.column_stack([axis.smoothed_drift for axis in self.axes])
-        out: FloatArray = self.residual_m_s2 - drift @ self.accelerometer.S.T
-        return out
+        return self.residual_m_s2 - drift @ self.accelerometer.S.T
 
     @property
     def n_poses(self) -> int:
@@ -244,25 +241,6 @@ class KalmanCalibration(Frozen):
     def is_trustworthy(self) -> bool:
         """No finding says that the answer is not to be trusted."""
         return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
-
-
-@dataclass(frozen=True, eq=False)
-class LiveEstimate(Frozen):
-    """What is known after a pose: constants (3, 4) with standard errors, and how far the goal is.
-
-    ``relative_sigma`` (3, 4) are the standard errors divided by the axis' own sensitivity: dimensionless for the three
-    sensitivities, m/s² for the bias. ``poses_needed`` counts further poses predicted to reach the goal (0 when
-    reached, None when the predicted poses do not reach it); ``next_reference`` (3,) [m/s²] is the most useful next one.
-    """
-
-    n_poses: int
-    constants: FloatArray
-    sigma: FloatArray
-    relative_sigma: FloatArray
-    good_enough: bool
-    poses_needed: int | None
-    next_reference: FloatArray | None
-    nis: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,5 +267,4 @@ class NormKalmanCalibration(Frozen):
     @property
     def nis(self) -> FloatArray:
         """(n,) normalised innovation squared."""
-        out: FloatArray = (self.innovation / self.innovation_sigma) ** 2
-        return out
+        return (self.innovation / self.innovation_sigma) ** 2

@@ -52,11 +52,8 @@ class PoseNoise:
     how much the noise differs from pose to pose beyond chance (standard deviation of the logarithm of its power).
     """
 
-    name: str
-    unit: str
     rate_hz: float
     n_poses: int
-    n_readings: int
     white: Measured | None
     reading_sigma: float
     step: float

@@ -150,8 +150,7 @@ class Segments(Presented):
         axes, up = self.accelerometer_sigma_mean, self.accelerometer_sigma_up
         if axes is None or up is None:
             return axes
-        out: FloatArray = np.where(np.isfinite(up)[:, None], up[:, None], axes)
-        return out
+        return np.where(np.isfinite(up)[:, None], up[:, None], axes)
 
     def pose_name(self, start: int, stop: int) -> str:
         """The pose that holds samples [start, stop), by its number from 1."""

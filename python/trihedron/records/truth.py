@@ -112,8 +112,7 @@ class Comparison:
     @property
     def z(self) -> FloatArray:
         """(k,) errors in standard errors: standard normal when the uncertainties are honest."""
-        z: FloatArray = (self.estimate - self.truth) / self.sigma
-        return z
+        return (self.estimate - self.truth) / self.sigma
 
     @property
     def chi2(self) -> float:

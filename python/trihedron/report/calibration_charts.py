@@ -95,8 +95,7 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
 
 def move_noise_deg(quality: FitQuality) -> FloatArray:
     """(m,) angle that noise alone gives after each move, rms, degrees."""
-    out: FloatArray = np.asarray(degrees_from_radians(1.0) * np.linalg.norm(quality.sigma, axis=1) / 9.8)
-    return out
+    return np.asarray(degrees_from_radians(1.0) * np.linalg.norm(quality.sigma, axis=1) / 9.8)
 
 
 def sphere_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
@@ -128,8 +127,7 @@ def direction_in_words(words: str) -> FloatArray | None:
     up = np.zeros(3)
     for side, axis in re.findall(r"([+-])([XYZ])", words.partition(" ")[0]):
         up[XYZ.index(axis)] = 1.0 if side == "+" else -1.0
-    out: FloatArray = up / np.linalg.norm(up)
-    return out
+    return up / np.linalg.norm(up)
 
 
 def strong_correlations(calibration: Calibration) -> list[tuple[str, str, float]]:

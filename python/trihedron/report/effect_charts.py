@@ -147,8 +147,7 @@ def force_at(time_s: FloatArray, recording: Recording, calibration: Calibration)
     mean = np.array(
         [np.nanmean(recording.accelerometer[a : max(b, a + 1)], axis=0) for a, b in zip(first, last, strict=True)]
     )
-    out: FloatArray = mean @ sensor.S.T + sensor.b
-    return out
+    return mean @ sensor.S.T + sensor.b
 
 
 def fastest_rate(time_s: FloatArray, recording: Recording, segments: Segments, calibration: Calibration) -> FloatArray:

@@ -36,5 +36,4 @@ def _placed(values: npt.ArrayLike, limits: tuple[float, float], *, is_log: bool)
             v = np.log10(v)
         low, high = math.log10(low), math.log10(high)
     # Marks far outside must not leave the range of a float32 of the renderer.
-    out: FloatArray = np.clip((v - low) / ((high - low) or 1.0) * UNITS, -9 * UNITS, 10 * UNITS)
-    return out
+    return np.clip((v - low) / ((high - low) or 1.0) * UNITS, -9 * UNITS, 10 * UNITS)

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.channel_facts.step import converter_steps, probe_stride
+from trihedron.channel_facts.at_rest import converter_steps, probe_stride
 from trihedron.records import Recording
 
 BLOCK_S = 0.1
@@ -51,8 +51,7 @@ class Channels:
     @property
     def quantisation_variance(self) -> FloatArray:
         """(c,) variance of rounding to a step, q²/12: no reading is known better than this."""
-        out: FloatArray = self.quantum**2 / 12.0
-        return out
+        return self.quantum**2 / 12.0
 
     def blocks(self, duration_s: float) -> int:
         """Blocks in a duration, at least one."""

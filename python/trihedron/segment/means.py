@@ -214,8 +214,7 @@ def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
             if n >= FEWEST_PHASES:
                 left[axis] = _mean_bias(np.bincount(place, by_pose[:, axis]) / np.bincount(place))
     left = left * q2
-    out: FloatArray = np.where(channels.quantum > 0.0, left, 0.0)
-    return out
+    return np.where(channels.quantum > 0.0, left, 0.0)
 
 
 # The error of a pose's mean along the vertical, the only part of it that the length of gravity sees.

@@ -30,8 +30,7 @@ class MeanNoise:
 
         (c,) for one duration, (k, c) for a column (k, 1) of them.
         """
-        out: FloatArray = self.white / duration_s + self.flicker + self.walk * duration_s / 3.0
-        return out
+        return self.white / duration_s + self.flicker + self.walk * duration_s / 3.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,8 +37,7 @@ from trihedron.segment.runs import (
     without_approaches,
 )
 from trihedron.segment.shaken import find_shaken
-from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks
-from trihedron.segment.turning import turning_blocks
+from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks, turning_blocks
 from trihedron.units import AccelerationUnit, rate_to_si
 
 LONG_S = 4.0

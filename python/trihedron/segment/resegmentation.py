@@ -12,11 +12,13 @@ from trihedron.ranges import ranges_of
 from trihedron.records import Move, Pose, Recording, Segments
 from trihedron.segment.shaken import is_shaken_by_a_support
 
+SHORTEST_PIECE_S = 0.3
+"""Of a pose beside a bump: what is shorter is left out."""
 RESTING = 1e-3
 """A mean rate of a thousandth of the moves' rms, five times over, is rest: below 1 °/s after moves of 3 rad/s."""
 
 
-def resegment(recording: Recording, segments: Segments, shortest_s: float = 0.3) -> Segments:
+def resegment(recording: Recording, segments: Segments) -> Segments:
     """Poses as a model of the whole session needs them: cut where they were bumped, found where only shaken.
 
     A bump inside a pose turns the body; averaged over, it contradicts the moves on both sides. Cut there, the gyro
@@ -25,7 +27,7 @@ def resegment(recording: Recording, segments: Segments, shortest_s: float = 0.3)
 
     The answer's ``whole`` are the poses as they were found, each averaged over whatever happened in it.
     """
-    shortest = max(int(shortest_s * recording.rate_hz), 8)
+    shortest = max(int(SHORTEST_PIECE_S * recording.rate_hz), 8)
     spans: list[tuple[int, int, int]] = []
     was_bumped = False
     for i, pose in enumerate(segments.poses):

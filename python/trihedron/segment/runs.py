@@ -100,8 +100,7 @@ def close_gaps(quiet: BoolArray, is_valid: BoolArray) -> BoolArray:
 def widen(quiet: BoolArray, is_valid: BoolArray) -> BoolArray:
     """The whole of the quiet windows: a quiet block is the centre of one, which reaches further on either side."""
     kernel = np.ones(2 * (WINDOW_BLOCKS // 2) + 1)
-    out: BoolArray = (np.convolve(quiet.astype(np.float64), kernel, mode="same") > 0.5) & is_valid
-    return out
+    return (np.convolve(quiet.astype(np.float64), kernel, mode="same") > 0.5) & is_valid
 
 
 def speed_of_moves(channels: Channels, quiet: BoolArray) -> float:

@@ -87,8 +87,7 @@ def unresolved_variance(
     fall = min(float(np.median(falls[both] / total[both])), 1.0) if np.any(both) else 1.0
     slowest = min(fall / OF_ITS_BAND, 1.0)
     part = max(fall / (2.0 - fall), min(slowest / (2.0 - slowest), OF_A_STEP))
-    variance: FloatArray = at_half * part * step_s**2
-    return variance
+    return at_half * part * step_s**2
 
 
 def _between_gaps(ranges: IntArray, time_s: FloatArray | None, step_s: float) -> tuple[IntArray, IntArray]:

@@ -135,8 +135,7 @@ def _second_halves_minus_first(readings: FloatArray, spans: IntArray) -> FloatAr
     middle = spans[:, 0] + (spans[:, 1] - spans[:, 0] + 1) // 2
     halves = np.column_stack([spans[:, 0], middle, middle, spans[:, 1]]).reshape(-1, 2)
     means, _ = _core.means_by_owner(readings, halves, np.arange(len(halves)), len(halves))
-    out: FloatArray = means[1::2] - means[::2]
-    return out
+    return means[1::2] - means[::2]
 
 
 def scatter_unit(force_sigma: FloatArray, rate_sigma: FloatArray | None, along: Along | None = None) -> FloatArray:
@@ -194,8 +193,7 @@ def coloured_variance(
     quiet = (quantiles(np.abs(halves / white), [QUIET])[0] / (2.0 * QUIET_OF_NORMAL)) ** 2
     pooled = medians((pose_sigma / white) ** 2)
     colour = np.maximum(np.minimum(pooled, MAY_EXCEED * quiet), 1.0)
-    out: FloatArray = np.outer(move_duration_s, (colour - 1.0) * density**2)
-    return out
+    return np.outer(move_duration_s, (colour - 1.0) * density**2)
 
 
 # How far 1/f noise carries zeros from pose to pose, from what it does inside poses (docs/model-session.md, 11.12d).
@@ -261,8 +259,7 @@ def _between_poses(halves: FloatArray, parts: FloatArray, spans: IntArray) -> Fl
         return np.zeros(k)
     level = excess * white / (4.0 * math.log(2.0) * (1.0 - 2.0 / PARTS))
     octaves = float(np.ptp(spans)) / (2.0 * float(np.median(spans[:, 1] - spans[:, 0])))
-    out: FloatArray = np.sqrt(level * max(math.log(octaves), 0.0))
-    return out
+    return np.sqrt(level * max(math.log(octaves), 0.0))
 
 
 def _steps(readings: FloatArray, spans: IntArray, along: FloatArray, n: int) -> FloatArray:
@@ -270,8 +267,7 @@ def _steps(readings: FloatArray, spans: IntArray, along: FloatArray, n: int) -> 
     edges = spans[:, :1] + (spans[:, 1:] - spans[:, :1]) * np.arange(n + 1) // n
     ranges = np.stack([edges[:, :-1], edges[:, 1:]], axis=2).reshape(-1, 2)
     means, _ = _core.means_by_owner(readings, ranges, np.arange(len(ranges)), len(ranges))
-    out: FloatArray = np.diff(np.einsum("hnc,hkc->hnk", means.reshape(len(spans), n, 3), along), axis=1)
-    return out
+    return np.diff(np.einsum("hnc,hkc->hnk", means.reshape(len(spans), n, 3), along), axis=1)
 
 
 def _mean_square(x: FloatArray) -> float:

@@ -34,8 +34,7 @@ LEAST_WHITE = 1e-2
 
 def undithered_axes(quantum: FloatArray, sigma: FloatArray) -> BoolArray:
     """Axes (3,) whose noise ``sigma`` (3,) [raw] is too small to be seen through the ADC's ``quantum`` (3,)."""
-    out: BoolArray = (quantum > 0.0) & (sigma < UNDITHERED * quantum)
-    return out
+    return (quantum > 0.0) & (sigma < UNDITHERED * quantum)
 
 
 def rounding_variance(
@@ -252,8 +251,7 @@ def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: f
     """Rate noise (3,) [raw·√s], on undithered axes without the rounding that :func:`rounding_variance` adds."""
     rounding = quantum**2 / 12.0 * step_s
     rest = np.maximum(density**2 - rounding, LEAST_WHITE * rounding)
-    out: FloatArray = np.where(axes, np.sqrt(rest), density)
-    return out
+    return np.where(axes, np.sqrt(rest), density)
 
 
 def common_bias(zero: FloatArray, var_bias: FloatArray, axes: BoolArray) -> tuple[FloatArray, FloatArray]:

@@ -24,8 +24,7 @@ def bias_of_poses(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, 
         return np.zeros((len(time_s), 3))
     draws = np.repeat(rng.standard_normal((len(stretches), 3)) * np.asarray(sigma), 2, axis=0)
     knots = np.array(stretches).ravel()
-    out: FloatArray = np.column_stack([np.interp(time_s, knots, draws[:, k]) for k in range(3)])
-    return out
+    return np.column_stack([np.interp(time_s, knots, draws[:, k]) for k in range(3)])
 
 
 def bias_in_moves(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, rng: np.random.Generator) -> FloatArray:

@@ -133,8 +133,7 @@ class Smoother:
         n = self.order
         angles = np.pi * (2.0 * np.arange(n) + n + 1.0) / (2.0 * n)
         poles = np.exp(2.0 * np.pi * self.corner_hz * dt * np.exp(1j * angles))
-        out: FloatArray = np.real(np.poly(poles))
-        return out
+        return np.real(np.poly(poles))
 
     def apply(self, signal: FloatArray, dt: float) -> FloatArray:
         """(n, 3) → (n, 3), settled on the first sample."""

@@ -154,8 +154,7 @@ def _die(sensor: Sensor, place: Environment, time_s: FloatArray, dt: float) -> F
     if lag == 0.0:
         return above
     three = np.repeat(above[:, None], 3, axis=1)
-    lagged: FloatArray = _core.simulate_first_order(three, dt, [lag, 0.0, 0.0])[:, 0]
-    return lagged
+    return _core.simulate_first_order(three, dt, [lag, 0.0, 0.0])[:, 0]
 
 
 def _sample_instants(clock: Clock, n: int, seed: int) -> FloatArray:
@@ -165,8 +164,7 @@ def _sample_instants(clock: Clock, n: int, seed: int) -> FloatArray:
     # Neighbours must not overtake each other: the tail beyond 0.45 steps is folded to it.
     limit = 0.45 / clock.true_rate_hz
     jitter = np.clip(clock.jitter_s * stream(seed, "clock/jitter").standard_normal(n), -limit, limit)
-    out: FloatArray = grid + jitter
-    return out
+    return grid + jitter
 
 
 def _kept(clock: Clock, true_s: FloatArray, seed: int) -> npt.NDArray[np.bool_]:
@@ -192,8 +190,8 @@ def _timestamps(clock: Clock, true_s: FloatArray, kept: npt.NDArray[np.bool_], s
     if clock.timestamp_jitter_s > 0.0:
         noise = clock.timestamp_jitter_s * stream(seed, "clock/timestamps").standard_normal(len(true_s))[kept]
         timestamps = np.maximum.accumulate(timestamps + noise)
-    since_first: FloatArray = timestamps - timestamps[0]
-    return since_first
+    out: FloatArray = timestamps - timestamps[0]
+    return out
 
 
 def _pick(values: FloatArray, kept: npt.NDArray[np.bool_]) -> FloatArray:

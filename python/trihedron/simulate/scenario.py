@@ -39,13 +39,12 @@ class Temperature:
         if self.warm_up_k == self.ramp_k_s == self.swing_k == 0.0:
             return np.full(len(time_s), self.start_degc)
         t = np.maximum(time_s, 0.0)
-        out: FloatArray = (
+        return (
             self.start_degc
             + self.warm_up_k * -np.expm1(-t / self.warm_up_tau_s)
             + self.ramp_k_s * t
             + self.swing_k * np.sin(2.0 * np.pi * t / self.swing_period_s)
         )
-        return out
 
     @property
     def is_constant_reference(self) -> bool:
@@ -72,8 +71,7 @@ class Supply:
             return np.full(len(time_s), self.nominal_v)
         t = np.maximum(time_s, 0.0)
         ripple = self.ripple_v * np.sin(2.0 * np.pi * self.ripple_hz * t)
-        out: FloatArray = self.nominal_v + self.sag_v * np.expm1(-t / self.sag_tau_s) + ripple
-        return out
+        return self.nominal_v + self.sag_v * np.expm1(-t / self.sag_tau_s) + ripple
 
 
 @dataclass(frozen=True)

@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 import enum
 import inspect
-import sys
 import types
 import typing
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from trihedron.documents import DocumentError, check_values, of_path, read_text
+from trihedron.documents import DocumentError, of_path, parse_toml, read_text
 from trihedron.errors import RefusedError
 from trihedron.sanitise import meant
 from trihedron.simulate.accelerometer import Accelerometer
@@ -23,11 +22,6 @@ from trihedron.simulate.motion.steps import LEVEL, Disturb, Motion, MoveTo, Osci
 from trihedron.simulate.named import SESSIONS
 from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.scenario import Clock, Environment, Scenario
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:  # pragma: no cover
-    import tomli as tomllib
 
 _STEPS: dict[str, type[Any]] = {
     "pose": Pose,
@@ -51,17 +45,9 @@ def read_scenario(path: str | Path) -> Scenario:
     """
     path = Path(path)
     try:
-        table = tomllib.loads(read_text(path, "scenario file"))
-        check_values(table)
+        table = parse_toml(read_text(path, "scenario file"))
     except DocumentError as error:
         raise RefusedError(of_path(path, error)) from None
-    except RecursionError:
-        raise RefusedError(f"{path}: this is nested too deeply.") from None
-    # A whole number of thousands of digits is a ValueError that is no TOMLDecodeError.
-    except ValueError as error:
-        if isinstance(error, RefusedError):
-            raise
-        raise RefusedError(f"{path.name} is not a TOML file: {str(error).split(';')[0][:200]}") from None
     try:
         return scenario_from_table(table, path.stem)
     except (TypeError, OverflowError, LookupError):

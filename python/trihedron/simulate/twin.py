@@ -145,8 +145,7 @@ def _averaged(time_s: FloatArray, values: FloatArray, knots: FloatArray) -> Floa
     diagonal += 1e-3
     nearest = np.column_stack([np.interp(knots, t, y[:, j]) for j in range(3)])
     right += 1e-3 * nearest
-    out: FloatArray = solveh_banded(np.vstack([np.concatenate([[0.0], off[:-1]]), diagonal]), right)
-    return out
+    return solveh_banded(np.vstack([np.concatenate([[0.0], off[:-1]]), diagonal]), right)
 
 
 def _attitudes(rate: FloatArray, start: Quaternion, duration_s: float) -> FloatArray:
@@ -191,8 +190,7 @@ def _matrices(q: FloatArray) -> FloatArray:
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
-    out: FloatArray = np.moveaxis(np.array(rows), 2, 0)
-    return out
+    return np.moveaxis(np.array(rows), 2, 0)
 
 
 def _filled(raw: FloatArray) -> FloatArray:
@@ -208,8 +206,7 @@ def _filled(raw: FloatArray) -> FloatArray:
 
 
 def _unit(v: FloatArray) -> FloatArray:
-    out: FloatArray = v / np.linalg.norm(v)
-    return out
+    return v / np.linalg.norm(v)
 
 
 def _triple(v: FloatArray) -> Triple:

@@ -299,20 +299,6 @@ impl NormFilter {
         Ok(())
     }
 
-    /// What a future reading would do to the covariance.
-    ///
-    /// # Errors
-    /// As [`Self::add`].
-    pub fn imagine(&mut self, pose: &NormPose) -> Result<()> {
-        self.check(pose)?;
-        self.move_noise(pose.start, pose.hold)?;
-        let theta = self.filter.x[self.n_noise..].to_vec();
-        let mut row = vec![0.0; self.filter.n()];
-        let (_, variance) = self.linearise(pose, &self.filter.x[..self.n_noise], &theta, &mut row);
-        self.filter.update_with_innovation(&row, 0.0, variance);
-        Ok(())
-    }
-
     /// The nine parameters.
     #[must_use]
     pub fn parameters(&self) -> &[f64] {
@@ -331,15 +317,9 @@ impl NormFilter {
         &self.innovations
     }
 
-    /// Poses seen (imagined ones do not count).
+    /// Poses seen.
     #[must_use]
     pub fn n_poses(&self) -> usize {
         self.poses.len()
-    }
-
-    /// End of the last hold, s.
-    #[must_use]
-    pub fn end(&self) -> Option<f64> {
-        self.timeline.end()
     }
 }

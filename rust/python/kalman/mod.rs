@@ -3,22 +3,20 @@
 mod least_squares;
 mod poses;
 
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, ToPyArray};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use self::poses::KalmanPoses;
-use crate::kalman::axis::{self, AxisFilter, N_CONSTANTS, Pose, Prior};
+use crate::kalman::axis::{self, N_CONSTANTS, Prior};
 use crate::kalman::shaping::{NoiseTerms, ShapingModel};
 use crate::kalman::smoother;
 use crate::python::arrays::matrix;
 
-type Array1<'py> = Bound<'py, PyArray1<f64>>;
 type Array2<'py> = Bound<'py, PyArray2<f64>>;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<AxisKalmanModel>()?;
-    module.add_class::<AxisKalman>()?;
     module.add_class::<KalmanStart>()?;
     module.add_class::<KalmanPoses>()?;
     module.add_function(wrap_pyfunction!(kalman_track, module)?)?;
@@ -138,101 +136,6 @@ impl KalmanStart {
                 walk: four("walk", &walk)?,
             },
         })
-    }
-}
-
-/// The filter of one axis, fed a pose at a time.
-#[pyclass(module = "trihedron._core")]
-struct AxisKalman {
-    inner: AxisFilter,
-}
-
-#[pymethods]
-impl AxisKalman {
-    #[new]
-    fn new(py: Python<'_>, model: &AxisKalmanModel, start: &KalmanStart) -> PyResult<Self> {
-        let (model, prior) = (model.inner.clone(), &start.prior);
-        Ok(Self {
-            inner: super::run(py, || AxisFilter::new(model, prior))?,
-        })
-    }
-
-    /// Take one pose; innovation and its predicted variance.
-    #[pyo3(signature = (reading, reference, start_s, pose_s, extra_variance=0.0))]
-    fn add(
-        &mut self,
-        py: Python<'_>,
-        reading: f64,
-        reference: [f64; 3],
-        start_s: f64,
-        pose_s: f64,
-        extra_variance: f64,
-    ) -> PyResult<(f64, f64)> {
-        let pose = Pose {
-            reading,
-            reference,
-            start: start_s,
-            hold: pose_s,
-            extra_variance,
-        };
-        let filter = &mut self.inner;
-        let seen = super::run(py, || filter.add(&pose))?;
-        Ok((seen.innovation, seen.innovation_variance))
-    }
-
-    /// Pass a pose that has not been measured: the covariance changes, the estimate does not.
-    fn imagine(
-        &mut self,
-        py: Python<'_>,
-        reference: [f64; 3],
-        start_s: f64,
-        pose_s: f64,
-    ) -> PyResult<()> {
-        let filter = &mut self.inner;
-        super::run(py, || filter.imagine(reference, start_s, pose_s))
-    }
-
-    /// An independent filter in the same state.
-    fn copy(&self) -> Self {
-        Self {
-            inner: self.inner.clone(),
-        }
-    }
-
-    #[getter]
-    fn constants<'py>(&self, py: Python<'py>) -> Array1<'py> {
-        self.inner.constants().to_pyarray(py)
-    }
-
-    #[getter]
-    fn sigma<'py>(&self, py: Python<'py>) -> Array1<'py> {
-        self.inner.sigma().to_pyarray(py)
-    }
-
-    #[getter]
-    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
-        matrix(py, &self.inner.covariance())
-    }
-
-    /// Slow noise at the end of the last hold, and its standard error.
-    #[getter]
-    fn drift(&self) -> (f64, f64) {
-        self.inner.drift()
-    }
-
-    #[getter]
-    fn n_poses(&self) -> usize {
-        self.inner.n_poses()
-    }
-
-    #[getter]
-    fn n_states(&self) -> usize {
-        self.inner.n_noise() + N_CONSTANTS
-    }
-
-    #[getter]
-    fn end_s(&self) -> Option<f64> {
-        self.inner.end()
     }
 }
 

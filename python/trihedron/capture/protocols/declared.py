@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import struct
 
-from trihedron.capture.protocols.checksums import CHECKSUM_OF
 from trihedron.capture.protocols.contract import Frame
-from trihedron.capture.protocols.framing import MORE, FramedDecoder
+from trihedron.capture.protocols.framing import CHECKSUM_OF, MORE, FramedDecoder
 from trihedron.errors import RefusedError
 from trihedron.records.frame_declaration import CHECKSUM_SIZES, SIZES, FrameDeclaration
 

@@ -13,7 +13,7 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms
 from trihedron.diagnose.residuals.within_poses import LOUD, pose_scatter
 from trihedron.diagnose.session.observations import Observations, observe
-from trihedron.diagnose.session.solve import fit, folds_of, leverage, predict_held_out
+from trihedron.diagnose.session.solve import fit, folds_of, predict_held_out
 from trihedron.diagnose.session.twin import NO_DISTORTION, STATIC_ACCEL
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
@@ -132,7 +132,7 @@ def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
     """
     obs, fitted = context.obs, context.fitted
     rows = np.flatnonzero((fitted.system.domain == STATIC_ACCEL) & (fitted.system.walk == 0))
-    poses, free = fitted.system.segment[rows], 1.0 - leverage(fitted)[rows]
+    poses, free = fitted.system.segment[rows], 1.0 - fitted.leverage[rows]
     chi2 = np.bincount(poses, fitted.system.residual[rows] ** 2, minlength=obs.n_poses)
     out: npt.NDArray[np.bool_] = chi2 > OWN_SIGMA**2 * np.maximum(
         np.bincount(poses, free, minlength=obs.n_poses), LEAST_DOF

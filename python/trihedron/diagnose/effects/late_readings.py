@@ -46,8 +46,7 @@ def by_low_pass(context: Context, values: FloatArray, time_s: float) -> FloatArr
     """What a second-order low-pass of this delay adds to readings: -(τ y' + τ²/2 y'')."""
     step = max(0.5 * time_s, 1.0 / context.obs.recording.rate_hz)
     twice = shifted(context, values, step) - 2.0 * values + shifted(context, values, -step)
-    out: FloatArray = -(time_s * context.derivative(values) + 0.5 * (time_s / step) ** 2 * twice)
-    return out
+    return -(time_s * context.derivative(values) + 0.5 * (time_s / step) ** 2 * twice)
 
 
 def is_confirmed(value: FloatArray, covariance: FloatArray) -> bool:

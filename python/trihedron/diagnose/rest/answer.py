@@ -15,8 +15,7 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
-from trihedron.diagnose.rest.curve import DriftCurve, slow_change, smooth_curve
-from trihedron.diagnose.rest.heat import Curve, branch_gap, thermal_curve
+from trihedron.diagnose.rest.heat import Curve, DriftCurve, branch_gap, slow_change, smooth_curve, thermal_curve
 from trihedron.diagnose.rest.pieces import RestPieces, rest_pieces
 from trihedron.diagnose.rest.process import BiasReadings
 from trihedron.diagnose.session.observations import Observations

@@ -243,12 +243,12 @@ class BiasProcess:
                 top, best = float(value[k]), around[k]
         return top, best
 
-    def mixture(self, keep: list[int], free: tuple[int, ...] = (0, 1, 2)) -> tuple[FloatArray, FloatArray]:
+    def mixture(self, keep: list[int]) -> tuple[FloatArray, FloatArray]:
         """Coefficients (axes, k) and covariances (axes, k, k) averaged over the strengths by their likelihood (R.8).
 
         Flat in log σ from the lowest level to the highest, with the weight of one level on 0.
         """
-        part, prior = self._around_best(keep, free)
+        part, prior = self._around_best(keep)
         value = part.log_likelihood(keep, restricted=True).sum(axis=0)
         weight = np.exp(value - value.max()) * prior
         weight /= weight.sum()
@@ -258,16 +258,12 @@ class BiasProcess:
         spread = np.einsum("g,agkl->akl", weight, covariance + away[..., :, None] * away[..., None, :])
         return mean, spread
 
-    def _around_best(self, keep: list[int], free: tuple[int, ...]) -> tuple[Grams, FloatArray]:
+    def _around_best(self, keep: list[int]) -> tuple[Grams, FloatArray]:
         """A grid as fine as the likelihood is sharp about its maximum, and the prior weight (g,) of its points."""
-        _, best = self.maximum(free, keep, restricted=True)
+        _, best = self.maximum((0, 1, 2), keep, restricted=True)
         one_level = float(np.log(self.levels[2] / self.levels[1]))
         axes, weights = [], []
         for j in range(3):
-            if j not in free:
-                axes.append(np.zeros(1))
-                weights.append(np.ones(1))
-                continue
             levels = self.levels[1:] if best[j] == 0.0 else best[j] * np.array(AROUND)
             axes.append(np.concatenate([[0.0], levels]))
             weights.append(np.concatenate([[one_level], np.gradient(np.log(levels))]))

@@ -95,8 +95,7 @@ class Observations:
         """(h, 3) standard errors of the gyro's means without the creep of poses."""
         if self.pose_rate_sigma is None or self.pose_settling is None:
             return self.pose_rate_sigma
-        out: FloatArray = np.sqrt(self.pose_rate_sigma**2 - self.pose_settling**2)
-        return out
+        return np.sqrt(self.pose_rate_sigma**2 - self.pose_settling**2)
 
     def norm_sigma(self, gradient: FloatArray) -> FloatArray:
         """(h,) standard errors of the length of gravity, SI, that grows with the raw means by ``gradient`` (h, 3)."""
@@ -243,5 +242,4 @@ def _turned_at_ends(rate_sigma: FloatArray, lasts_s: FloatArray) -> FloatArray:
     from its middle by as much, times half of the pose. Poses with the session's usual noise have none.
     """
     usual = np.median(rate_sigma**2 * lasts_s[:, None], axis=0) / lasts_s[:, None]
-    out: FloatArray = np.maximum(rate_sigma**2 - UNSTEADY**2 * usual, 0.0) * (0.5 * lasts_s[:, None]) ** 2
-    return out
+    return np.maximum(rate_sigma**2 - UNSTEADY**2 * usual, 0.0) * (0.5 * lasts_s[:, None]) ** 2

@@ -30,6 +30,9 @@ from trihedron.diagnose.session.twin import (
 )
 from trihedron.session.noise import PART_NOISE, START_STRENGTHS, Bounds
 
+FOLDS = 8
+"""Blocks of poses, and of moves, that are held out in turn."""
+
 
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -52,8 +55,8 @@ class Fit:
         )  # fmt: skip
 
     @cached_property
-    def used(self) -> FloatArray:
-        """(rows,) share of every row that the fit used up."""
+    def leverage(self) -> FloatArray:
+        """(rows,) share of every row that the fit used up; a block has the sum of 1 minus it as degrees of freedom."""
         return self.line.core.leverage()
 
     @property
@@ -90,9 +93,10 @@ class Fit:
         return core.linear_covariance(np.ascontiguousarray(obs.force_origin), np.ascontiguousarray(obs.rate_origin))
 
 
-def _fitted(
-    obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None, within: Bounds | None = None
+def fit(
+    obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None = None, within: Bounds | None = None
 ) -> Fit:
+    """Gauss-Newton on every row to convergence, noise corners as they are (eq. 11.9), or free ``within`` bounds."""
     if len(start.effect) != distortion.n_parameters:
         start = replace(start, effect=np.zeros(distortion.n_parameters))
     core = core_model(obs, start.gravity, prior).fit(
@@ -106,14 +110,9 @@ def _fitted(
     return Fit(twin, Linearisation(obs, twin, distortion, prior, core))
 
 
-def fit(obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None = None) -> Fit:
-    """Gauss-Newton on every row to convergence, noise corners as they are (eq. 11.9)."""
-    return _fitted(obs, start, distortion, prior)
-
-
 def tune_noise(obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None) -> Fit:
     """The same with walks as strong as is likeliest, no stronger than the noise of parts makes them (eq. 11.18)."""
-    return _fitted(obs, start, distortion, prior, PART_NOISE)
+    return fit(obs, start, distortion, prior, PART_NOISE)
 
 
 def move_misfit(obs: Observations, twin: Twin) -> FloatArray:
@@ -121,11 +120,6 @@ def move_misfit(obs: Observations, twin: Twin) -> FloatArray:
     residual = core_model(obs, twin.gravity, None).move_residuals(core_state(twin))
     out: FloatArray = (residual**2).sum(axis=1)
     return out
-
-
-def leverage(fitted: Fit) -> FloatArray:
-    """(rows,) share of every row that the fit used up; degrees of freedom of a block are the sum of one minus it."""
-    return fitted.used
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,17 +146,16 @@ class Prediction:
     @property
     def per_row(self) -> FloatArray:
         """(domains,) innovation chi-square per row."""
-        out: FloatArray = self.chi2 / np.maximum(self.n_rows, 1e-9)
-        return out
+        return self.chi2 / np.maximum(self.n_rows, 1e-9)
 
 
-def folds_of(fitted: Fit, n_folds: int = 8) -> list[npt.NDArray[np.bool_]]:
+def folds_of(fitted: Fit) -> list[npt.NDArray[np.bool_]]:
     """Blocks of neighbouring poses, then of neighbouring moves, whose rows are held out together."""
     system, obs = fitted.system, fitted.line.obs
     direct = system.walk == 0
     out = []
     for labels, count in (((STATIC_ACCEL, STATIC_GYRO), obs.n_poses), ((MOVES, DYNAMICS), obs.n_moves)):
-        for block in np.array_split(np.arange(count), min(n_folds, max(count // 2, 1))):
+        for block in np.array_split(np.arange(count), min(FOLDS, max(count // 2, 1))):
             held = np.isin(system.domain, labels) & direct & np.isin(system.segment, block)
             if held.any():
                 out.append(held)

@@ -12,11 +12,32 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import gaussian_filter1d
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.session.noise import START_STRENGTHS, Strengths, scatter_unit
+
+BLOCKS_OF_WIDTH = 10
+"""Blocks whose means stand for a width of the smoothing: it is wider than its blocks by a part in 2400, and a window of
+thousands of samples is one of dozens."""
+
+
+def smoothed_slope(values: FloatArray, time_s: FloatArray, width: float) -> FloatArray:
+    """(n,) rate of change, per second, of ``values`` (n,) smoothed by a Gaussian of ``width`` samples.
+
+    Timestamps are smoothed alike: a straight line keeps its slope across pauses, and to the ends.
+    """
+    length = max(round(width / BLOCKS_OF_WIDTH), 1)
+    starts = np.arange(0, len(values), length)
+    if len(starts) < 2:
+        return np.zeros(len(values))
+    n = np.diff(starts, append=len(values))
+    level, time = (np.add.reduceat(of, starts) / n for of in (values, time_s))
+    smooth, at = (gaussian_filter1d(of, max(width / length, 1.0), mode="nearest") for of in (level, time))
+    return np.interp(time_s, time, np.gradient(smooth, at))
+
 
 STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)
 """Labels of residual rows; ``PRIOR`` rows keep flat directions finite and belong to no domain."""
@@ -156,8 +177,7 @@ class Linearisation:
     def accel_white(self) -> FloatArray:
         """(poses, 3, 3) from an error in SI to a whitened row of the accelerometer at rest."""
         inverse = np.linalg.inv(self.twin.accel_S)
-        white: FloatArray = core_poses(self.obs).force_white() @ inverse
-        return white
+        return core_poses(self.obs).force_white() @ inverse
 
     @cached_property
     def gyro_white(self) -> FloatArray | None:
@@ -165,8 +185,7 @@ class Linearisation:
         if self.obs.pose_rate_sigma is None:
             return None
         inverse = np.linalg.inv(self.twin.gyro_S)
-        white: FloatArray = inverse / self.obs.pose_rate_sigma[:, :, None]
-        return white
+        return inverse / self.obs.pose_rate_sigma[:, :, None]
 
     @cached_property
     def move_errors(self) -> tuple[FloatArray, FloatArray]:

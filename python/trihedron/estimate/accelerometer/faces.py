@@ -12,7 +12,7 @@ from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import REFUSALS
 from trihedron.estimate.accelerometer import face_poses, face_tilt, inputs, verdict
-from trihedron.estimate.accelerometer.face_placements import placements
+from trihedron.estimate.accelerometer.face_poses import placements
 from trihedron.estimate.accelerometer.norm import norm_residual
 from trihedron.estimate.accelerometer.whole_turns import OppositeHeadings, with_opposite
 from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
@@ -177,8 +177,8 @@ def _inverses(noise: FloatArray) -> FloatArray:
     """Weights; an axis without noise (stuck) gets a millionth of the others' instead of an infinite one."""
     variance, axes = np.linalg.eigh(noise)
     variance = np.maximum(variance, 1e-6 * variance.sum(axis=1, keepdims=True))
-    inverse: FloatArray = np.einsum("nij,nj,nkj->nik", axes, 1.0 / variance, axes)
-    return inverse
+    out: FloatArray = np.einsum("nij,nj,nkj->nik", axes, 1.0 / variance, axes)
+    return out
 
 
 def _design(faces: IntArray, g: float) -> FloatArray:

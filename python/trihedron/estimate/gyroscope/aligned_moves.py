@@ -6,7 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.errors import RefusedError
+from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.gyroscope.alignment import (
     AccelerometerPart,
     Aligned,
@@ -18,11 +21,137 @@ from trihedron.estimate.gyroscope.alignment import (
     usually_missed_deg,
 )
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
-from trihedron.estimate.gyroscope.start import starts, turned_starts
+from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.session.averaging import TRIED, averaging_of, sharpened
 from trihedron.units import rate_to_si
+
+FEWEST_MOVES = 3
+"""Nine numbers of a scale, three of each move at most."""
+LARGEST_TURN_RAD, STEP_RAD = 6.0 * np.pi, np.pi / 12.0
+"""Turn of the move that turns most, up to which scales are tried, and the distance of two of them there: a fit finds
+its way from half a right angle off."""
+MOST_TRIED = 6
+"""Scales from which fits are begun: neighbours of the best one, and its likes a turn further."""
+
+
+def integral_start(
+    recording: Recording, measured: MoveMeasurements, accelerometer: SensorCalibration
+) -> FloatArray | None:
+    """``S_ω`` (3, 3) from Poisson's equation in integral form, or ``None`` when the moves do not determine it.
+
+    ``f_j − f_i = ∫ [f]× S_ω (w' − z) dt`` is linear in ``S_ω`` once ``f(t)`` inside the move is taken from the
+    accelerometer. Accelerations of the hand disturb it, but they average out over a move; scale, sign, axis order and
+    handedness come out right without any nominal figure.
+    """
+    if recording.accelerometer is None:
+        return None
+    before, after = np.asarray(measured.links).T
+    moments = _core.move_moments(
+        measured.time_s,
+        recording.accelerometer[measured.rows],
+        accelerometer.S,
+        accelerometer.b,
+        measured.rate,
+        np.asarray(measured.edges, dtype=np.int64),
+        0.5 * (measured.zero[before] + measured.zero[after]),
+    )
+    force = measured.reading @ accelerometer.S.T + accelerometer.b
+    used = [k for k, moment in enumerate(moments) if moment is not None and not measured.is_lost[k]]
+    # ∂([f]× S w)/∂S_ij = f × e_i w_j.
+    rows = [np.moveaxis(_ACROSS @ moments[k], 0, 1).reshape(3, 9) for k in used]
+    sides = [force[after[k]] - force[before[k]] for k in used]
+    if len(rows) < FEWEST_MOVES:
+        return None
+    matrix, side = np.concatenate(rows), np.concatenate(sides)
+    size = np.linalg.norm(matrix, axis=0)
+    if np.any(size == 0.0):
+        return None
+    solution, _, rank, singular = np.linalg.lstsq(matrix / size, side, rcond=1e-3)
+    if rank < 9 or singular[-1] < 1e-3 * singular[0]:
+        return None
+    out: FloatArray | None = (solution / size).reshape(3, 3)
+    return out
+
+
+def starts(
+    recording: Recording, measured: MoveMeasurements, accelerometer: SensorCalibration, nominal: FloatArray | None
+) -> FloatArray:
+    """Starts (k, 3, 3) for the alignment: the linear one, the nominal one, and the nominal one of the unit.
+
+    Raises
+    ------
+    ValueError
+        When readings are counts, no nominal scale is given and the moves do not determine a start.
+    """
+    found = []
+    if nominal is not None:
+        found.append(np.asarray(nominal, dtype=np.float64))
+    linear = integral_start(recording, measured, accelerometer)
+    if linear is not None:
+        found.append(linear)
+    unit = rate_to_si(recording.gyroscope_unit)
+    if unit is not None and nominal is None:
+        found.append(unit * np.eye(3))
+    if not found:
+        raise RefusedError(
+            "the moves do not determine a first guess of the gyro scale and its readings are counts: "
+            "give nominal_scale (3, 3) in rad/s per count, or add moves about all three axes"
+        )
+    return np.ascontiguousarray(np.stack(found))
+
+
+def turned_starts(
+    measured: MoveMeasurements, accelerometer: SensorCalibration, linear: FloatArray
+) -> FloatArray | None:
+    """Starts (k, 3, 3) that carry gravity best among scales of one size on all axes, or ``None`` without whole moves.
+
+    Moves of tenths of a second pull harder than gravity does, and through hundreds of degrees: the linear start then
+    tells nothing. Axes are tried as the accelerometer's, and turned as the ``linear`` start has them.
+    """
+    force = measured.reading @ accelerometer.S.T + accelerometer.b
+    up = force / np.linalg.norm(force, axis=1, keepdims=True)
+    courses = []
+    for (a, b), (before, after), lost in zip(measured.edges, measured.links, measured.is_lost, strict=True):
+        rate = measured.rate[a:b] - 0.5 * (measured.zero[before] + measured.zero[after])
+        if not lost and b - a > 1 and np.isfinite(rate).all():
+            courses.append((measured.time_s[a:b], rate, up[before], up[after]))
+    if len(courses) < FEWEST_MOVES:
+        return None
+    most = max(float(np.linalg.norm(rate, axis=1) @ _trapezoid_weights(time)) for time, rate, _, _ in courses)
+    if not most > 0.0:
+        return None
+    left, _, right = np.linalg.svd(linear)
+    turns = [np.eye(3), left @ right]
+    tried = [
+        (angle / most) * turn for turn in turns for angle in np.arange(STEP_RAD, LARGEST_TURN_RAD + STEP_RAD, STEP_RAD)
+    ]
+    missed = [
+        np.median([_missed_rad(time, rate @ S.T, before, after) for time, rate, before, after in courses])
+        for S in tried
+    ]
+    return np.ascontiguousarray(np.stack([tried[k] for k in np.argsort(missed)[:MOST_TRIED]]))
+
+
+def _missed_rad(time: FloatArray, rate: FloatArray, before: FloatArray, after: FloatArray) -> float:
+    turned = integrate_rate(time, rate, last_only=True).T @ before
+    return float(np.arccos(np.clip(turned @ after, -1.0, 1.0)))
+
+
+def _trapezoid_weights(time: FloatArray) -> FloatArray:
+    half = 0.5 * np.diff(time)
+    weights = np.zeros(len(time))
+    weights[1:] += half
+    weights[:-1] += half
+    return weights
+
+
+_ACROSS = np.array(
+    [[[0, 0, 0], [0, 0, 1], [0, -1, 0]], [[0, 0, -1], [0, 0, 0], [1, 0, 0]], [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]]
+)
+"""(3, 3, 3) what ``f`` is multiplied by in ``f × e_i``, for every i."""
+
 
 DENIED = 0.1
 """Part of what peaks that were cut would be short of by which gravity is missed, and they were not."""

@@ -100,28 +100,6 @@ class Aligned:
         return fit.chi2 / fit.dof if fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < FALSE_ALARM else 1.0
 
 
-def align(
-    measured: MoveMeasurements,
-    accelerometer: AccelerometerPart,
-    gravity_m_s2: float,
-    starts: FloatArray,
-    options: MoveOptions,
-    used: BoolArray | None = None,
-    is_near: bool = False,
-) -> AlignmentFit:
-    """One alignment in the core, not robust; ``is_near`` says that the first start solves nearly the same problem."""
-    return _core_align(
-        measured,
-        accelerometer,
-        gravity_m_s2,
-        starts,
-        options,
-        ~measured.is_lost if used is None else used,
-        None,
-        is_near,
-    )
-
-
 def align_screened(
     measured: MoveMeasurements,
     accelerometer: AccelerometerPart,
@@ -141,7 +119,7 @@ def align_screened(
     is_near = False
     n_parameters = 9 + (3 if options.is_offset_free else 0)
     if 2 * int(np.count_nonzero(used)) > n_parameters + 2:
-        screen = _core_align(measured, accelerometer, gravity_m_s2, starts, options, used, CAUCHY_SCALE)
+        screen = align(measured, accelerometer, gravity_m_s2, starts, options, used, CAUCHY_SCALE)
         distance = np.asarray(screen.mahalanobis)
         far = used.copy()
         far[used] = are_far(distance[used], 2.0 * np.count_nonzero(used) - screen.rank)
@@ -151,7 +129,7 @@ def align_screened(
             used = used & ~far
         starts = np.concatenate([np.asarray(screen.gyroscope_scale)[None], starts])
         is_near = screen.is_converged
-    fit = _core_align(measured, accelerometer, gravity_m_s2, starts, options, used, None, is_near)
+    fit = align(measured, accelerometer, gravity_m_s2, starts, options, used, None, is_near)
     return Aligned(fit, used, outliers, n_parameters)
 
 
@@ -165,20 +143,21 @@ def are_far(distance: FloatArray, dof: float) -> BoolArray:
     # Residuals of fitted parameters are smaller.
     shrink = max(dof / (2.0 * n), LEAST_SHRINK)
     typical = max(1.0, median(distance) / (MEDIAN_CHI2[2] * shrink))
-    far: BoolArray = distance > chdtri(2, FALSE_ALARM / n) * typical
-    return far
+    return distance > chdtri(2, FALSE_ALARM / n) * typical
 
 
-def _core_align(
+def align(
     measured: MoveMeasurements,
     accelerometer: AccelerometerPart,
     gravity_m_s2: float,
     starts: FloatArray,
     options: MoveOptions,
     used: BoolArray,
-    loss_scale: float | None,
+    loss_scale: float | None = None,
     is_near: bool = False,
 ) -> AlignmentFit:
+    """One alignment in the core, robust where a ``loss_scale`` is given; ``is_near`` says that the first start solves
+    nearly the same problem."""
     model = accelerometer.model
     return measured.moves.align(
         poses=_core.AlignmentPoses(

@@ -9,7 +9,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.errors import REFUSALS
 from trihedron.estimate.gyroscope.alignment import MoveOptions
-from trihedron.estimate.gyroscope.moves import calibrate_moves
+from trihedron.estimate.session.solved import calibrate_moves
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments

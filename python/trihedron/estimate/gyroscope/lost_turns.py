@@ -55,8 +55,7 @@ class PossibleLosses:
         All turns short by one part look like a scale.
         """
         along = self.carried * np.concatenate([S.ravel(), b])
-        out: FloatArray = covariance * max(self.scatter / inflation, 1.0) + np.outer(along, along)
-        return out
+        return covariance * max(self.scatter / inflation, 1.0) + np.outer(along, along)
 
     def findings(self, sigma_scale: float) -> tuple[Finding, ...]:
         """Losses that could be more than all else that is known of the scale, by its relative standard error."""

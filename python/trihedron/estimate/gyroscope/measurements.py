@@ -11,10 +11,15 @@ from trihedron import _core
 from trihedron._core import Moves
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import RefusedError
-from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
-from trihedron.estimate.gyroscope.biases import excess_variance, pool_biases, shrink
+from trihedron.estimate.gyroscope.biases import (
+    AttitudeDependence,
+    attitude_dependence,
+    excess_variance,
+    pool_biases,
+    shrink,
+)
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, Clipped, bridge_clipping, clipped_time
-from trihedron.estimate.gyroscope.resting_ends import resting_ends
+from trihedron.estimate.gyroscope.turn_rounding import resting_ends
 from trihedron.probability import chdtrc
 from trihedron.quantiles import median, medians
 from trihedron.ranges import rows_beside
@@ -131,8 +136,7 @@ def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
     else:
         raise RefusedError("the poses are too short to measure the gyro's noise: keep each pose for at least a second")
     converter = recording.facts.of("gyroscope").step ** 2 / 12.0 * step_s
-    density: FloatArray = np.sqrt(np.maximum(variance, converter))
-    return density
+    return np.sqrt(np.maximum(variance, converter))
 
 
 def measure_moves(
@@ -208,7 +212,7 @@ def measure_moves(
         sigma_time_s=jitter,
         nominal_step_s=nominal,
         clipped_s=clipped_time(clipped, in_log, nominal),
-        is_gapped=_gapped(steps, nominal, in_log),
+        is_gapped=np.array([np.max(steps[a : b - 1], initial=0.0) > GAP_STEPS * nominal for a, b in in_log]),
         bias_excess=excess,
         attitude=attitude,
         rate=rate,
@@ -274,7 +278,10 @@ def _edges_and_links(moves: Sequence[Move]) -> tuple[IntArray, IntArray]:
 
 def _undithered(quantum: FloatArray, sigma: FloatArray | None) -> BoolArray:
     """Axes (3,) whose noise does not reach the LSB ``quantum`` (3,)."""
-    white = np.full(3, np.inf) if sigma is None else _without_rounding(np.asarray(sigma), quantum)
+    # Of the noise of one reading, without what rounding adds to it; readings of one code alone show none.
+    white = (
+        np.full(3, np.inf) if sigma is None else np.sqrt(np.maximum(np.asarray(sigma) ** 2 - quantum**2 / 12.0, 0.0))
+    )
     return undithered_axes(quantum, white)
 
 
@@ -282,11 +289,6 @@ def _both_means(segments: Segments) -> tuple[FloatArray, FloatArray]:
     if segments.accelerometer_mean is None or segments.gyroscope_mean is None:
         raise RefusedError("method 2 needs the pose means of both sensors: segment a recording that has both")
     return segments.accelerometer_mean, segments.gyroscope_mean
-
-
-def _gapped(steps: FloatArray, nominal: float, edges: IntArray) -> BoolArray:
-    """Moves over a gap in the samples."""
-    return np.array([np.max(steps[a : b - 1], initial=0.0) > GAP_STEPS * nominal for a, b in edges])
 
 
 def _required(readings: FloatArray | None, name: str) -> FloatArray:
@@ -300,12 +302,6 @@ def _mean_variance(sigma_mean: FloatArray | None) -> FloatArray:
     if sigma_mean is None:
         raise RefusedError("the segments do not say the uncertainty of their pose means")
     return np.ascontiguousarray(np.asarray(sigma_mean, dtype=np.float64) ** 2)
-
-
-def _without_rounding(sigma: FloatArray, quantum: FloatArray) -> FloatArray:
-    """Noise (3,) of one reading without what rounding adds to it; readings of one code alone show none."""
-    out: FloatArray = np.sqrt(np.maximum(sigma**2 - quantum**2 / 12.0, 0.0))
-    return out
 
 
 def _unexplained_reading_variance(accelerometer: SensorCalibration) -> FloatArray:

@@ -121,8 +121,7 @@ def _contrasts(missing: int) -> FloatArray:
     """(2, 8) what no quintic through four samples on either side joins, those after it moved by ``missing`` steps."""
     offsets = np.r_[np.arange(-HALF_WINDOW, 0) + 0.5, np.arange(HALF_WINDOW) + 0.5 + missing] / HALF_WINDOW
     q, _ = np.linalg.qr(np.vander(offsets - offsets.mean(), COEFFICIENTS), mode="complete")
-    out: FloatArray = q[:, COEFFICIENTS:].T
-    return out
+    return q[:, COEFFICIENTS:].T
 
 
 CONTRASTS = np.array([_contrasts(missing) for missing in (0, 1, -1)])

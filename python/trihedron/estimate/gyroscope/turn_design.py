@@ -10,6 +10,7 @@ import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import RefusedError
+from trihedron.transforms import cross_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,13 +112,13 @@ def design_moves(moves: Sequence[PlannedMove], sigma_rad: float) -> tuple[int, f
     rows = []
     for move in moves:
         n, angle = move.axis / np.linalg.norm(move.axis), move.angle_rad
-        cross = _cross(n)
+        cross = cross_matrix(n)
         along = np.outer(n, n)
         gain = angle * along + math.sin(angle) * (np.eye(3) - along) - (1.0 - math.cos(angle)) * cross
         # What is fixed in the room turns the other way in the body.
         turned = along + math.cos(angle) * (np.eye(3) - along) - math.sin(angle) * cross
         up = turned @ (move.up / np.linalg.norm(move.up))
-        rows.append(np.kron(_cross(up) @ gain, n[None, :]))
+        rows.append(np.kron(cross_matrix(up) @ gain, n[None, :]))
     matrix = np.concatenate(rows) / sigma_rad
     singular, directions = np.linalg.svd(matrix)[1:]
     rank = int(np.sum(singular > 1e-9 * singular[0]))
@@ -125,7 +126,3 @@ def design_moves(moves: Sequence[PlannedMove], sigma_rad: float) -> tuple[int, f
         return rank, math.inf
     covariance = (directions[:9].T / singular[:9] ** 2) @ directions[:9]
     return rank, math.sqrt(float(np.max(np.diag(covariance))))
-
-
-def _cross(v: FloatArray) -> FloatArray:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

@@ -52,15 +52,13 @@ class TurnSystem:
                 size = np.where(faces == face, angles[:, abs(face) - 1], 0.0)
                 moved = self.sigma_face * size[:, None, None] * (self.S_w @ across)
                 covariance += np.einsum("ija,kla->ijkl", moved, moved)
-        out: FloatArray = np.linalg.inv(np.linalg.cholesky(covariance.reshape(3 * n, 3 * n)))
-        return out
+        return np.linalg.inv(np.linalg.cholesky(covariance.reshape(3 * n, 3 * n)))
 
     @property
     def axes(self) -> FloatArray:
         """(k, 3) unit vectors along the turns."""
         size = np.linalg.norm(self.angles, axis=1, keepdims=True)
-        axes: FloatArray = self.angles / np.where(size > 0.0, size, 1.0)
-        return axes
+        return self.angles / np.where(size > 0.0, size, 1.0)
 
     def noise(self) -> FloatArray:
         """(k, 3, 3) of the raw turns from the sensor alone."""
@@ -77,8 +75,7 @@ class TurnSystem:
         variance = self.measured.var_rate * t + self.measured.bias_spread * t**2
         if rounding is not None:
             variance = variance + rounding
-        noise: FloatArray = variance[:, :, None] * np.eye(3)
-        return noise
+        return variance[:, :, None] * np.eye(3)
 
     @staticmethod
     def designs(angles: FloatArray, duration_s: FloatArray) -> FloatArray:
@@ -106,8 +103,7 @@ class TurnSystem:
         """(12, m) by what errors of the turns (k, 3, m), rad, that all of them share, pull the solution."""
         matrix, _ = self.whitened(used, with_biases=False)
         moved = (fit.S_w @ errors[used]).reshape(len(matrix), -1)
-        out: FloatArray = fit.covariance @ matrix.T @ (self.factor(used) @ moved)
-        return out
+        return fit.covariance @ matrix.T @ (self.factor(used) @ moved)
 
     def correlation(self, fit: Solution, used: BoolArray) -> FloatArray:
         """(12, 12) to add to the solution's covariance where rounding errors are shared: weights take none as so."""
@@ -130,10 +126,7 @@ class TurnSystem:
 
     def residuals(self, fit: Solution) -> FloatArray:
         """(k, 3) measured minus predicted raw turns."""
-        out: FloatArray = (
-            self.measured.raw_angle - self.angles @ fit.S_w.T - np.outer(self.measured.duration_s, fit.b_w)
-        )
-        return out
+        return self.measured.raw_angle - self.angles @ fit.S_w.T - np.outer(self.measured.duration_s, fit.b_w)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,22 +3,70 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import AXES, FloatArray
+from trihedron.arrays import AXES, XYZ, FloatArray
 from trihedron.errors import RefusedError
-from trihedron.estimate.kalman.consistency import check_innovations, consistency_findings, is_settled
-from trihedron.estimate.kalman.guide import Goal, Guide
-from trihedron.estimate.kalman.norm_start import NormStart
+from trihedron.estimate.kalman.model import (
+    ShapingOptions,
+    check_innovations,
+    consistency_findings,
+    is_settled,
+    shaping_model,
+)
 from trihedron.estimate.kalman.per_axis import noise_per_axis, pose_arrays
-from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.kalman import AxisNoise, LiveEstimate, NormKalmanCalibration
+from trihedron.records.kalman import AxisNoise, NormKalmanCalibration
+
+
+@dataclass(frozen=True, eq=False)
+class NormStart:
+    """Where the filter starts: ``f = S (raw − zero)`` with S (3, 3) and bias (3,).
+
+    S is good to ``sigma_relative`` of its size, the bias to ``sigma_bias_m_s2``. The signs of S decide
+    the signs of the result: the length of a vector cannot.
+    """
+
+    S: FloatArray
+    zero: FloatArray
+    sigma_relative: float = 0.1
+    sigma_bias_m_s2: float = 1.0
+
+    def __post_init__(self) -> None:
+        S, zero = np.array(self.S, dtype=np.float64), np.array(self.zero, dtype=np.float64)
+        if S.shape != (3, 3) or zero.shape != (3,) or not (np.all(np.isfinite(S)) and np.all(np.isfinite(zero))):
+            raise RefusedError(f"a start needs finite S (3, 3) and bias (3,), got shapes {S.shape} and {zero.shape}")
+        if np.linalg.matrix_rank(S) < 3:
+            raise RefusedError(
+                "a start needs three independent axes: S = 0 is no calibration, but the filter would stay there"
+            )
+        if not (self.sigma_relative > 0 and self.sigma_bias_m_s2 > 0):
+            raise RefusedError("the uncertainty of a start must be positive")
+        object.__setattr__(self, "S", S)
+        object.__setattr__(self, "zero", zero)
+
+    @classmethod
+    def from_range(cls, readings: npt.ArrayLike, gravity_m_s2: float) -> NormStart:
+        """A guess from mean readings (n, 3) alone: each axis has been near the vertical, both ways up.
+
+        Raises
+        ------
+        ValueError
+            When an axis did not move.
+        """
+        a = np.asarray(readings, dtype=np.float64)
+        half = (a.max(axis=0) - a.min(axis=0)) / 2.0
+        if np.any(half <= 0):
+            raise RefusedError(f"{XYZ[int(np.argmin(half))]} never changed: turn it both ways up, or give a start")
+        zero = (a.max(axis=0) + a.min(axis=0)) / 2.0
+        return cls(np.diag(gravity_m_s2 / half), zero, sigma_relative=0.3, sigma_bias_m_s2=3.0)
+
 
 NormFrame = Literal["lower", "symmetric"]
 
@@ -29,8 +77,8 @@ MOST_RUNS = 50
 N_PARAMETERS = 9
 
 
-class LiveNormCalibration:
-    """Calibrate a triad in unknown attitudes while it is being turned.
+class NormFilter:
+    """The filter of a triad in unknown attitudes, over poses in order.
 
     Parameters
     ----------
@@ -42,6 +90,8 @@ class LiveNormCalibration:
         Rough calibration to start from, signs included.
     frame : "lower" or "symmetric"
         Form of S, which fixes the rotation that the length of a vector leaves free.
+    session_s, pose_s : float
+        Rough length of the session, which sets the slowest noise that is modelled, and of a pose.
     """
 
     def __init__(
@@ -51,16 +101,12 @@ class LiveNormCalibration:
         gravity_m_s2: float,
         start: NormStart,
         frame: NormFrame = "lower",
-        goal: Goal | None = None,
         options: ShapingOptions | None = None,
         session_s: float = 1800.0,
         pose_s: float = 3.0,
-        pause_s: float = 3.0,
     ) -> None:
-        self.goal = goal or Goal()
         self.frame: NormFrame = frame
         self._gravity = gravity_m_s2
-        self._pose, self._pause = pose_s, pause_s
         self._zero = start.zero
         options = options or ShapingOptions()
         models = [shaping_model(n, options, session_s=session_s, pose_s=pose_s) for n in noise_per_axis(noise)]
@@ -72,39 +118,15 @@ class LiveNormCalibration:
         )
         self.n_runs = 0
 
-    @property
-    def n_poses(self) -> int:
-        """Poses taken so far."""
-        return self._filter.n_poses
-
-    def add(
-        self,
-        reading: npt.ArrayLike,
-        *,
-        start_s: float,
-        pose_s: float,
-        extra_variance: npt.ArrayLike = 0.0,
-        relinearise: bool = True,
-        look_ahead: int = 50,
-    ) -> LiveEstimate:
-        """Take the mean raw reading (3,) of one pose and say where things stand.
-
-        ``relinearise`` repeats the run over all poses at the latest constants (milliseconds). ``next_reference`` of the
-        answer is a direction of specific force in the body frame; ``constants`` are rows of ``[S | b]``.
+    def add(self, reading: FloatArray, start_s: float, pose_s: float, extra_variance: FloatArray) -> None:
+        """Take the mean raw reading (3,) of one pose, with its variance (3,) on top of the noise model, raw².
 
         Raises
         ------
         ValueError
             When the reading is not finite or the pose is earlier than the last one.
         """
-        a = np.asarray(reading, dtype=np.float64)
-        if a.shape != (3,):
-            raise RefusedError(f"a pose needs three readings, got shape {a.shape}")
-        extra = [float(v) for v in np.broadcast_to(np.asarray(extra_variance, dtype=np.float64), (3,))]
-        innovation, variance = self._filter.add([float(v) for v in a - self._zero], start_s, pose_s, extra)
-        if relinearise:
-            self.relinearise(10)
-        return self.estimate(nis=np.full(3, innovation**2 / variance), look_ahead=look_ahead)
+        self._filter.add([float(v) for v in reading - self._zero], start_s, pose_s, [float(v) for v in extra_variance])
 
     def load(self, readings: FloatArray, start_s: FloatArray, pose_s: FloatArray, extra_variance: FloatArray) -> None:
         """Take many poses at once, (n, 3), (n,), (n,), (n, 3); :meth:`relinearise` then estimates from all of them."""
@@ -118,7 +140,7 @@ class LiveNormCalibration:
 
     def calibration(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """``S`` (3, 3), ``b`` (3,) and covariance (12, 12) of ``f = S raw + b``."""
-        S, b = self._centred(self._filter)
+        S, b = self._centred()
         # b = b_centred − S zero
         jacobian = self._expand()
         for k in range(3):
@@ -135,8 +157,8 @@ class LiveNormCalibration:
         jacobian[9:, 6:] = np.eye(3)
         return jacobian
 
-    def _centred(self, one: _core.NormKalman) -> tuple[FloatArray, FloatArray]:
-        theta = one.parameters
+    def _centred(self) -> tuple[FloatArray, FloatArray]:
+        theta = self._filter.parameters
         S: FloatArray = (self._expand()[:9] @ theta).reshape(3, 3)
         return S, theta[6:]
 
@@ -144,50 +166,6 @@ class LiveNormCalibration:
         """(n,) innovations of the latest run and their predicted standard deviations, m/s²."""
         rows = self._filter.innovations
         return rows[:, 0].copy(), np.sqrt(rows[:, 1])
-
-    def _relative(self, one: _core.NormKalman) -> FloatArray:
-        """(3, 4) standard errors of ``δf = E f + e``: E = δS S⁻¹ (dimensionless) and e = δb − E b [m/s²]."""
-        S, b = self._centred(one)
-        inverse = np.linalg.inv(S)
-        expand = self._expand()
-        jacobian = np.zeros((3, 4, N_PARAMETERS))
-        for i in range(3):
-            rows = np.einsum("jk,jp->kp", inverse, expand[3 * i : 3 * i + 3])
-            jacobian[i, :3] = rows
-            jacobian[i, 3] = expand[9 + i] - b @ rows
-        flat = jacobian.reshape(12, N_PARAMETERS)
-        variance = np.einsum("ip,pq,iq->i", flat, one.covariance, flat)
-        relative: FloatArray = np.sqrt(np.maximum(variance, 0.0)).reshape(3, 4)
-        return relative
-
-    def _after(self, one: _core.NormKalman, direction: FloatArray) -> _core.NormKalman:
-        S, b = self._centred(one)
-        copy = one.copy()
-        reading = np.linalg.solve(S, direction - b)
-        copy.imagine([float(v) for v in reading], (one.end_s or 0.0) + self._pause, self._pose)
-        return copy
-
-    def estimate(self, *, nis: FloatArray | None = None, look_ahead: int = 50) -> LiveEstimate:
-        """Where things stand now."""
-        S, b, covariance = self.calibration()
-        sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        guide = Guide(self.goal, self._gravity, self._after, self._relative)
-        relative = self._relative(self._filter)
-        good = self.n_poses >= N_PARAMETERS and self.goal.shortfall(relative) <= 1.0
-        needed: int | None = 0 if good else None
-        best: FloatArray | None = None
-        if not good and look_ahead > 0:
-            needed, best = guide.look_ahead(self._filter, None, look_ahead)
-        return LiveEstimate(
-            n_poses=self.n_poses,
-            constants=np.column_stack([S, b]),
-            sigma=np.column_stack([sigma[:9].reshape(3, 3), sigma[9:]]),
-            relative_sigma=relative,
-            good_enough=good,
-            poses_needed=needed,
-            next_reference=best,
-            nis=np.full(3, np.nan) if nis is None else nis,
-        )
 
 
 def calibrate_without_references(
@@ -226,8 +204,8 @@ def calibrate_without_references(
     a = _mean_readings(readings)
     begin, pose, extra = pose_arrays(len(a), start_s, pose_s, extra_variance)
 
-    def fresh() -> LiveNormCalibration:
-        return LiveNormCalibration(
+    def fresh() -> NormFilter:
+        return NormFilter(
             noise,
             gravity_m_s2=gravity_m_s2,
             start=start or NormStart.from_range(a, gravity_m_s2),
@@ -239,18 +217,18 @@ def calibrate_without_references(
 
     parameters, sigmas = _track(fresh(), a, begin, pose, extra)
     # The answer does not depend on how the first few poses went: all together, from the start.
-    live = fresh()
-    live.load(a, begin, pose, extra)
-    converged = live.relinearise()
-    S, b, covariance = live.calibration()
+    one = fresh()
+    one.load(a, begin, pose, extra)
+    converged = one.relinearise()
+    S, b, covariance = one.calibration()
     parameters[-1], sigmas[-1] = _flat(S, b, covariance)
-    innovation, innovation_sigma = live.innovations()
+    innovation, innovation_sigma = one.innovations()
     seen = check_innovations(innovation, innovation_sigma)
     findings: list[Finding] = []
     if not converged:
         findings.append(Finding.of(FindingCode.NOT_CONVERGED, "kalman", most_runs=MOST_RUNS))
     findings += consistency_findings(None, seen)
-    observability, weak = _observability(live)
+    observability, weak = _observability(one)
     findings += weak
     accelerometer = SensorCalibration(
         S, b, covariance, raw_unit, "m/s^2", "kalman, norm of gravity", observability=observability
@@ -264,7 +242,7 @@ def calibrate_without_references(
         innovation=innovation,
         innovation_sigma=innovation_sigma,
         is_settled=is_settled(innovation_sigma),
-        n_runs=live.n_runs,
+        n_runs=one.n_runs,
         residual_m_s2=residual,
         consistency=seen,
         findings=tuple(findings),
@@ -288,24 +266,25 @@ def _flat(S: FloatArray, b: FloatArray, covariance: FloatArray) -> tuple[FloatAr
 
 
 def _track(
-    live: LiveNormCalibration, a: FloatArray, begin: FloatArray, pose: FloatArray, extra: FloatArray
+    one: NormFilter, a: FloatArray, begin: FloatArray, pose: FloatArray, extra: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """S row by row and b with standard errors (n, 12), as they stand after every pose."""
     parameters, sigmas = np.empty((len(a), 12)), np.empty((len(a), 12))
     for i in range(len(a)):
         # Every pose counts at first; later ones change the point of linearisation by less than its error.
         again = i < 40 or i % 10 == 0
-        when = {"start_s": float(begin[i]), "pose_s": float(pose[i])}
-        live.add(a[i], **when, extra_variance=extra[i], relinearise=again, look_ahead=0)
-        parameters[i], sigmas[i] = _flat(*live.calibration())
+        one.add(a[i], float(begin[i]), float(pose[i]), extra[i])
+        if again:
+            one.relinearise(10)
+        parameters[i], sigmas[i] = _flat(*one.calibration())
     return parameters, sigmas
 
 
-def _observability(live: LiveNormCalibration) -> tuple[Observability, list[Finding]]:
+def _observability(one: NormFilter) -> tuple[Observability, list[Finding]]:
     """Directions of the nine parameters, from the covariance of ``[E | e/g]``."""
-    covariance = live._filter.covariance
-    S, _ = live._centred(live._filter)
-    scale = np.array([1.0 / np.abs(np.diag(S))[j] for _, j in ENTRIES] + [1.0 / live._gravity] * 3)
+    covariance = one._filter.covariance
+    S, _ = one._centred()
+    scale = np.array([1.0 / np.abs(np.diag(S))[j] for _, j in ENTRIES] + [1.0 / one._gravity] * 3)
     values = np.linalg.eigvalsh(scale[:, None] * covariance * scale)
     singular = 1.0 / np.sqrt(np.maximum(values, 1e-300))
     condition = float(singular[0] / singular[-1])

@@ -11,8 +11,13 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import AXES, FloatArray
 from trihedron.errors import REFUSALS, RefusedError
-from trihedron.estimate.kalman.consistency import check_innovations, consistency_findings, is_settled
-from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
+from trihedron.estimate.kalman.model import (
+    ShapingOptions,
+    check_innovations,
+    consistency_findings,
+    is_settled,
+    shaping_model,
+)
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisKalmanResult, AxisNoise, ConstantsTrack, KalmanCalibration, PoseTable
@@ -158,8 +163,8 @@ def pose_arrays(
 def _sensitivity(z: FloatArray, f: FloatArray) -> FloatArray:
     """(3,) rough size of each axis' sensitivity row [raw/(m/s²)], good enough to scale an angle error."""
     rows = np.linalg.lstsq(np.column_stack([f, np.ones(len(f))]), z, rcond=None)[0][:3]
-    sensitivity: FloatArray = np.linalg.norm(rows, axis=0)
-    return sensitivity
+    out: FloatArray = np.linalg.norm(rows, axis=0)
+    return out
 
 
 def _one_axis(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -109,44 +109,6 @@ def curve_of_columns(
     return curve_with_intervals(
         "overlapping", rate_hz, n, np.array(sizes), variance, terms.astype(np.int64), weight, 0.95, names, units
     )
-
-
-def stream_allan_deviation(
-    chunks: Iterable[npt.ArrayLike],
-    rate_hz: float,
-    clusters: Sequence[int] | npt.NDArray[np.int64] | None = None,
-    *,
-    n_samples: int | None = None,
-    confidence: float = 0.95,
-    names: Sequence[str] = (),
-    units: Sequence[str] = (),
-    budget_bytes: int = STREAM_BUDGET_BYTES,
-) -> AllanCurve:
-    """Overlapping Allan deviation of a log that does not fit into memory, in one pass over its chunks.
-
-    ``chunks`` yields arrays (k,) or (k, channels) in order, for instance slices of a memory-mapped array. Clusters
-    up to 65536 readings use every start; longer ones use every ``stride``-th start once the running sums exceed
-    ``budget_bytes`` (at least 64 starts to a cluster) and are rounded up to a multiple of ``stride``.
-
-    Raises
-    ------
-    ValueError
-        When a chunk has missing readings or another number of channels, or the log is too short.
-    """
-    check_question(rate_hz, "overlapping", confidence)
-    sizes = default_clusters(n_samples or 1 << 44) if clusters is None else checked_clusters(clusters)
-    stream: _core.AllanStream | None = None
-    for chunk in chunks:
-        readings = as_readings(chunk)
-        if stream is None:
-            channels = readings.shape[1]
-            stream = _core.AllanStream(
-                channels, sizes, max(budget_bytes // (8 * channels), _core.AllanStream.LEAST_BUDGET)
-            )
-        stream.extend(readings)
-    if stream is None:
-        raise RefusedError("the log holds no chunk of readings")
-    return streamed_curve(stream, rate_hz, confidence, tuple(names), tuple(units))
 
 
 def streamed_curve(

@@ -7,9 +7,25 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
-from trihedron.estimate.noise.isotonic import never_falling
 from trihedron.records.noise import AllanKind
+
+
+def never_falling(values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Isotonic regression by pooling adjacent violators."""
+    level: list[float] = []
+    mass: list[float] = []
+    size: list[int] = []
+    for value, weight in zip(values.tolist(), weights.tolist(), strict=True):
+        level.append(value)
+        mass.append(weight)
+        size.append(1)
+        while len(level) > 1 and level[-2] > level[-1]:
+            last, last_mass, last_size = level.pop(), mass.pop(), size.pop()
+            level[-1] = (level[-1] * mass[-1] + last * last_mass) / (mass[-1] + last_mass)
+            mass[-1] += last_mass
+            size[-1] += last_size
+    return np.repeat(level, size)
+
 
 KINDS = {
     "overlapping": _core.AllanKind.Overlapping,
@@ -28,28 +44,13 @@ TYPES = {
 }
 
 
-def degrees_of_freedom(n: int, m: int, alpha: int, kind: AllanKind = "overlapping") -> float:
-    """Equivalent degrees of freedom of the variance of ``n`` rate readings in clusters of ``m`` (docs/noise.md, eq. 6).
-
-    ``edf = 2 E(V)² / var(V)`` after Greenhall and Riley (2003); ``alpha`` is the exponent of the rate's density: 2
-    quantisation, 0 white, -1 flicker, -2 random walk.
-
-    Raises
-    ------
-    ValueError
-        When ``n`` readings hold no pair of clusters of ``m``, or the exponent is none of these.
-    """
-    if alpha not in TYPES:
-        raise RefusedError(f"alpha must be one of 2, 0, -1, -2, got {alpha}")
-    if m < 1:
-        raise RefusedError(f"a cluster holds at least one reading, got {m}")
-    return _core.allan_degrees(n, m, TYPES[alpha], KINDS[kind])
-
-
 def edf_along(
     n: int, clusters: npt.NDArray[np.int64], variance: FloatArray, weight: FloatArray, kind: AllanKind
 ) -> FloatArray:
-    """(k,) degrees of freedom along a curve, the type of noise read off its slopes; between types edf is mixed."""
+    """(k,) degrees of freedom along a curve, the type of noise read off its slopes; between types edf is mixed.
+
+    ``edf = 2 E(V)² / var(V)`` of each type after Greenhall and Riley (2003), docs/noise.md, eq. 6.
+    """
     slopes = slopes_along(n, clusters, variance)
     out = np.empty(len(clusters))
     types = list(TYPES.values())

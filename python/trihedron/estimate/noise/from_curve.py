@@ -18,7 +18,7 @@ from trihedron.estimate.noise.allan import check_question, curve_with_intervals
 from trihedron.estimate.noise.axis import LEAST_EDF
 from trihedron.estimate.noise.curve_terms import LEAST_EDF as LEAST_EDF_OF_A_POINT
 from trihedron.estimate.noise.curve_terms import TERMS, CurveFit, CurvePoints
-from trihedron.records.finding import Finding
+from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.noise import AllanCurve, Noise, NoiseAxis, NoiseTerm, TermName
 
 FEWEST_POINTS = 6
@@ -93,7 +93,8 @@ def identify_curve(
         tuple(names),
         tuple(units),
     )
-    return Noise(tuple(_axis(curve, c) for c in range(channels)), curve, source, findings=(remarks.curve_alone(),))
+    alone = Finding.of(FindingCode.CURVE_ALONE)
+    return Noise(tuple(_axis(curve, c) for c in range(channels)), curve, source, findings=(alone,))
 
 
 def _axis(curve: AllanCurve, channel: int) -> NoiseAxis:
@@ -127,7 +128,7 @@ def _axis(curve: AllanCurve, channel: int) -> NoiseAxis:
         longest_tau_s=float(usable[-1]) if len(usable) else 0.0,
         covariance_scale=scale,
     )
-    ramp = [remarks.curve_ramp()] if terms[TermName.RATE_RAMP].is_present else []
+    ramp = [Finding.of(FindingCode.RAMP_OR_WALK)] if terms[TermName.RATE_RAMP].is_present else []
     return replace(axis, findings=(*found.findings, *ramp, *remarks.about_terms(axis)))
 
 
@@ -173,7 +174,7 @@ def _screened(points: CurvePoints) -> _Found:
         # What bends the curve fades by half an octave by octave: two more take it below the tolerance.
         first = min(first + MARGIN, most)
         used = points.from_point(first, TOLERANCE)
-        findings.append(remarks.curve_coloured(float(used.tau_s[0])))
+        findings.append(Finding.of(FindingCode.SPECTRUM_COLOURED, "curve", first_s=float(used.tau_s[0])))
     fit, evidence = used.select()
     chi2, z = used.misfit(fit.squares)
     dof = len(used.clusters) - len(fit.active)
@@ -182,7 +183,9 @@ def _screened(points: CurvePoints) -> _Found:
         scale = chi2 / dof
         worst = int(np.argmax(np.abs(z)))
         share = math.sqrt(used.variance[worst] / float(used.design[worst] @ fit.squares)) - 1.0
-        findings.append(remarks.curve_unexplained(share, float(used.tau_s[worst])))
+        findings.append(
+            Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, "curve", deviation=share, tau_s=float(used.tau_s[worst]))
+        )
     return _Found(used, fit, evidence, scale, findings)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.noise.isotonic import never_falling
+from trihedron.estimate.noise.degrees import never_falling
 from trihedron.ranges import edges_of, ranges_of
 
 MOST_BRIDGED = 0.02
@@ -123,16 +123,12 @@ def filled(parts: FloatArray) -> tuple[FloatArray, FloatArray]:
             whole = np.interp(np.arange(len(row)), np.flatnonzero(~gone), row[~gone])
             out.append((whole - whole.mean()) / np.sqrt(1.0 - share))
             shares.append(1.0)
-        elif share < 0.9 and _longest(gone) <= LONGEST_SCATTERED:
+        elif share < 0.9 and int(np.diff(edges_of(gone), axis=1).max(initial=0)) <= LONGEST_SCATTERED:
             out.append(np.where(gone, 0.0, row - row[~gone].mean()))
             shares.append(1.0 - share)
     if not out:
         return np.empty((0, parts.shape[1])), np.empty(0)
     return np.stack(out), np.array(shares)
-
-
-def _longest(missing: npt.NDArray[np.bool_]) -> int:
-    return int(np.diff(edges_of(missing), axis=1).max(initial=0))
 
 
 def true_share(x: FloatArray, clusters: npt.NDArray[np.int64], variance: FloatArray, order: int = 2) -> FloatArray:

@@ -20,7 +20,7 @@ from trihedron.estimate.noise.gaps import bridged
 from trihedron.estimate.noise.screening import Event, readout, repeated_rows, shaken, steps_and_knocks, tail_error
 from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.estimate.noise.warm_up import warm_up
-from trihedron.records.finding import Finding
+from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
 
 MOST_DISTURBED = 0.25
@@ -88,7 +88,7 @@ def identify_noise(
     findings: list[Finding] = []
     repeated = repeated_rows(readings)
     if repeated > 0.001:
-        findings.append(remarks.rows_repeated(repeated))
+        findings.append(Finding.of(FindingCode.REPEATED_ROWS, "at-rest", share=repeated))
 
     def screened(c: int) -> _Screened:
         return _screen(readings[:, c], rate_hz, excluded, names[c], units[c], automatic=automatic)
@@ -150,13 +150,14 @@ def _screen(
         share = sum(stop - start for start, stop in cuts) / len(column)
         if share > MOST_DISTURBED:
             # A log that is disturbed most of the time has no undisturbed rest to describe.
-            findings.append(remarks.disturbed_throughout(share))
+            findings.append(Finding.of(FindingCode.LOG_MOTION, "throughout", share=share))
             steps, cuts = [], []
         for start, stop in cuts:
             column[start:stop] = np.nan
         warm = None if steps else warm_up(column, rate_hz)
         if warm is not None:
-            findings.append(remarks.warmed_up(warm, unit))
+            drift, time_s = abs(warm.size), warm.time_s
+            findings.append(Finding.of(FindingCode.LOG_DRIFT, "warm-up", drift=drift, time_s=time_s, unit=unit))
             column -= warm.at(np.arange(len(column)) / rate_hz)
     present = np.isfinite(column)
     n = int(np.count_nonzero(present))

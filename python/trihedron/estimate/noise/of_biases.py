@@ -82,7 +82,6 @@ class SlowDifference:
     first: tuple[dict[str, Measured], ...]
     second: tuple[dict[str, Measured], ...]
     ratio: tuple[dict[str, Ratio], ...]
-    shows: tuple[bool, bool]
 
 
 def compare_slow(first: Sequence[PoseBiases], second: Sequence[PoseBiases]) -> SlowDifference | None:
@@ -109,17 +108,15 @@ def compare_slow(first: Sequence[PoseBiases], second: Sequence[PoseBiases]) -> S
         by_k += float((p.max(axis=1) + q.max(axis=1)).max()) - together
     p_value = float(chi2.sf(2.0 * won, 2.0 * len(first)))
     sides = [tuple(_terms(t[j], t[0], t[1]) for t in tables) for j in (2, 3)]
-    shows = tuple(any(_is_shown(t[j]) for t in tables) for j in (2, 3))
     ratios = tuple(_ratios(*t) for t in tables)
-    return SlowDifference(p_value, "B" if by_b > by_k else "K", sides[0], sides[1], ratios, (shows[0], shows[1]))
+    return SlowDifference(p_value, "B" if by_b > by_k else "K", sides[0], sides[1], ratios)
 
 
 def levels(sizes: Sequence[float]) -> FloatArray:
     """Strengths to be tried, zero first, for biases spreading by ``sizes`` (what one unit of strength makes of it)."""
     low, high = LOWEST * min(sizes), HIGHEST * max(sizes)
     n = math.ceil(math.log(high / low) / math.log(SPACING)) + 1
-    out: FloatArray = np.concatenate([[0.0], np.geomspace(low, high, n)])
-    return out
+    return np.concatenate([[0.0], np.geomspace(low, high, n)])
 
 
 def _table(zeros: PoseBiases, b: FloatArray, k: FloatArray) -> FloatArray:
@@ -143,11 +140,6 @@ def best_scatter(
     s = np.concatenate([[0.0], np.geomspace(0.15, 1.5, 5) * zeros.spread]) if zeros.scatters else np.zeros(1)
     out: FloatArray = _log_likelihood(contrasts, covariances, b, k, s).max(axis=2)
     return out
-
-
-def _is_shown(table: FloatArray) -> bool:
-    """Whether slow noise of either kind is there."""
-    return bool(2.0 * float(table.max() - table[0, 0]) > SHOWS)
 
 
 def _terms(table: FloatArray, b: FloatArray, k: FloatArray) -> dict[str, Measured]:
@@ -205,8 +197,7 @@ def kernels(zeros: PoseBiases) -> tuple[FloatArray, FloatArray]:
 def _twice_integrated(x: FloatArray) -> FloatArray:
     """The second integral of ln|x|: x²/2 ln|x| - 3x²/4."""
     size = np.maximum(np.abs(x), 1e-300)
-    out: FloatArray = size**2 * (0.5 * np.log(size) - 0.75)
-    return out
+    return size**2 * (0.5 * np.log(size) - 0.75)
 
 
 def _log_likelihood(

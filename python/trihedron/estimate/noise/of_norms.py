@@ -59,8 +59,7 @@ class PoseNorms:
         design = np.column_stack([x, y, z, x * x, y * y, z * z, x * y, x * z, y * z])
         u, size, _ = np.linalg.svd(design)
         rank = int((size > 1e-6 * size[0]).sum())
-        out: FloatArray = u[:, rank:]
-        return out
+        return u[:, rank:]
 
 
 def compare_slow_norms(first: PoseNorms, second: PoseNorms) -> SlowDifference | None:
@@ -83,10 +82,9 @@ def compare_slow_norms(first: PoseNorms, second: PoseNorms) -> SlowDifference | 
     by_k = float((p.max(axis=1) + q.max(axis=1)).max()) - together
     drawn = [_Drawn.of(one, float(b[-1]), float(k[-1]), least) for one in (first, second)]
     terms = tuple(one.terms() for one in drawn)
-    shows = tuple(any(t.lower > 0.0 for axis in side for t in axis.values()) for side in terms)
     ratios = tuple(_ratios(drawn[0], drawn[1], axis) for axis in range(AXES))
     p_value = float(chi2.sf(2.0 * won, 2.0))
-    return SlowDifference(p_value, "B" if by_b > by_k else "K", terms[0], terms[1], ratios, (shows[0], shows[1]))
+    return SlowDifference(p_value, "B" if by_b > by_k else "K", terms[0], terms[1], ratios)
 
 
 def _free_of_calibration(one: PoseNorms) -> PoseNorms:
@@ -149,8 +147,7 @@ def _quantiles(values: FloatArray, weight: FloatArray, places: FloatArray) -> Fl
     """Values (k,) below which shares ``places`` (k,) of the weight lie."""
     order = np.argsort(values)
     reached = np.cumsum(weight[order]) / max(float(weight.sum()), 1e-300)
-    out: FloatArray = values[order[np.minimum(np.searchsorted(reached, places), len(order) - 1)]]
-    return out
+    return values[order[np.minimum(np.searchsorted(reached, places), len(order) - 1)]]
 
 
 def _measured(values: FloatArray, weight: FloatArray) -> Measured:

@@ -11,15 +11,9 @@ from trihedron.records.noise import NoiseAxis, SpectralLine, TermName
 
 if TYPE_CHECKING:
     from trihedron.estimate.noise.screening import Event, Readout
-    from trihedron.estimate.noise.warm_up import WarmUp
 
 NAMED = 4
 """So many lines are told one by one."""
-
-
-def rows_repeated(share: float) -> Finding:
-    """The same row more often than its channels repeat by chance."""
-    return Finding.of(FindingCode.REPEATED_ROWS, "at-rest", share=share)
 
 
 def events(
@@ -52,11 +46,6 @@ def events(
             )
         )
     return out
-
-
-def disturbed_throughout(share: float) -> Finding:
-    """Too much of the log would have to be excluded."""
-    return Finding.of(FindingCode.LOG_MOTION, "throughout", share=share)
 
 
 def stretches_excluded(stretches: Sequence[tuple[int, int]], n: int, rate_hz: float) -> Finding:
@@ -112,31 +101,6 @@ def coloured(highest_hz: float, nyquist_hz: float, at_nyquist: float) -> Finding
     )
 
 
-def curve_alone() -> Finding:
-    """The log behind a curve was not seen."""
-    return Finding.of(FindingCode.CURVE_ALONE)
-
-
-def curve_coloured(first_s: float) -> Finding:
-    """The short end of a curve is no sum of terms."""
-    return Finding.of(FindingCode.SPECTRUM_COLOURED, "curve", first_s=first_s)
-
-
-def curve_ramp() -> Finding:
-    """A curve shows the square of a drift, not its shape."""
-    return Finding.of(FindingCode.RAMP_OR_WALK)
-
-
-def curve_unexplained(deviation: float, tau_s: float) -> Finding:
-    """A point that the terms miss by more than chance."""
-    return Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, "curve", deviation=deviation, tau_s=tau_s)
-
-
-def unexplained(deviation: float, frequency_hz: float) -> Finding:
-    """A band whose power the terms miss."""
-    return Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, deviation=deviation, frequency_hz=frequency_hz)
-
-
 def _slow_noise_unresolved(axis: NoiseAxis) -> Finding:
     """B and K together are needed, neither by itself."""
     flicker, walk = axis.terms[TermName.BIAS_INSTABILITY], axis.terms[TermName.RATE_RANDOM_WALK]
@@ -150,11 +114,6 @@ def _slow_noise_unresolved(axis: NoiseAxis) -> Finding:
         walk_lower=walk.lower,
         walk_upper=walk.upper,
     )
-
-
-def warmed_up(warm: WarmUp, unit: str) -> Finding:
-    """An exponential approach that was taken out of the readings."""
-    return Finding.of(FindingCode.LOG_DRIFT, "warm-up", drift=abs(warm.size), time_s=warm.time_s, unit=unit)
 
 
 def about_terms(axis: NoiseAxis) -> list[Finding]:

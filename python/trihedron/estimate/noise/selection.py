@@ -110,9 +110,7 @@ class Selection:
     fit: _core.SpectralFit
     spectrum: BinnedSpectrum
     evidence: tuple[float, ...]
-    evidence_ramp: float
     correlation_time_s: float | None = None
-    correlation_interval_s: tuple[float, float] = (0.0, 0.0)
     evidence_gauss_markov: float = 0.0
 
 
@@ -158,8 +156,7 @@ def select(
         without = tuple(i for i in active if i != k)
         base = table[without, has_ramp].deviance if without else float("inf")
         earned.append(base - table[with_k, has_ramp].deviance)
-    earned_ramp = table[active, False].deviance - table[active, True].deviance
-    plain = Selection(active, has_ramp, table[best], spectrum, tuple(earned), earned_ramp)
+    plain = Selection(active, has_ramp, table[best], spectrum, tuple(earned))
     step_s = min(band.step_s / band.block for band in bands)
     return _with_gauss_markov(step_s, plain, evidence) or plain
 
@@ -191,13 +188,13 @@ def _with_gauss_markov(step_s: float, plain: Selection, evidence: float) -> Sele
     if not longest > 64 * shortest:
         return None
 
-    def best_at(time_s: float) -> tuple[float, tuple[int, ...], bool, float]:
+    def best_at(time_s: float) -> tuple[float, tuple[int, ...], bool]:
         likelihood = spectrum.with_gauss_markov(step_s, time_s).likelihood()
         found = []
         for model in models:
             deviance = likelihood.fit(model, plain.has_ramp).deviance
             price = deviance + evidence * (len(model) - 1 + plain.has_ramp) + EVIDENCE_GAUSS_MARKOV
-            found.append((price, model, plain.has_ramp, deviance))
+            found.append((price, model, plain.has_ramp))
         return min(found)
 
     # A corner in the uppermost three octaves is the colouring of a filter, not a process of the sensor.
@@ -210,10 +207,9 @@ def _with_gauss_markov(step_s: float, plain: Selection, evidence: float) -> Sele
     fine = np.geomspace(max(grid[place] / step, grid[0]), grid[place] * step, 17)
     finer = [best_at(time_s) for time_s in fine]
     place = int(np.argmin([item[0] for item in finer]))
-    price, model, has_ramp, least = finer[place]
+    price, model, has_ramp = finer[place]
     if price > price_plain:
         return None
-    inside = [t for t, item in zip(fine, finer, strict=True) if item[3] < least + 3.84]
     time_s = float(fine[place])
     full = plain.spectrum.with_gauss_markov(step_s, time_s)
     likelihood = full.likelihood()
@@ -229,8 +225,6 @@ def _with_gauss_markov(step_s: float, plain: Selection, evidence: float) -> Sele
         fit=fit,
         spectrum=full,
         evidence=tuple(evidence_terms),
-        evidence_ramp=abs(likelihood.fit(model, not has_ramp).deviance - fit.deviance),
         correlation_time_s=time_s,
-        correlation_interval_s=(float(min(inside)), float(max(inside))),
         evidence_gauss_markov=price_plain - price + EVIDENCE_GAUSS_MARKOV,
     )

@@ -30,8 +30,7 @@ class WarmUp:
 
     def at(self, t: FloatArray) -> FloatArray:
         """(n,) what is left of the way at times (n,) [s] after the first reading, the end being none."""
-        out: FloatArray = -self.size * np.exp(-t / self.time_s)
-        return out
+        return -self.size * np.exp(-t / self.time_s)
 
 
 def warm_up(x: FloatArray, rate_hz: float) -> WarmUp | None:

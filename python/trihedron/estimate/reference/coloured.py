@@ -126,8 +126,7 @@ def _solve(
 
 def _least_squares(X: FloatArray, y: FloatArray) -> FloatArray:
     normal = X.T @ X
-    theta: FloatArray = np.linalg.pinv(normal, rcond=1e-14, hermitian=True) @ (X.T @ y)
-    return theta
+    return np.linalg.pinv(normal, rcond=1e-14, hermitian=True) @ (X.T @ y)
 
 
 def _weights(r: FloatArray, size: FloatArray, used: Mask) -> FloatArray:

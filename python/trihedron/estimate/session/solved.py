@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.aligned_moves import measured_and_aligned
-from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions
+from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, given_accelerometer
 from trihedron.estimate.gyroscope.findings import findings_of
 from trihedron.estimate.gyroscope.lost_turns import (
     PossibleLosses,
@@ -18,8 +18,7 @@ from trihedron.estimate.gyroscope.lost_turns import (
 )
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.gyroscope.observability import describe
-from trihedron.estimate.session.carried import Carried, carried
-from trihedron.estimate.session.figures import HeldOut, held_out, move_quality
+from trihedron.estimate.session.carried import Carried, HeldOut, carried, held_out, move_quality
 from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted, solve_session
 from trihedron.estimate.session.observed import Observed, arranged, with_prior
 from trihedron.records.calibration import SensorCalibration
@@ -29,6 +28,44 @@ from trihedron.records.segments import Segments
 from trihedron.sensor_model import reframing
 from trihedron.session.averaging import sharpened
 from trihedron.session.rounding import plateau_variance, shared_errors
+
+
+def calibrate_moves(
+    recording: Recording,
+    segments: Segments,
+    accelerometer: SensorCalibration,
+    gravity_m_s2: float,
+    options: MoveOptions | None = None,
+) -> tuple[SensorCalibration, tuple[Finding, ...]]:
+    """Calibrate the gyro so that its integrated moves carry each pose's gravity into the next (equations 5.1-5.9).
+
+    Parameters
+    ----------
+    recording : Recording
+        Raw readings of both sensors.
+    segments : Segments
+        Its poses and moves.
+    accelerometer : SensorCalibration
+        Calibrated accelerometer: its frame becomes the gyro's, its covariance enters the gyro's.
+    gravity_m_s2 : float
+        Magnitude of gravity, m/s².
+    options : MoveOptions
+        Rate model, screening, folds.
+
+    Returns
+    -------
+    SensorCalibration, tuple of Finding
+        ``ω = S raw + b`` in rad/s, and what was noticed.
+
+    Raises
+    ------
+    ValueError
+        When a sensor or every move is missing, or nothing tells the scale to start from.
+    """
+    part = given_accelerometer(accelerometer)
+    found = solved(recording, segments, part, gravity_m_s2, options or MoveOptions())
+    return in_frame_of(part, found), found.findings
+
 
 _Near = tuple[FloatArray, FloatArray, FloatArray]
 HIDDEN_S = 0.01 * 2.0 ** np.arange(7)

@@ -1,4 +1,4 @@
-r"""Standard deviations between sessions with intervals that hold for few of them (docs/many-recordings.md).
+"""Standard deviations between sessions with intervals that hold for few of them (docs/many-recordings.md).
 
 The model of one parameter: ``y_ij = μ + d_i + u_ij + e_ij``, ``d`` of the group (day, device) with variance σ_d²,
 ``u`` of the session with σ_u², ``e`` the session's own error with known variance. The point is the restricted maximum
@@ -19,8 +19,58 @@ from functools import cache
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.errors import RefusedError
 from trihedron.probability import chdtri, ndtri, stdtrit
-from trihedron.records.sessions import Spread
+from trihedron.records.sessions import PARAMETERS, Repeated, Session, Spread
+
+
+def repeated_parameters(sessions: Sequence[Session]) -> tuple[Repeated, ...]:
+    """The numbers of all sessions, one parameter after the other; sessions are grouped by their ``group``.
+
+    Where every session is a group of its own there is one spread, from session to session, as ``within``.
+
+    Raises
+    ------
+    ValueError
+        With fewer than two sessions.
+    """
+    if len(sessions) < 2:
+        raise RefusedError("one recording does not show how far a parameter repeats; give two or more.")
+    groups = _groups(sessions)
+    out = []
+    for k, parameter in enumerate(PARAMETERS[: len(sessions[0].numbers)]):
+        values = np.array([session.numbers[k] for session in sessions])
+        own = np.array([max(float(session.covariance[k, k]), 1e-300) for session in sessions])
+        within = spread_within(values, own, groups)
+        between = spread_between(values, own, groups)
+        mean = common_mean(values, own, groups, within, between)
+        own_std = float(np.sqrt(np.median(own)))
+        out.append(Repeated(parameter, mean.value, mean.std, mean.half_width, within, between, own_std))
+    return tuple(out)
+
+
+def next_session(sessions: Sequence[Session], repeated: Sequence[Repeated]) -> tuple[FloatArray, FloatArray]:
+    """(k,) by how much the next session's numbers differ from the common ones, and the errors of those, one sigma.
+
+    The axes of a kind repeat alike: three axes of two sessions say more of how far than one.
+    """
+    groups = _groups(sessions)
+    numbers = np.array([session.numbers for session in sessions])
+    own = np.array([np.maximum(np.diag(session.covariance), 1e-300) for session in sessions])
+    within2, between2 = np.zeros(len(repeated)), np.zeros(len(repeated))
+    for name in dict.fromkeys(one.parameter.id for one in repeated):
+        of = [k for k, one in enumerate(repeated) if one.parameter.id == name]
+        by_axis = [(axis, group) for axis in of for group in groups]
+        within2[of] = spread_of_next(spread_within(numbers[:, of].T.ravel(), own[:, of].T.ravel(), by_axis)) ** 2
+        between2[of] = np.mean([spread_of_next(repeated[k].between) ** 2 for k in of])
+    error2 = np.maximum([one.std**2 for one in repeated], within2 / len(sessions) + between2 / len(set(groups)))
+    return np.sqrt(within2 + between2), np.sqrt(error2)
+
+
+def _groups(sessions: Sequence[Session]) -> list[str]:
+    groups = [session.group for session in sessions]
+    return [""] * len(groups) if len(set(groups)) == len(groups) else groups
+
 
 LEVEL = 0.95
 QUANTILES = 60

@@ -87,8 +87,7 @@ def _term(sessions: Sequence[Session], name: str, t: FloatArray, branch: FloatAr
 
 
 def _columns(t: FloatArray, order: int) -> FloatArray:
-    out: FloatArray = t[:, None] ** np.arange(order + 1)
-    return out
+    return t[:, None] ** np.arange(order + 1)
 
 
 def _fit(y: FloatArray, v: FloatArray, X: FloatArray) -> tuple[FloatArray, FloatArray, float]:

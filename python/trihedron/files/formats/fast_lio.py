@@ -7,7 +7,7 @@ the bias.
 from __future__ import annotations
 
 from trihedron.files.formats.contract import ExportOptions, Format, number
-from trihedron.files.formats.without_intrinsics import noise_alone
+from trihedron.files.formats.matrices import noise_alone
 from trihedron.records import Calibration
 
 

@@ -19,8 +19,7 @@ from trihedron.files.formats.contract import (
     number,
     row,
 )
-from trihedron.files.formats.lower import in_lower
-from trihedron.files.formats.matrices import lower_orthogonal
+from trihedron.files.formats.matrices import in_lower, lower_orthogonal
 from trihedron.files.formats.noise_keys import required, si_rows
 from trihedron.files.formats.parsing import array_of, without_readings, yaml_of
 from trihedron.records import Calibration

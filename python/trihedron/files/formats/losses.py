@@ -58,8 +58,8 @@ def lost_to_a_diagonal(calibration: Calibration) -> list[str]:
 
 def _unit_columns(sensor: SensorCalibration) -> FloatArray:
     """Columns at the length of one unit of truth: what is off the diagonal is the share of another axis."""
-    unit: FloatArray = sensor.S * np.linalg.norm(np.linalg.inv(sensor.S), axis=1)
-    return unit
+    out: FloatArray = sensor.S * np.linalg.norm(np.linalg.inv(sensor.S), axis=1)
+    return out
 
 
 def lost_gyro_scale(gyro: SensorCalibration, target: str) -> list[str]:

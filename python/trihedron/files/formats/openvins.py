@@ -17,8 +17,7 @@ from trihedron.files.formats.contract import (
     row,
 )
 from trihedron.files.formats.kalibr import KEYS, g_sensitivity
-from trihedron.files.formats.lower import in_lower
-from trihedron.files.formats.matrices import lower_orthogonal
+from trihedron.files.formats.matrices import in_lower, lower_orthogonal
 from trihedron.files.formats.noise_keys import required, si_rows
 from trihedron.files.formats.parsing import array_of, numbers_in, yaml_of
 from trihedron.records import Calibration

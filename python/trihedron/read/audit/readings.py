@@ -11,9 +11,82 @@ from trihedron import _core
 from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.quiet import Windows
 from trihedron.quantiles import quantile
-from trihedron.read.audit.clipping import audit_clipping, short
 from trihedron.records import Finding, FindingCode, Severity
-from trihedron.records.channel_facts import ChannelFacts
+from trihedron.records.channel_facts import ChannelFacts, Limit
+from trihedron.units import (
+    STANDARD_GRAVITY_M_S2,
+    AccelerationUnit,
+    RateUnit,
+    acceleration_to_si,
+    degrees_from_radians,
+    rate_to_si,
+)
+
+
+def short(sensor: str) -> str:
+    """The sensor's name in a sentence."""
+    return "gyro" if sensor == "gyroscope" else sensor
+
+
+def audit_clipping(sensor: str, walls: tuple[Limit, ...], place: Place) -> list[Finding]:
+    """One finding per sensor that names every wall."""
+    if not walls:
+        return []
+    first = min(int(w.runs[0, 0]) for w in walls)
+    numbers = {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_count": float(w.count) for w in walls}
+    numbers |= {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_value": w.value for w in walls}
+    return [
+        Finding.of(
+            FindingCode.CLIPPING,
+            sensor=short(sensor),
+            walls=[(AXES[w.axis], w.value, w.count, len(w.runs)) for w in walls],
+            where=place(first),
+            count=sum(w.count for w in walls),
+            sample=first,
+            numbers=numbers,
+        )
+    ]
+
+
+LOST_IN_NOISE = 0.01
+"""Steps below this part of the noise are not worth saying: a hundred of them are one deviation of a reading."""
+
+
+def audit_steps(
+    sensor: str, facts: ChannelFacts, windows: Windows | None, unit: AccelerationUnit | RateUnit
+) -> list[Finding]:
+    """A note on the steps (3,) of readings whose unit is not counts; nothing where they are lost in the noise."""
+    noise = np.zeros(3) if windows is None else windows.quiet_noise(sensor)
+    if unit.value == "counts" or not np.all(facts.step > LOST_IN_NOISE * noise):
+        return []
+    steps = facts.step.tolist()
+    scale = acceleration_to_si(unit) if isinstance(unit, AccelerationUnit) else rate_to_si(unit)
+    usual = float(np.median(steps))
+    return [
+        Finding.of(
+            FindingCode.RAW_STEP,
+            sensor=short(sensor),
+            unit=unit.value,
+            steps=list(zip(AXES, steps, strict=True)),
+            per_unit=_per_unit(usual * (scale or math.nan), sensor),
+            is_accelerometer=sensor == "accelerometer",
+            is_decimal=_is_decimal(usual),
+            numbers={f"{axis}_step": step for axis, step in zip(AXES, steps, strict=True)},
+        )
+    ]
+
+
+def _is_decimal(step: float) -> bool:
+    exponent = math.log10(step)
+    return abs(exponent - round(exponent)) < 1e-4
+
+
+def _per_unit(step_si: float, sensor: str) -> float:
+    """Steps in one g, or in one degree per second."""
+    if sensor == "accelerometer":
+        return STANDARD_GRAVITY_M_S2 / step_si
+    return 1.0 / degrees_from_radians(step_si)
+
 
 Place = Callable[[int], str]
 MANY, LONG, HALF = 0.05, 0.1, 0.5

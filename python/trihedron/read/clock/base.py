@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.read.clock.order import in_order, order_of_rows, unwrap
-from trihedron.read.clock.steps import steps_of
+from trihedron.read.clock.rate import steps_of
 from trihedron.read.clock.unit import Witness, seconds_of, time_unit
 from trihedron.read.errors import ReadError
 from trihedron.read.table import Table

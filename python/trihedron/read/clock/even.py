@@ -35,8 +35,7 @@ CLOSE_PIECES = 60
 @dataclass(frozen=True, eq=False)
 class EvenClock:
     """``tick`` (n,) number of each sample, lost ones counted; ``even_s`` (n,) when the even clock took it, relative to
-    the timestamps; ``kind``; ``counts_losses``: whether ``tick`` says what was lost; ``pauses`` (m,) rows behind which
-    the logger paused; ``wanders``: the rate changes over the log."""
+    the timestamps; ``kind``; ``counts_losses``: whether ``tick`` says what was lost."""
 
     kind: TimestampKind
     period_s: float
@@ -45,9 +44,7 @@ class EvenClock:
     even_s: FloatArray
     timestamp_error_s: float
     counts_losses: bool
-    pauses: IntArray
     grid_s: float = 0.0
-    wanders: bool = False
 
     @property
     def lost_behind(self) -> IntArray:
@@ -106,20 +103,20 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
         even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False, room)
         error = _error(time_s, even)
     if wanders:
-        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False, room, CLOSE_PIECES)
+        even, mean_period, sigma, _ = _lay(time_s, tick, period, pauses, width, False, room, CLOSE_PIECES)
         error = _error(time_s, even)
     on_grid = 0.0 < found.grid_s < 1.3 * period and _range(error) < 1.3 * found.grid_s
     growth = 0.0 if on_grid else _growth(error, pauses, UNSEEN * period)
     if moved_back > TAKEN_BACK or growth > GROWTH or (not sees and growth > 0.5 * GROWTH):
-        return EvenClock(TimestampKind.IRREGULAR, period, sigma, np.arange(n), time_s, 0.0, False, pauses)
+        return EvenClock(TimestampKind.IRREGULAR, period, sigma, np.arange(n), time_s, 0.0, False)
     kind = _kind(error, period, found.grid_s)
     if kind is not TimestampKind.LATE:
         # Two-sided errors have their middle, not their edge, on the clock.
-        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, True, room, CLOSE_PIECES)
+        even, mean_period, sigma, _ = _lay(time_s, tick, period, pauses, width, True, room, CLOSE_PIECES)
         error = _error(time_s, even)
     rms = _core.errors_deviation(error)
     even = _error(time_s, error)
-    return EvenClock(kind, mean_period, sigma, tick, even, rms, sees, pauses, found.grid_s, wanders)
+    return EvenClock(kind, mean_period, sigma, tick, even, rms, sees, found.grid_s)
 
 
 def _error(time_s: FloatArray, even: FloatArray) -> FloatArray:

@@ -71,7 +71,9 @@ def find_period(time_s: FloatArray) -> Period:
     spectrum = _Spectrum(power, mean_step / (length * cell), int(2 * length / size) + 1, threshold)
     line = _first_line(windows, mean_step, spectrum)
     grid = mean_step / line if line else 0.0
-    best = _choose(spectrum, line, _shortest_step(windows) / mean_step)
+    # A step that only one in 500 falls short of.
+    shortest = quantile(np.concatenate([np.diff(w) for w in windows]), 0.002)
+    best = _choose(spectrum, line, shortest / mean_step)
     if best is None or sum(np.count_nonzero(np.diff(w) > 0.2 * mean_step) for w in windows) < FEWEST_TIMESTAMPS:
         return Period(mean_step, 0.0, grid, False)
     k = int(np.argmin(np.abs(spectrum.per_step - best)))
@@ -132,8 +134,8 @@ def _first_line(windows: list[FloatArray], mean_step: float, spectrum: _Spectrum
 
 
 def _mean_power(windows: list[FloatArray], frequency_hz: FloatArray) -> FloatArray:
-    mean: FloatArray = np.mean([_direct(w, frequency_hz) for w in windows], axis=0)
-    return mean
+    out: FloatArray = np.mean([_direct(w, frequency_hz) for w in windows], axis=0)
+    return out
 
 
 def _direct(time_s: FloatArray, frequency_hz: FloatArray) -> FloatArray:
@@ -174,11 +176,6 @@ def _poll(spectrum: _Spectrum) -> float:
     k = a + int(strong[0])
     k += int(np.argmax(spectrum.power[k : k + 2 * spectrum.lobe]))
     return _summit(spectrum.power, k) * spectrum.width
-
-
-def _shortest_step(windows: list[FloatArray]) -> float:
-    """A step that only one in 500 falls short of."""
-    return quantile(np.concatenate([np.diff(w) for w in windows]), 0.002)
 
 
 def _choose(spectrum: _Spectrum, line: float, shortest: float) -> float | None:

@@ -1,12 +1,28 @@
-"""Samples per second of timestamps that nobody has judged yet."""
+"""Steps and rate of timestamps that nobody has judged yet."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.read.clock.steps import steps_of
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Numbers of steps ``back``, of zero (``same``) and ``forward``, and of timestamps that are not finite."""
+
+    back: int
+    same: int
+    forward: int
+    missing: int
+
+
+def steps_of(time_s: FloatArray) -> Steps:
+    """Steps of timestamps (n,)."""
+    return Steps(*_core.timestamp_steps(np.asarray(time_s, dtype=np.float64)))
 
 
 def usual_step(time_s: FloatArray) -> float:

@@ -10,8 +10,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.read.clock.rate import usual_step
-from trihedron.read.clock.steps import steps_of
+from trihedron.read.clock.rate import steps_of, usual_step
 from trihedron.read.errors import ReadError
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.records.words import words

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from trihedron.read.errors import ReadError, from_os_error
-from trihedron.read.memory_limit import check_ratio
+from trihedron.read.memory import check_ratio
 
 BLOCK_BYTES = 1 << 23
 """Text parsed at a time: large enough for polars to use every core, small enough not to matter (a block takes some

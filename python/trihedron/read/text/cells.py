@@ -13,9 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.read.errors import ReadError
+from trihedron.read.errors import ReadError, panics_unprinted
 from trihedron.read.names import parse_name
-from trihedron.read.panics import panics_unprinted
 from trihedron.read.text.dates import form_of, seconds
 from trihedron.read.text.layout import MISSING, Layout
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from trihedron.read.errors import ReadError, refuse_after_fork
-from trihedron.read.memory_limit import check_memory
+from trihedron.read.memory import check_memory
 from trihedron.read.table import Table
 from trihedron.read.text.blocks import Cursor, as_utf8, beginning, blocks
 from trihedron.read.text.dialect import Rewritten, rewrite

@@ -15,7 +15,7 @@ from trihedron.arrays import FloatArray
 from trihedron.read.columns import find_columns
 from trihedron.read.digest import LateSha256, file_sha256, kept_open
 from trihedron.read.errors import ReadError
-from trihedron.read.memory_limit import check_memory
+from trihedron.read.memory import check_memory
 from trihedron.read.names import parse_name
 from trihedron.read.table import Table
 from trihedron.read.text.ahead import Bytes, blocks_ahead

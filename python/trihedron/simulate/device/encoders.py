@@ -58,14 +58,10 @@ def _xio(scales: Scales, *, binary: bool) -> Encoder:
     return encode
 
 
-def _ten_bits(value: float) -> int:
-    return min(max(round(value), 0), 1023)
-
-
 def _sparkfun(*, binary: bool) -> Encoder:
     def encode(n: int, _t: float, accel: Reading, gyro: Reading) -> bytes:
         # Pitch comes before roll: the gyro's y before its x.
-        numbers = [_ten_bits(v) for v in (*accel, gyro[1], gyro[0], gyro[2])]
+        numbers = [min(max(round(v), 0), 1023) for v in (*accel, gyro[1], gyro[0], gyro[2])]
         if binary:
             return b"A" + struct.pack(">7H", n % 32_768, *numbers) + b"Z"
         return ("A\t" + "\t".join(str(v) for v in (n % 32_768, *numbers)) + "\tZ\r\n").encode()

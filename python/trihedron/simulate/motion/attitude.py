@@ -43,8 +43,7 @@ def vector_from_quaternion(q: Quaternion) -> FloatArray:
         return 2.0 * v
     if w < 0.0:
         w, v = -w, -v
-    out: FloatArray = v * (2.0 * math.atan2(n, w) / n)
-    return out
+    return v * (2.0 * math.atan2(n, w) / n)
 
 
 def up_in_body(q: Quaternion) -> FloatArray:
@@ -75,7 +74,5 @@ def shortest_turn(a: FloatArray, b: FloatArray) -> FloatArray:
             return np.zeros(3)
         other = np.eye(3)[int(np.argmin(np.abs(a)))]
         perpendicular = np.cross(a, other)
-        opposite: FloatArray = perpendicular * (math.pi / float(np.linalg.norm(perpendicular)))
-        return opposite
-    turn: FloatArray = cross * (math.atan2(sine, cosine) / sine)
-    return turn
+        return perpendicular * (math.pi / float(np.linalg.norm(perpendicular)))
+    return cross * (math.atan2(sine, cosine) / sine)

@@ -1,16 +1,49 @@
-"""A time that is in the log but not understood must not become 100 Hz."""
+"""The time of a log: a column, the sum of its steps, paced by arrivals; or there and not understood, and refused."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.arrivals import paced
 from trihedron.read.columns import Columns
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
 from trihedron.read.table import Table
+from trihedron.records import Finding, FindingCode
+
+
+def summed_steps(table: Table, chosen: Columns) -> tuple[Table, Columns]:
+    """The table with the sum of its column of steps in place of them, as its time; both as they are without one."""
+    for i, name in enumerate(table.names or ()):
+        step, parsed = table.columns[i], parse_name(name)
+        if parsed.role != "step" or not len(step) or not (np.all(step >= 0.0) and np.median(step) > 0.0):
+            continue
+        columns = tuple(np.cumsum(step) if k == i else column for k, column in enumerate(table.columns))
+        note = Finding.of(FindingCode.TIME_UNIT_DETECTED, "sum-of-steps", column=table.label(i))
+        table = replace(table, columns=columns, findings=(*table.findings, note))
+        return table, replace(chosen, time=i, time_unit=parsed.time_unit)
+    return table, chosen
+
+
+def with_arrivals(table: Table, time: int) -> Table:
+    """A log of ``trihedron capture`` from a board without a clock, its times paced anew by all of its arrivals.
+
+    While it is recorded the first seconds can only guess the rate; the log keeps counter and arrivals for this.
+    """
+    names = table.names or ()
+    if table.metadata.get("device clock") != "none" or not {"frame", "host_s"} <= set(names):
+        return table
+    frame, host_s = (table.columns[names.index(name)] for name in ("frame", "host_s"))
+    if not len(frame) or np.isnan(frame).any() or np.isnan(host_s).any():
+        return table
+    columns = list(table.columns)
+    columns[time] = paced(frame, host_s)
+    return replace(table, columns=tuple(columns))
+
 
 _CLOCK = re.compile(r"\d[:.h]\d\d[:.m]\d\d")
 """Hours, minutes and seconds in some order of marks."""

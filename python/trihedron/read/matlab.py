@@ -1,18 +1,100 @@
-"""A MATLAB file before 7.3 walked through first: SciPy trusts its sizes, and over wrong ones it ends the program.
+"""MATLAB files: whether their structure is sound enough for a library, and objects as tables.
+
+A MATLAB file before 7.3 walked through first: SciPy trusts its sizes, and over wrong ones it ends the program.
 
 Level 5 MAT-files (The MathWorks, MAT-File Format): a header of 128 bytes, then elements of type, size and content; an
 array is an element of elements: flags, dimensions, name, and what its class asks for.
+
+Tables and timetables of MATLAB, which are objects in its files: decoded by mat-io, one data frame each.
+
+MATLAB Mobile saves a timetable for each sensor (``Acceleration``, ``AngularVelocity``) with columns X, Y, Z.
 """
 
 from __future__ import annotations
 
 import struct
+import warnings
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
+from pathlib import Path
+from typing import Any
 
 from trihedron.errors import RefusedError
+from trihedron.read.columns import Columns, find_columns, sensor_of_file_name
+from trihedron.read.devices import Choice
+from trihedron.read.digest import file_sha256
+from trihedron.read.errors import ReadError
+from trihedron.read.memory import columns_table, frame_columns
+from trihedron.read.ros import Stream, choice_note, first_line, missing_extra, pick
+from trihedron.read.table import Table
+
+_AXES = {"x", "y", "z"}
+
+
+def read_objects(path: Path, choice: Choice) -> tuple[Table, ...]:
+    """The log in a MATLAB file of tables: one that holds it, or one for each sensor.
+
+    Raises
+    ------
+    ReadError
+        When mat-io is not installed, the file is damaged, or several tables could be the log.
+    """
+    try:
+        from matio import load_from_mat
+    except ImportError:
+        raise missing_extra(path, "a MATLAB file of tables or timetables", "mat-io", "matlab") from None
+    try:
+        with warnings.catch_warnings():
+            # SciPy, which mat-io uses, warns of the objects' own bookkeeping.
+            warnings.simplefilter("ignore")
+            content = load_from_mat(str(path))
+    # mat-io answers damage with whatever its unpacking met.
+    except Exception as error:
+        raise ReadError(f"{path}: mat-io cannot read this MATLAB file ({first_line(error)}); save it again.") from None
+    tables = {name: table for name, value in content.items() if (table := _table(path, name, value)) is not None}
+    found = {name: columns for name, table in tables.items() if (columns := _columns(table)) is not None}
+    if not found:
+        held = ", ".join(f"{name} ({type(value).__name__})" for name, value in content.items())
+        raise ReadError(
+            f"{path}: no table named as an accelerometer's or a gyro's in this MATLAB file; it holds {held[:300]}."
+        )
+    if choice.topic is None:
+        acc = [name for name, columns in found.items() if columns.accelerometer and not columns.gyroscope]
+        gyr = [name for name, columns in found.items() if columns.gyroscope and not columns.accelerometer]
+        if len(acc) == len(gyr) == 1 and len(found) == 2:
+            sha256 = file_sha256(path)
+            return (
+                replace(tables[acc[0]], sensor="accelerometer", sha256=sha256),
+                replace(tables[gyr[0]], sensor="gyroscope", sha256=sha256),
+            )
+    streams = [Stream(name, tables[name].n_rows) for name in found]
+    taken = pick(path, streams, choice, "this MATLAB file")
+    note = choice_note("MATLAB file", taken, streams)
+    table = tables[taken.topic]
+    return (replace(table, sha256=file_sha256(path), findings=(*table.findings, *note)),)
+
+
+def _table(path: Path, name: str, value: Any) -> Table | None:
+    """A data frame as a table; columns that are axes alone take the name of their table."""
+    if not (hasattr(value, "columns") and hasattr(value, "dtypes")):
+        return None
+    items = frame_columns(value)
+    is_bare = {label.lower() for label, _ in items} >= _AXES and sensor_of_file_name(name) is not None
+    named = [(f"{name}_{label}" if is_bare and label.lower() in _AXES else label, data) for label, data in items]
+    try:
+        return replace(columns_table(str(path), named), path=path)
+    except ReadError:
+        return None
+
+
+def _columns(table: Table) -> Columns | None:
+    try:
+        return find_columns(table, None, None)
+    except ReadError:
+        return None
+
 
 _SIZE = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
 """Bytes of a value by type of element."""

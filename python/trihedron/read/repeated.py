@@ -1,4 +1,4 @@
-"""Rows that a log holds twice, told from readings that came out alike under one stamp."""
+"""What repeats: a channel that reads the same throughout, rows that a log holds twice."""
 
 from __future__ import annotations
 
@@ -9,6 +9,39 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.probability import bdtrc
+from trihedron.read.errors import ReadError
+from trihedron.read.table import Table
+
+TOO_FEW_TO_JUDGE = 20
+"""Rows in which a live channel may well read the same throughout."""
+
+
+def refuse_constant(table: Table, name: str, triad: FloatArray, where: tuple[int, int, int]) -> None:
+    """Readings (n, 3) of which an axis never changes, from columns ``where``.
+
+    Raises
+    ------
+    ReadError
+        Naming the first such column.
+    """
+    for k, column in enumerate(where):
+        head = triad[:1000, k]
+        if np.isfinite(head[0]) and np.any(np.isfinite(head) & (head != head[0])):
+            continue  # it changes: no need to go through millions of rows
+        finite = triad[np.isfinite(triad[:, k]), k]
+        if len(finite) == 0:
+            raise ReadError(f"{table.path}: column {table.label(column)} of the {name} holds no finite number.")
+        if finite[0] == finite[-1] and np.all(finite == finite[0]):
+            if table.n_rows < TOO_FEW_TO_JUDGE:
+                raise ReadError(
+                    f"{table.path}: the file holds {table.n_rows} rows of numbers only, too few for a recording; log "
+                    "for a minute or more."
+                )
+            raise ReadError(
+                f"{table.path}: column {table.label(column)} of the {name} is {finite[0]:.6g} in all {len(finite)} "
+                f"rows from {table.place(0)} on: a dead channel, or the wrong column; name the columns with --columns."
+            )
+
 
 MOST_LOOKED_AT = 100_000
 """Rows at which readings are compared with those farther back: chance as low as one in ten thousand is seen."""

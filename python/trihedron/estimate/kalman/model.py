@@ -1,0 +1,124 @@
+"""The filter's model of an axis' noise, and whether what the filter then saw fits it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from trihedron import _core
+from trihedron.arrays import AXES, FloatArray
+from trihedron.records.finding import Finding, FindingCode
+from trihedron.records.kalman import AxisNoise, Consistency
+
+SLOWEST_PER_SESSION, FASTEST_PER_POSE = 0.3, 6.0
+"""Extreme inverse correlation times, over those of the session and of a pose. With one Gauss-Markov process per decade
+between them the Allan deviation follows flicker within 2 %."""
+
+
+@dataclass(frozen=True)
+class ShapingOptions:
+    """How the noise becomes states (docs/kalman.md, eq. 4-8).
+
+    ``flicker_rates_per_s`` are the inverse correlation times β of the Gauss-Markov processes for flicker: one for the
+    article's filter, empty for as many as the session needs. ``ramp_frequency_rad_s`` is ω₀ of the second-order ramp, 0
+    for one tenth of the session's inverse length: its slope then lasts for the whole session; ``ramp_damping`` is ζ.
+    With ``averages`` a reading is the mean over its pose, exactly; without, it is the value at its end (the article).
+    """
+
+    flicker_rates_per_s: tuple[float, ...] = ()
+    ramp_frequency_rad_s: float = 0.0
+    ramp_damping: float = 1.0 / np.sqrt(2.0)
+    averages: bool = True
+
+    @classmethod
+    def of_the_article(cls, session_s: float, pose_s: float) -> ShapingOptions:
+        """Eight states: one Gauss-Markov process in the middle of the session's time scales, instantaneous readings."""
+        return cls(flicker_rates_per_s=(1.0 / float(np.sqrt(session_s * pose_s)),), averages=False)
+
+
+def shaping_model(
+    noise: AxisNoise, options: ShapingOptions, *, session_s: float, pose_s: float
+) -> _core.AxisKalmanModel:
+    """Compiled shaping filter of one axis for a session of ``session_s`` with poses of about ``pose_s``."""
+    rates = options.flicker_rates_per_s
+    if not rates:
+        slow, fast = SLOWEST_PER_SESSION / session_s, FASTEST_PER_POSE / pose_s
+        n = max(2, int(np.ceil(np.log10(fast / slow))) + 1)
+        rates = tuple(float(rate) for rate in np.geomspace(slow, fast, n))
+    return _core.AxisKalmanModel(
+        quantisation=noise.quantisation,
+        white=noise.white,
+        flicker=noise.flicker,
+        walk=noise.walk,
+        ramp=noise.ramp,
+        gauss_markov=noise.gauss_markov,
+        gauss_markov_rate=1.0 / noise.gauss_markov_time_s if noise.gauss_markov_time_s > 0 else 0.0,
+        resolution=noise.resolution,
+        dither=noise.sample_sigma,
+        flicker_rates=list(rates),
+        ramp_frequency=options.ramp_frequency_rad_s or 0.1 / session_s,
+        ramp_damping=options.ramp_damping,
+        averages=options.averages,
+    )
+
+
+CONFIDENCE = 0.99
+DIFFUSE_RATIO = 30.0
+"""An innovation predicted this many times wider than the later ones tells of the diffuse start, not of noise."""
+
+
+def is_settled(innovation_sigma: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which innovations (n,) were predicted by the data; the others only by the diffuse start."""
+    typical = float(np.median(innovation_sigma[len(innovation_sigma) // 2 :]))
+    return innovation_sigma <= DIFFUSE_RATIO * typical
+
+
+def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray) -> Consistency:
+    """Mean of the normalised innovation squared, and Ljung-Box test of whiteness (docs/kalman.md, eq. 11-12).
+
+    Parameters
+    ----------
+    innovation, innovation_sigma : (n,)
+        One-step prediction errors and their predicted standard deviations, any unit.
+    """
+    z = (innovation / innovation_sigma)[is_settled(innovation_sigma)]
+    n = len(z)
+    if n == 0:
+        return Consistency(float("nan"), 0.0, float("inf"), 0, 1.0, 0)
+    tail = (1.0 - CONFIDENCE) / 2.0
+    low, high = float(stats.chi2.ppf(tail, n)) / n, float(stats.chi2.ppf(1.0 - tail, n)) / n
+    n_lags = min(20, n // 5)
+    power = float(z @ z)
+    r = np.array([float(z[lag:] @ z[: n - lag]) / power for lag in range(1, n_lags + 1)]) if power > 0 else np.zeros(0)
+    p = 1.0
+    if len(r):
+        q = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, n_lags + 1))))
+        p = float(stats.chi2.sf(q, n_lags))
+    return Consistency(power / n, low, high, n, p, n_lags, tuple(float(v) for v in r))
+
+
+def consistency_findings(axis: int | None, seen: Consistency) -> list[Finding]:
+    """What an inconsistent filter tells about the noise it was given; ``axis`` None stands for all three."""
+    out: list[Finding] = []
+    case, name = ("norm", "") if axis is None else ("axis", AXES[axis])
+    size: dict[str, Any] = {"axis": name, "nis_mean": seen.nis_mean, "nis_low": seen.nis_low, "nis_high": seen.nis_high}
+    if seen.n and seen.nis_mean > seen.nis_high:
+        out.append(Finding.of(FindingCode.INNOVATIONS_TOO_LARGE, case, **size, widening=np.sqrt(seen.nis_mean)))
+    elif seen.n and seen.nis_mean < seen.nis_low:
+        out.append(Finding.of(FindingCode.INNOVATIONS_TOO_SMALL, case, **size))
+    if seen.n_lags and seen.whiteness_p < 1.0 - CONFIDENCE:
+        out.append(
+            Finding.of(
+                FindingCode.INNOVATIONS_COLOURED,
+                case,
+                axis=name,
+                whiteness_p=seen.whiteness_p,
+                n_lags=seen.n_lags,
+                autocorrelation_1=seen.autocorrelation[0],
+            )
+        )
+    return out
