@@ -93,7 +93,7 @@ def differing_in_short(diagnosis: Diagnosis) -> list[str]:
     if len(numbers) > MOST_NUMBERS:
         numbers = _groups_in_short(diagnosis)
     left = max(len(numbers) - MOST_NUMBERS, 0) + max(len(noise) - MOST_NOISE, 0)
-    more = [f"{left} more {'difference' if left == 1 else 'differences'} (see the tables)"] if left else []
+    more = [f"{left} more {'difference' if left == 1 else 'differences'}"] if left else []
     return [*numbers[:MOST_NUMBERS], *noise[:MOST_NOISE], *more]
 
 
