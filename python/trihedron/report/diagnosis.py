@@ -72,7 +72,7 @@ def first_screen(diagnosis: Diagnosis) -> int:
 
 
 def diagnosis_report(diagnosis: Diagnosis, model: str = "") -> Document:
-    """Lay out a diagnosis; the first sections fit one screen. ``model`` names the file that was held against the log."""
+    """Lay out a diagnosis; the first sections fit one screen. ``model`` names the file held against the log."""
     sections = [Section("Result", _located(diagnosis))]
     if diagnosis.parameters:
         about = (*forest_pictures(diagnosis), *differing_blocks(diagnosis), *_traces(diagnosis))
@@ -271,7 +271,8 @@ def _traces(diagnosis: Diagnosis) -> tuple[Picture, ...]:
     recording, simulated, segments = (getattr(diagnosis, name, None) for name in ("recording", "simulated", "segments"))
     if recording is None or simulated is None or segments is None:
         return ()
-    picture = traces_picture(recording, simulated, segments)
+    models = (getattr(diagnosis, "updated", None), getattr(diagnosis, "calibration", None))
+    picture = traces_picture(recording, simulated, segments, models)
     return () if picture is None else (picture,)
 
 

@@ -32,6 +32,8 @@ LONG = 14
 """Rows of a table that is folded from here on: what fits beside its figure on a screen is not."""
 WORDY = 28
 """A column with longer cells holds sentences: they wrap, and begin at the left."""
+SHORT = 12
+"""Names of rows that are no longer are never broken."""
 _DASHED = re.compile(r"(?<![\w-])-{1,2}[A-Za-z][\w/+-]*")
 
 
@@ -77,6 +79,11 @@ def unbroken(text: str) -> Markup:
     return Markup(_DASHED.sub(r'<span class="whole">\g<0></span>', str(escape(text))))
 
 
+def stacked(text: str) -> Markup:
+    """A cell that may put its uncertainty below its value, where there is no room beside."""
+    return escape(text).replace(" ± ", Markup(" <wbr>± "))
+
+
 def path(text: str) -> Markup:
     """Names of files, broken at their folders where they must be."""
     return escape(text).replace("/", Markup("/<wbr>"))
@@ -97,7 +104,7 @@ def template(name: str) -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.filters |= {"unbroken": unbroken, "path": path}
+    made.filters |= {"unbroken": unbroken, "stacked": stacked, "path": path}
     return made.get_template(name)
 
 
@@ -137,6 +144,7 @@ def _shown(block: Block) -> dict[str, Any]:
         shown |= {"name": block.name, "caption": block.caption, "drawn": Markup(_drawn(block))}
     if isinstance(block, Table):
         shown["is_long"] = len(block.rows) > LONG
+        shown["is_wordy"] = any(len(row[0]) > SHORT for row in block.rows)
         shown["words"] = [k > 0 and any(len(row[k]) > WORDY for row in block.rows) for k in range(len(block.head))]
     return shown
 
