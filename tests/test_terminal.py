@@ -59,7 +59,6 @@ def test_what_to_do_stands_below_the_verdict():
     assert lines[after + 1].startswith("  ")
 
 
-
 def coloured():
     """The same of three axes, and a note."""
     cause, action = "A low-pass filter in the sensor.", "All terms are quoted from below."

@@ -47,6 +47,7 @@ from trihedron.report.diagnosis_words import (
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.effect_charts import effect_chart
+from trihedron.report.effect_rest_charts import rest_panels
 from trihedron.report.findings import findings_block
 from trihedron.report.numbers import (
     engineering_exponent,
@@ -294,6 +295,8 @@ def _physics(diagnosis: Diagnosis) -> list[Picture]:
 
 
 def _drawn_in_words(effect: AcceptedEffect) -> str:
+    if rest_panels(effect):
+        return "the bias of the log (dots: means of neighbouring stretches) and the curve that it follows"
     if not effect.curves:
         return "the residual that it explains"
     beside = any(len(one.data) for one in effect.curves)

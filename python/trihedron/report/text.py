@@ -18,6 +18,7 @@ WIDTH = 100
 NARROWEST, WIDEST = 60, 200
 _GAP, _NARROW_GAP = 3, 2
 _HELD = "\u00a0"
+_TOGETHER = re.compile(r"(?<=\S) ± (?=[\d.])|(?<=\d) %")
 _FEWEST, _FEWEST_OF_HEADS = 16, 9
 """Columns that names of rows keep, and heads."""
 # The sixteen colours: the terminal's own theme decides what is readable on its background.
@@ -94,10 +95,12 @@ def finding_lines(finding: Finding, style: Style) -> list[str]:
 
 
 def _wrap(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
-    # A name such as accel-scale is one word.
-    return textwrap.wrap(
+    # A name such as accel-scale is one word, and so is a number with its uncertainty or its per cent.
+    text = _TOGETHER.sub(lambda found: found[0].replace(" ", _HELD), text)
+    lines = textwrap.wrap(
         text, width, initial_indent=first, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False
-    ) or [""]
+    )
+    return [line.replace(_HELD, " ") for line in lines] or [""]
 
 
 def _width(text: str) -> int:
@@ -127,7 +130,7 @@ def _facts(facts: Facts, style: Style) -> list[str]:
 def _table(table: Table, style: Style) -> list[str]:
     """The first of the layouts that keeps the columns together, else the one that parts them least."""
     rows = [tuple(map(style.plain, row)) for row in (table.head, *table.rows)]
-    found = [layout(rows, style.width) for layout in (_as_it_is, _with_heads_in_lines, _stacked, _with_names_in_lines)]
+    found = [_as_it_is(rows), _with_heads_in_lines(rows), _stacked(rows), _with_names_in_lines(rows, style.width)]
     grid, gap = min(found, key=lambda one: len(_parts(_widths(one[0]), style.width, one[1])))
     widths = _widths(grid)
     out = _wrap(style.plain(table.caption), style.width) if table.caption else []
@@ -145,19 +148,19 @@ Grid = list[list[list[str]]]
 """Rows of cells, each of one line or more; the first row is the head."""
 
 
-def _as_it_is(rows: Sequence[Sequence[str]], columns: int) -> tuple[Grid, int]:
+def _as_it_is(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
     return [[[cell] for cell in row] for row in rows], _GAP
 
 
-def _with_heads_in_lines(rows: Sequence[Sequence[str]], columns: int) -> tuple[Grid, int]:
+def _with_heads_in_lines(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
     """Heads no wider than what stands below them."""
-    grid, gap = _as_it_is(rows, columns)
+    grid, gap = _as_it_is(rows)
     room = _widths(grid[1:]) if len(grid) > 1 else [0] * len(rows[0])
     grid[0] = [_in_lines(cell, max(most, _FEWEST_OF_HEADS)) for cell, most in zip(rows[0], room, strict=True)]
     return grid, gap
 
 
-def _stacked(rows: Sequence[Sequence[str]], columns: int) -> tuple[Grid, int]:
+def _stacked(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
     """Uncertainties below their values as well, and columns closer to each other."""
     low = [[_below(cell) for cell in row] for row in rows[1:]]
     room = _widths(low) if low else [0] * len(rows[0])
@@ -169,10 +172,10 @@ def _stacked(rows: Sequence[Sequence[str]], columns: int) -> tuple[Grid, int]:
 
 def _with_names_in_lines(rows: Sequence[Sequence[str]], columns: int) -> tuple[Grid, int]:
     """The names of the rows as well, in the room that the others leave."""
-    grid, gap = _stacked(rows, columns)
+    grid, gap = _stacked(rows)
     room = columns - sum(width + gap for width in _widths(grid)[1:])
     for row, cells in zip(grid, rows, strict=True):
-        row[0] = _in_lines(cells[0], max(room, _FEWEST))
+        row[0] = _wrap(cells[0], max(room, _FEWEST))
     return grid, gap
 
 
