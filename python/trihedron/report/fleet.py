@@ -225,7 +225,7 @@ def _outliers(summary: FleetSummary) -> list[Block]:
             away,
             plain_number(one.sigmas, 2),
         )
-        rows.append((*cells, f"{one.p_adjusted:.1g}"))
+        rows.append((*cells, plain_number(one.p_adjusted, 1)))
     return [Table(("device", "parameter", "from the median", "in spreads of the others", "p"), tuple(rows), "Outliers")]
 
 
@@ -256,7 +256,7 @@ def _drift_cells(change: Change) -> tuple[str, str, str]:
     }[change.kind]
     value = change.size[k] * factor
     amount = plain_number(value, 2) if change.kind == "scatter" else with_sigma(value, change.std[k] * factor)
-    return how, f"{amount} {unit} in {change.names[k]}", f"{change.p_adjusted:.1g}"
+    return how, f"{amount} {unit} in {change.names[k]}", plain_number(change.p_adjusted, 1)
 
 
 def _logs(summary: FleetSummary) -> Table:
