@@ -107,7 +107,7 @@ def _swatch(mark: Mark) -> str:
 def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
     at = Places(panel)
     (x0, x1), (y0, y1) = at.x_limits, at.y_limits
-    x_ticks = ticks(x0, x1, is_log=panel.x.is_log, whole=panel.x.whole)
+    x_ticks = ticks(x0, x1, is_log=panel.x.is_log, whole=panel.x.whole, most=4 if panel.y.names else 6)
     if _has_room_for_names(panel):
         x_ticks = [(float(k), name) for k, name in enumerate(panel.x.names, 1)]
     y_ticks = _y_ticks(panel)
