@@ -32,6 +32,7 @@ LONG = 14
 """Rows of a table that is folded from here on: what fits beside its figure on a screen is not."""
 WORDY = 28
 """A column with longer cells holds sentences: they wrap, and begin at the left."""
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 SHORT = 12
 """Names of rows that are no longer are never broken."""
 _DASHED = re.compile(r"(?<![\w-])-{1,2}[A-Za-z][\w/+-]*")
@@ -126,9 +127,9 @@ def png_of(picture: Picture) -> bytes:
 
 @cache
 def _file(name: str) -> str:
-    """A part of every page, without the indents that only its authors need."""
-    text = (files("trihedron.report") / name).read_text(encoding="utf-8")
-    return "\n".join(line.strip() for line in text.splitlines())
+    """A part of every page, without the indents and comments that only its authors need."""
+    text = _COMMENT.sub("", (files("trihedron.report") / name).read_text(encoding="utf-8"))
+    return "\n".join(line.strip() for line in text.splitlines() if line.strip())
 
 
 def _version() -> str:
