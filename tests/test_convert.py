@@ -40,7 +40,9 @@ def test_the_logs_own_time_and_other_columns_stay_where_they_were(tmp_path):
     """A camera beside the sensor is joined by the log's own clock."""
     table = readings()
     table[:, 0] += 1_535_632_344.25
-    log = write(tmp_path / "log.csv", np.column_stack([table, np.arange(len(table))]), HEADER.replace("gz", "gz,exposure"))
+    log = write(
+        tmp_path / "log.csv", np.column_stack([table, np.arange(len(table))]), HEADER.replace("gz", "gz,exposure")
+    )
     trihedron.convert(log, tmp_path / "out.csv")
     first, again = trihedron.read(log), trihedron.read(tmp_path / "out.csv")
     # Seconds since 1970 are known to a quarter of a microsecond in 64 bits.

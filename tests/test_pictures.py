@@ -12,12 +12,15 @@ from diagnosed_session import simulated
 from trihedron.cli import main
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.records.diagnosis import Candidate
+from trihedron.report.calibration_charts import residual_chart
 from trihedron.report.chart import Note, Panel, Scale
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.diagnosis_candidates import candidates_table
+from trihedron.report.diagnosis_numbers import differing_noise
 from trihedron.report.diagnosis_overview_charts import traces_chart
 from trihedron.report.disc import drawn_disc
 from trihedron.report.document import Picture, Table
+from trihedron.report.effect_rest_charts import rest_panels
 from trihedron.report.findings.told import told_once
 from trihedron.report.findings.wording import filled
 from trihedron.report.many_charts import sessions_chart
@@ -127,6 +130,12 @@ def test_a_candidate_that_another_effect_made_needless_says_which():
     assert [row[2] for row in table.rows] == ["needless beside gyro-g-sensitivity", "not needed"]
 
 
+def counts_model(S, b):
+    """Both sensors by the same S (diagonal) and b."""
+    sensor = SimpleNamespace(S=S * np.eye(3), b=np.full(3, b), si_unit="m/s^2")
+    return SimpleNamespace(accelerometer=sensor, gyroscope=sensor)
+
+
 @pytest.mark.parametrize(
     ("unit", "factor"),
     [
@@ -135,7 +144,7 @@ def test_a_candidate_that_another_effect_made_needless_says_which():
     ],
 )
 def test_traces_in_two_physical_units_are_drawn_in_that_of_the_recording(unit, factor):
-    """A simulation in SI over a log in g and °/s; counts have no scale to be drawn in."""
+    """A simulation in SI over a log in g and °/s; counts have no scale to be drawn in but that of their model."""
     rng = np.random.default_rng(3)
     time = np.arange(400) / 100.0
     f, w = rng.normal(size=(2, 400, 3))
@@ -162,6 +171,13 @@ def test_traces_in_two_physical_units_are_drawn_in_that_of_the_recording(unit, f
     chart = traces_chart(SimpleNamespace(**ours, n_samples=400), SimpleNamespace(**si), segments)
     if unit[0] is AccelerationUnit.COUNTS:
         assert chart is None
+        models = (counts_model(0.01, 2.0), counts_model(1.0, 0.0))
+        ours = SimpleNamespace(**ours | {"accelerometer": 100.0 * (f - 2.0), "gyroscope": 100.0 * (w - 2.0)})
+        ours.n_samples = 400
+        chart = traces_chart(ours, SimpleNamespace(**si), segments, models)
+        for panel in chart.panels:
+            assert panel.y.label.startswith("corrected [")
+            assert panel.marks[1].y == pytest.approx(panel.marks[0].y, rel=1e-9)
         return
     assert [panel.y.label for panel in chart.panels] == ["reading [g]", "reading [deg/s]"]
     for panel in chart.panels:
@@ -197,3 +213,43 @@ def test_a_plan_keeps_what_one_came_for_in_its_tables_at_80_columns(capsys, monk
 )
 def test_a_power_of_ten_is_a_prefix_where_the_unit_takes_one(exponent, unit, printed):
     assert unit_with_power(exponent, unit) == printed
+
+
+def test_a_bias_of_a_static_log_is_drawn_over_temperature_with_its_curve_through_it():
+    """Two orientations at temperatures of their own: the biases of each are told about its own mean."""
+    heat = np.concatenate([np.linspace(10.0, 30.0, 300), np.linspace(30.0, 50.0, 300)])
+    pose = np.repeat([0, 1], 300)
+    apart = heat - heat.mean()
+    bias = np.outer([1e-3, -2e-3, 0.0], apart) + np.outer([0.0, 0.0, 1e-4], apart**2)
+    about = np.stack([bias[:, pose == p].mean(axis=1) for p in (0, 1)], axis=1)[:, pose]
+    values = {"bias_per_kelvin_x": 1e-3, "bias_per_kelvin_y": -2e-3, "bias_per_kelvin2_z": 1e-4}
+    parameters = [SimpleNamespace(name=name, value=value) for name, value in values.items()]
+    series = {"time_s": [], "temperature_degc": heat.tolist(), "value": (bias - about).tolist(), "pose": pose.tolist()}
+    model = {"variant": "rest-curve", "curve": series | {"unit": "m/s^2"}}
+    panels = rest_panels(SimpleNamespace(model=model, parameters=parameters))
+    assert [panel.title for panel in panels] == ["X", "Y", "Z"]
+    for panel in panels:
+        _, dots, curve = panel.marks
+        assert len(dots.x) <= 200
+        # Three neighbours are averaged: a parabola is above its chord by less than a thousandth of its height.
+        np.testing.assert_allclose(dots.y, np.interp(dots.x, curve.x, curve.y), atol=2e-3 * np.ptp(curve.y))
+
+
+def test_what_differs_by_one_number_from_axis_to_axis_is_said_once():
+    def told(axis, ratio):
+        remark = f"The resolution (LSB) of the gyro is {ratio} times the recording's."
+        return SimpleNamespace(sensor="gyroscope", axis=axis, term="resolution", significant=True, remark=remark)
+
+    compared = [told("x", 0.123), told("y", 0.128), told("z", 0.124)]
+    said = differing_noise(SimpleNamespace(noise_compared=compared))
+    assert said == ["The resolution (LSB) of the gyro is 0.123 to 0.128 times the recording's."]
+
+
+def test_the_bar_of_a_pose_that_determines_a_parameter_alone_does_not_hide_the_others():
+    residual, sigma = 1e-3 * np.array([1.0, -2.0, 0.5, 1.5, -1.0]), np.full(5, 1e-3)
+    lone = sigma.copy()
+    lone[3] = 1.0
+    quality = SimpleNamespace(residual=residual, sigma=sigma, held_out=2.0 * residual, held_out_sigma=lone)
+    low, high = residual_chart(quality).panels[0].y.limits
+    # All points, mm/s²; of the bar a thousand times as long no more than three usual ones.
+    assert 4.0 < high == -low < 10.0

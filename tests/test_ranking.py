@@ -12,7 +12,7 @@ from trihedron.files.formats import export_calibration
 from trihedron.files.formats.boards import as_logged
 from trihedron.files.formats.contract import ExportOptions, NoiseFigure, SensorNoise
 from trihedron.records import FindingCode, Onboard
-from trihedron.report.ranking import said_of
+from trihedron.report.ranking import ranking_report, said_of
 
 SWAPPED = np.eye(3)[[1, 0, 2]]
 
@@ -189,3 +189,16 @@ def test_the_recording_that_a_calibration_was_made_from_proves_nothing_of_it(ses
     ranking = trihedron.rank([own, session[1]], log, gravity_m_s2=9.81)
     assert [one.name for one in ranking.candidates] == ["calibration 2", "calibration 1"]
     assert ranking.best.behind == 0.0
+
+
+def test_a_ranking_shows_its_order_and_says_which_to_use(session):
+    log, known = session
+    wrong = replace(known, accelerometer=replace(known.accelerometer, b=-known.accelerometer.b))
+    document = ranking_report(trihedron.rank([wrong, known], log, gravity_m_s2=9.81))
+    assert document.next_step == "Use calibration 2: trihedron apply, trihedron export."
+    assert document.verdict == "calibration 2 fits this log best; calibration 1 is rejected."
+    gravity, tilt = document.lead.chart().panels
+    assert gravity.y.names == tilt.y.names == ("calibration 2", "calibration 1")
+    interval, right, rejected = gravity.marks
+    assert (right.colour, rejected.colour) == ("c1", "accent")
+    assert interval.x[0] <= right.x[0] <= interval.x[1] < rejected.x[0]

@@ -49,7 +49,8 @@ def test_a_report_comes_back_from_json_word_for_word_and_mark_for_mark():
 
 def test_a_finding_that_warns_and_its_action_stand_below_the_verdict():
     head = to_html(document()).partition("<nav")[0]
-    assert '<p class="foremost">Seen → Action' in head.replace("seen", "Seen").replace("action", "Action")
+    told = '<p class="foremost"><b class="warning">warning</b>Seen → Action'
+    assert told in head.replace("seen", "Seen").replace("action", "Action")
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -29,11 +30,33 @@ def document():
 def test_no_line_is_wider_than_the_terminal_and_no_cell_is_lost(width):
     text = to_text(document(), width=width)
     assert max(len(line) for line in text.splitlines()) <= width
+    # Heads, and names of rows, may stand on several lines.
+    said = text.split()
     for cell in (*HEAD, *ROW):
+        assert all(word in said for word in cell.split())
+    for cell in ROW[1:]:
         assert cell in text
 
 
-# The whole of a report, as it was looked at and found good. After a change that is meant: TRIHEDRON_GOLDEN=write.
+def test_s_and_b_stand_side_by_side_on_a_narrow_terminal_with_uncertainties_below():
+    lines = to_text(whole(), width=70).splitlines()
+    assert not any("(continued" in line for line in lines)
+    first = next(k for k, line in enumerate(lines) if line.startswith("f1 ="))
+    row, below = lines[first : first + 2]
+    assert row.split() == ["f1", "=", "2.412814", "0", "0", "−79.9221"]
+    assert below.split() == ["±", "0.000083", "±", "0.0025"]
+    assert below.index("± 0.0025") + len("± 0.0025") == len(row)
+
+
+def test_a_table_that_fits_keeps_its_cells_whole():
+    assert "2.412814 ± 0.000083" in to_text(whole(), width=120)
+
+
+def test_what_to_do_stands_below_the_verdict():
+    lines = to_text(replace(whole(), next_step="Test it on another recording. " * 4), width=80).splitlines()
+    after = lines.index("Usable, with 1 warning.") + 1
+    assert lines[after].startswith("→ Test it")
+    assert lines[after + 1].startswith("  ")
 
 
 def coloured():

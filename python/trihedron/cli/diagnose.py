@@ -109,7 +109,7 @@ def diagnose(
             alpha=alpha,
             progress=tell,
         )
-    document = diagnosis_report(result)
+    document = diagnosis_report(result, str(against or calibration or ""))
     machine = diagnosis_document(result)
     tell_all(document, machine, json, report, force=force, sections=None if full else first_screen(result))
     if improved is not None and against is not None:

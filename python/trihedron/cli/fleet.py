@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from trihedron.cli.options import GravitySource, Json, progress, with_options
-from trihedron.cli.output import check_outputs, say, write_json
+from trihedron.cli.output import check_outputs, say, show, write_json
 
 NOT_TO_BE_TRUSTED = 2
 
@@ -51,7 +51,6 @@ def fleet(
     """Calibrate and diagnose many logs of many devices: one table, one page."""
     check_outputs(json, force=force)
     from trihedron.fleet import fleet as run
-    from trihedron.report import to_text
     from trihedron.report.fleet import fleet_report
 
     with progress("fleet") as tell:
@@ -70,9 +69,8 @@ def fleet(
             progress=tell,
         )
     document = fleet_report(result.summary)
-    if json is None or str(json) != "-":
-        shown = tuple(section for section in document.sections if section.heading != "Every log")
-        typer.echo(to_text(document, sections=len(shown)), nl=False)
+    shown = tuple(section for section in document.sections if section.heading != "Every log")
+    show(document, json, sections=len(shown))
     write_json({"rows": list(result.rows)}, json, force=force, document=document)
     say(f"table: {out / 'fleet.parquet'}, {out / 'fleet.csv'}; page: {out / 'fleet.html'}")
     say(f"calibrations, for export, verify and apply: {out / 'calibrations'}")

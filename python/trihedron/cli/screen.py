@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from textwrap import shorten
+from collections.abc import Sequence
+from textwrap import wrap
 
 from rich.console import Group
 from rich.panel import Panel
@@ -89,13 +90,18 @@ def screen(view: GuideView, width: int = 80, height: int = 24, *, lost: int = 0,
     if seconds is not None:
         facts.append(f"{seconds:.0f} s")
     room = max(height - 21, 1)
-    warned = [
-        Text(shorten(f"! {text}", inner - 1, placeholder=" ..."), style=BAD, no_wrap=True)
-        for text in view.warnings[:room]
-    ]
+    warned = [Text(line, style=BAD, no_wrap=True) for line in _in_lines(view.warnings, inner - 1, room)]
     foot = Text(" | ".join(facts)[:inner], style=DIM, no_wrap=True)
     title = f"trihedron guide: {view.accuracy.sentence()}"
     return Group(Panel(Group(*lines, Text(""), body, Text(""), *warned, foot), title=title, width=width))
+
+
+def _in_lines(warnings: Sequence[str], width: int, room: int) -> list[str]:
+    """The first warnings whole, as many lines as there is room for; what is cut says so."""
+    lines = [line for text in warnings for line in wrap(f"! {text}", width, subsequent_indent="  ")]
+    if len(lines) > room:
+        lines[room - 1 :] = [f"{lines[room - 1][: width - 4].rstrip()} ..."]
+    return lines
 
 
 def _to_go(known: Examination) -> str:

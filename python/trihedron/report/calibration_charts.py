@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import PARAMETER_NAMES, Calibration, FitQuality, Segments, SensorCalibration
-from trihedron.report.chart import Band, Bars, Chart, Disc, Level, Panel, Points, Scale
+from trihedron.report.chart import MOST_OF_A_BAR, Band, Bars, Chart, Disc, Level, Panel, Points, Scale
 from trihedron.report.disc import equal_area
 from trihedron.report.drawn import said
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
@@ -33,7 +33,10 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
         Band(edge, -np.repeat(limit, 2), np.repeat(limit, 2), "3σ of noise alone"),
         Level(y=0.0),
     ]
-    if quality.held_out is not None and np.any(np.isfinite(quality.held_out)):
+    has_held = quality.held_out is not None and bool(np.any(np.isfinite(quality.held_out)))
+    held_sigma: FloatArray | None = None
+    held = np.zeros(0)
+    if quality.held_out is not None and has_held:
         held = mm_s2(quality.held_out)
         held_sigma = None if quality.held_out_sigma is None else mm_s2(quality.held_out_sigma)
         told = [
@@ -46,7 +49,20 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
     told = [said(name, "", v, "mm/s²", s) for name, v, s in zip(label, residual, sigma, strict=True)]
     marks.append(Points(pose - 0.17, residual, told, None, "in sample", "c1"))
     x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
-    return Chart((Panel(x, Scale("|f| − |g|  [mm/s²]", "mm/s²"), tuple(marks)),))
+    top = _highest(held, held_sigma, residual, limit) if has_held else None
+    y = Scale("|f| − |g|  [mm/s²]", "mm/s²", limits=None if top is None else (-top, top))
+    return Chart((Panel(x, y, tuple(marks)),))
+
+
+def _highest(held: FloatArray, held_sigma: FloatArray | None, residual: FloatArray, limit: FloatArray) -> float:
+    """Where the axis ends: every point is shown, of error bars what is usual.
+
+    A pose without which a parameter is not determined predicts nothing: its bar would hide all others.
+    """
+    reach = np.abs(held)
+    if held_sigma is not None:
+        reach = reach + np.minimum(held_sigma, MOST_OF_A_BAR * float(np.nanmedian(held_sigma)))
+    return 1.06 * float(np.nanmax(np.concatenate([reach, np.abs(residual), limit]))) or 1.0
 
 
 def mm_s2(values: FloatArray) -> FloatArray:

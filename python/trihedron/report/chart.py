@@ -12,6 +12,8 @@ from trihedron.arrays import FloatArray
 
 Colour = Literal["c1", "c2", "c3", "accent", "ink", "soft", "shade", "warn", "grey"]
 """Names, not values: the page gives each a colour for light, dark and paper. c1, c2, c3 are the axes x, y, z."""
+MOST_OF_A_BAR = 3.0
+"""Times the median of all: up to here an error bar is shown whole."""
 AXIS_COLOURS: tuple[Colour, Colour, Colour] = ("c1", "c2", "c3")
 
 

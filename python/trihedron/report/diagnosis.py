@@ -32,6 +32,8 @@ from trihedron.report.diagnosis_relations import relations_blocks
 from trihedron.report.diagnosis_words import (
     LEVELS,
     MEANING,
+    differing_headline,
+    headlines_of,
     next_step_in_words,
     p_in_words,
     printed_unit,
@@ -42,9 +44,10 @@ from trihedron.report.diagnosis_words import (
     verdict_in_words,
     where_in_words,
 )
-from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.effect_charts import effect_chart
+from trihedron.report.effect_rest_charts import rest_panels
 from trihedron.report.findings import findings_block
 from trihedron.report.numbers import (
     engineering_exponent,
@@ -69,8 +72,8 @@ def first_screen(diagnosis: Diagnosis) -> int:
     return 4 if diagnosis.parameters else 3
 
 
-def diagnosis_report(diagnosis: Diagnosis) -> Document:
-    """Lay out a diagnosis; the first sections fit one screen."""
+def diagnosis_report(diagnosis: Diagnosis, model: str = "") -> Document:
+    """Lay out a diagnosis; the first sections fit one screen. ``model`` names the file held against the log."""
     sections = [Section("Result", _located(diagnosis))]
     if diagnosis.parameters:
         about = (*forest_pictures(diagnosis), *differing_blocks(diagnosis), *_traces(diagnosis))
@@ -100,12 +103,12 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         # The reference's own error leads then.
         sections[0] = replace(sections[0], blocks=(*sections[0].blocks, strengths))
     document = Document(
-        title="Diagnosis",
-        subtitle=diagnosis.recording_source,
+        title="Diagnosis against a model" if diagnosis.parameters else "Diagnosis",
+        subtitle=f"{diagnosis.recording_source} against {model}" if model else diagnosis.recording_source,
         verdict=verdict_in_words(diagnosis),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
-        headlines=tuple(_headlines(diagnosis)),
+        headlines=(*differing_headline(diagnosis), *headlines_of(diagnosis)),
         lead=strengths,
         next_step=next_step_in_words(diagnosis),
         stated_level=LEVELS[diagnosis.verdict],
@@ -269,7 +272,8 @@ def _traces(diagnosis: Diagnosis) -> tuple[Picture, ...]:
     recording, simulated, segments = (getattr(diagnosis, name, None) for name in ("recording", "simulated", "segments"))
     if recording is None or simulated is None or segments is None:
         return ()
-    picture = traces_picture(recording, simulated, segments)
+    models = (getattr(diagnosis, "updated", None), getattr(diagnosis, "calibration", None))
+    picture = traces_picture(recording, simulated, segments, models)
     return () if picture is None else (picture,)
 
 
@@ -291,6 +295,8 @@ def _physics(diagnosis: Diagnosis) -> list[Picture]:
 
 
 def _drawn_in_words(effect: AcceptedEffect) -> str:
+    if rest_panels(effect):
+        return "the bias of the log (dots: means of neighbouring stretches) and the curve that it follows"
     if not effect.curves:
         return "the residual that it explains"
     beside = any(len(one.data) for one in effect.curves)
@@ -317,25 +323,3 @@ def _counted(residuals: DomainResiduals) -> str:
     if residuals.kind == "move":
         return said + (f" and {how_many(n_rows - n, 'disturbance')} inside poses" if n_rows > n else "")
     return said + (f" in {n_rows} intervals, apart at disturbances" if n_rows > n else "")
-
-
-def _headlines(diagnosis: Diagnosis) -> list[Headline]:
-    """The strongest effect by what it gains on unseen poses and moves; else the worst domain."""
-    for effect in diagnosis.effects:
-        if effect.held_out:
-            held = effect.held_out[0]
-            after, _, unit = size_in_words(held.rms_after, held.unit).partition(" ")
-            before = size_in_words(held.rms_before, held.unit)
-            if effect.share is not None:
-                words = f"{plain_number(100.0 * effect.share, 2)}"
-                return [
-                    Headline(f"{effect.id} explains", words, "%", "of the misfit"),
-                    Headline(quantity(held), after, unit, f"cross-validated, with it; {before} without"),
-                ]
-            return [Headline(quantity(held), after, unit, f"cross-validated, with {effect.id}; {before} without")]
-    tests = [d for d in diagnosis.domains if d.dof > 0]
-    if not tests:
-        return []
-    worst = min((d for d in tests if d.disagrees), key=lambda d: d.p_value, default=tests[0])
-    beside = f"χ² per degree of freedom, 1 by noise alone; p {p_in_words(worst.p_value)}"
-    return [Headline(MEANING[worst.domain], plain_number(worst.chi2_per_dof), "", beside)]

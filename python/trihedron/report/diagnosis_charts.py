@@ -9,12 +9,10 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.records.domains import DomainResiduals
 from trihedron.report.axes import channel_in_print
-from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
+from trihedron.report.chart import AXIS_COLOURS, MOST_OF_A_BAR, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.drawn import said
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
-MOST_OF_A_BAR = 3.0
-"""Times the median of all: up to here a bar of noise is shown whole."""
 PRINTED = {
     "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
     "rad/s": (degrees_from_radians(1.0), "°/s"),

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference, Stage
 from trihedron.report.axes import BIAS
 from trihedron.report.document import Block, Facts, Paragraph, Table
+from trihedron.report.findings import ranged
 from trihedron.report.numbers import MINUS, decimals_of, plain_number, unit_in_print, with_sigma
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_radians
 
@@ -34,6 +37,7 @@ MOST_NUMBERS, MOST_NOISE = 3, 2
 """Clauses of numbers and of noise in a headline, which is one sentence; a table holds them all."""
 _SENTENCES_FIRST = ("unit", "frame", "range", "rate")
 """What is wrong with every reading of a sensor is said before its noise."""
+_SIZE = re.compile(r"(?<![\w.])\d[\d.]*(?:e[+−-]?\d+)?")
 _HEAD = ("parameter", "model", "recording", "recording − model", "p of its group")
 _STAGES = {
     "as-given": "as given",
@@ -85,7 +89,7 @@ def differing_in_short(diagnosis: Diagnosis) -> list[str]:
 
     The most certain first; what no longer fits is counted.
     """
-    clauses = {sentence: _as_clause(sentence) for sentence in differing_noise(diagnosis)}
+    clauses = {said: _as_clause(together) for said, together in _noise_in_words(diagnosis).items()}
     noise = list(clauses.values())
     whole = [clauses[_sentence(n)] for n in _noise_that_differs(diagnosis) if n.term in _SENTENCES_FIRST]
     noise = list(dict.fromkeys([*whole, *noise]))
@@ -93,7 +97,7 @@ def differing_in_short(diagnosis: Diagnosis) -> list[str]:
     if len(numbers) > MOST_NUMBERS:
         numbers = _groups_in_short(diagnosis)
     left = max(len(numbers) - MOST_NUMBERS, 0) + max(len(noise) - MOST_NOISE, 0)
-    more = [f"{left} more {'difference' if left == 1 else 'differences'} (see the tables)"] if left else []
+    more = [f"{left} more {'difference' if left == 1 else 'differences'}"] if left else []
     return [*numbers[:MOST_NUMBERS], *noise[:MOST_NOISE], *more]
 
 
@@ -131,12 +135,22 @@ def _noise_that_differs(diagnosis: Diagnosis) -> list[NoiseDifference]:
 
 
 def _sentence(n: NoiseDifference) -> str:
-    return n.remark or f"{_sensor(n)} {n.term} is {_ratio(n)} times the recording's"
+    said = n.remark or f"{_sensor(n)} {n.term} is {_ratio(n)} times the recording's"
+    return said[0].upper() + said[1:].rstrip(".") + "."
 
 
 def differing_noise(diagnosis: Diagnosis) -> list[str]:
-    """One sentence for every figure of noise or sampling that differs."""
-    return list(dict.fromkeys(map(_sentence, _noise_that_differs(diagnosis))))
+    """One sentence for every figure of noise or sampling that differs, axes with another size of it together."""
+    return list(dict.fromkeys(_noise_in_words(diagnosis).values()))
+
+
+def _noise_in_words(diagnosis: Diagnosis) -> dict[str, str]:
+    """What is said of every figure, and what of all together that differ from it in nothing but one number."""
+    alike: dict[str, list[str]] = {}
+    for said in dict.fromkeys(map(_sentence, _noise_that_differs(diagnosis))):
+        # More numbers are a band, an interval: nothing that ranges may be made of.
+        alike.setdefault(_SIZE.sub("", said) if len(_SIZE.findall(said)) == 1 else said, []).append(said)
+    return {said: ranged(same) or said for same in alike.values() for said in same}
 
 
 def numbers_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray
-from trihedron.records import Recording, Segments
+from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
 from trihedron.report.axes import axis_in_print
 from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
@@ -19,6 +19,7 @@ from trihedron.report.document import Block, Picture
 from trihedron.report.drawing import later
 from trihedron.report.drawn import envelope
 from trihedron.report.numbers import plain_number, unit_in_print, with_sigma
+from trihedron.sensor_model import correct
 from trihedron.units import ratio_of_units
 
 ROW_PX = 26
@@ -30,6 +31,8 @@ SLIVER = 1.04
 TWO_SIGMA = 2.0
 WINDOW_S = 6.0
 """Of traces drawn: a move and its poses on both sides."""
+SENSOR_OF = {"accelerometer": "accelerometer", "gyro": "gyroscope"}
+CORRECTED = "corrected"
 RATIOS = ("N", "B", "K", "Q", "bandwidth", "resolution", "range", "rate", "correlation-time", "poses", "moves")
 """Terms whose ratio is drawn; octaves are drawn as spectra."""
 
@@ -154,18 +157,28 @@ def _ratio_words(n: NoiseDifference, name: str) -> str:
     return f"{_row_name(n)}: {plain_number(n.ratio)}{beside}, {name}"
 
 
-def traces_picture(recording: Recording, simulated: Recording, segments: Segments) -> Picture | None:
+Models = tuple[Calibration | None, Calibration | None]
+"""The recording's own parameters and those of the simulation."""
+
+
+def traces_picture(
+    recording: Recording, simulated: Recording, segments: Segments, models: Models = (None, None)
+) -> Picture | None:
     """Simulated over recorded readings where they lie farthest apart."""
-    chart = traces_chart(recording, simulated, segments)
+    chart = traces_chart(recording, simulated, segments, models)
     if chart is None:
         return None
     caption = "Readings of the recording and of the simulation moved as it was, where the two lie farthest apart."
+    if any(isinstance(one, Panel) and one.y.label.startswith(CORRECTED) for one in chart.panels):
+        caption += " One is in counts: both were corrected, each by its own parameters."
     return _picture("traces", caption, lambda: chart)
 
 
-def traces_chart(recording: Recording, simulated: Recording, segments: Segments) -> Chart | None:
+def traces_chart(
+    recording: Recording, simulated: Recording, segments: Segments, models: Models = (None, None)
+) -> Chart | None:
     """A panel a sensor: the axis that differs most, in the move or pose where both sensors differ most together."""
-    sides = _both_sides(recording, simulated, segments)
+    sides = _both_sides(recording, simulated, segments, models)
     if not sides:
         return None
     time_s = recording.time_s
@@ -187,7 +200,9 @@ def traces_chart(recording: Recording, simulated: Recording, segments: Segments)
         )
         x = Scale("time [s]", "s", limits=(float(time_s[window[0]]), float(time_s[window[-1]])))
         title = f"{sensor} {XYZ[axis]}, about {name}"
-        panels.append(Panel(x, Scale(f"reading [{unit}]", unit), lines, title=title, height_px=190))
+        is_as_read = mine is getattr(recording, SENSOR_OF[sensor])
+        y = Scale(f"{'reading' if is_as_read else CORRECTED} [{unit}]", unit)
+        panels.append(Panel(x, y, lines, title=title, height_px=190))
     return Chart(tuple(panels), columns=len(panels), is_linked=True)
 
 
@@ -196,21 +211,30 @@ Side = tuple[str, tuple[FloatArray, str], FloatArray, FloatArray]
 the recording's noise."""
 
 
-def _both_sides(recording: Recording, simulated: Recording, segments: Segments) -> list[Side]:
-    """Sensors that both have, the simulation's in the recording's unit; counts beside another unit are not drawn."""
+def _both_sides(recording: Recording, simulated: Recording, segments: Segments, models: Models) -> list[Side]:
+    """Sensors that both have, the simulation's in the recording's unit; counts beside another unit both corrected."""
     out: list[Side] = []
     mine_s, theirs_s = (log.time_s - log.time_s[0] for log in (recording, simulated))
     for name, sigma in (("accelerometer", segments.accelerometer_sigma), ("gyroscope", segments.gyroscope_sigma)):
         mine, theirs = getattr(recording, name), getattr(simulated, name)
         unit = getattr(recording, f"{name}_unit")
         scale = ratio_of_units(getattr(simulated, f"{name}_unit"), unit)
-        if mine is None or theirs is None or sigma is None or scale is None:
+        if mine is None or theirs is None or sigma is None:
             continue
+        printed = unit_in_print(unit.value)
+        if scale is None:
+            own, given = (None if model is None else getattr(model, name) for model in models)
+            if own is None or given is None:
+                continue
+            # Noise of raw readings, which S takes to SI.
+            sigma = np.abs(own.S) @ np.asarray(sigma)
+            mine, theirs, scale = correct(mine, own.S, own.b), correct(theirs, given.S, given.b), 1.0
+            printed = unit_in_print(own.si_unit)
         at = scale * np.column_stack([np.interp(mine_s, theirs_s, theirs[:, k]) for k in range(3)])
         at[mine_s > theirs_s[-1]] = math.nan
         noise = np.where(np.asarray(sigma) > 0.0, sigma, 1.0)
         said = "gyro" if name == "gyroscope" else name
-        out.append((said, (mine, unit_in_print(unit.value)), at, (mine - at) / noise))
+        out.append((said, (mine, printed), at, (mine - at) / noise))
     return out
 
 

@@ -6,7 +6,7 @@ from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.finding import FindingCode
 from trihedron.report.diagnosis_numbers import differing_in_short
-from trihedron.report.document import Level
+from trihedron.report.document import Headline, Level
 from trihedron.report.numbers import listed, plain_number, unit_in_print, with_sigma
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
@@ -171,3 +171,33 @@ def where_in_words(test: DomainTest) -> str:
 
 def value_in_words(value: float, sigma: float) -> str:
     return with_sigma(value, sigma) if sigma > 0.0 else plain_number(value, 4)
+
+
+def differing_headline(diagnosis: Diagnosis) -> tuple[Headline, ...]:
+    """How many parameters of the model are others than the recording's."""
+    n_off = sum(p.significant for p in diagnosis.parameters)
+    if not n_off:
+        return ()
+    return (Headline("parameters that differ", str(n_off), "", f"of {len(diagnosis.parameters)} compared"),)
+
+
+def headlines_of(diagnosis: Diagnosis) -> tuple[Headline, ...]:
+    """The strongest effect by what it gains on unseen poses and moves; else the worst domain."""
+    for effect in diagnosis.effects:
+        if effect.held_out:
+            held = effect.held_out[0]
+            after, _, unit = size_in_words(held.rms_after, held.unit).partition(" ")
+            before = size_in_words(held.rms_before, held.unit)
+            if effect.share is not None:
+                words = f"{plain_number(100.0 * effect.share, 2)}"
+                return (
+                    Headline(f"{effect.id} explains", words, "%", "of the misfit"),
+                    Headline(quantity(held), after, unit, f"cross-validated, with it; {before} without"),
+                )
+            return (Headline(quantity(held), after, unit, f"cross-validated, with {effect.id}; {before} without"),)
+    tests = [d for d in diagnosis.domains if d.dof > 0]
+    if not tests:
+        return ()
+    worst = min((d for d in tests if d.disagrees), key=lambda d: d.p_value, default=tests[0])
+    beside = f"χ² per degree of freedom, 1 by noise alone; p {p_in_words(worst.p_value)}"
+    return (Headline(MEANING[worst.domain], plain_number(worst.chi2_per_dof), "", beside),)

@@ -114,17 +114,20 @@ class Document:
             return self.stated_level
         if not self.is_trustworthy:
             return "bad"
-        lists = [b for section in self.sections for b in section.blocks if isinstance(b, FindingList)]
-        is_warned = any(f.severity is Severity.WARNING for found in lists for f in found.findings)
+        is_warned = any(finding.severity is Severity.WARNING for finding in self.findings)
         return "usable" if is_warned else "good"
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """All of them, in reading order."""
+        lists = [b for section in self.sections for b in section.blocks if isinstance(b, FindingList)]
+        return tuple(finding for one in lists for finding in one.findings)
 
     @property
     def foremost(self) -> Finding | None:
         """The first of the gravest findings, where it is more than a note: what a reader should know first."""
-        lists = [b for section in self.sections for b in section.blocks if isinstance(b, FindingList)]
-        found = [f for one in lists for f in one.findings]
         for severity in (Severity.SERIOUS, Severity.WARNING):
-            for finding in found:
+            for finding in self.findings:
                 if finding.severity is severity:
                     return finding
         return None

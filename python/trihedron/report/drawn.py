@@ -35,6 +35,8 @@ from trihedron.report.ticks import ticks
 
 COARSE = 10
 """Units in a step of a long curve: no screen shows less of a line through so many points."""
+FEW_LETTERS = 20
+"""Of all figures below a panel that a phone has room for; of more, every other one is left out there."""
 LONG = 500
 BETWEEN = "|"
 """Stands between what is told of the dots, or the bars, of one path."""
@@ -105,7 +107,7 @@ def _swatch(mark: Mark) -> str:
 def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
     at = Places(panel)
     (x0, x1), (y0, y1) = at.x_limits, at.y_limits
-    x_ticks = ticks(x0, x1, is_log=panel.x.is_log, whole=panel.x.whole)
+    x_ticks = ticks(x0, x1, is_log=panel.x.is_log, whole=panel.x.whole, most=4 if panel.y.names else 6)
     if _has_room_for_names(panel):
         x_ticks = [(float(k), name) for k, name in enumerate(panel.x.names, 1)]
     y_ticks = _y_ticks(panel)
@@ -114,6 +116,7 @@ def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
     x_words = "".join(_word(w, f"left:{x / UNITS:.2%}") for x, (_, w) in zip(xs, x_ticks, strict=True) if w)
     y_words = "".join(_word(w, f"top:{y / UNITS:.2%}") for y, (_, w) in zip(ys, y_ticks, strict=True) if w)
     room = max(around[0], _letters(y_ticks))
+    crowded = " crowded" if sum(map(len, (word for _, word in x_ticks))) > FEW_LETTERS else ""
     words = apart([mark for mark in panel.marks if isinstance(mark, Note)], at, panel.height_px)
     notes = "".join(_note(note, at) for note in words)
     back = [_mark(mark, at) for mark in panel.marks if isinstance(mark, Band)] + _spans(panel, at)
@@ -134,7 +137,8 @@ def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
         f'<div class="plot"><svg role="img" aria-label="{escape(about)}" viewBox="0 0 {UNITS} {UNITS}" '
         f'preserveAspectRatio="none"><g class="back">{"".join(back)}</g><path class="grid" d="{grid}"/>'
         f'<g class="front">{"".join(front)}</g></svg>{notes}</div>'
-        f'<div class="xticks" aria-hidden="true">{x_words}</div><div class="xlabel">{escape(panel.x.label)}</div></div>'
+        f'<div class="xticks{crowded}" aria-hidden="true">{x_words}</div>'
+        f'<div class="xlabel">{escape(panel.x.label)}</div></div>'
     )
 
 

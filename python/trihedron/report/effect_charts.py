@@ -14,6 +14,7 @@ from trihedron.report.axes import channel_in_print
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.diagnosis_charts import PRINTED
 from trihedron.report.drawn import said
+from trihedron.report.effect_rest_charts import rest_panels
 from trihedron.report.numbers import plain_number
 from trihedron.units import degrees_from_radians
 
@@ -37,8 +38,8 @@ def effect_chart(
 ) -> Chart | None:
     """An effect as curves over the variable that drives it, with what poses show; of one that acts in moves the
     residual that it explains against force, rate or time besides."""
-    panels = curve_panels(effect.curves)
-    if not any(len(one.data) for one in effect.curves):
+    panels = curve_panels(effect.curves) or rest_panels(effect)
+    if not rest_panels(effect) and not any(len(one.data) for one in effect.curves):
         panels += _explained(effect, residuals, recording, segments, calibration)
     return Chart(tuple(panels), columns=min(3, len(panels))) if panels else None
 

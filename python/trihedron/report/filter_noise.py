@@ -17,6 +17,7 @@ from trihedron.report.numbers import how_many, plain_number, unit_in_print
 from trihedron.sanitise import printable
 from trihedron.units import degrees_from_radians
 
+NEXT = "Put these values into your filter: --to TARGET writes them for the common ones."
 CAUSE_WORDS = {
     "rest": ("noise as at rest", "a better sensor; nothing else"),
     "vibration": ("vibration", "dampers at the mount, a low-pass filter on the sensor, a higher rate"),
@@ -48,15 +49,16 @@ def filter_noise_report(found: FilterNoise) -> Document:
         later("chart_figures", "draw_chart", chart),
         chart,
     )
+    is_trustworthy = not any(f.severity.value == "serious" for f in found.findings)
     return Document(
         title="Noise for your filter",
         subtitle=printable(found.source),
         verdict=verdict_of(found.findings, "OK: no problems found.", "Usable", "NOT TO BE TRUSTED"),
-        is_trustworthy=not any(f.severity.value == "serious" for f in found.findings),
+        is_trustworthy=is_trustworthy,
         sections=tuple(sections),
         headlines=tuple(headline for one in found.sensors for headline in _headlines(one)),
         lead=picture if tested else None,
-        next_step="Put these values into your filter: --to TARGET writes them for the common ones.",
+        next_step=NEXT if is_trustworthy else "",
     )
 
 

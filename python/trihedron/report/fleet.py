@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
@@ -11,13 +12,14 @@ from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.records.sessions import Change, Repeated
 from trihedron.report.axes import axis_in_print
 from trihedron.report.chart import Chart
-from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.many_charts import fleet_chart, shown
 from trihedron.report.numbers import how_many, plain_number, with_sigma
 
+MOST_NAMED = 4
 MOST_LEADING = 4
-"""Numbers of the first picture."""
+"""Devices in a sentence, and numbers of the first picture."""
 VERDICTS = {
     "consistent": "the linear model explains everything",
     "missing-physics": "physics beyond the linear model",
@@ -58,12 +60,12 @@ def fleet_report(summary: FleetSummary) -> Document:
         verdict = "NONE of the logs could be calibrated; the reasons are below."
     for one in summary.mixed:
         verdict += f" The {how_many(one.n_logs, 'log')} of {one.serial} are of SEVERAL devices."
-    strays = {one.serial for one in summary.outliers}
-    moved = {change.group for change in summary.changes if change.significant}
+    strays = list(dict.fromkeys(one.serial for one in summary.outliers))
+    moved = list(dict.fromkeys(change.group for change in summary.changes if change.significant))
     if strays:
-        verdict += f" {how_many(len(strays), 'device')} outside the others."
+        verdict += f" {_named(strays)} outside the others."
     if moved:
-        verdict += f" {how_many(len(moved), 'device')} changed between sessions."
+        verdict += f" {_named(moved)} changed between sessions."
     return Document(
         title="Fleet",
         subtitle=f"{how_many(n, 'log')}, {how_many(len(devices), 'device')}",
@@ -71,8 +73,46 @@ def fleet_report(summary: FleetSummary) -> Document:
         is_trustworthy=n_done > 0 and not mixed,
         sections=tuple(sections),
         lead=_lead(summary) if n_done else None,
-        next_step="Use each device's own calibration; look at failed logs and outliers first." if n_done else "",
+        headlines=_headlines(summary),
+        next_step=_next_step(bad, strays, moved) if n_done and not mixed else "",
+        stated_level="usable" if n_done and not mixed and (bad or strays or moved) else None,
     )
+
+
+def _named(devices: list[str]) -> str:
+    """``3 devices (a, b, c)``; of very many the first."""
+    more = ", ..." if len(devices) > MOST_NAMED else ""
+    return f"{how_many(len(devices), 'device')} ({', '.join(devices[:MOST_NAMED])}{more})"
+
+
+def _next_step(bad: list[FleetLog], strays: list[str], moved: list[str]) -> str:
+    steps = ["record the failed logs again"] if bad else []
+    steps += ["look at the devices that stand out"] if strays else []
+    steps += ["calibrate those that changed anew before use"] if moved else []
+    steps.append("use each device's own calibration, not a common one")
+    said = "; ".join(steps)
+    return f"{said[0].upper()}{said[1:]}."
+
+
+def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
+    """How good the calibrations are, and how far devices are apart."""
+    held = [log.held_out_rms_m_s2 for log in summary.logs if log.held_out_rms_m_s2 is not None]
+    factor, unit = shown("m/s^2")
+    out = []
+    if held:
+        beside = f"median log, cross-validated; worst {plain_number(max(held) * factor, 3)}"
+        typical = plain_number(statistics.median(held) * factor, 3)
+        out.append(Headline("gravity error in static poses", typical, unit, beside))
+    for name, words in (("accel-bias", "accelerometer bias"), ("gyro-bias", "gyroscope bias")):
+        apart = [(one.between, one.within) for one in summary.repeated if one.parameter.id == name]
+        spreads = [between.sd for between, _ in apart if between is not None]
+        if spreads:
+            factor, unit = shown("m/s^2" if name == "accel-bias" else "rad/s")
+            own = [within.sd for _, within in apart if within is not None]
+            repeat = f"; session to session {plain_number(max(own) * factor, 2)}" if own else ""
+            beside = f"device to device, worst axis{repeat}"
+            out.append(Headline(words, plain_number(max(spreads) * factor, 2), unit, beside))
+    return tuple(out)
 
 
 def _lead(summary: FleetSummary) -> Picture:
@@ -185,7 +225,7 @@ def _outliers(summary: FleetSummary) -> list[Block]:
             away,
             plain_number(one.sigmas, 2),
         )
-        rows.append((*cells, f"{one.p_adjusted:.1g}"))
+        rows.append((*cells, plain_number(one.p_adjusted, 1)))
     return [Table(("device", "parameter", "from the median", "in spreads of the others", "p"), tuple(rows), "Outliers")]
 
 
@@ -216,7 +256,7 @@ def _drift_cells(change: Change) -> tuple[str, str, str]:
     }[change.kind]
     value = change.size[k] * factor
     amount = plain_number(value, 2) if change.kind == "scatter" else with_sigma(value, change.std[k] * factor)
-    return how, f"{amount} {unit} in {change.names[k]}", f"{change.p_adjusted:.1g}"
+    return how, f"{amount} {unit} in {change.names[k]}", plain_number(change.p_adjusted, 1)
 
 
 def _logs(summary: FleetSummary) -> Table:

@@ -21,6 +21,7 @@ _NO_UNIT = (
     "The unit of the log is not known: say it with --gyro-unit and --accel-unit, or the size of a count with "
     "--gyro-lsb and --accel-lsb."
 )
+NEXT = "Take N, B, K into a filter (trihedron export --noise); average no longer than stated."
 
 
 def noise_report(
@@ -52,7 +53,7 @@ def noise_report(
         is_trustworthy=noise.is_trustworthy,
         headlines=tuple(_headlines(groups)),
         lead=_lead(noise, groups) if groups else None,
-        next_step="Take N, B, K into a filter (trihedron export --noise); average no longer than stated.",
+        next_step=NEXT if noise.is_trustworthy else "",
         sections=(
             Section("Result", tuple(tables)),
             Section("Data sheet", tuple(dict.fromkeys(b for unit, axes in groups for b in _customary(axes, unit)))),
@@ -310,10 +311,8 @@ def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
 
 
 def _lead(noise: Noise, groups: list[tuple[str, list[NoiseAxis]]]) -> Picture:
-    caption = (
-        "Allan deviation of both sensors with its 95 % interval; the orange marks are the least deviations, where "
-    )
-    caption += "a mean is best. The terms, each with its part of the curve, stand below."
+    caption = "Allan deviation of both sensors with its 95 % interval; orange: the averaging time at which a "
+    caption += "mean is best. The terms, each with its part of the curve, stand below."
     chart = partial(sensors_chart, noise.curve, groups)
     return Picture("sensors", caption, later("chart_figures", "draw_chart", chart), chart)
 

@@ -12,6 +12,8 @@ from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Line, Mark, Note, 
 from trihedron.report.noise_parts import parts_of, room_for
 from trihedron.report.numbers import plain_number, unit_in_print
 
+BEST = "best averaging time"
+
 
 def allan_chart(curve: AllanCurve, unit: str, axes: Sequence[NoiseAxis]) -> Chart:
     """Curves of one sensor on the same scales."""
@@ -47,11 +49,13 @@ def sensors_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseA
             best = axis.optimal_averaging()
             if best is not None:
                 told = f"{axis.name}: best averaging time {plain_number(best[0])} s, {plain_number(best[1])} {printed}"
-                marks.append(
-                    Points(np.array([best[0]]), np.array([best[1]]), [told], None, "smallest deviation", "accent")
-                )
+                # On the curve as measured: the least of the sum of terms may lie beside it.
+                found = np.exp(np.interp(np.log(best[0]), np.log(tau), np.log(curve.deviation[good, c])))
+                marks.append(Points(np.array([best[0]]), np.array([found]), [told], None, BEST, "accent"))
         x = Scale("averaging time τ [s]", "s", is_log=True)
         y = Scale(f"Allan deviation [{printed}]", printed, is_log=True)
+        # The axes stand together in the legend.
+        marks.sort(key=lambda mark: isinstance(mark, Points))
         panels.append(Panel(x, y, tuple(marks), title=axes[0].name.rsplit(" ", 1)[0], height_px=250))
     return Chart(tuple(panels), columns=len(panels))
 

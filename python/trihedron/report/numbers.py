@@ -82,7 +82,7 @@ def unit_with_power(exponent: int, unit: str) -> str:
 
 def unit_in_print(unit: str) -> str:
     """``m/s^2`` and ``sqrt(Hz)`` as people print them."""
-    return unit.replace("^2", "²").replace("sqrt(Hz)", "√Hz").replace("sqrt(s)", "√s")
+    return unit.replace("^2", "²").replace("^3", "³").replace("sqrt(Hz)", "√Hz").replace("sqrt(s)", "√s")
 
 
 def how_many(n: int, noun: str) -> str:

@@ -245,11 +245,12 @@
   };
   for (const table of document.querySelectorAll("table")) {
     const body = table.tBodies[0], rows = [...body.rows];
-    if (rows.length < 4) continue;
+    /* A row without a name belongs to the one above it. */
+    if (rows.length < 4 || rows.some((row) => !row.cells[0].textContent.trim())) continue;
     [...table.tHead.rows[0].cells].forEach((head, k) => {
       if (!head.textContent.trim()) return;
       const button = document.createElement("button");
-      button.type = "button"; button.textContent = head.textContent; button.title = "Sort"; head.replaceChildren(button);
+      button.type = "button"; button.textContent = head.dataset.name = head.textContent; button.title = "Sort"; head.replaceChildren(button);
       button.onclick = () => {
         const was = head.getAttribute("aria-sort");
         for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");

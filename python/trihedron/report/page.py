@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError
@@ -12,8 +13,9 @@ from importlib.resources import files
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
+from trihedron.records import Severity
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 from trihedron.report.drawing import NoFiguresError
 from trihedron.sanitise import one_line, printable
@@ -30,6 +32,10 @@ LONG = 14
 """Rows of a table that is folded from here on: what fits beside its figure on a screen is not."""
 WORDY = 28
 """A column with longer cells holds sentences: they wrap, and begin at the left."""
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+SHORT = 12
+"""Names of rows that are no longer are never broken."""
+_DASHED = re.compile(r"(?<![\w-])-{1,2}[A-Za-z][\w/+-]*")
 
 
 def to_html(document: Document) -> str:
@@ -40,7 +46,11 @@ def to_html(document: Document) -> str:
     ]
     lead = None if document.lead is None else _shown(document.lead)
     script = _file("body.js") + _file("page.js")
+    told, others, place = _noticed(document)
     page = template("page.html.j2").render(
+        told=told,
+        others=others,
+        findings=place,
         document=replace(document, title=one_line(document.title), subtitle=one_line(document.subtitle)),
         sections=sections,
         lead=lead,
@@ -52,6 +62,34 @@ def to_html(document: Document) -> str:
     return printable(page)
 
 
+def _noticed(document: Document) -> tuple[Markup, list[str], str]:
+    """What the first screen says of findings: the foremost, codes of the others that are no notes, where all stand."""
+    first = document.foremost
+    if first is None:
+        return Markup(""), [], ""
+    grave = [finding.code.value for finding in document.findings if finding.severity is not Severity.NOTE]
+    grave.remove(first.code.value)
+    listing = (any(isinstance(block, FindingList) for block in section.blocks) for section in document.sections)
+    seen = "" if first.seen in document.verdict else first.seen
+    told = f"{seen} → {first.action}" if first.action else seen
+    return unbroken(told.strip()), list(dict.fromkeys(grave)), f"s{list(listing).index(True) + 1}"
+
+
+def unbroken(text: str) -> Markup:
+    """Options (``--extended``) and directions (``-X/+Y``) kept on one line."""
+    return Markup(_DASHED.sub(r'<span class="whole">\g<0></span>', str(escape(text))))
+
+
+def stacked(text: str) -> Markup:
+    """A cell that may put its uncertainty below its value, where there is no room beside."""
+    return escape(text).replace(" ± ", Markup(" <wbr>± "))
+
+
+def path(text: str) -> Markup:
+    """Names of files, broken at their folders where they must be."""
+    return escape(text).replace("/", Markup("/<wbr>"))
+
+
 def _digest(script: str) -> str:
     """The one script that a page may run."""
     return f"sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}"
@@ -60,13 +98,15 @@ def _digest(script: str) -> str:
 @cache
 def template(name: str) -> Template:
     """A template of this room; whatever goes into it is escaped."""
-    return Environment(
+    made = Environment(
         loader=PackageLoader("trihedron.report", "."),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-    ).get_template(name)
+    )
+    made.filters |= {"unbroken": unbroken, "stacked": stacked, "path": path}
+    return made.get_template(name)
 
 
 def png_of(picture: Picture) -> bytes:
@@ -87,9 +127,9 @@ def png_of(picture: Picture) -> bytes:
 
 @cache
 def _file(name: str) -> str:
-    """A part of every page, without the indents that only its authors need."""
-    text = (files("trihedron.report") / name).read_text(encoding="utf-8")
-    return "\n".join(line.strip() for line in text.splitlines())
+    """A part of every page, without the indents and comments that only its authors need."""
+    text = _COMMENT.sub("", (files("trihedron.report") / name).read_text(encoding="utf-8"))
+    return "\n".join(line.strip() for line in text.splitlines() if line.strip())
 
 
 def _version() -> str:
@@ -105,6 +145,7 @@ def _shown(block: Block) -> dict[str, Any]:
         shown |= {"name": block.name, "caption": block.caption, "drawn": Markup(_drawn(block))}
     if isinstance(block, Table):
         shown["is_long"] = len(block.rows) > LONG
+        shown["is_wordy"] = any(len(row[0]) > SHORT for row in block.rows)
         shown["words"] = [k > 0 and any(len(row[k]) > WORDY for row in block.rows) for k in range(len(block.head))]
     return shown
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 from trihedron.records.ranking import Ranked, Ranking, Suspicion
-from trihedron.report.document import Document, Facts, Section, Table
-from trihedron.report.numbers import how_many, plain_number, with_sigma
-from trihedron.report.verification import parameters_table
+from trihedron.report.document import Document, Facts, Picture, Section, Table
+from trihedron.report.drawing import later
+from trihedron.report.numbers import how_many, listed, plain_number, with_sigma
+from trihedron.report.ranking_charts import ranking_chart
+from trihedron.report.verification import AGAIN, headlines_of, parameters_table
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_from_m_s2
 
 MISTAKES = {
@@ -25,9 +28,13 @@ MISTAKES = {
 def ranking_report(ranking: Ranking) -> Document:
     """Lay out a ranking: the order, what is wrong with each, and the parameters of the best."""
     best = ranking.best
-    verdict = f"{best.name} fits this log best."
+    rejected = [one.name for one in ranking.candidates if one.is_rejected]
+    verdict = f"{best.name} fits this log best"
+    verdict += f"; {listed(rejected)} {'is' if len(rejected) == 1 else 'are'} rejected." if rejected else "."
     if best.is_rejected:
-        verdict = "None of these calibrations fits this log."
+        verdict = f"None of these calibrations fits this log: of the best, {best.name}, {said_of(best)}."
+    chart = partial(ranking_chart, ranking)
+    caption = "Errors of each calibration on this log, the best first."
     facts = (
         ("gravity", f"{ranking.gravity_m_s2:.5f} m/s², {ranking.gravity_source}"),
         ("judged on", _judged_on(best)),
@@ -43,6 +50,9 @@ def ranking_report(ranking: Ranking) -> Document:
         verdict=verdict,
         is_trustworthy=not best.is_rejected,
         sections=tuple(sections),
+        headlines=headlines_of(best.verification),
+        lead=Picture("order", caption, later("chart_figures", "draw_chart", chart), chart),
+        next_step=AGAIN if best.is_rejected else f"Use {best.name}: trihedron apply, trihedron export.",
     )
 
 

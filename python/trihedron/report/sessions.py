@@ -8,7 +8,7 @@ from typing import Any
 
 from trihedron.records.sessions import Change, Repeated, Session, SessionsModel, Spread, ThermalModel
 from trihedron.report.axes import BIAS, axis_in_print
-from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.frames import Columns
@@ -17,6 +17,14 @@ from trihedron.report.numbers import how_many, plain_number, with_sigma
 
 DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
 """What a first picture shows of a unit over its sessions; all the others follow below."""
+HEADLINES = {
+    "accel-bias": "accelerometer bias",
+    "accel-scale": "accelerometer scale",
+    "gyro-bias": "gyroscope bias",
+    "gyro-scale": "gyroscope scale",
+}
+
+NEXT = "Use the common parameters (-o FILE writes them): their uncertainty is that of the next recording."
 
 
 def sessions_report(model: SessionsModel) -> Document:
@@ -48,9 +56,28 @@ def sessions_report(model: SessionsModel) -> Document:
         verdict=verdict_of(model.findings, good, usable, "NOT TO BE TRUSTED"),
         is_trustworthy=model.is_trustworthy,
         sections=tuple(sections),
+        headlines=_headlines(model),
         lead=_lead(model),
-        next_step="Use the common parameters (-o FILE writes them): their uncertainty is that of the next recording.",
+        next_step=NEXT if model.is_trustworthy else "",
     )
+
+
+def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
+    """How certain the common parameters are, on the worst axis, and how far they repeat."""
+    out = []
+    for name, words in HEADLINES.items():
+        axes = [one for one in model.repeated if one.parameter.id == name]
+        if not axes:
+            continue
+        factor, unit = shown(axes[0].parameter.unit)
+        repeats = [one.within.sd * factor for one in axes if one.within is not None]
+        beside = "1 σ, worst axis"
+        if repeats:
+            spread = f"repeats to {plain_number(max(repeats), 2)} {unit}"
+            beside += f"; {spread}" if max(repeats) > 0.0 else "; repeats within it"
+        worst = max(one.std * factor for one in axes)
+        out.append(Headline(f"{words} uncertainty", plain_number(worst, 2), unit, beside))
+    return tuple(out)
 
 
 def _lead(model: SessionsModel) -> Picture:

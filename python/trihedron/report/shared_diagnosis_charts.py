@@ -16,12 +16,16 @@ ROW_PX = 26
 COLUMNS = 3
 BAR = 0.7
 """Of a row."""
+LONGEST = 16
+"""Letters of a name that stands beside its row; recordings of longer ones are counted, as the title names them."""
 
 
 def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
     """A panel a parameter: its value in all recordings together, then in each, with 95 % intervals."""
     panels = []
     rows = ("together", *names)
+    is_counted = max(map(len, names)) > LONGEST
+    beside = ("together", *(f"recording {k}" for k in range(1, len(names) + 1))) if is_counted else rows
     place = -np.arange(1.0, len(rows) + 1.0)
     for i, common in enumerate(effect.parameters):
         found = [one[i] for one in (effect.parameters, *effect.each)]
@@ -35,7 +39,7 @@ def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
             Points(value[:1], place[:1], told[:1], TWO_SIGMA * sigma[:1], "together", "accent", is_across=True),
         )
         x = Scale(f"{common.name} [{unit}]", unit, includes=(0.0,))
-        panels.append(Panel(x, Scale("", names=rows), marks, title=common.name, height_px=ROW_PX * (len(rows) + 1)))
+        panels.append(Panel(x, Scale("", names=beside), marks, title=common.name, height_px=ROW_PX * (len(rows) + 1)))
     return Chart(tuple(panels), columns=min(COLUMNS, len(panels)))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 import unicodedata
 from collections.abc import Sequence
@@ -15,7 +16,11 @@ from trihedron.sanitise import one_line, printable
 WIDTH = 100
 """Columns of a report that goes into a file, a pipe or a notebook."""
 NARROWEST, WIDEST = 60, 200
-_GAP = 3
+_GAP, _NARROW_GAP = 3, 2
+_HELD = "\u00a0"
+_TOGETHER = re.compile(r"(?<=\S) ± (?=[\d.])|(?<=\d) %")
+_FEWEST, _FEWEST_OF_HEADS = 16, 9
+"""Columns that names of rows keep, and heads."""
 # The sixteen colours: the terminal's own theme decides what is readable on its background.
 _COLOURS = {"good": "1;32", "usable": "1;33", "bad": "1;31", "serious": "1;31", "warning": "1;33", "note": "1;36"}
 _BOLD, _DIM = "1", "2"
@@ -49,6 +54,8 @@ def to_text(document: Document, *, sections: int | None = None, width: int = WID
     verdict = _wrap(style.plain(document.verdict), style.width)
     lines = [*title, *_wrap(style.plain(one_line(document.subtitle)), style.width), ""]
     lines += [style.paint(line, _COLOURS[document.level]) for line in verdict]
+    if document.next_step:
+        lines += _wrap(style.plain(document.next_step), style.width, style.plain("→ "), "  ")
     for section in document.sections[:sections]:
         shown = [_block(block, style) for block in section.blocks if not isinstance(block, Picture)]
         if not shown:
@@ -88,10 +95,12 @@ def finding_lines(finding: Finding, style: Style) -> list[str]:
 
 
 def _wrap(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
-    # A name such as accel-scale is one word.
-    return textwrap.wrap(
+    # A name such as accel-scale is one word, and so is a number with its uncertainty or its per cent.
+    text = _TOGETHER.sub(lambda found: found[0].replace(" ", _HELD), text)
+    lines = textwrap.wrap(
         text, width, initial_indent=first, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False
-    ) or [""]
+    )
+    return [line.replace(_HELD, " ") for line in lines] or [""]
 
 
 def _width(text: str) -> int:
@@ -119,36 +128,95 @@ def _facts(facts: Facts, style: Style) -> list[str]:
 
 
 def _table(table: Table, style: Style) -> list[str]:
-    cells = [tuple(map(style.plain, row)) for row in (table.head, *table.rows)]
-    widths = [max(_width(row[k]) for row in cells) for k in range(len(table.head))]
+    """The first of the layouts that keeps the columns together, else the one that parts them least."""
+    rows = [tuple(map(style.plain, row)) for row in (table.head, *table.rows)]
+    found = [_as_it_is(rows), _with_heads_in_lines(rows), _stacked(rows), _with_names_in_lines(rows, style.width)]
+    grid, gap = min(found, key=lambda one: len(_parts(_widths(one[0]), style.width, one[1])))
+    widths = _widths(grid)
     out = _wrap(style.plain(table.caption), style.width) if table.caption else []
-    for n, part in enumerate(_parts(widths, style.width)):
+    for n, part in enumerate(_parts(widths, style.width, gap)):
         if n:
-            names = ", ".join(cells[0][k].strip() or f"column {k + 1}" for k in part[1:])
+            names = ", ".join(rows[0][k].strip() or f"column {k + 1}" for k in part[1:])
             out += ["", *_wrap(f"(continued: {names})", style.width)]
-        head, *rows = (_line(row, part, widths, style.width) for row in cells)
+        head, *body = (_line(row, part, widths, (style.width, gap)) for row in grid)
         out += [style.paint(line.rstrip(), _BOLD) for line in head]
-        out += [line for row in rows for line in row]
+        out += [line for row in body for line in row]
     return out
 
 
-def _line(row: Sequence[str], chosen: Sequence[int], widths: Sequence[int], columns: int) -> list[str]:
-    """One row of a part; a last cell that is too long for the terminal is wrapped."""
-    cells = [_pad(row[k], widths[k], right=k > 0) for k in chosen]
-    line = (" " * _GAP).join(cells)
-    if _width(line) <= columns or len(chosen) < 2:
-        return [line]
-    return [cells[0].rstrip(), *_wrap(row[chosen[-1]], columns, "    ", "    ")]
+Grid = list[list[list[str]]]
+"""Rows of cells, each of one line or more; the first row is the head."""
 
 
-def _parts(widths: list[int], columns: int) -> list[list[int]]:
+def _as_it_is(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
+    return [[[cell] for cell in row] for row in rows], _GAP
+
+
+def _with_heads_in_lines(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
+    """Heads no wider than what stands below them."""
+    grid, gap = _as_it_is(rows)
+    room = _widths(grid[1:]) if len(grid) > 1 else [0] * len(rows[0])
+    grid[0] = [_in_lines(cell, max(most, _FEWEST_OF_HEADS)) for cell, most in zip(rows[0], room, strict=True)]
+    return grid, gap
+
+
+def _stacked(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
+    """Uncertainties below their values as well, and columns closer to each other."""
+    low = [[_below(cell) for cell in row] for row in rows[1:]]
+    room = _widths(low) if low else [0] * len(rows[0])
+    return [
+        [_in_lines(cell, max(most, _FEWEST_OF_HEADS)) for cell, most in zip(rows[0], room, strict=True)],
+        *low,
+    ], _NARROW_GAP
+
+
+def _with_names_in_lines(rows: Sequence[Sequence[str]], columns: int) -> tuple[Grid, int]:
+    """The names of the rows as well, in the room that the others leave."""
+    grid, gap = _stacked(rows)
+    room = columns - sum(width + gap for width in _widths(grid)[1:])
+    for row, cells in zip(grid, rows, strict=True):
+        row[0] = _wrap(cells[0], max(room, _FEWEST))
+    return grid, gap
+
+
+def _in_lines(text: str, most: int) -> list[str]:
+    """Text in lines of at most so many columns, or of the longest word; a power of ten is one with its sign."""
+    text = text.replace(" × ", f" ×{_HELD}")
+    longest = max((_width(word) for word in re.split(r"[ ]|(?<=-)", text)), default=1)
+    lines = textwrap.wrap(text, max(most, longest, 1), break_long_words=False) or [""]
+    return [line.replace(_HELD, " ") for line in lines]
+
+
+def _below(cell: str) -> list[str]:
+    value, sign, rest = cell.partition(" ± ")
+    return [value, f"± {rest}"] if sign and value.strip() else [cell]
+
+
+def _widths(grid: Grid) -> list[int]:
+    return [max(_width(line) for row in grid for line in row[k]) for k in range(len(grid[0]))]
+
+
+def _line(row: list[list[str]], chosen: Sequence[int], widths: Sequence[int], room: tuple[int, int]) -> list[str]:
+    """One row of a part within (columns, gap); a last cell that is too long for the terminal is wrapped."""
+    columns, gap = room
+    high = max(len(row[k]) for k in chosen)
+    lines = []
+    for n in range(high):
+        cells = [_pad(row[k][n] if n < len(row[k]) else "", widths[k], right=k > 0) for k in chosen]
+        lines.append((" " * gap).join(cells))
+    if max(map(_width, lines)) <= columns or len(chosen) < 2:
+        return lines
+    return [" ".join(row[chosen[0]]).rstrip(), *_wrap(" ".join(row[chosen[-1]]), columns, "    ", "    ")]
+
+
+def _parts(widths: list[int], columns: int, gap: int) -> list[list[int]]:
     """Columns of every part of a table, the first column in each, as many as fit (one at least)."""
     parts: list[list[int]] = []
     part, used = [0], widths[0] if widths else 0
     for k in range(1, len(widths)):
-        if used + _GAP + widths[k] > columns and len(part) > 1:
+        if used + gap + widths[k] > columns and len(part) > 1:
             parts.append(part)
             part, used = [0], widths[0]
         part.append(k)
-        used += _GAP + widths[k]
+        used += gap + widths[k]
     return [*parts, part]

@@ -40,13 +40,14 @@ def verification_report(
         ),
         is_trustworthy=verification.is_passed,
         sections=tuple(sections),
-        headlines=tuple(_headlines(verification)),
+        headlines=headlines_of(verification),
         lead=_errors_picture(verification),
         next_step="Use the calibration: trihedron apply, trihedron export." if verification.is_passed else AGAIN,
     )
 
 
-def _headlines(v: Verification) -> list[Headline]:
+def headlines_of(v: Verification) -> tuple[Headline, ...]:
+    """Errors beside what was to be expected."""
     expected = plain_number(mm_s2_from_m_s2(float(np.sqrt(np.mean(v.norm_sigma**2)))))
     norm = plain_number(mm_s2_from_m_s2(v.norm_rms))
     beside = f"rms over {how_many(len(v.norm_error), 'pose')}; expected {expected}"
@@ -55,7 +56,7 @@ def _headlines(v: Verification) -> list[Headline]:
         expected = plain_number(v.angle_expected_deg)
         beside = f"rms over {how_many(len(v.angle_deg), 'move')}; expected {expected}"
         out.append(Headline("tilt error after a rotation", plain_number(v.angle_rms_deg), "°", beside))
-    return out
+    return tuple(out)
 
 
 def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:

@@ -240,7 +240,7 @@ def _thermal(
 
 def _series(pieces: RestPieces, sensor: Sensor, size: FloatArray, unit: str) -> Mapping[str, Any]:
     out: dict[str, Any] = {"time_s": pieces.time_s.tolist(), "value": (_about_poses(pieces, sensor) * size).T.tolist(),
-                           "unit": unit}  # fmt: skip
+                           "pose": pieces.pose.tolist(), "unit": unit}  # fmt: skip
     if pieces.temperature is not None:
         out["temperature_degc"] = pieces.temperature.tolist()
     return out

@@ -13,6 +13,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
+from trihedron.estimate.gyroscope.own_residuals import with_own_residuals
 from trihedron.probability import fdtrc
 from trihedron.ranges import ranges_of
 from trihedron.records.calibration import Calibration
@@ -142,8 +143,10 @@ def on_turntable(
     shift = gain @ misfit
     accelerometer = calibration.accelerometer
     values = np.concatenate([accelerometer.S.ravel(), accelerometer.b]) + shift[:12]
+    # What the speeds ask for is paid by the moves: the rise of their sum of squares, in linear steps.
+    paid = float(shift @ np.linalg.pinv(calibration.covariance, hermitian=True) @ shift)
     said = _said(scatter, misfit / W, float(np.sqrt(np.mean((_model(mean, theta)[0] / W - 1.0) ** 2))), relative_sigma)
-    return replace(
+    after = replace(
         calibration,
         accelerometer=replace(
             accelerometer, S=values[:9].reshape(3, 3), b=values[9:], covariance=posterior[:12, :12]
@@ -152,6 +155,7 @@ def on_turntable(
         covariance=posterior,
         findings=(*calibration.findings, said),
     )  # fmt: skip
+    return with_own_residuals(after, recording, segments, paid)
 
 
 def _speeds(found: Plateaus, speeds_deg_s: Sequence[float], rate_hz: float) -> FloatArray:

@@ -51,10 +51,10 @@ def _together(sentences: Sequence[str]) -> str:
     for pattern, name in ((_AXIS, _axes), (_NAMED, _things)):
         parts = [pattern.match(text) for text in sentences]
         if all(parts):
-            rest = _ranged([part[part.re.groups] for part in parts if part is not None])
+            rest = ranged([part[part.re.groups] for part in parts if part is not None])
             if rest is not None:
                 return name([part for part in parts if part is not None], rest)
-    whole = _ranged(sentences)
+    whole = ranged(sentences)
     if whole is not None and not re.search(r"\b(hold|pose|move|sample|line|axis)s? \d", sentences[0], re.IGNORECASE):
         return whole
     return " ".join(map(_capital, sentences))
@@ -75,7 +75,7 @@ def _things(parts: Sequence[re.Match[str]], rest: str) -> str:
     return f"{parts[0][1]}s {listed([part[2] for part in parts])}: each {rest}"
 
 
-def _ranged(sentences: Sequence[str]) -> str | None:
+def ranged(sentences: Sequence[str]) -> str | None:
     """The sentence they share, with ranges where its numbers differ; None where more than numbers differs."""
     skeleton = _NUMBER.sub("\0", sentences[0])
     if any(_NUMBER.sub("\0", text) != skeleton for text in sentences[1:]):
