@@ -51,7 +51,8 @@ def line(t):
     ("flaw", "seed", "expected"),
     [
         ("none", 4500100519, []),  # soft supports that ring: named a line
-        ("vibration-rectification", 8500100015, ["vibration-rectification"]),  # power in brisk moves was the hand's
+        # Power in brisk moves was the hand's.
+        pytest.param("vibration-rectification", 8500100015, ["vibration-rectification"], marks=pytest.mark.slow),
     ],
 )
 def test_soft_supports_and_brisk_moves_are_not_vibration(flaw, seed, expected, tmp_path):
