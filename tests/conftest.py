@@ -12,6 +12,7 @@ if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
 
 import pytest
 
+import this_run  # noqa: F401 - before workers start, who inherit its folder
 from trihedron.records.words import Words
 from trihedron.report.findings import catalogue
 

@@ -1,11 +1,9 @@
 """One short session with everything that commands read: made once, copied wherever a test wants to harm it."""
 
-import functools
 import os
 import shutil
 import subprocess
 import sys
-import tempfile
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from io import StringIO
@@ -13,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from this_run import once, place
 from trihedron.cli import main
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
@@ -41,10 +40,12 @@ matrix = [[1e-3, 0, 0], [0, 1e-3, 0], [0, 0, 1e-3]]
 """
 
 
-@functools.cache
 def made_once() -> Path:
     """Folder with log.csv, log.npy, rest.csv, c.json, untrusted.json, noise.json, diagnosis.json and s.toml."""
-    folder = Path(tempfile.mkdtemp(prefix="session-"))
+    return once("session", _made)
+
+
+def _made(folder: Path) -> None:
     motion = hand_session(n_poses=12, pose_s=2.0, move_s=1.0, first_pose_s=4.0)
     recording = simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)[0]
     rows = np.column_stack([recording.time_s, recording.accelerometer, recording.gyroscope])
@@ -71,17 +72,15 @@ def made_once() -> Path:
     del document["was"]
     document["is_trustworthy"] = False
     untrusted.write_text(json.dumps(document))
-    return folder
 
 
 def made_elsewhere() -> Path:
     """The same, made by a process of its own: this one has then read no table and can be forked."""
-    code = "from small_session import made_once; print(made_once())"
-    path = os.pathsep.join([str(Path(__file__).parent), *(p for p in sys.path if p)])
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": path}
-    )
-    return Path(done.stdout.strip())
+    if not place("session").exists():
+        code = "from small_session import made_once; made_once()"
+        path = os.pathsep.join([str(Path(__file__).parent), *(p for p in sys.path if p)])
+        subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "PYTHONPATH": path})
+    return place("session")
 
 
 def quietly(*arguments: str) -> int:

@@ -105,48 +105,6 @@ def test_a_series_gives_arrays_of_one_dimension_and_channels_of_two():
     assert np.array_equal(two.deviation[:, 1], one.deviation)
 
 
-WRONG = {
-    "a path of no file": (lambda _: trihedron.calibrate("nofile.csv"), "no such file"),
-    "a number for a log": (lambda _: trihedron.calibrate(3), "trihedron.read takes"),
-    "a text for a number": (lambda r: trihedron.calibrate(r.recording, latitude_deg="60"), "latitude_deg is a number"),
-    "one number for many": (lambda r: trihedron.calibrate(r.recording, turns_deg=90), "turns_deg is a list"),
-    "segments of another kind": (lambda r: trihedron.calibrate(r.recording, segments=[1]), "trihedron.segment"),
-    "a recording for a calibration": (lambda r: trihedron.verify(r.recording, r.recording), "trihedron.calibrate"),
-    "a check for a calibration": (lambda r: trihedron.apply(trihedron.check(r), r), "not CheckResult"),
-    "no calibration": (lambda r: trihedron.apply(None, r.recording), "not NoneType"),
-    "counts without a size": (lambda r: trihedron.export(r, "px4"), 'accelerometer_lsb="0.061 mg"'),
-    "no such target": (lambda r: trihedron.export(r, "x"), "there are airsim, ardupilot"),
-    "no such figure": (lambda r: trihedron.plot(r, "x"), "'residuals'"),
-    "no such ending": (lambda r: trihedron.report(r, "x.pdf"), ".html, .txt, .json"),
-    "no result": (lambda _: trihedron.report(3), "no result of trihedron"),
-    "no such library": (lambda r: r.to_dataframe("excel"), "polars"),
-    "no such scenario": (lambda _: trihedron.simulate(3), "a scenario is its name"),
-    "a list of columns": (lambda _: trihedron.read("x.csv", columns=["t"]), "columns is a text"),
-    "a rate in words": (lambda _: trihedron.read("x.csv", rate_hz="fast"), "rate_hz is a number"),
-    "gravity twice": (lambda r: trihedron.calibrate(r, gravity_m_s2=9.8, latitude_deg=1.0), "gravity_m_s2 or lat"),
-    "no port": (lambda _: trihedron.capture("/dev/ttyNOPE", "x.csv"), "trihedron.ports()"),
-    "three by n": (lambda _: trihedron.Recording.from_arrays(np.arange(5.0), np.zeros((3, 5))), r"\(n, 3\)"),
-}
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_argument_is_one_sentence_in_words_of_python(name, result):
-    ask, words = WRONG[name]
-    with pytest.raises((ValueError, TypeError), match=words) as caught:
-        ask(result)
-    assert "\n" not in str(caught.value)
-    assert not re.search(r"(?<!\w)--\w", str(caught.value))
-
-
-def test_frames_lists_and_nested_dictionaries_are_logs():
-    rng = np.random.default_rng(2)
-    t, acc = np.arange(500) / 100, rng.normal([0, 0, 9.8], 0.02, (500, 3))
-    frame = pl.DataFrame(np.c_[t, acc], schema=["t", "ax", "ay", "az"])
-    rows = [{"t": a, "ax": b[0], "ay": b[1], "az": b[2]} for a, b in zip(t, acc, strict=True)]
-    for given in (frame, frame.lazy(), rows, {"t": t, "acc": {"x": acc[:, 0], "y": acc[:, 1], "z": acc[:, 2]}}):
-        assert np.array_equal(trihedron.read(given).accelerometer, acc)
-
-
 def with_sensor(result, **changes):
     from dataclasses import replace
 

@@ -93,8 +93,8 @@ def test_losses_stand_in_the_log_where_they_were(tmp_path):
 
 def test_an_unplugged_board_goes_on_in_the_same_file_with_the_gap_said(tmp_path):
     link = tmp_path / "tty"
-    faults = Faults(disconnect_s=(0.8,), away_s=0.5)
-    with Board(counts_recording(400, 200.0), "lines", faults=faults, speed=1.0, link=link) as board:
+    faults = Faults(disconnect_s=(0.4,), away_s=0.5)
+    with Board(counts_recording(240, 200.0), "lines", faults=faults, speed=1.0, link=link) as board:
         recorder, blocks = capture(board.port, tmp_path / "log.csv", wait_for_return_s=1.5)
     text = (tmp_path / "log.csv").read_text()
     assert "went away (unplugged)" in text
@@ -112,8 +112,8 @@ def test_an_unplugged_board_goes_on_in_the_same_file_with_the_gap_said(tmp_path)
 @pytest.mark.parametrize("protocol", ["xio"])
 def test_frames_cut_by_unplugging_are_counted_by_the_device_counter(protocol, tmp_path):
     link = tmp_path / "tty"
-    faults = Faults(disconnect_s=(0.8, 1.4), away_s=0.4)
-    board = Board(counts_recording(600, 300.0), protocol, faults=faults, speed=1.0, link=link)
+    faults = Faults(disconnect_s=(0.4, 0.8), away_s=0.3)
+    board = Board(counts_recording(360, 300.0), protocol, faults=faults, speed=1.0, link=link)
     # The port is open before the first byte: nothing is lost for want of a reader.
     source = open_source(board.port)
     with board:
@@ -122,9 +122,9 @@ def test_frames_cut_by_unplugging_are_counted_by_the_device_counter(protocol, tm
         blocks = list(recorder)
     saved = sum(len(block.time_s) for block in blocks)
     assert recorder.count.disconnections == 3  # the last is for good
-    assert saved + recorder.count.lost == 600
+    assert saved + recorder.count.lost == 360
     # The index of every frame is the one that the device gave it, whatever was cut.
-    assert np.concatenate([block.index for block in blocks])[-1] == 599
+    assert np.concatenate([block.index for block in blocks])[-1] == 359
 
 
 def test_the_baud_rate_is_found_by_itself():
@@ -185,7 +185,7 @@ class SlowLog(GrowingLog):
 
 
 def test_a_slow_disk_loses_nothing(tmp_path):
-    with Board(counts_recording(1500, 1000.0), "xsens-mtdata2", speed=1.0) as board:
+    with Board(counts_recording(900, 1000.0), "xsens-mtdata2", speed=1.0) as board:
         source, found = open_device(board.port)
         log = SlowLog(tmp_path / "log.csv")
         recorder = Recorder(source, found.make_decoder, first_bytes=found.first_bytes, log=log, wait_for_return_s=0.0)

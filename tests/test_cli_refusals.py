@@ -1,8 +1,6 @@
 """One sentence for every question that the command line cannot answer, and nothing written."""
 
-import gzip
 import json
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -38,62 +36,14 @@ def test_a_slip_of_the_pen_is_answered_with_what_there_is(capsys, arguments, sai
     assert said in refused(capsys, *arguments)
 
 
-def bad_log(name, recording):
-    """Content of a log that cannot be calibrated."""
-    text = log_text(recording)
-    lines = text.splitlines()
-    header = lines[0]
-    body = {
-        "empty": b"",
-        "one row": "\n".join(lines[:2]),
-        "header only": header,
-        "text in numbers": "\n".join([*lines[:500], "12.0,oops,oops,oops,1,2,3", *lines[500:]]),
-        "constant column": "\n".join(
-            [header, *(",".join([*r.split(",")[:3], "7", *r.split(",")[4:]]) for r in lines[1:])]
-        ),
-        "all not a number": "\n".join([header, *(f"{k / 100},nan,nan,nan,nan,nan,nan" for k in range(500))]),
-        "truncated gzip": gzip.compress(text.encode())[:-2000],
-        "a picture": b"\x89PNG\r\n\x1a\n" + b"\x00" * 100,
-        "words": "dear diary\n" * 50,
-        "reversed time": "\n".join([header, *lines[:0:-1]]),
-    }[name]
-    return body if isinstance(body, bytes) else body.encode()
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["empty", "one row", "header only", "constant column", "all not a number", "truncated gzip", "a picture", "words"],
-)
-def test_a_log_that_is_none_is_refused_by_name_and_nothing_is_written(recording, tmp_path, capsys, name):
+@pytest.mark.parametrize("content", [b"", b"dear diary\n" * 50, b"\x89PNG\r\n\x1a\n" + b"\x00" * 100])
+def test_a_log_that_is_none_is_refused_by_name_and_nothing_is_written(tmp_path, capsys, content):
     log = tmp_path / "bad.csv"
-    log.write_bytes(bad_log(name, recording))
+    log.write_bytes(content)
     for command in ("check", "calibrate"):
         said = refused_only(capsys, command, log, *(["-o", tmp_path / "c.json"] if command == "calibrate" else []))
         assert "bad.csv" in said
     assert [p.name for p in tmp_path.iterdir()] == ["bad.csv"]
-
-
-@pytest.mark.parametrize("name", ["text in numbers", "reversed time"])
-def test_a_damaged_log_is_refused_or_calibrated_with_a_finding_but_never_in_silence(recording, tmp_path, capsys, name):
-    log = tmp_path / "bad.csv"
-    log.write_bytes(bad_log(name, recording))
-    status = main(["calibrate", str(log), "--gravity", G])
-    out, err = capsys.readouterr()
-    assert "Traceback" not in err
-    if status == 1:
-        assert "bad.csv" in err
-    else:
-        assert "warning" in out or "serious" in out
-
-
-def test_a_directory_and_a_file_without_permission_are_told_apart(tmp_path, capsys):
-    assert "directory" in refused(capsys, "calibrate", tmp_path)
-    closed = tmp_path / "closed.csv"
-    closed.write_text("t,ax,ay,az\n")
-    closed.chmod(0)
-    if os.access(closed, os.R_OK):
-        pytest.skip("this user may read everything")
-    assert "permission" in refused(capsys, "calibrate", closed)
 
 
 def test_an_output_that_exists_is_refused_before_the_work_and_left_as_it_was(session, tmp_path, capsys):
@@ -104,13 +54,6 @@ def test_an_output_that_exists_is_refused_before_the_work_and_left_as_it_was(ses
         assert kept.read_text() == "precious"
     assert main(["calibrate", str(session / "log.csv"), "--gravity", G, "-o", str(kept), "--force"]) == 0
     assert json.loads(kept.read_text())["format_version"] == 1
-
-
-def test_the_log_itself_is_never_overwritten_by_a_forgotten_argument(session, capsys):
-    before = (session / "log.csv").read_bytes()
-    main(["calibrate", "--json", str(session / "log.csv")])
-    assert (session / "log.csv").read_bytes() == before
-    capsys.readouterr()
 
 
 def test_units_that_a_calibration_does_not_map_are_refused(session, recording, tmp_path, capsys):

@@ -13,6 +13,7 @@ from trihedron.segment.means import BIAS_VARIANCE, NOISE_TRIED
 RATE_HZ = 100.0
 DEG = np.pi / 180.0
 POSE_S = 3.0
+SLOW = ((True, 1.0), (False, 4.0))
 
 
 def steady_turns(rng, step_deg_s, rate_deg_s, noise_deg_s=0.05, is_table=True):
@@ -39,8 +40,9 @@ def steady_turns(rng, step_deg_s, rate_deg_s, noise_deg_s=0.05, is_table=True):
     return recording, turns, zeros, back * DEG, -back @ zero * DEG
 
 
-@pytest.mark.parametrize("is_table", [True, False])
-@pytest.mark.parametrize("step", [4.0, 1.0])
+@pytest.mark.parametrize(
+    ("is_table", "step"), [(True, 4.0), (False, 1.0), *(pytest.param(*o, marks=pytest.mark.slow) for o in SLOW)]
+)
 def test_known_turns_of_a_coarse_gyro_lie_within_their_error_bars(step, is_table):
     rng = np.random.default_rng([31, round(step), is_table])
     scores = []

@@ -104,7 +104,7 @@ def test_the_zero_of_a_coarse_gyro_is_not_drawn_to_its_code():
     assert abs(slope) < 3.0 * error
 
 
-@pytest.mark.parametrize("bits", [8, 10])
+@pytest.mark.parametrize("bits", [8, pytest.param(10, marks=pytest.mark.slow)])
 def test_a_coarse_gyro_has_the_error_bars_of_its_rounding(bits):
     z, of_bias = [], []
     for seed in (31, 32, 33):
@@ -128,15 +128,15 @@ def test_a_coarse_gyro_has_the_error_bars_of_its_rounding(bits):
 
 
 @pytest.mark.parametrize("make", [hand, robot])
-def test_lost_samples_with_stamps_remade_are_seen_through_tremor_and_ringing(make):
-    for seed in (41, 42):
-        f, w, rate, _, _ = make(seed, n_poses=12)
-        result = calibrate(recording_of(*with_losses(f, w, seed), rate), gravity_m_s2=G)
-        lost = [finding for finding in result.findings if finding.code is FindingCode.SAMPLES_LOST]
-        assert lost
-        assert not result.is_trustworthy
-        # Of some hundred steps that tell, 3 % were lost: within five of its own standard errors and what hides.
-        assert 0.01 < lost[0].numbers["lost_share"] < 0.045
+@pytest.mark.parametrize("seed", [41, pytest.param(42, marks=pytest.mark.slow)])
+def test_lost_samples_with_stamps_remade_are_seen_through_tremor_and_ringing(make, seed):
+    f, w, rate, _, _ = make(seed, n_poses=12)
+    result = calibrate(recording_of(*with_losses(f, w, seed), rate), gravity_m_s2=G)
+    lost = [finding for finding in result.findings if finding.code is FindingCode.SAMPLES_LOST]
+    assert lost
+    assert not result.is_trustworthy
+    # Of some hundred steps that tell, 3 % were lost: within five of its own standard errors and what hides.
+    assert 0.01 < lost[0].numbers["lost_share"] < 0.045
 
 
 @pytest.mark.parametrize("seed", [43, pytest.param(44, marks=pytest.mark.slow)])
@@ -150,28 +150,30 @@ def test_moves_through_hundreds_of_degrees_need_no_nominal_scale(seed):
     assert relative < 0.01
 
 
-def test_faces_hold_their_bars_on_a_table_that_leans_with_headings_that_come_back():
+@pytest.mark.parametrize("sessions", [3, pytest.param(6, marks=pytest.mark.slow)])
+def test_faces_hold_their_bars_on_a_table_that_leans_with_headings_that_come_back(sessions):
     accelerometer, gyro = [], []
-    for seed in range(60, 66):
+    for seed in range(60, 60 + sessions):
         f, w, rate, truth, _ = table(seed, turns=(90.0, -90.0))
         result = calibrate(recording_of(f, w, rate), gravity_m_s2=G, method="faces")
         a = result.accelerometer
         accelerometer.append(np.append((a.S - truth.S_f) / a.sigma_S, (a.b - truth.b_f) / a.sigma_b))
         gyro.append(gyro_z(result, truth)[0])
-    # 72 and 54 scores; the tilt of a table makes a dozen of the former free. Headings counted twice gave 1.4² = 2.
+    # Twelve and nine scores each; a tilt makes two of the former free. Headings counted twice gave 1.4² = 2.
     assert np.mean(np.square(accelerometer)) < 1.7
     assert np.mean(np.square(gyro)) < 1.5
 
 
-def test_whole_turns_show_the_lean_of_a_table_that_headings_hide():
+@pytest.mark.parametrize("others", [2, pytest.param(5, marks=pytest.mark.slow)])
+def test_whole_turns_show_the_lean_of_a_table_that_headings_hide(others):
     accelerometer = []
-    for seed in (610080, *range(90, 95)):
+    for seed in (610080, *range(90, 90 + others)):
         f, w, rate, truth, motion = table(seed, turns=(360.0, -360.0))
         turns = [angle for _, _, angle in motion.turns]
         result = calibrate(recording_of(f, w, rate), gravity_m_s2=G, method="faces", turns_deg=turns)
         a = result.accelerometer
         accelerometer.append(np.append((a.S - truth.S_f) / a.sigma_S, (a.b - truth.b_f) / a.sigma_b))
-    # 72 scores; the six placements of seed 610080 agree by chance, and their bars, from headings alone, missed by 12.7.
+    # Twelve scores each; six placements of seed 610080 agree by chance: bars from headings alone missed by 12.7.
     assert np.abs(accelerometer).max() < 4.0
     assert np.mean(np.square(accelerometer)) > 0.1, "bars that say nothing would pass as well"
 
@@ -179,22 +181,21 @@ def test_whole_turns_show_the_lean_of_a_table_that_headings_hide():
 def test_losses_that_no_step_shows_are_in_the_error_bars_and_said():
     # At 1000 Hz a lost sample is below the noise of a reading, and each move lost two of its 2000: 0.1 % of the scale,
     # ten standard errors of the bars without them.
-    for seed in (400,):
-        f, w, rate, truth, _ = hand(seed, rate_hz=1000.0)
-        result = calibrate(recording_of(*with_losses(f, w, seed, 0.001), rate), gravity_m_s2=G)
-        z, _ = gyro_z(result, lower(truth))
-        assert np.abs(z).max() < 4.5
-        assert FindingCode.SAMPLES_LOST in {finding.code for finding in result.findings}
-        assert not result.is_trustworthy
+    f, w, rate, truth, _ = hand(400, rate_hz=1000.0)
+    result = calibrate(recording_of(*with_losses(f, w, 400, 0.001), rate), gravity_m_s2=G)
+    z, _ = gyro_z(result, lower(truth))
+    assert np.abs(z).max() < 4.5
+    assert FindingCode.SAMPLES_LOST in {finding.code for finding in result.findings}
+    assert not result.is_trustworthy
 
 
-def test_a_machine_that_always_turns_at_one_speed_is_not_at_its_gyros_limit():
+@pytest.mark.parametrize("seed", [3000, *(pytest.param(s, marks=pytest.mark.slow) for s in (3001, 3002))])
+def test_a_machine_that_always_turns_at_one_speed_is_not_at_its_gyros_limit(seed):
     # Half a degree per second a step: its top speed is one code. Bridged as if cut, scales were wrong by a fifth.
-    for seed in (3000, 3001, 3002):
-        f, w, rate, truth, _ = robot(seed, gyro_bits=12)
-        result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
-        assert FindingCode.CLIPPING not in {finding.code for finding in result.findings}
-        if result.gyroscope is not None and result.is_trustworthy:
-            z, relative = gyro_z(result, lower(truth))
-            assert np.abs(z).max() < 4.0
-            assert relative < 5e-3
+    f, w, rate, truth, _ = robot(seed, gyro_bits=12)
+    result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
+    assert FindingCode.CLIPPING not in {finding.code for finding in result.findings}
+    if result.gyroscope is not None and result.is_trustworthy:
+        z, relative = gyro_z(result, lower(truth))
+        assert np.abs(z).max() < 4.0
+        assert relative < 5e-3

@@ -14,22 +14,13 @@ def test_a_healthy_recording_is_consistent(grade):
 
 
 CASES = {
-    "accel-scale-asymmetry": {"asymmetry": (1e-3, -1.5e-3, 1e-3)},
     "accel-hysteresis": {"offset_m_s2": (0.01, 0.015, 0.01), "width_m_s2": 2.0},
     "gyro-g-sensitivity": {"matrix": ((1e-4, 2e-5, 0), (0, -1e-4, 5e-5), (5e-5, 0, 1e-4))},
-    "gyro-bias-drift": {"amplitude": (2e-3, -1e-3, 2e-3), "tau_s": 60.0},
     "timing-jitter": {"jitter_s": 1e-3},
-    "periodic-interference": {"sensor": "accelerometer", "frequency_hz": 17.0, "amplitude": 0.05},
 }
 
 
-BY_BENCHES = {"accel-scale-asymmetry", "gyro-bias-drift", "periodic-interference"}
-"""Drawn by the blind trials as well, or named by other files of the default run."""
-
-
-@pytest.mark.parametrize(
-    "effect_id", [pytest.param(name, marks=[pytest.mark.slow] * (name in BY_BENCHES)) for name in CASES]
-)
+@pytest.mark.parametrize("effect_id", CASES)
 def test_the_mechanism_is_named_first(effect_id):
     diagnosis = diagnosed(effect_id, **CASES[effect_id])
     assert diagnosis.verdict == "missing-physics"

@@ -175,6 +175,7 @@ def noisy(profile, accel, gyro, seed, **changes):
     return log(profile, accel, replace(gyro, noise=replace(gyro.noise, **changes)), 8, seed)
 
 
+@pytest.mark.slow
 def test_a_density_scaled_by_the_rate_twice_is_named_with_its_ratio(unit):
     profile, accel, gyro = unit
     N = tuple(10.0 * v for v in np.ones(3) * np.array(gyro.noise.N))

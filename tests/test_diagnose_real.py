@@ -30,9 +30,17 @@ def diagnosed(gravity: float, **arguments: object):
     )
 
 
-def test_xsens_holds_g_sensitivity_and_gravity_after_moves_gains(real_data: Path) -> None:
+@pytest.fixture(scope="module")
+def xsens(real_data: Path):
+    """Its calibration, and its diagnosis from the same segments."""
     folder = real_data / "xsens_mti"
-    d = diagnosed(9.81744, accelerometer_path=folder / "xsens_acc.txt", gyroscope_path=folder / "xsens_gyro.txt")
+    recording = read_recording(accelerometer_path=folder / "xsens_acc.txt", gyroscope_path=folder / "xsens_gyro.txt")
+    result = calibrate(recording, gravity_m_s2=9.81744)
+    return result, diagnose(recording, segments=result.segments, gravity_m_s2=9.81744)
+
+
+def test_xsens_holds_g_sensitivity_and_gravity_after_moves_gains(xsens) -> None:
+    _, d = xsens
     assert d.verdict == "missing-physics"
     first = d.effects[0]
     assert first.id == "gyro-g-sensitivity"
@@ -113,7 +121,7 @@ def test_moves_left_out_at_a_limit_explain_only_what_they_disagree_by_more_than_
 @pytest.mark.parametrize(
     ("name", "gravity", "first", "domain"),
     [
-        ("openaxes/bmi160", 9.8127, "accel-bias-drift", "static-accel"),
+        pytest.param("openaxes/bmi160", 9.8127, "accel-bias-drift", "static-accel", marks=pytest.mark.slow),
         ("getovermassif/session2", 9.803, "gyro-g-sensitivity", "static-gyro"),
     ],
 )
@@ -132,15 +140,12 @@ def test_an_answer_that_poses_support_stands_though_moves_are_spoilt(
     assert held.chi2_per_dof_after < 1.5
 
 
-def test_calibrate_diagnose_and_the_readme_give_one_figure_each_for_xsens(real_data: Path) -> None:
-    folder = real_data / "xsens_mti"
-    recording = read_recording(accelerometer_path=folder / "xsens_acc.txt", gyroscope_path=folder / "xsens_gyro.txt")
-    result = calibrate(recording, gravity_m_s2=9.81744)
+def test_calibrate_diagnose_and_the_readme_give_one_figure_each_for_xsens(xsens) -> None:
+    result, d = xsens
     figures = published_figures(result.calibration)
     quality = result.calibration.accelerometer.quality
     readme = (Path(__file__).parents[1] / "README.md").read_text()
     row = next(line for line in readme.splitlines() if line.startswith("| Xsens MTi"))
     assert f"| {1e3 * quality.held_out_rms:.2f} mm/s² cross-validated (noise alone {1e3 * quality.floor:.2f})" in row
     assert f"tilt {figures['tilt_error_after_rotations']['held_out_rms']:.3f}° after unseen rotations" in row
-    d = diagnose(recording, segments=result.segments, gravity_m_s2=9.81744)
     assert d.to_dict()["figures"] == figures

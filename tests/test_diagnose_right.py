@@ -7,18 +7,6 @@ import numpy as np
 from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
 
-STEP = 0.002
-
-
-def peaks(rng, limit, n=6000):
-    """(n, 3) readings whose channels reach their own heights, on an LSB, stopped at ``limit``."""
-    t = np.arange(n) / 100.0
-    x = np.stack(
-        [height * np.sin(2.0 * np.pi * f * t) for height, f in ((3.0, 0.31), (2.6, 0.43), (2.2, 0.37))], axis=1
-    )
-    x += 0.3 * np.sin(2.0 * np.pi * 0.017 * t)[:, None] + rng.normal(0.0, 0.01, x.shape)
-    return np.round(np.clip(x, -limit, limit) / STEP) * STEP
-
 
 def small_session(seed=3, pose_s=3.0):
     profile = profile_by_name("adis")

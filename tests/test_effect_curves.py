@@ -32,7 +32,13 @@ def test_a_quadratic_is_a_parabola_over_the_force_along_each_axis():
     ("effect_id", "size", "driver", "is_relative"),
     [
         ("accel-thermal-scale", {"per_k": (1e-3, -1e-3, 2e-3)}, "temperature", True),
-        ("vibration-rectification", {"sensor": "accelerometer", "coefficient": 0.02}, "vibration", False),
+        pytest.param(
+            "vibration-rectification",
+            {"sensor": "accelerometer", "coefficient": 0.02},
+            "vibration",
+            False,
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_what_drives_an_effect_is_found_from_its_columns(effect_id, size, driver, is_relative):

@@ -19,7 +19,7 @@ def session():
     return simulate(scenario, 3)[0]
 
 
-@pytest.mark.parametrize("law", ["one pair", "pairs", "late"])
+@pytest.mark.parametrize("law", ["one pair", pytest.param("pairs", marks=pytest.mark.slow), "late"])
 def test_two_samples_with_one_stamp_do_not_crash_the_diagnosis(session, law):
     t = np.array(session.time_s)
     if law == "one pair":

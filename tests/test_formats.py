@@ -8,12 +8,10 @@ import yaml
 
 import trihedron
 from test_export import NOISE, READINGS, ROUNDING, calibration, corrected, with_g_sensitivity
-from trihedron.files.formats import any_calibration, export_files, formats, is_calibration
+from trihedron.files.formats import any_calibration, export_files, is_calibration
 from trihedron.files.formats.parsing import yaml_of
 from trihedron.records import Calibration
 from trihedron.sensor_model import in_frame
-
-READ = [name for name, one in formats().items() if one.read is not None and one.write is not None]
 
 
 def read_back(known, target, folder):

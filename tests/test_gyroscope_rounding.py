@@ -32,7 +32,7 @@ def test_settling_inside_a_step_is_charged_whichever_way_the_moves_go(noise, way
     assert np.abs(scores).max() < 6.0
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("noise", [0.0, pytest.param(0.1, marks=pytest.mark.slow), 0.3])
 def test_steady_rates_that_toggle_between_two_codes_share_one_error(noise):
     # Axis after axis at one speed behind ramps: what is read of the other axes, too, stands still for a second.
     rng = np.random.default_rng(11)

@@ -1,6 +1,6 @@
 """From a log and a pose table to the filters: matching, noise from the poses, recordings."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from trihedron.estimate.kalman.session import (
 from trihedron.read import ReadError, read_pose_table
 from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode, PoseTable
 from trihedron.segment import segment_recording
-from trihedron.simulate import Accelerometer, Adc, NoiseTerms, Scenario, dividing_head, simulate
+from trihedron.simulate import Accelerometer, NoiseTerms, Scenario, dividing_head, simulate
 from twins_kalman import normalised_error_squared
 
 GRAVITY = 9.80665
@@ -25,12 +25,11 @@ S_TRUE = np.array([[0.98, 0.01, -0.02], [0.005, 1.03, 0.008], [-0.01, 0.012, 0.9
 B_TRUE = np.array([0.2, -0.3, 0.1])
 
 
-def head_session(seed, *, adc=0.0, noise=0.005, walk=0.0):
+def head_session(seed):
     accelerometer = Accelerometer(
         S=tuple(map(tuple, S_TRUE)),
         b=tuple(B_TRUE),
-        noise=NoiseTerms(N=(noise,) * 3, K=(walk,) * 3),
-        adc=Adc(lsb=adc),
+        noise=NoiseTerms(N=(0.005,) * 3),
     )
     recording = simulate(Scenario(motion=dividing_head(), accelerometer=accelerometer), seed=seed)[0]
     return recording, segment_recording(recording)
@@ -71,13 +70,13 @@ def test_hold_numbers_pick_still_poses_and_a_mismatch_is_said(head, table):
         )
 
 
-def test_a_coarse_converter_is_charged_with_its_step():
-    recording, segments = head_session(3, adc=0.37, noise=0.001)
-    noise = noise_from_poses(recording, segments)
+def test_a_coarse_converter_is_charged_with_its_step(head):
+    recording, segments = head
+    # As a resolution of 0.37 would have it, of noise far below.
+    coarse = replace(recording, accelerometer=0.37 * np.round(recording.accelerometer / 0.37))
     # Readings are multiples of the step to rounding of the decimal.
-    assert noise[0].resolution == pytest.approx(0.37, rel=1e-9)
-    fine, _ = head_session(3, adc=0.001)
-    assert noise_from_poses(fine, segment_recording(fine))[0].resolution == 0.0
+    assert noise_from_poses(coarse, segments)[0].resolution == pytest.approx(0.37, rel=1e-9)
+    assert noise_from_poses(recording, segments)[0].resolution == 0.0
 
 
 def poses_of(recording, segments):

@@ -85,10 +85,14 @@ def knocked(w, rests, rate, per_rad_s, rng):
     return w
 
 
-def test_moves_left_out_for_a_sample_they_lack_are_losses_and_knocked_ones_are_not():
+@pytest.mark.parametrize(
+    ("seeds", "least", "most"),
+    [(range(640003, 640007), 3, 0), pytest.param(range(640000, 640008), 6, 1, marks=pytest.mark.slow)],
+)
+def test_moves_left_out_for_a_sample_they_lack_are_losses_and_knocked_ones_are_not(seeds, least, most):
     """Axis after axis at one speed, 12 bits: what remains of the moves is within the noise whatever the rest lost."""
-    lossy, false, n = 0, 0, 8
-    for seed in range(640000, 640000 + n):
+    lossy, false = 0, 0
+    for seed in seeds:
         f, w, rate, truth, motion = robot(seed, gyro_bits=12)
         kept = np.random.default_rng([14, seed]).random(len(f)) >= 0.003
         per_rad_s = 1.0 / np.abs(np.diag(truth.S_w)).mean()
@@ -102,6 +106,6 @@ def test_moves_left_out_for_a_sample_they_lack_are_losses_and_knocked_ones_are_n
             lossy += is_lossy and is_said
             false += not is_lossy and is_said
     # 41 of 54 sessions: what three lost samples do to moves that others were left out of may be a hidden turn as well.
-    assert lossy >= n - 2
+    assert lossy >= least
     # None of 30 sessions: a knock meets the curve of a loss by chance only.
-    assert false <= 1
+    assert false <= most

@@ -43,7 +43,10 @@ def of(rng, **options):
     return noise_of_poses(readings, RATE, windows)[0]
 
 
-@pytest.mark.parametrize("options", [{"step": 0.2}, {"scatter": 0.2}, {"knocks": 2}], ids=str)
+@pytest.mark.parametrize(
+    "options", [{"step": 0.2}, *(pytest.param(o, marks=pytest.mark.slow) for o in ({"scatter": 0.2}, {"knocks": 2}))],
+    ids=str,
+)  # fmt: skip
 def test_the_white_density_and_the_ratio_of_two_are_inside_their_intervals(options):
     rng = np.random.default_rng(71)
     inside = covered = false = 0
@@ -84,7 +87,7 @@ def test_a_line_common_to_the_holds_is_found_with_its_amplitude():
     assert of(rng, poses=40).lines == ()
 
 
-@pytest.mark.parametrize("amplitude", [0.3, 1.0])
+@pytest.mark.parametrize("amplitude", [0.3, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_a_line_is_neither_white_noise_nor_a_corner_nor_the_noise_of_its_octave(amplitude):
     ratios, corners = [], []
     for seed in range(6):

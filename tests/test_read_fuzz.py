@@ -2,7 +2,6 @@
 
 import gzip
 import io
-import string
 
 import numpy as np
 import polars as pl
@@ -12,7 +11,6 @@ from hypothesis import strategies as st
 
 from trihedron.read import ReadError, read_recording
 from trihedron.read.names import parse_name
-from trihedron.read.text.layout import detect
 from trihedron.records import Recording
 
 FUZZ = settings(
@@ -75,20 +73,7 @@ TOKENS = st.sampled_from(
         "2024-01-01 00:00:00",
     ]
 )
-MAGIC = [b"PK\x03\x04", b"\x93NUMPY\x01\x00", b"PAR1", b"\x1f\x8b\x08\x00", b"BZh9", b"\xfd7zXZ\x00", b"\xff\xfe"]
 SEPARATORS = st.sampled_from([",", ";", "\t", " ", "  ", ", ", "\n", "\r\n", "\r", ",,"])
-
-
-@FUZZ
-@given(st.binary(max_size=400))
-def test_any_bytes_are_a_recording_or_a_sentence(tmp_path, content):
-    read_bytes(tmp_path, content)
-
-
-@FUZZ
-@given(st.sampled_from(MAGIC), st.binary(max_size=200))
-def test_any_bytes_behind_a_known_beginning_are_a_sentence(tmp_path, magic, content):
-    read_bytes(tmp_path, magic + content)
 
 
 @FUZZ
@@ -107,28 +92,6 @@ def test_any_mixture_of_log_words_is_a_recording_or_a_sentence(tmp_path, words):
 def test_any_table_of_log_words_under_a_header_is_a_recording_or_a_sentence(tmp_path, rows, separator, packed):
     text = "\n".join([separator.join(["t", "ax", "ay", "az"]), *map(separator.join, rows)])
     read_bytes(tmp_path, gzip.compress(text.encode()) if packed else text.encode())
-
-
-@FEW
-@given(st.integers(0, 1_000_000), st.integers(0, 1199), st.integers(0, 255))
-def test_one_damaged_byte_never_breaks_the_reader(tmp_path, seed, position, value):
-    rng = np.random.default_rng(seed)
-    table = np.column_stack([np.arange(20) / 100, rng.normal([0, 0, 9.8, 0, 0, 0], 1.0, (20, 6)).round(4)])
-    kinds = []
-    text = "t,ax,ay,az,gx,gy,gz\n" + "\n".join(",".join(map(str, map(float, row))) for row in table)
-    kinds.append(text.encode())
-    kinds.append(gzip.compress(text.encode(), mtime=0))
-    for save in (np.save, np.savez_compressed):
-        buffer = io.BytesIO()
-        save(buffer, table)
-        kinds.append(buffer.getvalue())
-    buffer = io.BytesIO()
-    pl.DataFrame(table, schema=["t", "ax", "ay", "az", "gx", "gy", "gz"]).write_parquet(buffer)
-    kinds.append(buffer.getvalue())
-    content = bytearray(kinds[seed % len(kinds)])
-    content[position % len(content)] = value
-    read_bytes(tmp_path, bytes(content))
-    read_bytes(tmp_path, bytes(content[: position % len(content)]))
 
 
 FINITE = st.floats(-1e12, 1e12, allow_nan=False, allow_subnormal=False)
@@ -180,13 +143,6 @@ def test_any_column_name_has_a_meaning_or_none(name):
         "supply",
         "counter",
     }
-
-
-@FUZZ
-@given(st.text(alphabet=string.printable, max_size=200))
-def test_any_text_has_a_layout_or_none(text):
-    layout = detect(text)
-    assert layout is None or (layout.n_fields >= 1 and layout.first_line >= 1)
 
 
 @FEW

@@ -22,6 +22,10 @@ TABLE = readings()
 NAMED = dict(zip(NAMES, TABLE.T, strict=True))
 
 
+def by_axis(first):
+    return dict(zip("xyz", TABLE[:, first : first + 3].T, strict=True))
+
+
 def pandas_frame():
     return pytest.importorskip("pandas").DataFrame(NAMED)
 
@@ -41,6 +45,9 @@ CARRIERS = {
     "dict-of-columns": lambda: NAMED,
     "dict-of-triads": lambda: {"t": TABLE[:, 0], "acc": TABLE[:, 1:4], "gyr": TABLE[:, 4:]},
     "polars": lambda: pl.DataFrame(NAMED),
+    "polars-lazy": lambda: pl.DataFrame(NAMED).lazy(),
+    "rows": lambda: pl.DataFrame(NAMED).to_dicts(),
+    "nested-dict": lambda: {"t": TABLE[:, 0], "acc": by_axis(1), "gyr": by_axis(4)},
     "pandas": pandas_frame,
     "pandas-with-time-index": lambda: pandas_frame().set_index("t"),
     "pandas-with-index-of-two-levels": lambda: pandas_frame().set_index(["t", "ax"]),

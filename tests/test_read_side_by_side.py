@@ -10,8 +10,10 @@ from trihedron.read import ReadError, read_recording
 from trihedron.read.devices import _devices
 
 
-@pytest.mark.parametrize("form", ["%Y/%m/%d", "%d/%m/%Y", "%d.%m.%Y", "%Y-%m-%d"])
-@pytest.mark.parametrize("line", ["time: {}, {}", "{} {}", "[{}] {}"])
+@pytest.mark.parametrize(
+    ("form", "line"),
+    [("%Y/%m/%d", "time: {}, {}"), ("%d/%m/%Y", "{} {}"), ("%d.%m.%Y", "[{}] {}"), ("%Y-%m-%d", "{} {}")],
+)
 def test_a_date_before_or_among_labels_is_a_clock_however_it_is_written(tmp_path, form, line):
     t, force, rate = motion(n_poses=3)
     names = ("ax", "ay", "az", "gx", "gy", "gz")
@@ -27,8 +29,10 @@ def test_a_date_before_or_among_labels_is_a_clock_however_it_is_written(tmp_path
     np.testing.assert_allclose(recording.gyroscope, rate, atol=1e-6)
 
 
-@pytest.mark.parametrize("form", ["{d}_{c}", "{c}_{d}", "{d} {c}"])
-@pytest.mark.parametrize("devices", [("A", "B"), ("left", "right"), ("imu0", "imu1"), ("1", "2")])
+@pytest.mark.parametrize(
+    ("form", "devices"),
+    [("{d}_{c}", ("A", "B")), ("{c}_{d}", ("left", "right")), ("{d} {c}", ("imu0", "imu1")), ("{c}_{d}", ("1", "2"))],
+)
 def test_devices_side_by_side_are_identified_by_the_names_of_their_columns(tmp_path, form, devices):
     t, force, rate = motion(n_poses=3)
     names = [form.format(d=d, c=c) for d in devices for c in ("ax", "ay", "az", "gx", "gy", "gz")]

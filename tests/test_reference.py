@@ -46,6 +46,13 @@ EARTH_RAD_S = 7.292115e-5
 NORTH_OF_48_DEG = EARTH_RAD_S * np.array([np.cos(np.radians(48.0)), 0.0, np.sin(np.radians(48.0))])
 
 
+@pytest.fixture(scope="module")
+def coarse():
+    """What is found of half a minute under a tracker of 0.05°."""
+    trial = tracked(3, seconds=30)
+    return fit_reference(trial.log, trial.motion, G)
+
+
 def fine_unit(seed, earth=None):
     """A gyro that tells the Earth's rate before a tracker of a hundredth of a degree."""
     trial = tracked(seed, 60, 0.005, earth=earth, is_fine=True, gyro_noise=5e-4)
@@ -97,21 +104,19 @@ def test_the_earths_rate_that_is_not_there_is_not_put_in():
     trial, found = fine_unit(1)
     assert found.earth_rate is None
     assert np.abs(z_of(found, trial)).max() < 5.5
-    coarse = tracked(3, seconds=30)
-    assert fit_reference(coarse.log, coarse.motion, G).earth_rate is None
 
 
-def test_an_earths_rate_that_the_log_cannot_tell_is_in_the_uncertainty_of_the_bias():
-    trial = tracked(3, seconds=30)
-    found = fit_reference(trial.log, trial.motion, G)
-    assert found.earth_rate is None
+def test_an_earths_rate_that_the_log_cannot_tell_is_in_the_uncertainty_of_the_bias(coarse):
+    assert coarse.earth_rate is None
     # One component of a vector of any direction; attitudes that turn about average part of it away.
-    assert np.all(np.array(found.gyroscope.sigmas()["sigma_b"]) > 0.1 * EARTH_RAD_S)
+    assert np.all(np.array(coarse.gyroscope.sigmas()["sigma_b"]) > 0.1 * EARTH_RAD_S)
 
 
-def test_error_bars_of_a_wobbling_table_cover_the_truth():
-    z = np.array([z_of(fit_reference(t.log, t.motion, G), t) for t in (measured_table(500 + k, 45) for k in range(4))])
-    # 48 numbers, not independent: 68 % within one sigma, less four standard errors of 12 independent ones a run.
+@pytest.mark.parametrize("tables", [2, pytest.param(4, marks=pytest.mark.slow)])
+def test_error_bars_of_a_wobbling_table_cover_the_truth(tables):
+    trials = [measured_table(500 + k, 45) for k in range(tables)]
+    z = np.array([z_of(fit_reference(t.log, t.motion, G), t) for t in trials])
+    # Twelve numbers a table, as of few independent ones: 68 % within one sigma, less four standard errors.
     assert np.mean(np.abs(z) < 1.0) > 0.4
     assert np.mean(np.abs(z) < 2.0) > 0.8
 
@@ -232,10 +237,10 @@ def test_a_clock_that_jumps_late_is_refused_with_the_place(seed, by_s):
         fit_reference(trial.log, moved, G)
 
 
-def test_no_part_of_a_sound_reference_is_called_elsewhere_however_noisy():
-    for seed in range(70, 72):
-        trial = tracked(seed, sigma_deg=0.3)
-        assert fit_reference(trial.log, trial.motion, G).overlap_s > 40.0
+@pytest.mark.parametrize("seed", [70, pytest.param(71, marks=pytest.mark.slow)])
+def test_no_part_of_a_sound_reference_is_called_elsewhere_however_noisy(seed):
+    trial = tracked(seed, sigma_deg=0.3)
+    assert fit_reference(trial.log, trial.motion, G).overlap_s > 40.0
 
 
 def test_a_reference_of_another_motion_is_refused(posed):
@@ -316,7 +321,7 @@ def test_two_recordings_of_one_unit_share_the_scale_and_have_biases_of_their_own
     assert "2 recordings beside references" in str(result)
 
 
-def test_an_attitude_that_the_gyro_itself_carried_is_not_independent():
+def test_an_attitude_that_the_gyro_itself_carried_is_not_independent(coarse):
     other = neighbour(44, 40)
     C, now = np.empty((len(other.time_s), 3, 3)), np.eye(3)
     for k, step in enumerate(rotation_from_vector(other.gyroscope[:-1] * np.diff(other.time_s)[:, None])):
@@ -326,7 +331,7 @@ def test_an_attitude_that_the_gyro_itself_carried_is_not_independent():
     found = fit_reference(other, ReferenceMotion(other.time_s - other.time_s[0], attitude=C), G)
     assert "mounted-without-error" in {sign.kind for sign in found.error.signs}
     assert any(f.code is FindingCode.REFERENCE_NOT_INDEPENDENT for f in found.findings)
-    assert not fit_reference(*part(tracked(3, seconds=30), 0.0, 30.0), G).error.signs
+    assert not coarse.error.signs
 
 
 def test_as_many_references_behind_the_option_as_logs_before_it_are_one_each():

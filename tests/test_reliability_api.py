@@ -156,6 +156,8 @@ def refused(what, ask):
         assert 10 < len(said) < 500, (what, said)
         assert said.count("\n") == 0, (what, said)
         assert not OF_A_LIBRARY.search(said), (what, said)
+        # In words of Python, not of the command line.
+        assert not re.search(r"(?<!\w)--\w", said), (what, said)
         return
     pytest.fail(f"{what} was taken")
 

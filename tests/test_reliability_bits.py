@@ -29,7 +29,7 @@ def without_its_day(text):
     return re.sub(r'"(made_at|created)": "[^"]*"|\d{4}-\d\d-\d\d \d\d:\d\d UTC', "", text)
 
 
-@pytest.mark.parametrize("name", ["diagnose", "simulate"])
+@pytest.mark.parametrize("name", [pytest.param("diagnose", marks=pytest.mark.slow), "simulate"])
 def test_outputs_do_not_depend_on_threads_or_cores(tmp_path, name):
     folder = copied(tmp_path)
     ending = ".csv" if name == "simulate" else ".json"

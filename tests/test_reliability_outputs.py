@@ -171,9 +171,7 @@ def test_impossible_places_end_in_a_sentence(tmp_path):
     "words",
     [
         ["--help"],
-        ["check", "log.csv", "--json"],
         ["apply", "c.json", "log.csv"],
-        ["export", "c.json", "--to", "c"],
     ],
 )
 def test_standard_output_on_a_full_disk_is_status_1(session, words):
@@ -182,21 +180,6 @@ def test_standard_output_on_a_full_disk_is_status_1(session, words):
     assert status == 1, err
     assert len(err.strip().splitlines()) == 1, err
     assert "standard output" in err
-
-
-def test_a_reader_that_leaves_early_does_not_cost_the_files_that_were_asked_for(session):
-    out, page = session / "left.json", session / "left.html"
-    # The pipe is closed before anything is said.
-    read, write = os.pipe()
-    os.close(read)
-    status, _, err = run(
-        "calibrate", session / "log.csv", "-o", out, "--report", page, "--gravity", str(G), stdout=write
-    )
-    os.close(write)
-    assert status in (0, 2), err
-    assert out.exists(), err
-    assert page.exists(), err
-    assert "Traceback" not in err
 
 
 # Two writers at the same moment

@@ -22,7 +22,7 @@ ENVIRONMENTS = (
 
 def test_the_answer_does_not_depend_on_locale_home_or_terminal(tmp_path):
     folder = copied(tmp_path)
-    said = [run("check", "log.csv", "--json", "-", cwd=folder, env=env) for env in ({}, *ENVIRONMENTS)]
+    said = [run("segment", "log.csv", "--json", "-", cwd=folder, env=env) for env in ({}, *ENVIRONMENTS)]
     plain, *odd = (re.sub(r'"(made_at|created)": "[^"]*"', "", out) for _, out, _ in said)
     assert [status for status, _, _ in said] == [0, 0, 0]
     assert json.loads(plain)
@@ -52,13 +52,13 @@ def test_closed_streams_lose_no_result_and_reach_no_file(tmp_path, closed, statu
 @pytest.mark.parametrize("options", [[], ["--force"]])
 def test_of_writers_of_one_output_each_says_whether_it_wrote(tmp_path, options):
     folder = copied(tmp_path)
-    line = ["calibrate", "log.csv", "--gravity", G, "-o", "one.json", *options]
+    line = ["convert", "log.csv", "-o", "one.csv", *options]
     writers = [started(*line, cwd=folder) for _ in range(2)]
     said = [writer.communicate(timeout=120)[1].decode() for writer in writers]
     written = [writer.returncode == 0 for writer in writers]
     assert sum(written) == (2 if options else 1)
     assert all("left alone" in text for text, wrote in zip(said, written, strict=True) if not wrote)
-    assert json.loads((folder / "one.json").read_text())
+    assert read_recording(folder / "one.csv").n_samples == read_recording(folder / "log.csv").n_samples
     assert leftovers(folder) == []
 
 

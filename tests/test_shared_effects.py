@@ -93,6 +93,7 @@ def test_values_that_differ_are_not_called_the_instruments():
     assert all(not one.is_of_instrument for one in found.effects)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not MASSIF.is_dir(), reason="the recordings are not here")
 def test_the_g_sensitivity_of_a_real_unit_is_in_all_three_of_its_sessions():
     recordings = [

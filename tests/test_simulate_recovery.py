@@ -19,7 +19,7 @@ def relative(S, truth):
     ("rate_hz", "gyro_tolerance"),
     # Poses have no sampling error; the integral over a sampled move has one, of about fourth order in the step. Moves
     # exclude that the sensor averages over its interval to a few 10^-9 of the scale at 800 Hz.
-    [(100.0, 1e-6), (800.0, 2e-9)],
+    [(100.0, 1e-6), pytest.param(800.0, 2e-9, marks=pytest.mark.slow)],
 )
 def test_calibration_of_the_linear_noiseless_instrument_recovers_the_truth(rate_hz, gyro_tolerance):
     scenario = replace(scenario_by_name("linear-noiseless"), clock=Clock(rate_hz))

@@ -32,6 +32,14 @@ _PARAMETERS = {
     "--accuracy": "accuracy",
     "--noise": "noise",
     "--reference": "reference",
+    "--reference-columns": "reference_columns",
+    "--calibration": "calibration",
+    "--current-parameters": "current_parameters",
+    "--loss": "loss",
+    "--by": "by",
+    "--labels": "labels",
+    "--serial": "serial",
+    "--workers": "workers",
     "--static": "static",
     "--band": "band_hz",
     "--baud": "baud",
@@ -68,7 +76,7 @@ class _Patterns:
 @cache
 def _patterns() -> _Patterns:
     # A place holder behind a flag (`--latitude DEG`) says what the parameter's own name says.
-    place = r"(?: (?:DEG|M_S2|M|HZ|N|NAME|UNIT|LIST|SIZE|ALLAN\.json)\b)?"
+    place = r"(?: (?:DEG|M_S2|M|HZ|N|NAME|UNIT|LIST|SIZE|FILE|ALLAN\.json)\b)?"
     flags, commands = (
         "|".join(sorted(map(re.escape, words), key=len, reverse=True)) for words in (_PARAMETERS, _COMMANDS)
     )
