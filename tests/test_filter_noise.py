@@ -40,7 +40,7 @@ def still(m=60):
     noise = accumulated(np.ones(m), BLOCK_ENDS)
     return Stretch(
         time, np.zeros(3 * m), np.tile(0.1 * eye, (m, 1)), np.zeros(3),
-        (noise, 0 * noise, np.eye(m)), walked(steps), steps, None, eye, np.tile(eye, (m, 1, 1)), np.zeros(m),
+        (noise, 0 * noise, np.eye(m)), walked(steps), steps, None, np.tile(eye, (m, 1, 1)), np.zeros(m),
     )  # fmt: skip
 
 
