@@ -48,6 +48,8 @@ VELOCITY = Prior(
 """The same of accelerometers beside a path: a millimetre of white error; the slow one is that of the attitude."""
 LEAST_S = 40.0
 """Shared motion below which two halves say nothing of ten seconds."""
+UNTURNED = np.ones(2)
+"""A body that keeps its attitude."""
 PREDICTING = 20
 """Draws of the strengths for a prediction."""
 
@@ -121,7 +123,9 @@ def _sensor(
     shares = tuple(
         share
         for h in asked.horizons_s
-        for share in shares_over({**parts_of(draws, h, tilt), **left.get(h, {}), **warm.get(h, {})}, h)
+        for share in shares_over(
+            {**parts_of(draws, h, tilt, turned_alike(stretches, h)), **left.get(h, {}), **warm.get(h, {})}, h
+        )
     )
     return SensorFilterNoise(
         sensor="gyroscope" if is_gyro else "accelerometer",
@@ -224,23 +228,28 @@ def _worth(draws: FloatArray, follows: bool) -> ReferenceWorth:
 # What the error over a horizon is made of (docs/filter-noise.md).
 
 
-def parts_of(draws: FloatArray, horizon_s: float, tilt: FloatArray | None = None) -> dict[Cause, FloatArray]:
+def parts_of(
+    draws: FloatArray, horizon_s: float, tilt: FloatArray | None = None, alike: FloatArray = UNTURNED
+) -> dict[Cause, FloatArray]:
     """Mean squares (k,) of all three axes together by cause, under strengths (k, 7), without the correction's.
 
     Of an angle over h: 3 N² h, 3 V² h, K² h³, and of a reference the difference of two of its errors,
-    2 σ² (1 - k(h)) and white. ``tilt`` (2,) makes it a velocity: what a radian of slow error [m/s²], and the white
-    error of the attitude [m/s/√s], add over h, of two axes.
+    2 σ² (1 - k(h)) and white; one of the body turns with it, so that only ``alike`` (n,) of it, at times from 0 to h,
+    is still the same (`turned_alike`). ``tilt`` (2,) makes it a velocity: what a radian of slow error [m/s²], and the
+    white error of the attitude [m/s/√s], add over h, of two axes.
     """
     s = dict(zip(NAMES, draws.T, strict=True))
     h = horizon_s
     out: dict[Cause, FloatArray] = {"rest": 3.0 * s["noise"] ** 2 * h, "vibration": 3.0 * s["vibration"] ** 2 * h}
     out["bias"] = s["bias_walk"] ** 2 * h**3
     if tilt is None:
-        slow = 6.0 * (s["world"] ** 2 + s["body"] ** 2) * (1.0 - matern(h, s["slow_s"]))
-        out["reference"] = 6.0 * s["white"] ** 2 + slow
+        same = matern(h, s["slow_s"])
+        slow = s["world"] ** 2 * (1.0 - same) + s["body"] ** 2 * (1.0 - same * alike[-1])
+        out["reference"] = 6.0 * (s["white"] ** 2 + slow)
     else:
-        slow = tilt[0] ** 2 * (s["world"] ** 2 + s["body"] ** 2) * _twice_summed(h, s["slow_s"])
-        out["reference"] = 12.0 * s["white"] ** 2 + 2.0 * (slow + tilt[1] ** 2 * h)
+        world, body = (_twice_summed(h, s["slow_s"], same) for same in (UNTURNED, alike))
+        slow = s["world"] ** 2 * world + s["body"] ** 2 * body
+        out["reference"] = 12.0 * s["white"] ** 2 + 2.0 * (tilt[0] ** 2 * slow + tilt[1] ** 2 * h)
     return out
 
 
@@ -250,8 +259,20 @@ def shares_over(parts: dict[Cause, FloatArray], horizon_s: float) -> tuple[Share
     return tuple(Share(name, horizon_s, bounded(parts[name] / total)) for name in CAUSES if name in parts)
 
 
-def _twice_summed(h: float, tau_s: FloatArray) -> FloatArray:
-    """Variance of the integral over h of a Matérn-3/2 process of variance one."""
+def turned_alike(stretches: Sequence[Stretch], horizon_s: float) -> FloatArray:
+    """(n,) how much of a vector of the body is still the same in the world, at times from 0 to ``horizon_s``: a third
+    of the trace of the turn, its mean over all starts."""
+    step_s = float(np.median(np.diff(stretches[0].time_s)))
+    alike = []
+    for ahead in range(max(1, round(horizon_s / step_s)) + 1):
+        pairs = [(one.attitude[ahead:], one.attitude[: len(one.attitude) - ahead]) for one in stretches]
+        starts = sum(len(later) for later, _ in pairs)
+        alike.append(sum(float(np.sum(later * before)) for later, before in pairs) / (3.0 * max(starts, 1)))
+    return np.array(alike)
+
+
+def _twice_summed(h: float, tau_s: FloatArray, alike: FloatArray) -> FloatArray:
+    """Variance of the integral over h of a Matérn-3/2 process of variance one, of which ``alike`` stays the same."""
     lag = np.linspace(0.0, h, 101)
-    kernel = matern(lag[None, :], tau_s[:, None])
+    kernel = matern(lag[None, :], tau_s[:, None]) * np.interp(lag, np.linspace(0.0, h, len(alike)), alike)
     return np.asarray(2.0 * trapezoid((h - lag) * kernel, lag, axis=1))
