@@ -40,7 +40,7 @@ def still(m=60):
     noise = accumulated(np.ones(m), BLOCK_ENDS)
     return Stretch(
         time, np.zeros(3 * m), np.tile(0.1 * eye, (m, 1)), np.zeros(3),
-        (noise, 0 * noise, np.eye(m)), walked(steps), steps, None, eye, np.tile(eye, (m, 1, 1)), np.zeros(m),
+        (noise, 0 * noise, np.eye(m)), walked(steps), steps, None, np.tile(eye, (m, 1, 1)), np.zeros(m),
     )  # fmt: skip
 
 
@@ -131,6 +131,9 @@ def test_parts_of_an_error_are_the_textbook_ones():
     assert found["bias"] == pytest.approx(K**2 * 1000)
     far = parts_of(STRENGTHS[None], 1e6)["reference"][0]
     assert far == pytest.approx(6 * SLOW**2, rel=1e-3)  # two errors that no longer know of each other
+    # Of an error fixed in a body that has turned by half a turn two axes have changed sign: (2 σ)² each.
+    fixed, half = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, SLOW, 1e6]]), np.array([1.0, -1.0 / 3.0])
+    assert parts_of(fixed, 10.0, alike=half)["reference"][0] == pytest.approx(8 * SLOW**2, rel=1e-3)
 
 
 @pytest.fixture(scope="module")

@@ -129,7 +129,7 @@ def drawn(seed, kind, seconds, horizons):
         h: {
             **of_noise(N, V, K, h),
             "temperature": warmed(warm, middle, h),
-            "reference": 12 * steady**2 / TRACK_HZ + tilt[h],
+            "reference": 12 * steady**2 / TRACK_HZ + tilt[h] + 2 * G**2 * white**2 / TRACK_HZ * h,
         }
         for h in horizons
     }

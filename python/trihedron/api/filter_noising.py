@@ -232,6 +232,12 @@ def _noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
         mixed = one.reference is not None and (one.K.is_limit or one.reference.slow.is_limit)
         if mixed:
             out.append(Finding.of(FindingCode.FILTER_NOISE_NOT_SEPARATED, sensor=one.sensor))
+        uncalibrated = _uncalibrated(one)
+        if uncalibrated is not None:
+            share, horizon_s = uncalibrated
+            out.append(
+                Finding.of(FindingCode.FILTER_NOISE_UNCALIBRATED, sensor=one.sensor, share=share, horizon_s=horizon_s)
+            )
         tested = [c for c in one.consistency if c.n_apart >= 3]
         worst = next((c for c in tested if not CONSISTENT[0] <= c.nees <= CONSISTENT[1]), None)
         if worst is not None:
@@ -241,3 +247,15 @@ def _noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
                 )
             )
     return tuple(out)
+
+
+def _uncalibrated(one: SensorFilterNoise) -> tuple[float, float] | None:
+    """Share and horizon [s] where what a calibration removes is more than N and K are for, by its lower limit and
+    their upper ones; None where it is nowhere."""
+    found: list[tuple[float, float]] = []
+    for horizon_s in {share.horizon_s for share in one.shares}:
+        at = {share.cause: share.share for share in one.shares if share.horizon_s == horizon_s}
+        removed = sum(at[cause].lower for cause in ("calibration", "g-sensitivity", "temperature") if cause in at)
+        if removed > sum(at[cause].upper for cause in ("rest", "vibration", "bias") if cause in at):
+            found.append((removed, horizon_s))
+    return max(found, default=None)

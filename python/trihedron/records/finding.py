@@ -116,6 +116,7 @@ class FindingCode(str, Enum):
     FILTER_NOISE_FOLLOWED = "filter-noise-followed"
     FILTER_NOISE_INCONSISTENT = "filter-noise-inconsistent"
     FILTER_NOISE_UNSETTLED = "filter-noise-unsettled"
+    FILTER_NOISE_UNCALIBRATED = "filter-noise-uncalibrated"
     ACCELEROMETER_NOMINAL = "accelerometer-nominal"
     SHARED_MOTION = "shared-motion"
     # many recordings, temperature

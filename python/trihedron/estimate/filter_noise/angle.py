@@ -87,8 +87,7 @@ def _stretch(table: dict[str, FloatArray], at: slice, h: float, centre: FloatArr
         alike=(noise, vibration, np.diag(table["white"][at])),
         bias_walk=h * walked(steps),
         bias_steps=steps,
-        slow=None,
-        plane=np.eye(3),
+        tilts=None,
         attitude=table["attitude"][at],
         power=table["power"][at],
     )

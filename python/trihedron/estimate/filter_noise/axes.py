@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.filter_noise.strengths import ABSENT, Fitted
+from trihedron.estimate.filter_noise.strengths import ABSENT, PREFERRED, Fitted
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
 from trihedron.records.filter_noise import Bounded
 
@@ -19,7 +19,7 @@ AXES_SIGMA = float(np.log(3.0))
 
 
 def unlike_axes_beside(stretches: Sequence[Stretch], found: Fitted, N: Bounded) -> tuple[Bounded, ...]:
-    """N of each axis, noise at rest and vibration together, where two intervals do not meet; else nothing.
+    """N of each axis, noise at rest and vibration together, where the evidence prefers three to one; else nothing.
 
     The other strengths stay as they are; the interval of N itself is in every axis'.
     """
@@ -39,12 +39,14 @@ def unlike_axes_beside(stretches: Sequence[Stretch], found: Fitted, N: Bounded) 
     here = low(best)
     curved = np.array([(low(best + e) + low(best - e) - 2.0 * here) / STEP**2 for e in steps])
     own = 1.0 / np.maximum(curved, 1.0 / AXES_SIGMA**2)
+    if 2.0 * (low(np.zeros(3)) - here) + float(np.sum(np.log(own / AXES_SIGMA**2))) < PREFERRED:
+        return ()
     common = (0.25 * np.log(N.upper / max(N.lower, N.upper / ABSENT))) ** 2
     each = []
     for x, variance in zip(best, own, strict=True):
         value, factor = N.value * float(np.exp(x)), float(np.exp(1.96 * np.sqrt(variance + common)))
         each.append(Bounded(value, value / factor, value * factor))
-    return tuple(each) if max(one.lower for one in each) > min(one.upper for one in each) else ()
+    return tuple(each)
 
 
 def _without_noise(stretch: Stretch, strengths: FloatArray) -> FloatArray:

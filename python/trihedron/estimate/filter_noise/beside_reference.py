@@ -18,6 +18,7 @@ from trihedron.estimate.filter_noise.strengths import PREFERRED, Fitted, Prior, 
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, matern
 from trihedron.estimate.filter_noise.temperature import PER_KELVIN, beside_temperature, of_temperature
 from trihedron.estimate.filter_noise.velocity import velocity_stretches
+from trihedron.estimate.reference.beside import BLOCK_S
 from trihedron.estimate.reference.fit import laid_beside
 from trihedron.estimate.reference.motion import fit_motion
 from trihedron.records import Recording
@@ -42,11 +43,13 @@ ANGLE = Prior(
 VELOCITY = Prior(
     np.append(np.log([2e-3, 2e-3, 3e-4, 1e-3, 1e-3, 8.0]), 0.0),
     ANGLE.sigma,
-    np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0]),
+    np.ones(7),
 )
-"""The same of accelerometers beside a path: a millimetre of white error; a tilt of the world's attitude."""
+"""The same of accelerometers beside a path: a millimetre of white error; the slow one is that of the attitude."""
 LEAST_S = 40.0
 """Shared motion below which two halves say nothing of ten seconds."""
+UNTURNED = np.ones(2)
+"""A body that keeps its attitude."""
 PREDICTING = 20
 """Draws of the strengths for a prediction."""
 
@@ -82,9 +85,11 @@ def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Asked
     out = [_sensor(stretches, ANGLE, asked, asked.gyroscope, left)]
     if motion.position is not None and side.force is not None:
         known = 0.0 if asked.accelerometer is None else asked.accelerometer.N.value
-        more = velocity_stretches(side, found.points[0], asked.band_hz, known, asked.gravity_m_s2)
+        assert out[0].reference is not None
+        white = out[0].reference.white.value
+        more = velocity_stretches(side, found.points[0], asked.band_hz, known, asked.gravity_m_s2, white)
         more = beside_temperature(more, recording, PER_KELVIN["accelerometer"])
-        out.append(_sensor(more, VELOCITY, asked, asked.accelerometer, {}))
+        out.append(_sensor(more, VELOCITY, asked, asked.accelerometer, {}, white))
     return tuple(out)
 
 
@@ -97,8 +102,9 @@ def _refuse_short(stretches: Sequence[Stretch], motion: ReferenceMotion) -> None
 
 
 def _sensor(
-    stretches: Sequence[Stretch], usual: Prior, asked: Asked, static: StaticNoise | None, left: Left
-) -> SensorFilterNoise:
+    stretches: Sequence[Stretch], usual: Prior, asked: Asked, static: StaticNoise | None, left: Left,
+    white_rad: float = 0.0,
+) -> SensorFilterNoise:  # fmt: skip
     is_gyro = usual is ANGLE
     prior = informed(usual, stretches, static)
     half, held = halves(stretches)
@@ -112,12 +118,14 @@ def _sensor(
         # What is left beside it is the reference's as much as the sensor's.
         assert static is not None
         N, K = static.N, replace(K, lower=0.0, is_limit=True)
-    tilt = None if is_gyro else asked.gravity_m_s2
+    tilt = None if is_gyro else asked.gravity_m_s2 * np.array([1.0, white_rad * np.sqrt(BLOCK_S)])
     warm = of_temperature(stretches, found, asked.horizons_s)
     shares = tuple(
         share
         for h in asked.horizons_s
-        for share in shares_over({**parts_of(draws, h, tilt), **left.get(h, {}), **warm.get(h, {})}, h)
+        for share in shares_over(
+            {**parts_of(draws, h, tilt, turned_alike(stretches, h)), **left.get(h, {}), **warm.get(h, {})}, h
+        )
     )
     return SensorFilterNoise(
         sensor="gyroscope" if is_gyro else "accelerometer",
@@ -196,8 +204,9 @@ def consistency(
         plain = np.zeros(len(NAMES))
         plain[[0, 2]] = static.N.filter_value, static.K.filter_value
         # Of a path only means are compared: its white error cannot be none, and is what it is.
-        plain[3] = 0.0 if held[0][0].slow is None else taught.mode[3]
-        beside = errors_over(held, plain[None], horizon_s)
+        plain[3] = 0.0 if held[0][0].tilts is None else taught.mode[3]
+        exact = [(replace(one, given=None), first) for one, first in held]
+        beside = errors_over(exact, plain[None], horizon_s)
     return Consistency(
         horizon_s,
         float(np.mean(found.nees)),
@@ -219,21 +228,28 @@ def _worth(draws: FloatArray, follows: bool) -> ReferenceWorth:
 # What the error over a horizon is made of (docs/filter-noise.md).
 
 
-def parts_of(draws: FloatArray, horizon_s: float, tilt_m_s2: float | None = None) -> dict[Cause, FloatArray]:
+def parts_of(
+    draws: FloatArray, horizon_s: float, tilt: FloatArray | None = None, alike: FloatArray = UNTURNED
+) -> dict[Cause, FloatArray]:
     """Mean squares (k,) of all three axes together by cause, under strengths (k, 7), without the correction's.
 
     Of an angle over h: 3 N² h, 3 V² h, K² h³, and of a reference the difference of two of its errors,
-    2 σ² (1 - k(h)) and white. ``tilt_m_s2`` makes it a velocity: a slow tilt adds g² over h, of two axes.
+    2 σ² (1 - k(h)) and white; one of the body turns with it, so that only ``alike`` (n,) of it, at times from 0 to h,
+    is still the same (`turned_alike`). ``tilt`` (2,) makes it a velocity: what a radian of slow error [m/s²], and the
+    white error of the attitude [m/s/√s], add over h, of two axes.
     """
     s = dict(zip(NAMES, draws.T, strict=True))
     h = horizon_s
     out: dict[Cause, FloatArray] = {"rest": 3.0 * s["noise"] ** 2 * h, "vibration": 3.0 * s["vibration"] ** 2 * h}
     out["bias"] = s["bias_walk"] ** 2 * h**3
-    if tilt_m_s2 is None:
-        slow = 6.0 * (s["world"] ** 2 + s["body"] ** 2) * (1.0 - matern(h, s["slow_s"]))
-        out["reference"] = 6.0 * s["white"] ** 2 + slow
+    if tilt is None:
+        same = matern(h, s["slow_s"])
+        slow = s["world"] ** 2 * (1.0 - same) + s["body"] ** 2 * (1.0 - same * alike[-1])
+        out["reference"] = 6.0 * (s["white"] ** 2 + slow)
     else:
-        out["reference"] = 12.0 * s["white"] ** 2 + 2.0 * (tilt_m_s2 * s["world"]) ** 2 * _twice_summed(h, s["slow_s"])
+        world, body = (_twice_summed(h, s["slow_s"], same) for same in (UNTURNED, alike))
+        slow = s["world"] ** 2 * world + s["body"] ** 2 * body
+        out["reference"] = 12.0 * s["white"] ** 2 + 2.0 * (tilt[0] ** 2 * slow + tilt[1] ** 2 * h)
     return out
 
 
@@ -243,8 +259,20 @@ def shares_over(parts: dict[Cause, FloatArray], horizon_s: float) -> tuple[Share
     return tuple(Share(name, horizon_s, bounded(parts[name] / total)) for name in CAUSES if name in parts)
 
 
-def _twice_summed(h: float, tau_s: FloatArray) -> FloatArray:
-    """Variance of the integral over h of a Matérn-3/2 process of variance one."""
+def turned_alike(stretches: Sequence[Stretch], horizon_s: float) -> FloatArray:
+    """(n,) how much of a vector of the body is still the same in the world, at times from 0 to ``horizon_s``: a third
+    of the trace of the turn, its mean over all starts."""
+    step_s = float(np.median(np.diff(stretches[0].time_s)))
+    alike = []
+    for ahead in range(max(1, round(horizon_s / step_s)) + 1):
+        pairs = [(one.attitude[ahead:], one.attitude[: len(one.attitude) - ahead]) for one in stretches]
+        starts = sum(len(later) for later, _ in pairs)
+        alike.append(sum(float(np.sum(later * before)) for later, before in pairs) / (3.0 * max(starts, 1)))
+    return np.array(alike)
+
+
+def _twice_summed(h: float, tau_s: FloatArray, alike: FloatArray) -> FloatArray:
+    """Variance of the integral over h of a Matérn-3/2 process of variance one, of which ``alike`` stays the same."""
     lag = np.linspace(0.0, h, 101)
-    kernel = matern(lag[None, :], tau_s[:, None])
+    kernel = matern(lag[None, :], tau_s[:, None]) * np.interp(lag, np.linspace(0.0, h, len(alike)), alike)
     return np.asarray(2.0 * trapezoid((h - lag) * kernel, lag, axis=1))

@@ -15,6 +15,11 @@ Left = dict[float, dict[Cause, FloatArray]]
 """Mean squares (k,) [rad²] by horizon and cause."""
 SIZES = np.geomspace(1e-5, 0.1, 33)
 """Of the elements of a scale matrix."""
+G_SENSITIVITY = "gyro-g-sensitivity"
+PARTS = np.geomspace(1e-2, 10.0, 33)
+"""Of g-sensitivities, in the size that data sheets give."""
+FLAT = 1e-2
+"""Information, in units of a prior that is taken out, that keeps what no motion shows invertible."""
 
 
 def left_over(found: MotionFit, horizons_s: Sequence[float]) -> Left:
@@ -32,14 +37,14 @@ def left_over(found: MotionFit, horizons_s: Sequence[float]) -> Left:
         return np.cumsum(np.einsum("nij,nk->nijk", C, apart).reshape(len(C), 3, 9), axis=0) * grid.step_s
 
     S, cov = found.value(0, "S"), found.covariance(0, ("S",))
-    by: dict[Cause, tuple[FloatArray, FloatArray]] = {
-        "calibration": (carried(grid.gyroscope), drawn_errors(left_of(S), _across(S) @ cov @ _across(S).T, SIZES))
-    }
-    name = "gyro-g-sensitivity"
-    if side.force is not None and name in found.places[0]:
-        rng = np.random.default_rng(1)
-        drawn = rng.multivariate_normal(found.value(0, name), found.covariance(0, (name,)), DRAWN)
-        by["g-sensitivity"] = (carried(side.force), drawn)
+    across = _across(S)
+    # A matrix has six numbers beside a rotation: in the other three nothing is ever seen, of any size.
+    u, gains, _ = np.linalg.svd(across)
+    kept = u[:, gains > 0.5]
+    elements = drawn_errors(kept.T @ left_of(S), kept.T @ across @ cov @ across.T @ kept, SIZES) @ kept.T
+    by: dict[Cause, tuple[FloatArray, FloatArray]] = {"calibration": (carried(grid.gyroscope), elements)}
+    if side.force is not None and G_SENSITIVITY in found.places[0]:
+        by["g-sensitivity"] = (carried(side.force), _g_sensitivities(found))
     return {
         h: {
             cause: mean_square(_steps(angle, max(1, round(h / grid.step_s))), errors)
@@ -47,6 +52,15 @@ def left_over(found: MotionFit, horizons_s: Sequence[float]) -> Left:
         }
         for h in horizons_s
     }
+
+
+def _g_sensitivities(found: MotionFit) -> FloatArray:
+    """(k, 9) drawn from what the log says of them, without the fit's prior: all of one size, small ones as likely."""
+    name = G_SENSITIVITY
+    size = float(np.mean(found.wider.get(name, 1.0) * found.sides[0].sigma(name)))
+    inverse = np.linalg.inv(found.covariance(0, (name,)))
+    cov = np.asarray(np.linalg.inv(inverse - (1.0 - FLAT) * np.eye(len(inverse)) / size**2), float)
+    return drawn_errors(cov @ inverse @ found.value(0, name), cov, size * PARTS)
 
 
 def _steps(angle: FloatArray, ahead: int) -> FloatArray:
@@ -59,17 +73,17 @@ def mean_square(steps: FloatArray, errors: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("ki,ij,kj->k", errors, square, errors))
 
 
-def drawn_errors(seen: FloatArray, cov: FloatArray, sizes: FloatArray) -> FloatArray:
-    """(k, f) errors of numbers seen as ``seen`` (f,) with covariance (f, f), all of one unknown size among ``sizes``.
+def drawn_errors(seen: FloatArray, cov: FloatArray, sizes: FloatArray, n: int = DRAWN, seed: int = 0) -> FloatArray:
+    """(n, f) errors of numbers seen as ``seen`` (f,) with covariance (f, f), all of one unknown size among ``sizes``.
 
     What noise alone makes of a perfect matrix is no error: without a common size its square would be twice counted.
     """
     width = [cov + size**2 * np.eye(len(seen)) for size in sizes]
     log_p = np.array([-0.5 * (np.linalg.slogdet(V)[1] + seen @ np.linalg.solve(V, seen)) for V in width])
     weight = np.exp(log_p - log_p.max())
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     out = []
-    for k in rng.choice(len(sizes), DRAWN, p=weight / weight.sum()):
+    for k in rng.choice(len(sizes), n, p=weight / weight.sum()):
         gain = sizes[k] ** 2 * np.linalg.inv(width[k])
         left = sizes[k] ** 2 * (np.eye(len(seen)) - gain)
         values, vectors = np.linalg.eigh(0.5 * (left + left.T))

@@ -15,8 +15,9 @@ from trihedron.records.filter_noise import Bounded
 
 COORDINATES = ("noise", "vibration", "bias_walk", "white", "slow", "slow_s", "body")
 """Logarithms of strengths, ``slow`` that of the reference's whole slow error, and last a standard normal number whose
-quantile is the part of its square that turns with the body: two strengths of which either may be nothing would have a
-posterior with a corner."""
+quantile is the angle, in right angles, between it and its part in the world: two strengths of which either may be
+nothing would have a posterior with a corner. The ratio of the two is then half-Cauchy; with the quantile as the part of
+the *square* that turns with the body, none of it was so unlikely that the whole came out too small."""
 MAY_BE_NOTHING = np.isin(COORDINATES, ("vibration", "bias_walk", "white", "slow"))
 FARTHEST = 4.0
 """Coordinates beyond four prior σ are those of nothing."""
@@ -137,9 +138,9 @@ def whole(prior: Prior, x: FloatArray) -> FloatArray:
     """(7,) strengths in SI of coordinates (f,); those that the model does not have are none."""
     every = np.full(len(COORDINATES), -np.inf)
     every[prior.is_there > 0.0] = x
-    body = float(ndtr(every[-1]))
+    angle = 0.5 * np.pi * float(ndtr(every[-1]))
     slow = np.exp(every[4])
-    return np.array([*np.exp(every[:4]), slow * np.sqrt(1.0 - body), slow * np.sqrt(body), np.exp(every[5])])
+    return np.array([*np.exp(every[:4]), slow * np.cos(angle), slow * np.sin(angle), np.exp(every[5])])
 
 
 def fit(stretches: Sequence[Stretch], prior: Prior) -> Fitted:

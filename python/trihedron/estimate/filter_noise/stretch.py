@@ -31,7 +31,8 @@ class Stretch:
 
     ``centre`` (p,) is where that prior stands; ``alike`` the covariances (m, m), the same along every axis, of noise,
     vibration and white error of the reference for strength one, ``bias_walk`` (3 m, 3 m) that of a bias that walks;
-    ``slow`` (m, m) integrates a slow error of the world, which ``plane`` (3, 3) turns into the observation;
+    ``tilts`` (m, 3, 3) what an attitude error of the world up to an observation adds to it and to all later ones, None
+    where it is the observation itself; ``given`` (3 m, 3 m) a covariance that is known, or None;
     ``attitude`` (m, 3, 3) is the body's; ``bias_steps`` (3 m, 3 m) is what a bias of each block does to the
     observations; ``power`` (m,) the vibration's, mean one; ``ends`` the parts of a block's variance by which a mean of
     a walk, and two neighbouring ones, have less than min(t, t') of their middles; ``kelvin`` (m,) a logged
@@ -45,13 +46,21 @@ class Stretch:
     alike: tuple[AnyFloats, ...]
     bias_walk: AnyFloats
     bias_steps: FloatArray
-    slow: FloatArray | None
-    plane: FloatArray
+    tilts: FloatArray | None
     attitude: FloatArray
     power: FloatArray
     ends: tuple[float, float] = BLOCK_ENDS
     kelvin: FloatArray | None = None
     kelvin_size: float = 0.0
+    given: AnyFloats | None = None
+
+    @cached_property
+    def tilted(self) -> tuple[FloatArray, FloatArray]:
+        """(m, 3, m, 3) covariances of what one attitude error of the world, and of the body, adds at all times."""
+        assert self.tilts is not None
+        own = self.tilts @ self.attitude
+        world, body = (np.asarray(np.einsum("kij,lmj->kilm", by, by)) for by in (self.tilts, own))
+        return world, body
 
     @cached_property
     def turned(self) -> FloatArray:
@@ -70,15 +79,18 @@ class Stretch:
         correlation = matern(self.lag_s, s["slow_s"])
         out = s["bias_walk"] ** 2 * self.bias_walk
         parted = out.reshape(m, 3, m, 3)
-        if s["body"] > 0.0:
-            parted += s["body"] ** 2 * correlation[:, None, :, None] * self.turned
         same = sum(s[name] ** 2 * basis for name, basis in zip(ALIKE, self.alike, strict=True))
-        slow = s["world"] ** 2 * correlation
-        if self.slow is not None:
-            slow = self.slow @ slow @ self.slow.T
-        for i, j in zip(*np.nonzero(np.abs(self.plane) + np.eye(3)), strict=True):
-            parted[:, i, :, j] += self.plane[i, j] * slow + (same if i == j else 0.0)
-        return np.asarray(out)
+        if self.tilts is None:
+            same = same + s["world"] ** 2 * correlation
+            if s["body"] > 0.0:
+                parted += s["body"] ** 2 * correlation[:, None, :, None] * self.turned
+        elif s["world"] > 0.0 or s["body"] > 0.0:
+            world, body = self.tilted
+            added = correlation[:, None, :, None] * (s["world"] ** 2 * world + s["body"] ** 2 * body)
+            parted += np.cumsum(np.cumsum(added, axis=0), axis=2)
+        for axis in range(3):
+            parted[:, axis, :, axis] += same
+        return np.asarray(out if self.given is None else out + self.given)
 
     def evidence(self, strengths: FloatArray) -> float:
         """Log evidence of the observations, the columns' coefficients integrated out (docs/reference.md, eq. 2)."""
@@ -124,7 +136,8 @@ class Stretch:
             alike=tuple(basis[at, at] for basis in self.alike),
             bias_walk=self.bias_walk[rows, rows],
             bias_steps=self.bias_steps[rows],
-            slow=None if self.slow is None else self.slow[at, at],
+            tilts=None if self.tilts is None else self.tilts[at],
+            given=None if self.given is None else self.given[rows, rows],
             attitude=self.attitude[at],
             power=self.power[at],
             kelvin=None if self.kelvin is None else self.kelvin[at],

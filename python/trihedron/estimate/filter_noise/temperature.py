@@ -8,19 +8,19 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.filter_noise.left_over import Left, drawn_errors, mean_square
+from trihedron.estimate.filter_noise.left_over import FLAT, Left, drawn_errors, mean_square
 from trihedron.estimate.filter_noise.strengths import Fitted
-from trihedron.estimate.filter_noise.stretch import Stretch
+from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
 from trihedron.records import Recording
 
 PER_KELVIN = {"gyroscope": 4e-4, "accelerometer": 5e-3}
 """How far biases of parts move [SI/K], one σ, as the session's effects of temperature have it."""
 WIDE = 3.0
 """The columns' prior in those: a part may be worse than most."""
-FLAT = 1e-2
-"""Information, in units of the prior, that keeps a temperature of one direction of motion invertible."""
 SIZES = np.geomspace(1e-3, 2.0, 33)
 """Of the biases per kelvin that are tried, in those of the prior."""
+GROUPS = 40
+"""Of draws with like K; the biases per kelvin of a group are those under the strengths in its middle."""
 LEAST_SWING_K = 0.3
 """A sensor's own thermometer scatters by some hundredths."""
 
@@ -73,17 +73,28 @@ def of_temperature(stretches: Sequence[Stretch], found: Fitted, horizons_s: Sequ
     told = [one for one in stretches if one.kelvin is not None]
     if not told:
         return {}
-    size = told[0].kelvin_size
-    parts = [one.coefficients(found.mode) for one in told]
-    # One sensor in all stretches; each holds the prior, which counts once.
-    inverses = [np.linalg.inv(cov[-3:, -3:]) for _, cov in parts]
-    cov = np.linalg.inv(np.sum([one - np.eye(3) for one in inverses], axis=0) + FLAT * np.eye(3))
-    seen = np.sum([inverse @ mean[-3:] for inverse, (mean, _) in zip(inverses, parts, strict=True)], axis=0)
-    errors = size * drawn_errors(cov @ seen, cov, SIZES)
+    errors = _drawn(told, found)
     return {
         h: {"temperature": mean_square(np.concatenate([_since_start(one, h) for one in told]), errors)}
         for h in horizons_s
     }
+
+
+def _drawn(told: Sequence[Stretch], found: Fitted) -> FloatArray:
+    """(k, 3) bias per kelvin [SI/K], one for each draw of the strengths.
+
+    What moves slowly is temperature or walk: each goes with a K near that of its own draw.
+    """
+    order = np.argsort(found.draws[:, NAMES.index("bias_walk")])
+    errors = np.empty((len(order), 3))
+    for seed, some in enumerate(np.array_split(order, GROUPS)):
+        parts = [one.coefficients(found.draws[some[len(some) // 2]]) for one in told]
+        # One sensor in all stretches; each holds the prior, which counts once.
+        inverses = [np.linalg.inv(cov[-3:, -3:]) for _, cov in parts]
+        cov = np.linalg.inv(np.sum([one - np.eye(3) for one in inverses], axis=0) + FLAT * np.eye(3))
+        seen = np.sum([inverse @ mean[-3:] for inverse, (mean, _) in zip(inverses, parts, strict=True)], axis=0)
+        errors[some] = told[0].kelvin_size * drawn_errors(cov @ seen, cov, SIZES, len(some), seed)
+    return errors
 
 
 def _since_start(stretch: Stretch, horizon_s: float) -> FloatArray:

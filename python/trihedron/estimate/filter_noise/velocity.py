@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from trihedron.arrays import FloatArray
@@ -9,14 +11,19 @@ from trihedron.estimate.filter_noise.angle import band_power, bias_steps, relati
 from trihedron.estimate.filter_noise.stretch import TRIANGLE_ENDS, Stretch, accumulated, walked
 from trihedron.estimate.reference.beside import Beside, Point
 
+LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)[None])
+"""Of a cross product: [i, j, k] the k-th part of axis i with axis j."""
 SIZES = {"S": 0.05, "b": 0.5, "up": 0.5, "start": 5.0, "arm": 0.3}
 """Prior σ: 5 % of a scale beside the fit, 0.5 m/s² of bias and of gravity, 5 m/s at the start, 0.3 m of lever arm."""
 
 
 def velocity_stretches(
-    side: Beside, point: Point, band_hz: float, static_N: float, gravity_m_s2: float
+    side: Beside, point: Point, band_hz: float, static_N: float, gravity_m_s2: float, white_rad: float
 ) -> list[Stretch]:
-    """Stretches of differences of the position's block means, each a triangular mean of the velocity."""
+    """Stretches of differences of the position's block means, each a triangular mean of the velocity.
+
+    ``white_rad`` is the white error of the reference's attitude, of a block's mean: the accelerometer does not make it.
+    """
     assert side.force is not None
     h_grid = side.grid.step_s
     n = max(2, round(1.0 / h_grid))
@@ -33,7 +40,7 @@ def velocity_stretches(
         at = slice(a * n, b * n)
         local = (C[at], side.force[at], side.reference.position(inside[at]))
         out.append(_stretch(local, time[at], n, vibration[a:b], gravity_m_s2))
-    return out
+    return [replace(one, given=_of_white_attitude(one, white_rad)) for one in out]
 
 
 def _stretch(
@@ -64,9 +71,9 @@ def _stretch(
     steps = bias_steps(bias)
     quiet = np.full(m, h)
     shaken = 0.5 * h * (vibration[1:] + vibration[:-1])
-    eye = np.eye(3)
     noise, shakes = (accumulated(q, TRIANGLE_ENDS) for q in (quiet, shaken))
-    # An attitude wrong by e turns gravity by g e: two axes across the vertical, summed over time.
+    # An attitude wrong by e turns the specific force by e x f, gravity and the motion's own; summed over time.
+    across = between(np.einsum("ijk,nk->nij", LEVI_CIVITA, world))
     return Stretch(
         time_s=time[: m * n].reshape(m, n).mean(axis=1) + 0.5 * h,
         observed=observed.ravel(),
@@ -75,13 +82,20 @@ def _stretch(
         alike=(noise, shakes, (2.0 * np.eye(m) - neighbours(m)) / h**2),
         bias_walk=h * walked(steps),
         bias_steps=steps,
-        slow=h * np.tril(np.ones((m, m))),
-        plane=gravity**2 * (eye - np.outer(up, up)),
+        tilts=np.diff(across, axis=0, prepend=0.0),
         # At the edge that two blocks share.
         attitude=C[n - 1 : m * n : n],
         power=vibration[1:],
         ends=TRIANGLE_ENDS,
     )
+
+
+def _of_white_attitude(stretch: Stretch, white_rad: float) -> FloatArray:
+    """(3 m, 3 m) of an attitude with an error of its own in every block: white acceleration of |f| times it."""
+    assert stretch.tilts is not None
+    m = len(stretch.tilts)
+    per_block = np.einsum("kij,klj->il", stretch.tilts, stretch.tilts) / m * white_rad**2
+    return np.kron(accumulated(np.ones(m), TRIANGLE_ENDS), per_block)
 
 
 def neighbours(m: int) -> FloatArray:
