@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from trihedron.sensor_model import other_form, other_form_jacobian
 
 KNOWN = 0.05
 """σ of S, as a part of the scale, up to which a force is told by the fit: g-sensitivity is then wrong by as much."""
+CLOCK_STEP_S = 1e-3
 TURNS = 4
 """Steps of the direction of gravity: it starts within a degree or two, and each squares the error."""
 
@@ -25,6 +27,10 @@ class ForceFit:
 
     ``up`` (3,): unit vector of the specific force at rest in the reference's world, with its covariance (3, 3); ``arm``
     (3,) [m] from the reference's origin to the accelerometer, in the reference's body.
+
+    These are so far under attitudes and a clock that are right. ``wrt_attitude`` (n, k, 3) and ``wrt_clock`` (n, k):
+    errors of the n numbers of S, b, up and arm, as far as there, where in a window the attitude is short of a small
+    turn about an axis of the world [1/rad] (``None``: attitudes have no part in it), the clock of its offset [1/s].
     """
 
     S: FloatArray
@@ -35,15 +41,19 @@ class ForceFit:
     arm: FloatArray | None
     arm_covariance: FloatArray | None
     solution: Solution
+    wrt_attitude: FloatArray | None
+    wrt_clock: FloatArray
 
-    def within(self, frame: FloatArray) -> ForceFit:
-        """The same where the reference's body is known to ``frame`` (3, 3) [rad²] only."""
-        J = turns_of_frame(self.S, self.b)
-        arm_covariance = self.arm_covariance
-        if self.arm is not None and arm_covariance is not None:
-            of_arm = turns(self.arm[:, None])
-            arm_covariance = arm_covariance + of_arm @ frame @ of_arm.T
-        return replace(self, covariance=self.covariance + J @ frame @ J.T, arm_covariance=arm_covariance)
+    def with_error(self, covariance: FloatArray) -> ForceFit:
+        """The same where attitudes and clock are wrong, which adds a covariance (n, n) to the n numbers."""
+        up, arm = self.up_covariance, self.arm_covariance
+        n = 12 if up is None else 15
+        return replace(
+            self,
+            covariance=self.covariance + covariance[:12, :12],
+            up_covariance=None if up is None else up + covariance[12:15, 12:15],
+            arm_covariance=None if arm is None else arm + covariance[n:, n:],
+        )
 
 
 def turns(columns: FloatArray) -> FloatArray:
@@ -104,20 +114,30 @@ def _in_body(grid: Grid, reference: Reference, windows: Windows, time: FloatArra
     assert grid.accelerometer is not None
     signals = windows.of(windows.weight, np.column_stack([grid.accelerometer, np.ones(len(time))]))
     k = len(windows.start)
-    design = np.zeros((k, 3, 15))
+    readings = np.zeros((k, 3, 12))
     for i in range(3):
-        design[:, i, 3 * i : 3 * i + 3] = signals[:, :3]
-        design[:, i, 9 + i] = signals[:, 3]
-    omega = _cross(reference.rate(time))
-    design[:, :, 12:] = -(windows.of(windows.weight, omega @ omega) - windows.of(windows.slope, omega))
-    target = windows.of(windows.weight, reference.specific_force(time))
+        readings[:, i, 3 * i : 3 * i + 3] = signals[:, :3]
+        readings[:, i, 9 + i] = signals[:, 3]
+
+    def rows(at: FloatArray) -> tuple[FloatArray, FloatArray]:
+        omega = _cross(reference.rate(at))
+        by_arm = windows.of(windows.slope, omega) - windows.of(windows.weight, omega @ omega)
+        return np.concatenate([readings, by_arm], axis=2), windows.of(windows.weight, reference.specific_force(at))
+
+    design, target = rows(time)
     size = _turning(windows, reference, time)
     solution = solve(design, target, windows.start // windows.spacing, size)
     S, b = solution.theta[:9].reshape(3, 3), solution.theta[9:12]
     _refuse_mirror(reference, float(np.linalg.det(S)), handedness)
+
+    def left(at: FloatArray) -> FloatArray:
+        design, target = rows(at)
+        return target - design @ solution.theta
+
     return ForceFit(
-        S, b, solution.covariance[:12, :12], None, None, solution.theta[12:], solution.covariance[12:, 12:], solution
-    )
+        S, b, solution.covariance[:12, :12], None, None, solution.theta[12:], solution.covariance[12:, 12:], solution,
+        None, _wrt_clock(solution.influence, left, time),
+    )  # fmt: skip
 
 
 def _along_path(
@@ -125,13 +145,17 @@ def _along_path(
 ) -> ForceFit:
     """``C (S a' + b) = d²(p + C ℓ)/dt² + g u`` in the reference's world."""
     assert grid.accelerometer is not None
-    C = reference.attitude(time)
-    signals = np.column_stack([grid.accelerometer, np.ones(len(time))])
-    moments = windows.of(windows.weight, C[:, :, :, None] * signals[:, None, None, :])
     k = len(windows.start)
-    base = np.concatenate([moments[:, :, :, :3].reshape(k, 3, 9), moments[:, :, :, 3]], axis=2)
-    base = np.concatenate([base, -windows.of(windows.curvature, C)], axis=2)
-    path = windows.of(windows.curvature, reference.position(time))
+    averaged = _averaged(grid.accelerometer)
+    signals = np.column_stack([grid.accelerometer - 0.5 * averaged, np.ones(len(time))])
+
+    def rows(at: FloatArray) -> tuple[FloatArray, FloatArray]:
+        C = reference.attitude(at)
+        moments = windows.of(windows.weight, C[:, :, :, None] * signals[:, None, None, :])
+        columns = moments[:, :, :, :3].reshape(k, 3, 9), moments[:, :, :, 3], -windows.of(windows.curvature, C)
+        return np.concatenate(columns, axis=2), windows.of(windows.curvature, reference.position(at))
+
+    base, path = rows(time)
     up = _first_up(base, path, gravity)
     size, noise = _turning(windows, reference, time), None
     for _ in range(TURNS):
@@ -145,7 +169,38 @@ def _along_path(
     _refuse_mirror(reference, float(np.linalg.det(S)), handedness)
     up_covariance = across @ solution.covariance[15:, 15:] @ across.T
     arm, arm_covariance = solution.theta[12:15], solution.covariance[12:15, 12:15]
-    return ForceFit(S, b, solution.covariance[:12, :12], up, up_covariance, arm, arm_covariance, solution)
+    own = solution.theta[:15]
+    by_up = np.einsum("ij,jka->ika", across, solution.influence[15:])
+    influence = np.concatenate([solution.influence[:12], by_up, solution.influence[12:15]])
+
+    def left(at: FloatArray) -> FloatArray:
+        base, path = rows(at)
+        return path - base @ own
+
+    turned = np.einsum("nij,nj->ni", reference.attitude(time), averaged @ S.T)
+    by_average = np.einsum("nka,ka->n", influence, windows.of(windows.weight, turned)) / np.sqrt(12.0)
+    found = ForceFit(
+        S, b, solution.covariance[:12, :12], up, up_covariance, arm, arm_covariance, solution,
+        # Attitudes short of a turn ε predict (C S a' + ...) short of ε x itself.
+        np.einsum("nka,kab->nkb", influence, _cross(base @ own)), _wrt_clock(influence, left, time),
+    )  # fmt: skip
+    return found.with_error(np.outer(by_average, by_average))
+
+
+def _averaged(readings: FloatArray) -> FloatArray:
+    """(n, 3) by how much averages over a sample differ from instants, T²/24 of the second derivative.
+
+    Some parts give averages and some instants: readings are taken halfway, and how far either way stays open (uniform).
+    """
+    padded = np.pad(readings, ((1, 1), (0, 0)), mode="edge")
+    return np.asarray((padded[2:] - 2.0 * readings + padded[:-2]) / 24.0)
+
+
+def _wrt_clock(influence: FloatArray, left: Callable[[FloatArray], FloatArray], time: FloatArray) -> FloatArray:
+    """(n, k) errors of numbers whose ``influence`` (n, k, 3) acts on what is left (k, 3) at times (n,), by its change
+    with them."""
+    change = (left(time + CLOCK_STEP_S) - left(time - CLOCK_STEP_S)) / (2.0 * CLOCK_STEP_S)
+    return -np.einsum("nka,ka->nk", influence, change)
 
 
 def _turning(windows: Windows, reference: Reference, time: FloatArray) -> FloatArray:
@@ -171,7 +226,11 @@ def _under_gravity(
     """
     assert grid.accelerometer is not None
     readings = windows.of(windows.weight, grid.accelerometer)
-    back = gravity * np.swapaxes(windows.of(windows.weight, reference.attitude(time)), 1, 2)
+
+    def turned_back(at: FloatArray) -> FloatArray:
+        return gravity * np.swapaxes(windows.of(windows.weight, reference.attitude(at)), 1, 2)
+
+    back = turned_back(time)
     k = len(windows.start)
     up, M = _gravity_seen(readings, back, handedness)
     design = np.zeros((k, 3, 14))
@@ -194,7 +253,17 @@ def _under_gravity(
     covariance = jacobian @ solution.covariance[:12, :12] @ jacobian.T
     scale = float(np.mean(np.linalg.svd(S, compute_uv=False)))
     in_si = replace(solution, residual=solution.residual * scale, rms_held_out=solution.rms_held_out * scale)
-    return ForceFit(S, b, covariance, up, across @ solution.covariance[12:, 12:] @ across.T, None, None, in_si)
+    all_of = np.zeros((15, 14))
+    all_of[:12, :12], all_of[12:, 12:] = jacobian, across
+    influence = np.einsum("ij,jka->ika", all_of, solution.influence)
+
+    def left(at: FloatArray) -> FloatArray:
+        return -turned_back(at) @ up @ M.T
+
+    return ForceFit(
+        S, b, covariance, up, across @ solution.covariance[12:, 12:] @ across.T, None, None, in_si,
+        -np.einsum("nka,kab->nkb", influence, M @ back @ _cross(up[None])), _wrt_clock(influence, left, time),
+    )  # fmt: skip
 
 
 def _gravity_seen(readings: FloatArray, back: FloatArray, handedness: float) -> tuple[FloatArray, FloatArray]:

@@ -40,10 +40,14 @@ class NoiseModel:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """θ (p,), covariance (p, p), residuals (k, 3) as they are, rows used (k,), and rms of rows left out in turn."""
+    """θ (p,), covariance (p, p), residuals (k, 3) as they are, rows used (k,), and rms of rows left out in turn.
+
+    ``influence`` (p, k, 3): change of θ with each row of the target.
+    """
 
     theta: FloatArray
     covariance: FloatArray
+    influence: FloatArray
     residual: FloatArray
     is_used: Mask
     widened: float
@@ -81,8 +85,8 @@ def solve(
     assert best is not None
     found = best[1]
     return Solution(
-        found.theta / scale, found.covariance / np.outer(scale, scale), found.residual, found.is_used, found.widened,
-        found.rms_held_out, found.model,
+        found.theta / scale, found.covariance / np.outer(scale, scale), found.influence / scale[:, None, None],
+        found.residual, found.is_used, found.widened, found.rms_held_out, found.model,
     )  # fmt: skip
 
 
@@ -121,7 +125,8 @@ def _solve(
     widened = float(np.median(wide))
     spread = float(np.mean(np.log(np.maximum(jackknife, predicted)[is_known]))) if np.any(is_known) else np.inf
     covariance = variance * inverse * np.outer(wide, wide)
-    return spread, Solution(theta, covariance, target - X @ theta, used, widened, held_out, model)
+    influence = _influence(inverse @ Z.T, index, used, filters) * weight[:, None]
+    return spread, Solution(theta, covariance, influence, target - X @ theta, used, widened, held_out, model)
 
 
 def _least_squares(X: FloatArray, y: FloatArray) -> FloatArray:
@@ -183,6 +188,18 @@ def _whitened(
         z.append(sum(c * y[rows - lag, axis] for lag, c in enumerate(f)))
         rows_of.append(rows)
     return np.concatenate(Z), np.concatenate(z), np.concatenate(rows_of)
+
+
+def _influence(of_white: FloatArray, index: IntArray, used: Mask, filters: list[FloatArray]) -> FloatArray:
+    """Change (p, k, 3) of θ with the rows before they were whitened, from that with the whitened ones."""
+    out = np.zeros((len(of_white), len(index), 3))
+    first = 0
+    for axis, f in enumerate(filters):
+        rows = _with_past(index, used, len(f) - 1)
+        for lag, c in enumerate(f):
+            out[:, rows - lag, axis] += c * of_white[:, first : first + len(rows)]
+        first += len(rows)
+    return out
 
 
 def _blocks(index: IntArray) -> IntArray:

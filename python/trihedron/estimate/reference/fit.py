@@ -12,6 +12,7 @@ import numpy.typing as npt
 from trihedron.arrays import AXES, FloatArray
 from trihedron.estimate.reference.accelerometer import ForceFit, fit_accelerometer, force_along
 from trihedron.estimate.reference.beside import Beside, Point
+from trihedron.estimate.reference.carried import error_carried
 from trihedron.estimate.reference.clocks import Alignment, align
 from trihedron.estimate.reference.coloured import Solution
 from trihedron.estimate.reference.earth import earth_of
@@ -162,13 +163,12 @@ def _answer(
     clock = found.value(k, "clock") if has_clock else np.array([one.gyro.offset_s, 0.0])
     sigma = np.sqrt(np.diag(found.covariance(k, ("clock",)))) if has_clock else np.array([np.nan, np.nan])
     frame = frame_covariance(found, k)
-    if force is not None and motion.attitude is not None:
-        point, known = found.points[k], without_slow_error(found, k)
-        force = fit_accelerometer(
-            side.grid, known, one.wide, point.offset_s, point.rate, one.gravity_m_s2, one.gyro.handedness
-        )
     if force is not None:
-        force = force.within(frame)
+        known, rate = without_slow_error(found, k), float(clock[1])
+        offset = float(clock[0]) - rate * (side.middle_s if has_clock else 0.0)
+        force = fit_accelerometer(side.grid, known, one.wide, offset, rate, one.gravity_m_s2, one.gyro.handedness)
+    if force is not None:
+        force = force.with_error(error_carried(found, k, force, side.grid.time_s[one.wide.middle], frame))
     up = None if force is None or force.up_covariance is None else _estimate(force.up, force.up_covariance, "1")
     result = AgainstReference(
         kind=motion.kind,

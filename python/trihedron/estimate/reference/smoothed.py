@@ -19,7 +19,7 @@ BODY = STRENGTHS.index("body")
 def bias_over_time(found: MotionFit, k: int) -> BiasOverTime:
     """Bias of recording k in every block, g-sensitivity at the recording's mean specific force included."""
     side, own, problem = found.sides[k], found.places[k], found.problems[k]
-    all_of = _posterior(found, found.fitted.strengths)
+    all_of = posterior(found, found.fitted.strengths)
     mean, cov = all_of.mean[problem.index], all_of.covariance[np.ix_(problem.index, problem.index)]
     columns, beside, _, _ = problem.blocks.smoothed(problem.table(), np.exp(found.fitted.strengths[k]).tolist())
     m = len(beside)
@@ -46,7 +46,7 @@ def error_over_time(found: MotionFit, k: int) -> ErrorOverTime:
     has walked since the beginning.
     """
     problem = found.problems[k]
-    mean = _posterior(found, found.fitted.strengths).mean[problem.index]
+    mean = posterior(found, found.fitted.strengths).mean[problem.index]
     strengths = np.exp(found.fitted.strengths[k])
     columns, beside, _, _ = problem.blocks.smoothed(problem.table(), strengths.tolist())
     m = len(beside)
@@ -68,7 +68,7 @@ def without_slow_error(found: MotionFit, k: int) -> Reference:
     motion = side.reference.motion
     if motion.attitude is None:
         return side.reference
-    slow = slow_error(problem, found.fitted.strengths[k], _posterior(found, found.fitted.strengths).mean)
+    slow = slow_error(problem, found.fitted.strengths[k], posterior(found, found.fitted.strengths).mean)
     time = (motion.time_s - point.offset_s) / (1.0 + point.rate)
     own = slow.taken_off(time, motion.attitude @ point.mounting) @ point.mounting.T
     return Reference(replace(motion, attitude=np.ascontiguousarray(own)))
@@ -83,17 +83,20 @@ def frame_covariance(found: MotionFit, k: int) -> FloatArray:
     side = found.sides[k]
     if side.reference.motion.attitude is None:
         return np.zeros((3, 3))
-    without = found.fitted.strengths.copy()
-    without[:, BODY] = (TYPICAL - FARTHEST * SPREAD)[BODY]
     at = found.places[k]["S"]
     sigma = found.wider.get("S", 1.0) * side.sigma("S")
-    alone = _posterior(found, without).covariance[np.ix_(at, at)] * np.outer(sigma, sigma)
     # Turns of the body about each axis as changes of S, and back again by least squares.
-    turn = np.linalg.pinv(turns(found.value(k, "S").reshape(3, 3)))
-    values, vectors = np.linalg.eigh(turn @ (found.covariance(k, ("S",)) - alone) @ turn.T)
-    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
+    turn = np.linalg.pinv(turns(found.value(k, "S").reshape(3, 3))) * sigma
+    out = np.zeros((3, 3))
+    for strengths in found.fitted.draws:
+        without = strengths.copy()
+        without[:, BODY] = (TYPICAL - FARTHEST * SPREAD)[BODY]
+        both, alone = (posterior(found, one).covariance[np.ix_(at, at)] for one in (strengths, without))
+        values, vectors = np.linalg.eigh(turn @ (both - alone) @ turn.T)
+        out += (vectors * np.maximum(values, 0.0)) @ vectors.T / len(found.fitted.draws)
+    return out
 
 
-def _posterior(found: MotionFit, strengths: FloatArray) -> Together:
+def posterior(found: MotionFit, strengths: FloatArray) -> Together:
     """All parameters at given strengths, biases those at the start."""
     return together(found.problems, [equations(p, s) for p, s in zip(found.problems, strengths, strict=True)])
