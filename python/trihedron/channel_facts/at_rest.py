@@ -13,7 +13,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts.low_pass import Spectrum, undisturbed
 from trihedron.channel_facts.pooled import Pooled, as_measured, pooled_logarithm, robust_poses, root_of
-from trihedron.channel_facts.step import converter_step
+from trihedron.channel_facts.step import adc_step
 from trihedron.errors import RefusedError
 from trihedron.ranges import ranges_of
 from trihedron.records.pose_noise import PoseLine
@@ -45,7 +45,7 @@ class AxisAtRest:
         parts = [run for start, stop in poses for run in _unbroken(x[start:stop])]
         if not parts:
             raise RefusedError(f"{name}: no pose has {SHORTEST} readings in a row; keep the sensor still for longer")
-        step = converter_step(np.concatenate(parts))
+        step = adc_step(np.concatenate(parts))
         power = _Power.of(parts)
         keep = robust_poses(power.variance, power.dof)
         parts = [part for part, kept in zip(parts, keep, strict=True) if kept]

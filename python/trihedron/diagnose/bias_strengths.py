@@ -111,8 +111,8 @@ def _flicker(model: Hypothesis) -> FloatArray:
 
 def _walked(model: Hypothesis, sensor: int) -> float:
     """Rms of a bias about its mean over the poses, over the usual error of a pose's mean."""
-    twin, obs = model.fitted.twin, model.obs
-    path = (twin.accel_bias, twin.gyro_bias)[sensor]
+    state, obs = model.fitted.state, model.obs
+    path = (state.accel_bias, state.gyro_bias)[sensor]
     unit = _units(model)[sensor] * model.context.si_per_raw(("accelerometer", "gyroscope")[sensor])
     return float(np.sqrt(np.mean(path.var(axis=0)) / np.mean(unit**2))) if obs.n_poses else 0.0
 
@@ -131,8 +131,8 @@ def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArra
         raw = (scatter[1:] if effect.sensor else scatter[0]) * _units(model)[effect.sensor]
         size = raw * model.context.si_per_raw(sensor)
         return size, size / np.sqrt(2.0 * max(n - 1, 1))
-    twin = model.fitted.twin
-    path = twin.accel_bias if effect.sensor == 0 else twin.gyro_bias
+    state = model.fitted.state
+    path = state.accel_bias if effect.sensor == 0 else state.gyro_bias
     obs = model.obs
     sigma = obs.pose_force_sigma if effect.sensor == 0 else obs.pose_rate_sigma
     assert sigma is not None

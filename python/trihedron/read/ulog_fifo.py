@@ -25,10 +25,10 @@ def expanded(data: dict[str, Any]) -> dict[str, npt.NDArray[np.float64]] | None:
     counts = np.clip(np.asarray(data["samples"], dtype=np.int64), 0, width)
     message = np.repeat(np.arange(len(counts)), counts)
     place = np.arange(len(message)) - np.repeat(np.cumsum(counts) - counts, counts)
-    stamp = np.asarray(data["timestamp_sample"], dtype=np.float64)
+    timestamp = np.asarray(data["timestamp_sample"], dtype=np.float64)
     step = np.asarray(data["dt"], dtype=np.float64)
     scale = np.asarray(data["scale"], dtype=np.float64)
-    out = {"timestamp_sample": stamp[message] - (counts[message] - 1 - place) * step[message]}
+    out = {"timestamp_sample": timestamp[message] - (counts[message] - 1 - place) * step[message]}
     for axis in AXES:
         block = np.column_stack([data[f"{axis}[{k}]"] for k in range(width)]).astype(np.float64)
         out[axis] = block[message, place] * scale[message]

@@ -37,10 +37,10 @@ def turning_blocks(
     for a, b in ranges:
         # Inside the quiet stretch only: the move next to it has its own say.
         second[a:b] = rolling_mean(reading[a:b], channels.blocks(1.0))
-    zero, scatter = _densest(second[quiet])
+    bias, scatter = _densest(second[quiet])
     long = _edges([(a, b) for a, b in ranges if b - a >= channels.blocks(MIN_POSE_S)])
     if len(long) > 2:
-        nearest = np.minimum.reduceat(np.abs(second[: long[-1]] - zero), long[:-1], axis=0)[::2]
+        nearest = np.minimum.reduceat(np.abs(second[: long[-1]] - bias), long[:-1], axis=0)[::2]
         scatter = np.maximum(scatter, 1.4826 * medians(nearest))
     # A few short poses hold a few independent seconds: the shortest interval among them flatters. No window is known
     # better than the white noise of its blocks.
@@ -53,17 +53,17 @@ def turning_blocks(
     noise = medians(channels.variance[quiet][:, gyro]) - channels.quantisation_variance[gyro]
     scatter = np.maximum(scatter, np.sqrt(left_by_rounding(noise, step2)[0] * step2))
     with np.errstate(divide="ignore", invalid="ignore"):
-        distance = np.nan_to_num(np.abs(second - zero) / scatter, nan=0.0)
+        distance = np.nan_to_num(np.abs(second - bias) / scatter, nan=0.0)
     top = speed_of_moves(channels, quiet)
     out[:] = quiet & (distance > TURN_SIGMAS).any(axis=1)
     for a, b in ranges:
         flagged = a + np.flatnonzero(out[a:b])
         if not len(flagged):
             continue
-        is_slow = bool((np.abs(second[flagged] - zero).max(axis=0) < CREEP_PART * top).all())
+        is_slow = bool((np.abs(second[flagged] - bias).max(axis=0) < CREEP_PART * top).all())
         if radians_per_reading is not None:
             # Within a factor of two, which is what is known of the scale.
-            turned = (reading[flagged] - zero).sum(axis=0) * channels.step_s * radians_per_reading
+            turned = (reading[flagged] - bias).sum(axis=0) * channels.step_s * radians_per_reading
             is_slow = is_slow and float(np.linalg.norm(turned)) < 2.0 * SWAY_RAD
         if gravity is not None and is_slow and _tilts_a_little(channels, flagged[0], flagged[-1] + 1, gravity):
             out[a:b] = False

@@ -172,7 +172,7 @@ impl AxisKalman {
             reading,
             reference,
             start: start_s,
-            hold: pose_s,
+            pose_s,
             extra_variance,
         };
         let filter = &mut self.inner;
@@ -214,7 +214,7 @@ impl AxisKalman {
         matrix(py, &self.inner.covariance())
     }
 
-    /// Slow noise at the end of the last hold, and its standard error.
+    /// Slow noise at the end of the last pose, and its standard error.
     #[getter]
     fn drift(&self) -> (f64, f64) {
         self.inner.drift()

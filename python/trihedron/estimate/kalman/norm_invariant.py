@@ -61,7 +61,7 @@ class LiveNormCalibration:
         self.frame: NormFrame = frame
         self._gravity = gravity_m_s2
         self._pose, self._pause = pose_s, pause_s
-        self._zero = start.zero
+        self._bias = start.bias
         options = options or ShapingOptions()
         models = [shaping_model(n, options, session_s=session_s, pose_s=pose_s) for n in noise_per_axis(noise)]
         size = np.abs(np.diag(start.S)).mean()
@@ -101,14 +101,14 @@ class LiveNormCalibration:
         if a.shape != (3,):
             raise RefusedError(f"a pose needs three readings, got shape {a.shape}")
         extra = [float(v) for v in np.broadcast_to(np.asarray(extra_variance, dtype=np.float64), (3,))]
-        innovation, variance = self._filter.add([float(v) for v in a - self._zero], start_s, pose_s, extra)
+        innovation, variance = self._filter.add([float(v) for v in a - self._bias], start_s, pose_s, extra)
         if relinearise:
             self.relinearise(10)
         return self.estimate(nis=np.full(3, innovation**2 / variance), look_ahead=look_ahead)
 
     def load(self, readings: FloatArray, start_s: FloatArray, pose_s: FloatArray, extra_variance: FloatArray) -> None:
         """Take many poses at once, (n, 3), (n,), (n,), (n, 3); :meth:`relinearise` then estimates from all of them."""
-        self._filter.load(readings - self._zero, start_s, pose_s, np.ascontiguousarray(extra_variance))
+        self._filter.load(readings - self._bias, start_s, pose_s, np.ascontiguousarray(extra_variance))
 
     def relinearise(self, most: int = MOST_RUNS) -> bool:
         """Repeat the run over all poses until the constants stay; whether they did within ``most`` runs."""
@@ -122,8 +122,8 @@ class LiveNormCalibration:
         # b = b_centred − S zero
         jacobian = self._expand()
         for k in range(3):
-            jacobian[9 + k] -= self._zero @ jacobian[3 * k : 3 * k + 3]
-        return S, b - S @ self._zero, jacobian @ self._filter.covariance @ jacobian.T
+            jacobian[9 + k] -= self._bias @ jacobian[3 * k : 3 * k + 3]
+        return S, b - S @ self._bias, jacobian @ self._filter.covariance @ jacobian.T
 
     def _expand(self) -> FloatArray:
         """(12, 9) derivative of S row by row and b with respect to the nine parameters."""

@@ -20,14 +20,14 @@ class NormStart:
     """
 
     S: FloatArray
-    zero: FloatArray
+    bias: FloatArray
     sigma_relative: float = 0.1
     sigma_bias_m_s2: float = 1.0
 
     def __post_init__(self) -> None:
-        S, zero = np.array(self.S, dtype=np.float64), np.array(self.zero, dtype=np.float64)
-        if S.shape != (3, 3) or zero.shape != (3,) or not (np.all(np.isfinite(S)) and np.all(np.isfinite(zero))):
-            raise RefusedError(f"a start needs finite S (3, 3) and bias (3,), got shapes {S.shape} and {zero.shape}")
+        S, bias = np.array(self.S, dtype=np.float64), np.array(self.bias, dtype=np.float64)
+        if S.shape != (3, 3) or bias.shape != (3,) or not (np.all(np.isfinite(S)) and np.all(np.isfinite(bias))):
+            raise RefusedError(f"a start needs finite S (3, 3) and bias (3,), got shapes {S.shape} and {bias.shape}")
         if np.linalg.matrix_rank(S) < 3:
             raise RefusedError(
                 "a start needs three independent axes: S = 0 is no calibration, but the filter would stay there"
@@ -35,12 +35,12 @@ class NormStart:
         if not (self.sigma_relative > 0 and self.sigma_bias_m_s2 > 0):
             raise RefusedError("the uncertainty of a start must be positive")
         object.__setattr__(self, "S", S)
-        object.__setattr__(self, "zero", zero)
+        object.__setattr__(self, "bias", bias)
 
     @classmethod
-    def nominal(cls, si_per_raw: float, zero: npt.ArrayLike = (0.0, 0.0, 0.0)) -> NormStart:
+    def nominal(cls, si_per_raw: float, bias: npt.ArrayLike = (0.0, 0.0, 0.0)) -> NormStart:
         """The data sheet: one scale [m/s² per raw unit] for all axes, and the bias."""
-        return cls(si_per_raw * np.eye(3), np.asarray(zero, dtype=np.float64))
+        return cls(si_per_raw * np.eye(3), np.asarray(bias, dtype=np.float64))
 
     @classmethod
     def from_range(cls, readings: npt.ArrayLike, gravity_m_s2: float) -> NormStart:
@@ -55,5 +55,5 @@ class NormStart:
         half = (a.max(axis=0) - a.min(axis=0)) / 2.0
         if np.any(half <= 0):
             raise RefusedError(f"{XYZ[int(np.argmin(half))]} never changed: turn it both ways up, or give a start")
-        zero = (a.max(axis=0) + a.min(axis=0)) / 2.0
-        return cls(np.diag(gravity_m_s2 / half), zero, sigma_relative=0.3, sigma_bias_m_s2=3.0)
+        bias = (a.max(axis=0) + a.min(axis=0)) / 2.0
+        return cls(np.diag(gravity_m_s2 / half), bias, sigma_relative=0.3, sigma_bias_m_s2=3.0)

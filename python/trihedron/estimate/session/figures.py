@@ -87,12 +87,12 @@ def held_out(
     rests = core.without(np.concatenate([is_pose & is_of_fold, is_move & is_of_fold]), observed.force_origin)
     norm, norm_sigma = np.full(n, np.nan), np.full(n, np.nan)
     for fold, (S, b, _, covariance) in enumerate(rests[:n_folds]):
-        holds = np.arange(n) % n_folds == fold
+        poses = np.arange(n) % n_folds == fold
         residual, noise = norm_errors(observed, S, b - S @ observed.force_origin)
-        norm[holds] = residual[holds]
-        norm_sigma[holds] = np.sqrt(noise**2 + _of_model(observed, S, b, covariance))[holds]
-    number = {int(hold): k for k, hold in enumerate(measured.links[:, 0])}
-    which = np.array([number[int(hold)] for hold in observed.before], dtype=np.int64)
+        norm[poses] = residual[poses]
+        norm_sigma[poses] = np.sqrt(noise**2 + _of_model(observed, S, b, covariance))[poses]
+    number = {int(pose): k for k, pose in enumerate(measured.links[:, 0])}
+    which = np.array([number[int(pose)] for pose in observed.before], dtype=np.int64)
     models = [
         Linear(np.flatnonzero(np.arange(m) % n_folds == fold), S, b - S @ observed.force_origin, S_w)
         for fold, (S, b, S_w, _) in enumerate(rests[n_folds:])
