@@ -82,9 +82,9 @@ def _shaking(rng, t, rate, poses):
         if rng.random() > share:
             continue
         here = slice(first, last)
-        wander = 2 * np.pi * np.cumsum(rng.normal(size=last - first)) * 0.02 / np.sqrt(rate)
+        drift = 2 * np.pi * np.cumsum(rng.normal(size=last - first)) * 0.02 / np.sqrt(rate)
         beat = 1.0 + 0.2 * np.sin(2 * np.pi * rng.uniform(0.3, 1.5) * t[here] + rng.uniform(0, 6))
-        wave = np.sin(2 * np.pi * hz * rng.uniform(0.99, 1.01) * t[here] + wander)
+        wave = np.sin(2 * np.pi * hz * rng.uniform(0.99, 1.01) * t[here] + drift)
         edge = _smooth((t[here] - t[first]) / 0.1) * _smooth((t[last - 1] - t[here]) / 0.1)
         out[here] = size * rng.uniform(0.5, 1.5) * (edge * beat * wave)[:, None] * rng.normal(size=3) / np.sqrt(3.0)
         about = np.linalg.norm(rng.normal(size=3)) * rng.normal(size=3)

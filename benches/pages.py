@@ -54,9 +54,9 @@ def beside_a_tracker(folder: Path) -> tuple[str, str]:
     force = attitude.inv().apply([0.0, 0.0, 9.80665])
     gyro = rate * 1.01 + 0.004 + 2e-3 * rng.normal(size=rate.shape)
     accelerometer = force * 1.005 + 0.1 + 0.02 * rng.normal(size=force.shape)
-    wander = np.radians(0.1) * np.column_stack([np.sin(time / 5.0), np.cos(time / 7.0), 0.0 * time])
+    drift = np.radians(0.1) * np.column_stack([np.sin(time / 5.0), np.cos(time / 7.0), 0.0 * time])
     mounted = Rotation.from_rotvec([0.02, -0.03, 0.05])
-    seen = (Rotation.from_rotvec(wander) * attitude * mounted).as_quat()[:, [3, 0, 1, 2]]
+    seen = (Rotation.from_rotvec(drift) * attitude * mounted).as_quat()[:, [3, 0, 1, 2]]
     names = (folder / "rocked.csv", folder / "tracker.csv")
     log = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
     np.savetxt(names[0], np.column_stack([time, accelerometer, gyro]), "%.7g", ",", header=log, comments="")

@@ -42,7 +42,7 @@ pub fn first_clean(
 #[derive(Debug, Clone, Copy)]
 pub struct Edges<'a> {
     /// Variance of a mean over T seconds is `white / T + flicker + walk T / 3`: three rows.
-    pub law: &'a [f64],
+    pub noise: &'a [f64],
     /// Variance of rounding to the converter's step.
     pub rounding: &'a [f64],
     /// Seconds in a block.
@@ -95,7 +95,7 @@ pub fn ends_to_trim(rows: &[f64], bumps: &[[usize; 2]], edges: &Edges) -> (usize
         .map(|k| 1 << k)
         .take_while(|&size| size <= most)
         .collect();
-    let (white, slow) = edges.law.split_at(channels);
+    let (white, slow) = edges.noise.split_at(channels);
     let (flicker, walk) = slow.split_at(channels);
     let duration_s = core.len() as f64 * edges.step_s;
     let of_core = |c: usize| white[c] / duration_s + flicker[c] + walk[c] * duration_s / 3.0;

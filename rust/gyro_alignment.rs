@@ -1,13 +1,13 @@
 //! Method 2 for gyros: the rotation between still poses must carry one measured specific force into the other.
 //!
-//! For the move from hold `i` to hold `j`
+//! For the move from pose `i` to pose `j`
 //!
 //! ```text
 //! r = Tⱼᵀ (B(S_ω, z) f_i − f_j),      f = S_f a' + b_f                                      (5.7)
 //! ```
 //!
 //! `Tⱼ` spans the plane across `f_j`: the length of `f` belongs to the accelerometer, so a move carries rank-two
-//! information. `z` is the zero reading of the gyro, interpolated between the means of the two poses. The residuals are
+//! information. `z` is the bias of the gyro, interpolated between the means of the two poses. The residuals are
 //! weighed by their full covariance (5.8), in which neighbouring moves are correlated through the pose they share. With
 //! free accelerometer parameters the rows `|f_h| − |g|` of every pose join in, and the fit is the joint one. A given
 //! accelerometer with standard errors is held to them by rows of its own, which is to weigh its errors as noise that all
@@ -27,13 +27,13 @@ pub use stages::{Fit, Settings, fit};
 
 /// Means of one still pose.
 #[derive(Debug, Clone, Copy)]
-pub struct StillPose {
+pub struct Pose {
     /// Raw accelerometer mean.
     pub reading: Vector3<f64>,
     /// Variance of each component of that mean.
     pub var_reading: Vector3<f64>,
-    /// Raw gyro mean: the zero reading here.
-    pub zero: Vector3<f64>,
+    /// Raw gyro mean: the bias here.
+    pub bias: Vector3<f64>,
     /// Variance of each component of that mean.
     pub var_bias: Vector3<f64>,
 }
@@ -66,8 +66,8 @@ pub struct Model {
 #[derive(Debug, Clone)]
 pub struct Alignment {
     /// Still poses.
-    pub holds: Vec<StillPose>,
-    /// Which holds each move joins.
+    pub poses: Vec<Pose>,
+    /// Which poses each move joins.
     pub links: Vec<Link>,
     /// The moves.
     pub moves: Vec<PreparedMove>,
@@ -77,7 +77,7 @@ pub struct Alignment {
     pub gravity: f64,
     /// Noise of the integrated rate.
     pub noise: RateNoise,
-    /// Variance of the true change of the zero reading from hold to hold, raw unit².
+    /// Variance of the true change of the bias from pose to pose, raw unit².
     pub var_bias_walk: Vector3<f64>,
     /// Directions in `(S_f row by row, b_f)` that are free: `(12, k)`; no columns when the accelerometer is given.
     pub accelerometer_basis: DMatrix<f64>,
@@ -127,7 +127,7 @@ struct Evaluated {
 #[derive(Default)]
 struct LastTurns(RefCell<Option<TurnsAt>>);
 
-/// Scale and zero of a point, and the turns integrated there.
+/// Scale and bias of a point, and the turns integrated there.
 type TurnsAt = (Matrix3<f64>, Vector3<f64>, Rc<Vec<Turn>>);
 
 /// Residual of one move and everything it answers to, in three components.
@@ -152,14 +152,14 @@ impl Alignment {
                 self.used.len()
             )));
         }
-        let n = self.holds.len();
+        let n = self.poses.len();
         if let Some(link) = self
             .links
             .iter()
             .find(|link| link.before >= n || link.after >= n)
         {
             return Err(Error::bad_input(format!(
-                "a move joins holds {} and {}, but there are {n} holds",
+                "a move joins poses {} and {}, but there are {n} poses",
                 link.before, link.after
             )));
         }
@@ -244,9 +244,9 @@ impl Alignment {
 
     fn evaluate(&self, model: Model, last: &LastTurns) -> Evaluated {
         let forces = self
-            .holds
+            .poses
             .iter()
-            .map(|hold| model.accelerometer_scale * hold.reading + model.accelerometer_bias)
+            .map(|pose| model.accelerometer_scale * pose.reading + model.accelerometer_bias)
             .collect();
         let known = last.0.borrow().as_ref().and_then(|(scale, offset, turns)| {
             (*scale == model.gyroscope_scale && *offset == model.rate_offset)
@@ -266,7 +266,7 @@ impl Alignment {
     }
 
     fn integrate(&self, model: &Model) -> Vec<Turn> {
-        let bias = |hold: usize| model.rate_offset - model.gyroscope_scale * self.holds[hold].zero;
+        let bias = |pose: usize| model.rate_offset - model.gyroscope_scale * self.poses[pose].bias;
         let before: Vec<_> = self.links.iter().map(|link| bias(link.before)).collect();
         let after: Vec<_> = self.links.iter().map(|link| bias(link.after)).collect();
         integrate_all(
@@ -286,13 +286,13 @@ impl Alignment {
         let k = self.n_accelerometer();
         let mut jacobian = DMatrix::zeros(3, self.n_parameters());
         if k > 0 {
-            let wrt = turn.rotation * force_wrt_accelerometer(&self.holds[link.before].reading)
-                - force_wrt_accelerometer(&self.holds[link.after].reading);
+            let wrt = turn.rotation * force_wrt_accelerometer(&self.poses[link.before].reading)
+                - force_wrt_accelerometer(&self.poses[link.after].reading);
             jacobian
                 .columns_mut(0, k)
                 .copy_from(&(wrt * &self.accelerometer_basis));
         }
-        let (z0, z1) = (self.holds[link.before].zero, self.holds[link.after].zero);
+        let (z0, z1) = (self.poses[link.before].bias, self.poses[link.after].bias);
         for i in 0..3 {
             for j in 0..3 {
                 let theta = turn.wrt_scale.column(3 * i + j)
@@ -313,7 +313,7 @@ impl Alignment {
     }
 }
 
-/// Rows of the stacked residual: which hold or move they belong to.
+/// Rows of the stacked residual: which pose or move they belong to.
 #[derive(Debug, Clone, Copy)]
 enum Rows {
     /// A given accelerometer direction, in its standard errors: one row.

@@ -3,6 +3,7 @@
 //! No module here reads files, prints, or knows Python; `python` (feature `python`) is the only seam.
 //! Vocabulary: `S`, `b` are the direct form `f = S a' + b` (raw to SI), `Mz` is the instrument trihedron.
 
+pub mod adc_grid;
 pub mod allan;
 pub mod attitude;
 pub mod audit;
@@ -10,7 +11,6 @@ pub mod banded;
 pub mod bias_process;
 pub mod block_motion;
 pub mod chi_square;
-pub mod converter_grid;
 pub mod ellipsoid;
 pub mod error;
 pub mod first_look;
@@ -21,10 +21,10 @@ pub mod interrupt;
 pub mod joints;
 pub mod kalman;
 pub mod levels;
+pub mod mean_noise;
 pub mod move_moments;
 pub mod move_signals;
 pub mod noise_floor;
-pub mod noise_law;
 pub mod norm_invariant;
 pub mod number_text;
 pub mod order_statistics;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-/// `∫ f wᵀ dt` by trapezoids over every move, `f = S a + b` of the readings `a`, `w` the rate less the move's `zero`.
+/// `∫ f wᵀ dt` by trapezoids over every move, `f = S a + b` of the readings `a`, `w` the rate less the move's `bias`.
 /// Rows that are no numbers are passed over; `None` where fewer than two are left.
 #[must_use]
 pub fn moments(
@@ -11,14 +11,14 @@ pub fn moments(
     direct: (&Matrix3<f64>, &Vector3<f64>),
     rate: &[Vector3<f64>],
     moves: &[[usize; 2]],
-    zero: &[Vector3<f64>],
+    bias: &[Vector3<f64>],
 ) -> Vec<Option<Matrix3<f64>>> {
     let is_number = |v: &Vector3<f64>| v.iter().all(|value| value.is_finite());
-    let of_move = |(&[start, stop], zero): (&[usize; 2], &Vector3<f64>)| {
+    let of_move = |(&[start, stop], bias): (&[usize; 2], &Vector3<f64>)| {
         let mut sum = Matrix3::zeros();
         let (mut before, mut rows): (Option<(f64, Matrix3<f64>)>, usize) = (None, 0);
         for i in start..stop {
-            let (force, rate) = (direct.0 * reading[i] + direct.1, rate[i] - zero);
+            let (force, rate) = (direct.0 * reading[i] + direct.1, rate[i] - bias);
             if !(is_number(&force) && is_number(&rate)) {
                 continue;
             }
@@ -31,5 +31,5 @@ pub fn moments(
         }
         (rows > 1).then_some(sum)
     };
-    moves.iter().zip(zero).map(of_move).collect()
+    moves.iter().zip(bias).map(of_move).collect()
 }

@@ -95,8 +95,8 @@ def readings(rng, u, C, path):
     n = len(C) // STEP
     f, w = (x[: n * STEP].reshape(n, STEP, 3).mean(axis=1) for x in (f, w))
     dt = STEP / FINE_HZ
-    noise, wander = np.exp(rng.uniform(np.log([5e-5, 2e-6]), np.log([5e-4, 5e-5])))
-    bias = np.cumsum(wander * np.sqrt(dt) * rng.normal(size=(n, 3)), axis=0)
+    noise, drift = np.exp(rng.uniform(np.log([5e-5, 2e-6]), np.log([5e-4, 5e-5])))
+    bias = np.cumsum(drift * np.sqrt(dt) * rng.normal(size=(n, 3)), axis=0)
     felt = w if u.g_sensitivity is None else w + f @ u.g_sensitivity.T
     gyro = (felt + bias) @ u.M.T + u.c + noise / np.sqrt(dt) * rng.normal(size=(n, 3))
     return gyro, f @ u.N.T + u.d + 0.02 * rng.normal(size=(n, 3)), bias.mean(axis=0)

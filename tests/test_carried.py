@@ -38,7 +38,7 @@ def seen(segments, measured, truth, covariance=None):
 def test_two_turns_about_the_vertical_with_stamps_that_stray_have_no_negative_variance():
     _, segments, measured, truth = measured_session(1e-12)
     # Timestamps alone: an error along the axis turned about, which is the vertical, and none across it.
-    zero = np.zeros_like(measured.zero)
+    zero = np.zeros_like(measured.bias)
     alone = replace(measured, sigma_time_s=1e-3, var_bias=zero, var_reading=zero, noise_density=np.zeros(3))
     one = np.linspace(-1.0, 1.0, 9)
     out = seen(segments, alone, truth, np.outer(one, one))
@@ -50,7 +50,7 @@ def test_two_turns_about_the_vertical_with_stamps_that_stray_have_no_negative_va
 def test_variances_of_independent_causes_add_up():
     _, segments, measured, truth = measured_session()
     measured = replace(measured, sigma_time_s=1e-4)
-    zero = np.zeros_like(measured.zero)
+    zero = np.zeros_like(measured.bias)
     nothing = {"sigma_time_s": 0.0, "var_bias": zero, "var_reading": zero, "noise_density": np.zeros(3)}
     whole = seen(segments, measured, truth)
     parts = [seen(segments, replace(measured, **(nothing | {name: getattr(measured, name)})), truth)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trihedron.channel_facts.at_rest import converter_step, converter_steps
+from trihedron.channel_facts.at_rest import adc_step, adc_steps
 from trihedron.records import Recording
 
 SCALE = 9.80665 / 16384
@@ -30,22 +30,22 @@ def written(x, digits):
 @pytest.mark.parametrize("sigma", [0.05, 0.3, 3.0, 30.0])
 def test_the_step_is_found_in_counts_units_and_decimals_with_and_without_dither(seed, sigma):
     x = session(seed, sigma=sigma, amplitude=10.0 ** np.random.default_rng(seed).uniform(1.5, 4.3))
-    assert converter_step(np.round(x)) == 1.0
-    assert converter_step(16.0 * np.round(x / 16.0)) % 16.0 == 0.0
-    assert converter_step(SCALE * np.round(x)) == pytest.approx(SCALE, rel=1e-6)
-    assert converter_step(SCALE * np.round(x) - 9.12345) == pytest.approx(SCALE, rel=1e-6)
+    assert adc_step(np.round(x)) == 1.0
+    assert adc_step(16.0 * np.round(x / 16.0)) % 16.0 == 0.0
+    assert adc_step(SCALE * np.round(x)) == pytest.approx(SCALE, rel=1e-6)
+    assert adc_step(SCALE * np.round(x) - 9.12345) == pytest.approx(SCALE, rel=1e-6)
     # Two percent: digits have cut an eighth of a step off each of a few levels.
-    assert converter_step(written(x, 30)) == pytest.approx(SCALE, rel=0.02)
-    assert converter_step(written(x, 8)) == pytest.approx(SCALE, rel=0.02)
+    assert adc_step(written(x, 30)) == pytest.approx(SCALE, rel=0.02)
+    assert adc_step(written(x, 8)) == pytest.approx(SCALE, rel=0.02)
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_readings_on_no_grid_have_no_step_and_resampled_ones_none_that_matters(seed):
     x = session(seed, sigma=0.3)
-    assert converter_step(x) == 0.0
-    assert converter_step(x.astype(np.float32).astype(float)) < 1e-3  # the last bit of a float is a grid too
-    assert converter_step(np.interp(np.arange(8000) * 0.9771, np.arange(8000), np.round(x))) < 1e-2
-    assert converter_step(np.repeat(np.random.default_rng(seed).normal(size=6), 500)) == 0.0
+    assert adc_step(x) == 0.0
+    assert adc_step(x.astype(np.float32).astype(float)) < 1e-3  # the last bit of a float is a grid too
+    assert adc_step(np.interp(np.arange(8000) * 0.9771, np.arange(8000), np.round(x))) < 1e-2
+    assert adc_step(np.repeat(np.random.default_rng(seed).normal(size=6), 500)) == 0.0
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -54,27 +54,27 @@ def test_one_code_in_two_spellings_is_one_code(seed):
     codes = np.round(session(seed, sigma=3.0))
     single = codes.astype(np.float32) * np.float32(SCALE)
     mixed = np.where(rng.random(len(codes)) < 0.5, single.astype(float), codes * SCALE)
-    assert converter_step(mixed) == pytest.approx(SCALE, rel=1e-3)
+    assert adc_step(mixed) == pytest.approx(SCALE, rel=1e-3)
 
 
 def test_codes_that_were_not_visited_leave_the_step_as_it_is():
     rng = np.random.default_rng(3)
-    assert converter_step(rng.choice([0, 2, 5, 8, 10, 13, 15], 500) * 0.01) == pytest.approx(0.01)
+    assert adc_step(rng.choice([0, 2, 5, 8, 10, 13, 15], 500) * 0.01) == pytest.approx(0.01)
     codes = np.round(session(4, sigma=2.0))
-    assert converter_step(np.where(codes % 4 == 3, codes + 1, codes)) == 1.0
+    assert adc_step(np.where(codes % 4 == 3, codes + 1, codes)) == 1.0
     few = np.round(0.2 * rng.normal(size=3000))  # at rest: two or three codes
-    assert converter_step(0.02 * few) == pytest.approx(0.02)
-    assert converter_step(np.zeros(1000)) == 0.0
-    assert converter_step(np.where(rng.random(8000) < 0.3, np.nan, codes)) == 1.0
+    assert adc_step(0.02 * few) == pytest.approx(0.02)
+    assert adc_step(np.zeros(1000)) == 0.0
+    assert adc_step(np.where(rng.random(8000) < 0.3, np.nan, codes)) == 1.0
 
 
 def test_of_two_steps_in_one_log_the_one_of_most_parts_is_told_and_of_multiples_the_finer():
     x = session(5, sigma=0.3)
     fine, coarse = 0.0061, np.sqrt(5.0) / 230.0
     switched = np.where(np.arange(8000) < 3000, fine * np.round(x), coarse * np.round(x * fine / coarse))
-    assert converter_step(switched) == pytest.approx(coarse, rel=1e-3)
+    assert adc_step(switched) == pytest.approx(coarse, rel=1e-3)
     codes = np.round(x)
-    assert converter_step(np.where(np.arange(8000) < 3000, codes, 4.0 * np.round(codes / 4.0))) == 1.0
+    assert adc_step(np.where(np.arange(8000) < 3000, codes, 4.0 * np.round(codes / 4.0))) == 1.0
 
 
 def test_a_recording_carries_its_facts_and_another_has_its_own():
@@ -82,7 +82,7 @@ def test_a_recording_carries_its_facts_and_another_has_its_own():
     recording = Recording(np.arange(8000) / 100.0, counts, None, 100.0)
     assert recording.facts is recording.facts
     assert recording.facts.of("accelerometer").common_step == 1.0
-    np.testing.assert_array_equal(recording.facts.of("accelerometer").step, converter_steps(counts))
+    np.testing.assert_array_equal(recording.facts.of("accelerometer").step, adc_steps(counts))
     with pytest.raises(ValueError, match="no gyroscope"):
         recording.facts.of("gyroscope")
     scaled = replace(recording, accelerometer=counts * [0.5, 0.5, 0.25])

@@ -10,7 +10,7 @@ import trihedron
 from trihedron.diagnose.effects.table_tilt import _error_of_mean
 from trihedron.diagnose.residuals import goodness_of_fit
 from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
-from trihedron.diagnose.session.twin import STATIC_ACCEL, STATIC_GYRO
+from trihedron.diagnose.session.state import STATIC_ACCEL, STATIC_GYRO
 from trihedron.records import Pose
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
 
@@ -52,7 +52,7 @@ def test_a_zero_that_jumps_in_a_few_poses_is_found_and_a_pose_that_turns_is_not(
         force[500 * k + 250 : 500 * k + 500, 0] += 0.0
     found = jumps_in_poses(Poses(force, rate))
     assert found.p_value[1] < JUMPS
-    assert set(found.holds[1]) <= {3, 9, 14, 22, 27}
+    assert set(found.poses[1]) <= {3, 9, 14, 22, 27}
     moved = force.copy()
     for k in (3, 9, 14, 22, 27):
         moved[500 * k + 250 : 500 * k + 500, 0] += 1.0
@@ -96,7 +96,7 @@ def test_restless_poses_hide_neither_a_scatter_nor_the_g_sensitivity_beside_it()
 
 
 def test_an_effect_that_changes_one_sensor_inside_poses_leaves_the_other_judged(monkeypatch):
-    found = SimpleNamespace(p_value=(0.2, 0.3), ratio=(1.1, 1.2), holds=((), ()))
+    found = SimpleNamespace(p_value=(0.2, 0.3), ratio=(1.1, 1.2), poses=((), ()))
     monkeypatch.setattr(goodness_of_fit, "jumps_in_poses", lambda _obs: found)
     changed = np.zeros((2, 3))
     for force, rate, accel, gyro in ((changed, None, 1.0, 0.3), (None, changed, 0.2, 1.0), (None, None, 0.2, 0.3)):

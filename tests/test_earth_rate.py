@@ -5,7 +5,7 @@ import pytest
 
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.effects.earth_rate import EarthRate, latitudes_of, nearest_turning
-from trihedron.diagnose.session.twin import NO_DISTORTION
+from trihedron.diagnose.session.state import NO_DISTORTION
 from trihedron.gravity import EARTH_RATE_RAD_S, normal_gravity
 
 

@@ -34,12 +34,12 @@ def blocks(seed):
 
 def test_a_log_without_any_noise_has_no_floor_but_its_rounding():
     still = np.full((40, 3), 7.0), np.zeros((40, 3)), np.ones(40, dtype=bool), np.ones((40, 3), dtype=bool)
-    fast, _slow, limits, quiet, white, wander = _core.noise_floor(*still, np.zeros(3), LENGTH, (5, 10, 0.8), TAILS)
+    fast, _slow, limits, quiet, white, drift = _core.noise_floor(*still, np.zeros(3), LENGTH, (5, 10, 0.8), TAILS)
     assert quiet.all()
     assert not fast.any()
     assert limits == [0.0, 0.0]
     assert not white.any()
-    assert not wander.any()
+    assert not drift.any()
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (4, 6), (5, 1), (137, 6)])

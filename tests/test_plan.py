@@ -10,9 +10,9 @@ from trihedron.cli import main
 from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turn_design import (
     PlannedMove,
+    design_bias_first,
     design_least_squares,
     design_moves,
-    design_zero_first,
 )
 from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.records import Recording
@@ -21,14 +21,14 @@ N = math.radians(0.005)
 
 
 def test_one_turn_and_one_zero_turn_give_the_manuals_variance():
-    design = design_zero_first([0, 1, 2], [math.pi / 2] * 3, [2.0] * 3, 5.0, N)
+    design = design_bias_first([0, 1, 2], [math.pi / 2] * 3, [2.0] * 3, 5.0, N)
     by_hand = N * math.sqrt(2.0 * (1.0 + 2.0 / 5.0)) / (math.pi / 2)
     np.testing.assert_allclose(design.scale, by_hand, rtol=1e-12)
     # There and back the bias cancels, and both routes are one.
     pair = ([0, 0, 1, 1, 2, 2], [math.pi / 2, -math.pi / 2] * 3, [2.0] * 6, 5.0, N)
-    np.testing.assert_allclose(design_zero_first(*pair).scale, N * math.sqrt(2.0 / 2.0) / (math.pi / 2), rtol=1e-12)
-    np.testing.assert_allclose(design_least_squares(*pair).scale, design_zero_first(*pair).scale, rtol=1e-12)
-    assert design_least_squares(*pair).zero < design_zero_first(*pair).zero
+    np.testing.assert_allclose(design_bias_first(*pair).scale, N * math.sqrt(2.0 / 2.0) / (math.pi / 2), rtol=1e-12)
+    np.testing.assert_allclose(design_least_squares(*pair).scale, design_bias_first(*pair).scale, rtol=1e-12)
+    assert design_least_squares(*pair).bias < design_bias_first(*pair).bias
 
 
 def test_the_plan_is_what_the_calibration_says_of_itself():
@@ -50,7 +50,7 @@ def test_the_plan_is_what_the_calibration_says_of_itself():
     design = design_least_squares([0, 0, 1, 1, 2, 2], [math.pi / 2, -math.pi / 2] * 3, [2.0] * 6, 120.0, N)
     # The calibration measures N itself, from 240 blocks of half a second: to 3 %.
     np.testing.assert_allclose(np.diag(found.sigma_S), design.scale, rtol=0.12)
-    np.testing.assert_allclose(found.sigma_b, design.zero, rtol=0.12)
+    np.testing.assert_allclose(found.sigma_b, design.bias, rtol=0.12)
 
 
 def level_turns(stops):

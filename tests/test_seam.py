@@ -39,14 +39,14 @@ def some_number(rng: np.random.Generator) -> float:
 
 def some_array(rng: np.random.Generator, name: str, n: int) -> np.ndarray:
     """Mostly an array of the shape its name suggests, sometimes of any other shape, order, kind or content."""
-    triads = {"readings", "gyroscope", "vectors", "reading", "noise", "zero", "starts", "force", "rate", "signal"}
+    triads = {"readings", "gyroscope", "vectors", "reading", "noise", "bias", "starts", "force", "rate", "signal"}
     if rng.random() < 0.2:
         shape = tuple(rng.integers(0, 5, rng.integers(0, 4)))
     elif name in triads:
         shape = (n, 3)
     elif name.endswith("rotations"):
         shape = (n, 3, 3)
-    elif name in {"moves", "edges", "holds"}:
+    elif name in {"moves", "edges", "links"}:
         shape = (n, 2)
     elif "scale" in name or name in {"S", "accelerometer_basis"}:
         shape = (3, 3)

@@ -14,8 +14,8 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.hypothesis import Term, hypothesis
 from trihedron.diagnose.search import search, threshold
 from trihedron.diagnose.session.observations import observe
-from trihedron.diagnose.session.starting_point import start_twin
-from trihedron.diagnose.session.twin import contiguous, core_model, core_state
+from trihedron.diagnose.session.starting_point import start_state
+from trihedron.diagnose.session.state import contiguous, core_model, core_state
 from trihedron.segment import resegment, segment_recording
 from trihedron.session.noise import ANYTHING, coloured_variance
 from trihedron.simulate import hand_session, simulate
@@ -31,14 +31,14 @@ def fitted(effect_id="", seed=3, n_poses=20, **size):
     segments = segment_recording(recording)
     calibration = trihedron.calibrate(recording, segments=segments, gravity_m_s2=truth.gravity_m_s2).calibration
     obs = observe(recording, resegment(recording, segments))
-    return hypothesis(obs, start_twin(obs, calibration), None)
+    return hypothesis(obs, start_state(obs, calibration), None)
 
 
 def refitted(model, strengths):
     """The model's session without effects at given strengths."""
-    twin = model.fitted.twin
-    session = core_model(model.obs, twin.gravity, None, is_scatter_free=True)
-    return session.fit(state=core_state(twin), strengths=strengths, force_effect=None, rate_effect=None)
+    state = model.fitted.state
+    session = core_model(model.obs, state.gravity, None, is_scatter_free=True)
+    return session.fit(state=core_state(state), strengths=strengths, force_effect=None, rate_effect=None)
 
 
 def term(model, effect_id, label=""):

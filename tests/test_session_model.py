@@ -10,8 +10,8 @@ import pytest
 from trihedron import calibrate
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import folds_of, predict_held_out, tune_noise
-from trihedron.diagnose.session.starting_point import start_twin
-from trihedron.diagnose.session.twin import DYNAMICS, MOVES, NO_DISTORTION, core_model, core_state
+from trihedron.diagnose.session.starting_point import start_state
+from trihedron.diagnose.session.state import DYNAMICS, MOVES, NO_DISTORTION, core_model, core_state
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
@@ -34,7 +34,7 @@ def fitted_to(recording, gravity):
     )
     calibration = calibrate_joint(recording, segments, accelerometer, gravity, "test")
     obs = observe(recording, segments)
-    return tune_noise(obs, start_twin(obs, calibration), NO_DISTORTION, None), calibration
+    return tune_noise(obs, start_state(obs, calibration), NO_DISTORTION, None), calibration
 
 
 def scattered(recording, segments, sigma_raw, rng):
@@ -56,7 +56,7 @@ def test_a_zero_that_scatters_from_pose_to_pose_does_not_shrink_the_gyro():
             recording, segment_recording(recording), np.radians(0.1) / scale, np.random.default_rng(seed + 50)
         )
         fitted, _ = fitted_to(moved, truth.gravity_m_s2)
-        change.append(np.diag(fitted.twin.gyro_S) / np.diag(plain.twin.gyro_S) - 1.0)
+        change.append(np.diag(fitted.state.gyro_S) / np.diag(plain.state.gyro_S) - 1.0)
     # A zero wrong by 0.1 deg/s in half of a move of 2 s is 0.1 deg in 120 deg, 1e-3 a move and less over 17 moves;
     # shrinking, where it happened, was -5e-3 with one sign on every axis.
     assert abs(np.mean(change)) < 5e-4
@@ -70,7 +70,7 @@ def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_
     )
     fitted, _ = fitted_to(recording, 9.803)
     # imu_tk found 1.000 on the log's own unit; shrunk by its biases' scatter it was 0.816, moves 4.70 deg.
-    assert fitted.twin.gyro_S[0, 0] == pytest.approx(1.0, abs=0.01)
+    assert fitted.state.gyro_S[0, 0] == pytest.approx(1.0, abs=0.01)
     missed = np.linalg.norm(fitted.line.move_errors[0][:, :2], axis=1)
     assert np.degrees(np.sqrt(np.mean(np.square(missed))) / 9.803) < 0.35
     # The calibration is the same estimator's, and publishes what its own moves miss.
@@ -91,7 +91,7 @@ def test_two_samples_with_one_stamp_change_nothing_that_can_be_seen():
         fitted, _ = fitted_to(replace(recording, time_s=timestamps), truth.gravity_m_s2)
     sigma = np.sqrt(np.diag(plain.covariance()))[9:18]
     # One timestamp of a move of some hundred samples late by half a step: a fraction of the noise.
-    assert np.abs((fitted.twin.gyro_S - plain.twin.gyro_S).ravel() / sigma).max() < 1.0
+    assert np.abs((fitted.state.gyro_S - plain.state.gyro_S).ravel() / sigma).max() < 1.0
 
 
 def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_and_prediction():
@@ -133,10 +133,10 @@ def test_moves_that_are_believed_less_cost_their_normalisation():
     fitted, _ = fitted_to(recording, truth.gravity_m_s2)
     core = fitted.line.core
     moves = (fitted.system.domain == MOVES) | (fitted.system.domain == DYNAMICS)
-    session = core_model(fitted.line.obs, fitted.twin.gravity, fitted.line.prior)
+    session = core_model(fitted.line.obs, fitted.state.gravity, fitted.line.prior)
     gain = [
         session.fit(
-            state=core_state(fitted.twin), strengths=(*core.strengths[:3], (w, w)), force_effect=None, rate_effect=None
+            state=core_state(fitted.state), strengths=(*core.strengths[:3], (w, w)), force_effect=None, rate_effect=None
         ).log_marginal
         for w in (1.0, 3.0)
     ]

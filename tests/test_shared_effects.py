@@ -12,7 +12,7 @@ from diagnosed_session import simulated
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.hypothesis import Asked, Term
-from trihedron.diagnose.session.twin import Distortion
+from trihedron.diagnose.session.state import Distortion
 from trihedron.diagnose.shared import Information, agreement, together
 
 MASSIF = Path(__file__).parents[2] / "shared" / "data" / "getovermassif"

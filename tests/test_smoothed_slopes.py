@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from trihedron.diagnose.session.twin import smoothed_slope
+from trihedron.diagnose.session.state import smoothed_slope
 
 
 def exact(values, time_s, width):

@@ -107,7 +107,7 @@ def test_a_line_in_every_pose_is_interference(seed):
     assert named == ["periodic-interference"]
 
 
-def wanders(rng, t):
+def drifts(rng, t):
     return np.cumsum(rng.normal(size=len(t))) * 0.03
 
 
@@ -115,7 +115,7 @@ def sways(rng, t):
     return rng.uniform(0.2, 1.0) * np.sin(2.0 * np.pi * rng.uniform(0.002, 0.02) * t + rng.uniform(0.0, 6.0))
 
 
-@pytest.mark.parametrize("phase", [wanders, sways])
+@pytest.mark.parametrize("phase", [drifts, sways])
 def test_the_mean_beside_a_shaker_whose_frequency_wanders_is_known_and_its_error_is_right(phase):
     """Of 30 to 300 times the noise: the fit of steady lines knew the mean fifty times worse than white noise does."""
     rng, sigma, z, over_white = np.random.default_rng(5), 0.01, [], []

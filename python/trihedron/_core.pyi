@@ -207,7 +207,7 @@ def readings_near(
 
 # first look
 def levels_of(readings: FloatArray) -> tuple[FloatArray, int]: ...
-def converter_grid(levels: FloatArray, n: int) -> float | None: ...
+def adc_grid(levels: FloatArray, n: int) -> float | None: ...
 def window_statistics(
     readings: FloatArray, starts: npt.NDArray[np.int64], length: int
 ) -> tuple[FloatArray, FloatArray, FloatArray] | None: ...
@@ -220,7 +220,7 @@ def running_median(values: FloatArray, size: int) -> FloatArray: ...
 def ends_to_trim(
     rows: FloatArray,
     bumps: list[tuple[int, int]],
-    law: FloatArray,
+    noise: FloatArray,
     rounding: FloatArray,
     step_s: float,
     variances: FloatArray,
@@ -275,7 +275,7 @@ def motion_joints(
 def halves_of(
     blocks: FloatArray, stretches: npt.NDArray[np.int64]
 ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.int64], npt.NDArray[np.int64]]: ...
-def mean_noise_law(
+def mean_noise_terms(
     design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int]
 ) -> tuple[float, list[float]]: ...
 
@@ -415,7 +415,7 @@ class AlignmentPoses:
         *,
         reading: FloatArray,
         var_reading: FloatArray,
-        zero: FloatArray,
+        bias: FloatArray,
         var_bias: FloatArray,
         var_bias_walk: FloatArray,
     ) -> AlignmentPoses: ...
@@ -434,7 +434,7 @@ class Moves:
         gyroscope: FloatArray,
         edges: npt.NDArray[np.int64],
         anchors_s: FloatArray,
-        holds: npt.NDArray[np.int64],
+        links: npt.NDArray[np.int64],
         rate_degree: int,
         var_extra: FloatArray | None = None,
     ) -> Moves: ...
@@ -522,7 +522,7 @@ def simulate_convert(
     low: float,
     high: float,
     dead_band: float,
-    zero: Sequence[float],
+    bias: Sequence[float],
     missing_every: int,
 ) -> FloatArray: ...
 
@@ -695,7 +695,7 @@ def move_moments(
     direct_b: FloatArray,
     rate: FloatArray,
     moves: npt.NDArray[np.int64],
-    zero: FloatArray,
+    bias: FloatArray,
 ) -> list[FloatArray | None]: ...
 def play(path: FloatArray, half_width: float) -> FloatArray: ...
 def move_derivative(time_s: FloatArray, values: FloatArray, moves: npt.NDArray[np.int64]) -> FloatArray: ...

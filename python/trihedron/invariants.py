@@ -25,14 +25,14 @@ class Invariants:
     """``zero`` (3,) [SI] along each axis, ``log_scale`` (3,) ln of raw units per SI, ``angle`` (3,) [rad] between axes
     (1,2), (1,3), (2,3), ``axes`` (3, 3) rows n_i in the model's own frame."""
 
-    zero: FloatArray
+    bias: FloatArray
     log_scale: FloatArray
     angle: FloatArray
     axes: FloatArray
 
     def vector(self) -> FloatArray:
         """(9,) zero, log_scale, angle."""
-        return np.concatenate([self.zero, self.log_scale, self.angle])
+        return np.concatenate([self.bias, self.log_scale, self.angle])
 
 
 def invariants(S: FloatArray, b: FloatArray) -> Invariants:
@@ -188,10 +188,10 @@ def model_jacobian(numbers: FloatArray, anchor: Anchor) -> FloatArray:
     return np.column_stack(columns)
 
 
-def _direct(zero: FloatArray, log_scale: FloatArray, axes: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _direct(bias: FloatArray, log_scale: FloatArray, axes: FloatArray) -> tuple[FloatArray, FloatArray]:
     k = np.exp(log_scale)
     S = np.asarray(np.linalg.inv(k[:, None] * axes), dtype=np.float64)
-    b: FloatArray = -S @ (k * zero)
+    b: FloatArray = -S @ (k * bias)
     return S, b
 
 

@@ -1,6 +1,6 @@
 //! Covariance of the stacked residuals, and the residuals themselves.
 //!
-//! A move's own part is the noise of its integrated rate and the wandering of the zero reading between the poses; the
+//! A move's own part is the noise of its integrated rate and the drift of the bias between the poses; the
 //! means of the poses enter every row that used them, so neighbouring moves are correlated:
 //!
 //! ```text
@@ -24,7 +24,7 @@ pub(super) struct Layout {
 
 impl Layout {
     pub fn new(problem: &Alignment, at: &Evaluated) -> Self {
-        let mut moves_from: Vec<Vec<usize>> = vec![Vec::new(); problem.holds.len()];
+        let mut moves_from: Vec<Vec<usize>> = vec![Vec::new(); problem.poses.len()];
         for (index, link) in problem.links.iter().enumerate() {
             if problem.used[index] {
                 moves_from[link.before].push(index);
@@ -35,9 +35,9 @@ impl Layout {
             rows.extend((0..problem.n_accelerometer()).map(Rows::Given));
         }
         rows.extend((0..problem.n_offset_rows()).map(Rows::Offset));
-        for (hold, moves) in moves_from.iter().enumerate() {
+        for (pose, moves) in moves_from.iter().enumerate() {
             if problem.n_accelerometer() > 0 && !problem.is_accelerometer_given {
-                rows.push(Rows::Norm(hold));
+                rows.push(Rows::Norm(pose));
             }
             for &index in moves {
                 let to = at.forces[problem.links[index].after];
@@ -70,11 +70,11 @@ impl Layout {
                         .view_mut((offset, problem.n_accelerometer() + 9), (1, 3))
                         .copy_from(&white);
                 }
-                Rows::Norm(hold) => {
-                    let force = at.forces[*hold];
+                Rows::Norm(pose) => {
+                    let force = at.forces[*pose];
                     residual[offset] = force.norm() - problem.gravity;
                     let wrt = force.normalize().transpose()
-                        * force_wrt_accelerometer(&problem.holds[*hold].reading)
+                        * force_wrt_accelerometer(&problem.poses[*pose].reading)
                         * &problem.accelerometer_basis;
                     jacobian
                         .view_mut((offset, 0), (1, problem.n_accelerometer()))
@@ -160,15 +160,15 @@ impl Layout {
 
     /// The means of every pose and the rows they entered.
     fn sources(&self, problem: &Alignment, at: &Evaluated) -> Vec<Source> {
-        let mut readings: Vec<Source> = (0..problem.holds.len())
-            .map(|hold| Source {
-                var: problem.holds[hold].var_reading,
+        let mut readings: Vec<Source> = (0..problem.poses.len())
+            .map(|pose| Source {
+                var: problem.poses[pose].var_reading,
                 touched: Vec::new(),
             })
             .collect();
-        let mut zeros: Vec<Source> = (0..problem.holds.len())
-            .map(|hold| Source {
-                var: problem.holds[hold].var_bias,
+        let mut biases: Vec<Source> = (0..problem.poses.len())
+            .map(|pose| Source {
+                var: problem.poses[pose].var_bias,
                 touched: Vec::new(),
             })
             .collect();
@@ -176,9 +176,9 @@ impl Layout {
         for (block, row) in self.rows.iter().enumerate() {
             match row {
                 Rows::Given(_) | Rows::Offset(_) => {}
-                Rows::Norm(hold) => readings[*hold].touched.push((
+                Rows::Norm(pose) => readings[*pose].touched.push((
                     block,
-                    dynamic(&(at.forces[*hold].normalize().transpose() * scale)),
+                    dynamic(&(at.forces[*pose].normalize().transpose() * scale)),
                 )),
                 Rows::Move(index, plane) => {
                     let link = problem.links[*index];
@@ -191,16 +191,16 @@ impl Layout {
                     readings[link.after]
                         .touched
                         .push((block, dynamic(&(plane * -scale))));
-                    zeros[link.before]
+                    biases[link.before]
                         .touched
                         .push((block, dynamic(&(across * turn.wrt_bias_before * rate))));
-                    zeros[link.after]
+                    biases[link.after]
                         .touched
                         .push((block, dynamic(&(across * turn.wrt_bias_after * rate))));
                 }
             }
         }
-        readings.append(&mut zeros);
+        readings.append(&mut biases);
         readings.retain(|source| !source.touched.is_empty());
         readings
     }
@@ -237,7 +237,7 @@ fn add_block(c: &mut Banded, row: usize, column: usize, block: &DMatrix<f64>) {
 pub(super) fn own_covariance(problem: &Alignment, at: &Evaluated, index: usize) -> Matrix3<f64> {
     let turn = &at.turns[index];
     let wrt_angle = problem.move_row(at, index).wrt_angle;
-    // A zero reading that walks freely between the poses leaves the interpolated one, over the move's share Δ of the
+    // A bias that walks freely between the poses leaves the interpolated one, over the move's share Δ of the
     // span T, off by var(∫) = q² Δ² (1/4 − Δ/6T): a Brownian bridge, in which q² is the variance of the whole change.
     let share = (turn.duration_s / problem.moves[index].span_s()).clamp(0.0, 1.0);
     let rate = (turn.wrt_bias_before + turn.wrt_bias_after) * at.model.gyroscope_scale;
@@ -252,7 +252,7 @@ pub(super) fn own_covariance(problem: &Alignment, at: &Evaluated, index: usize) 
 pub(super) fn whole_covariance(problem: &Alignment, at: &Evaluated, index: usize) -> Matrix3<f64> {
     let link = problem.links[index];
     let turn = &at.turns[index];
-    let (before, after) = (&problem.holds[link.before], &problem.holds[link.after]);
+    let (before, after) = (&problem.poses[link.before], &problem.poses[link.after]);
     let scale = at.model.accelerometer_scale;
     let across = problem.move_row(at, index).wrt_angle * -1.0;
     let mut cov = own_covariance(problem, at, index);

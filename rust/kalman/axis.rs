@@ -21,7 +21,7 @@ pub struct Pose {
     /// Start of the pose, s.
     pub start: f64,
     /// Length of the pose, s.
-    pub hold: f64,
+    pub pose_s: f64,
     /// Variance on top of the noise model (a disturbed pose, an uncertain reference), raw².
     pub extra_variance: f64,
 }
@@ -154,8 +154,8 @@ impl AxisFilter {
         phi
     }
 
-    fn advance(&mut self, reference: [f64; 3], start: f64, hold: f64) -> Result<()> {
-        let gap = self.timeline.gap(start, hold)?;
+    fn advance(&mut self, reference: [f64; 3], start: f64, pose_s: f64) -> Result<()> {
+        let gap = self.timeline.gap(start, pose_s)?;
         if reference.iter().any(|f| !f.is_finite()) {
             return Err(Error::bad_input(format!(
                 "pose {}: the reference is not finite",
@@ -171,22 +171,22 @@ impl AxisFilter {
             row,
             ..
         } = self;
-        let step = steps.get(gap, hold, || {
-            let (phi_noise, q_noise) = shaping.step(gap, hold);
+        let step = steps.get(gap, pose_s, || {
+            let (phi_noise, q_noise) = shaping.step(gap, pose_s);
             let mut phi = DMatrix::identity(m, m);
             let mut q = DMatrix::zeros(m, m);
             phi.view_mut((0, 0), (k, k)).copy_from(&phi_noise);
             q.view_mut((0, 0), (k, k)).copy_from(&q_noise);
             for i in k..m {
-                q[(i, i)] = walk[i - k].powi(2) * (gap + hold);
+                q[(i, i)] = walk[i - k].powi(2) * (gap + pose_s);
             }
             Transition::new(&phi, &q)
         });
         filter.predict(step);
-        shaping.measurement_row(hold, &mut row[..k]);
+        shaping.measurement_row(pose_s, &mut row[..k]);
         row[k..k + 3].copy_from_slice(&reference);
         row[k + 3] = 1.0;
-        self.timeline.pass(start, hold);
+        self.timeline.pass(start, pose_s);
         Ok(())
     }
 
@@ -204,8 +204,8 @@ impl AxisFilter {
                 self.n_poses() + 1
             )));
         }
-        self.advance(pose.reference, pose.start, pose.hold)?;
-        let r = self.model.white_variance(pose.hold) + pose.extra_variance;
+        self.advance(pose.reference, pose.start, pose.pose_s)?;
+        let r = self.model.white_variance(pose.pose_s) + pose.extra_variance;
         let seen = self.filter.update(&self.row, pose.reading, r);
         Ok(AxisStep {
             innovation: seen.value,

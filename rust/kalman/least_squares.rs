@@ -83,15 +83,15 @@ pub fn noise_covariance(model: &ShapingModel, poses: &[Pose]) -> Result<DMatrix<
     let mut h = DVector::zeros(k);
     for (i, pose) in poses.iter().enumerate() {
         let gap = end.map_or(0.0, |e| pose.start - e);
-        if gap < -1e-6 * pose.hold {
+        if gap < -1e-6 * pose.pose_s {
             return Err(Error::bad_input(format!(
                 "pose {} is earlier than the one before it",
                 i + 1
             )));
         }
-        let (phi, q) = shaping.step(gap.max(0.0), pose.hold);
+        let (phi, q) = shaping.step(gap.max(0.0), pose.pose_s);
         p = &phi * p * phi.transpose() + q;
-        shaping.measurement_row(pose.hold, h.as_mut_slice());
+        shaping.measurement_row(pose.pose_s, h.as_mut_slice());
         let moved = seen.rows(0, i) * phi.transpose();
         seen.rows_mut(0, i).copy_from(&moved);
         let with_now = seen.rows(0, i) * &h;
@@ -100,9 +100,9 @@ pub fn noise_covariance(model: &ShapingModel, poses: &[Pose]) -> Result<DMatrix<
             c[(j, i)] = with_now[j];
         }
         let mine = &p * &h;
-        c[(i, i)] = h.dot(&mine) + model.white_variance(pose.hold) + pose.extra_variance;
+        c[(i, i)] = h.dot(&mine) + model.white_variance(pose.pose_s) + pose.extra_variance;
         seen.row_mut(i).copy_from(&mine.transpose());
-        end = Some(pose.start + pose.hold);
+        end = Some(pose.start + pose.pose_s);
     }
     Ok(c)
 }

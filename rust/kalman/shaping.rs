@@ -44,7 +44,7 @@ pub struct ShapingModel {
     pub ramp_damping: f64,
     /// Noise of one sample before the converter, u; zero where a reading is a single conversion.
     pub dither: f64,
-    /// Whether a reading is the mean over its hold (exact) or the value at its end (the article's 8 states).
+    /// Whether a reading is the mean over its pose (exact) or the value at its end (the article's 8 states).
     pub averages: bool,
 }
 
@@ -53,8 +53,8 @@ const GAUSS_MARKOV_PEAK: f64 = 0.381_138_658;
 
 /// Variance of the slowest and the fastest of several Gauss-Markov processes, over that of the others.
 ///
-/// With one process per decade from 0.3/T to 6/hold the Allan deviation then follows 0.664 B within 2 % between one hold
-/// and a third of the session T.
+/// With one process per decade from 0.3/T to 6/T_p (T_p: length of a pose) the Allan deviation then follows 0.664 B within 2 %
+/// between one pose and a third of the session T.
 const END_SHARE: f64 = 1.25;
 
 /// The continuous system behind a [`ShapingModel`], with states of unit amplitude: `n(t) = h·s`.
@@ -71,7 +71,7 @@ pub struct Shaping {
 /// Where each state of the discrete system lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    /// Whether state 0 is the running mean of the current hold.
+    /// Whether state 0 is the running mean of the current pose.
     pub averages: bool,
     /// Whether two states hold the quantisation errors at the end and the start of the pose.
     pub quantises: bool,
@@ -224,17 +224,17 @@ impl ShapingModel {
         })
     }
 
-    /// Variance of a reading over `hold` seconds that is white from pose to pose.
+    /// Variance of a reading over `pose_s` seconds that is white from pose to pose.
     #[must_use]
-    pub fn white_variance(&self, hold: f64) -> f64 {
+    pub fn white_variance(&self, pose_s: f64) -> f64 {
         let t = &self.terms;
-        t.white * t.white / hold + undithered_variance(t.resolution, self.dither)
+        t.white * t.white / pose_s + undithered_variance(t.resolution, self.dither)
     }
 
     /// Variance of a reading without the slow terms: white, rounding, and the quantisation errors at both ends.
     #[must_use]
-    pub fn fast_variance(&self, hold: f64) -> f64 {
-        self.white_variance(hold) + 2.0 * (self.terms.quantisation / hold).powi(2)
+    pub fn fast_variance(&self, pose_s: f64) -> f64 {
+        self.white_variance(pose_s) + 2.0 * (self.terms.quantisation / pose_s).powi(2)
     }
 }
 
@@ -249,7 +249,7 @@ impl Shaping {
         }
     }
 
-    /// Covariance of the noise states before the first hold.
+    /// Covariance of the noise states before the first pose.
     #[must_use]
     pub fn start(&self) -> DMatrix<f64> {
         let layout = self.layout();
@@ -265,7 +265,7 @@ impl Shaping {
     }
 
     /// Row of the measurement: how the reading of a pose depends on the noise states at its end.
-    pub fn measurement_row(&self, hold: f64, h: &mut [f64]) {
+    pub fn measurement_row(&self, pose_s: f64, h: &mut [f64]) {
         let layout = self.layout();
         h.fill(0.0);
         if layout.averages {
@@ -275,17 +275,17 @@ impl Shaping {
         }
         if layout.quantises {
             let q = usize::from(layout.averages);
-            h[q] = self.quantisation / hold;
-            h[q + 1] = -self.quantisation / hold;
+            h[q] = self.quantisation / pose_s;
+            h[q + 1] = -self.quantisation / pose_s;
         }
     }
 
-    /// Transition over a pause of `gap` seconds and the pose of `hold` seconds after it, exactly.
+    /// Transition over a pause of `gap` seconds and the pose of `pose_s` seconds after it, exactly.
     ///
-    /// During the hold the running mean `m' = h·s / hold` starts from zero. With no pause the quantisation error at
+    /// During the pose the running mean `m' = h·s / pose_s` starts from zero. With no pause the quantisation error at
     /// the start of this pose is the one at the end of the last: first differences, not independent errors.
     #[must_use]
-    pub fn step(&self, gap: f64, hold: f64) -> (DMatrix<f64>, DMatrix<f64>) {
+    pub fn step(&self, gap: f64, pose_s: f64) -> (DMatrix<f64>, DMatrix<f64>) {
         let layout = self.layout();
         let (n, s, k) = (layout.n(), layout.first_slow(), layout.n_slow);
         let mut phi = DMatrix::zeros(n, n);
@@ -295,10 +295,10 @@ impl Shaping {
             let mut f = DMatrix::zeros(k + 1, k + 1);
             let mut qc = DMatrix::zeros(k + 1, k + 1);
             f.view_mut((0, 1), (1, k))
-                .copy_from(&(self.h.transpose() / hold));
+                .copy_from(&(self.h.transpose() / pose_s));
             f.view_mut((1, 1), (k, k)).copy_from(&self.f);
             qc.view_mut((1, 1), (k, k)).copy_from(&self.qc);
-            let (phi_pose, q_pose) = discretise(&f, &qc, hold);
+            let (phi_pose, q_pose) = discretise(&f, &qc, pose_s);
             let from_slow = phi_pose.columns(1, k).into_owned();
             let phi_both = &from_slow * phi_gap;
             let q_both = &from_slow * q_gap * from_slow.transpose() + q_pose;
@@ -313,7 +313,7 @@ impl Shaping {
                 }
             }
         } else {
-            let (phi_both, q_both) = discretise(&self.f, &self.qc, gap + hold);
+            let (phi_both, q_both) = discretise(&self.f, &self.qc, gap + pose_s);
             phi.view_mut((s, s), (k, k)).copy_from(&phi_both);
             q.view_mut((s, s), (k, k)).copy_from(&q_both);
         }
@@ -321,7 +321,7 @@ impl Shaping {
             let e = usize::from(layout.averages);
             q[(e, e)] = 1.0;
             // Shorter than a millionth of the pose is no pause but the rounding of the clock.
-            if gap <= 1e-6 * hold {
+            if gap <= 1e-6 * pose_s {
                 phi[(e + 1, e)] = 1.0;
             } else {
                 q[(e + 1, e + 1)] = 1.0;

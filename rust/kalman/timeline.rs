@@ -23,35 +23,35 @@ impl Timeline {
         self.n_poses
     }
 
-    /// Pause before a pose of `hold` seconds from `start` on.
+    /// Pause before a pose of `pose_s` seconds from `start` on.
     ///
     /// # Errors
     /// When the pose is not a stretch of time, or starts before the last one ended.
-    pub fn gap(&self, start: f64, hold: f64) -> Result<f64> {
+    pub fn gap(&self, start: f64, pose_s: f64) -> Result<f64> {
         let pose = self.n_poses + 1;
-        if !(hold.is_finite() && hold > 0.0 && start.is_finite()) {
+        if !(pose_s.is_finite() && pose_s > 0.0 && start.is_finite()) {
             return Err(Error::bad_input(format!(
-                "pose {pose}: a hold needs a finite start and a positive length, got {start} s and {hold} s"
+                "pose {pose}: a pose needs a finite start and a positive length, got {start} s and {pose_s} s"
             )));
         }
         match self.end {
             None => Ok(0.0),
             Some(end) if start >= end => Ok(start - end),
-            Some(end) if end - start <= CLOCK_ROUNDING * hold => Ok(0.0),
+            Some(end) if end - start <= CLOCK_ROUNDING * pose_s => Ok(0.0),
             Some(end) => Err(Error::bad_input(format!(
-                "pose {pose} starts at {start} s, before the last hold ended at {end} s: give the poses in order of time"
+                "pose {pose} starts at {start} s, before the last pose ended at {end} s: give the poses in order of time"
             ))),
         }
     }
 
     /// Take the pose.
-    pub fn pass(&mut self, start: f64, hold: f64) {
-        self.end = Some(start + hold);
+    pub fn pass(&mut self, start: f64, pose_s: f64) {
+        self.end = Some(start + pose_s);
         self.n_poses += 1;
     }
 }
 
-/// Transitions by pause and hold.
+/// Transitions by pause and pose.
 #[derive(Debug, Clone, Default)]
 pub struct Steps {
     known: Vec<([u64; 2], Transition)>,
@@ -59,9 +59,9 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// The transition over `gap` and `hold`, made by `make` when it is not known yet.
-    pub fn get(&mut self, gap: f64, hold: f64, make: impl FnOnce() -> Transition) -> &Transition {
-        let key = [gap.to_bits(), hold.to_bits()];
+    /// The transition over `gap` and `pose_s`, made by `make` when it is not known yet.
+    pub fn get(&mut self, gap: f64, pose_s: f64, make: impl FnOnce() -> Transition) -> &Transition {
+        let key = [gap.to_bits(), pose_s.to_bits()];
         let is_latest = self.known.get(self.latest).is_some_and(|(k, _)| *k == key);
         if !is_latest {
             if let Some(found) = self.known.iter().position(|(k, _)| *k == key) {

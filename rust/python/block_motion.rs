@@ -19,7 +19,7 @@ fn wrong(what: &str) -> PyErr {
     PyValueError::new_err(what.to_owned())
 }
 
-/// Blocks to take off both ends of a pose of `rows` `(n, c)` without `bumps`: by the `law` `(3, c)` of a mean's noise, the
+/// Blocks to take off both ends of a pose of `rows` `(n, c)` without `bumps`: by the terms `noise` `(3, c)` of a mean, the
 /// variance of `rounding` `(c,)`, blocks of `step_s`, `variances` `(k, c)` of the means of 1, 2, 4 ... blocks, and the
 /// `limit` of the channels `is_live` `(c,)`.
 #[pyfunction]
@@ -31,7 +31,7 @@ fn ends_to_trim(
     py: Python<'_>,
     rows: PyReadonlyArray2<'_, f64>,
     bumps: Vec<[usize; 2]>,
-    law: PyReadonlyArray2<'_, f64>,
+    noise: PyReadonlyArray2<'_, f64>,
     rounding: PyReadonlyArray1<'_, f64>,
     step_s: f64,
     variances: PyReadonlyArray2<'_, f64>,
@@ -40,18 +40,18 @@ fn ends_to_trim(
 ) -> PyResult<(usize, usize)> {
     let channels = rows.shape()[1];
     let fits = channels > 0
-        && law.shape() == [3, channels]
+        && noise.shape() == [3, channels]
         && variances.shape()[1] == channels
         && rounding.len() == channels
         && is_live.len() == channels;
     if !fits {
         return Err(wrong("rows (n, c) and their noise (c,) do not fit"));
     }
-    let (rows, law, variances) = (flat2(&rows), flat2(&law), flat2(&variances));
+    let (rows, noise, variances) = (flat2(&rows), flat2(&noise), flat2(&variances));
     let (rounding, is_live) = (flat1(&rounding), flat1(&is_live));
     super::run(py, || {
         let edges = Edges {
-            law: &law,
+            noise: &noise,
             rounding: &rounding,
             step_s,
             variances: &variances,

@@ -5,11 +5,11 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{as_rows, flat1, flat3};
-use crate::{converter_grid as grid, first_look, levels, running};
+use crate::{adc_grid as grid, first_look, levels, running};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(levels_of, module)?)?;
-    module.add_function(wrap_pyfunction!(converter_grid, module)?)?;
+    module.add_function(wrap_pyfunction!(adc_grid, module)?)?;
     module.add_function(wrap_pyfunction!(window_statistics, module)?)?;
     module.add_function(wrap_pyfunction!(median_length, module)?)?;
     module.add_function(wrap_pyfunction!(block_mean_readings, module)?)?;
@@ -30,11 +30,7 @@ fn levels_of<'py>(
 
 /// The step of a grid on which all `levels` `(k,)`, ascending, of `n` readings lie.
 #[pyfunction]
-fn converter_grid(
-    py: Python<'_>,
-    levels: PyReadonlyArray1<'_, f64>,
-    n: usize,
-) -> PyResult<Option<f64>> {
+fn adc_grid(py: Python<'_>, levels: PyReadonlyArray1<'_, f64>, n: usize) -> PyResult<Option<f64>> {
     let levels = flat1(&levels);
     if !levels.is_sorted_by(|low, high| low < high) || levels.iter().any(|v| !v.is_finite()) {
         return Err(PyValueError::new_err("levels must be numbers and ascend"));

@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use super::arrays::{dmatrix, matrix, matrix3, of3, rows3, samples, vector3, vectors};
 use super::poisson::{RateNoise, ranges};
 use crate::gauss_newton::Loss;
-use crate::gyro_alignment::{Alignment, Fit, Link, Model, Settings, StillPose, fit};
+use crate::gyro_alignment::{Alignment, Fit, Link, Model, Pose, Settings, fit};
 use crate::poisson::{PreparedMove, RateModel, prepare_all};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -29,43 +29,43 @@ struct Moves {
     moves: Vec<PreparedMove>,
 }
 
-/// What was read at rest: means of both sensors with variances, and how zeros walk between poses.
+/// What was read at rest: means of both sensors with variances, and how biases walk between poses.
 #[pyclass(frozen, module = "trihedron._core")]
 struct AlignmentPoses {
-    holds: Vec<StillPose>,
+    poses: Vec<Pose>,
     var_bias_walk: Vector3<f64>,
 }
 
 #[pymethods]
 impl AlignmentPoses {
     #[new]
-    #[pyo3(signature = (*, reading, var_reading, zero, var_bias, var_bias_walk))]
+    #[pyo3(signature = (*, reading, var_reading, bias, var_bias, var_bias_walk))]
     fn new(
         reading: PyReadonlyArray2<'_, f64>,
         var_reading: PyReadonlyArray2<'_, f64>,
-        zero: PyReadonlyArray2<'_, f64>,
+        bias: PyReadonlyArray2<'_, f64>,
         var_bias: PyReadonlyArray2<'_, f64>,
         var_bias_walk: PyReadonlyArray1<'_, f64>,
     ) -> PyResult<Self> {
         let reading = rows3("reading", &reading)?;
         let var_reading = rows3("var_reading", &var_reading)?;
-        let zero = rows3("zero", &zero)?;
+        let bias = rows3("bias", &bias)?;
         let var_bias = rows3("var_bias", &var_bias)?;
         let n = reading.len();
         same_length(
             n,
             &[
                 ("var_reading", var_reading.len()),
-                ("zero", zero.len()),
+                ("bias", bias.len()),
                 ("var_bias", var_bias.len()),
             ],
         )?;
         Ok(Self {
-            holds: (0..n)
-                .map(|h| StillPose {
+            poses: (0..n)
+                .map(|h| Pose {
                     reading: reading[h],
                     var_reading: var_reading[h],
-                    zero: zero[h],
+                    bias: bias[h],
                     var_bias: var_bias[h],
                 })
                 .collect(),
@@ -122,7 +122,7 @@ struct AlignmentFit {
     stopped_because: &'static str,
 }
 
-fn links(array: &PyReadonlyArray2<'_, i64>) -> PyResult<Vec<Link>> {
+fn as_links(array: &PyReadonlyArray2<'_, i64>) -> PyResult<Vec<Link>> {
     if array.shape()[1] != 2 {
         return Err(PyValueError::new_err(format!(
             "links must have shape (m, 2), got ({}, {})",
@@ -132,7 +132,7 @@ fn links(array: &PyReadonlyArray2<'_, i64>) -> PyResult<Vec<Link>> {
     }
     let index = |value: i64| {
         usize::try_from(value)
-            .map_err(|_| PyValueError::new_err(format!("hold {value} does not exist")))
+            .map_err(|_| PyValueError::new_err(format!("pose {value} does not exist")))
     };
     array
         .as_array()
@@ -161,7 +161,7 @@ fn same_length(n: usize, pieces: &[(&str, usize)]) -> PyResult<()> {
 #[pymethods]
 impl Moves {
     #[new]
-    #[pyo3(signature = (time_s, gyroscope, edges, anchors_s, holds, rate_degree, var_extra=None))]
+    #[pyo3(signature = (time_s, gyroscope, edges, anchors_s, links, rate_degree, var_extra=None))]
     #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
@@ -169,7 +169,7 @@ impl Moves {
         gyroscope: PyReadonlyArray2<'_, f64>,
         edges: PyReadonlyArray2<'_, i64>,
         anchors_s: PyReadonlyArray2<'_, f64>,
-        holds: PyReadonlyArray2<'_, i64>,
+        links: PyReadonlyArray2<'_, i64>,
         rate_degree: u8,
         var_extra: Option<PyReadonlyArray2<'_, f64>>,
     ) -> PyResult<Self> {
@@ -179,8 +179,8 @@ impl Moves {
             .map(|array| rows3("var_extra", &array))
             .transpose()?;
         let ranges = ranges(&edges, &anchors_s)?;
-        let links = links(&holds)?;
-        same_length(ranges.len(), &[("holds", links.len())])?;
+        let links = as_links(&links)?;
+        same_length(ranges.len(), &[("links", links.len())])?;
         let moves = super::run(py, || {
             let model = RateModel::of_degree(rate_degree)?;
             prepare_all(&time_s, &raw, var_extra.as_deref(), &ranges, model)
@@ -227,7 +227,7 @@ impl Moves {
             )));
         }
         let problem = Alignment {
-            holds: poses.holds.clone(),
+            poses: poses.poses.clone(),
             links: self.links.clone(),
             moves: self.moves.clone(),
             used: samples(&used),

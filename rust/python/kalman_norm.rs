@@ -26,11 +26,11 @@ fn nine(name: &str, array: &PyReadonlyArray1<'_, f64>) -> PyResult<[f64; N_PARAM
     })
 }
 
-fn pose(reading: [f64; 3], start: f64, hold: f64, extra_variance: [f64; 3]) -> NormPose {
+fn pose(reading: [f64; 3], start: f64, pose_s: f64, extra_variance: [f64; 3]) -> NormPose {
     NormPose {
         reading,
         start,
-        hold,
+        pose_s,
         extra_variance,
     }
 }
@@ -108,9 +108,9 @@ impl NormKalman {
                 rows.len()
             )));
         }
-        let (t, hold) = (start_s.as_array(), pose_s.as_array());
+        let (t, pose_s) = (start_s.as_array(), pose_s.as_array());
         let poses: Vec<NormPose> = (0..rows.len())
-            .map(|i| pose(rows[i].into(), t[i], hold[i], extra[i].into()))
+            .map(|i| pose(rows[i].into(), t[i], pose_s[i], extra[i].into()))
             .collect();
         let filter = &mut self.inner;
         super::run_long(py, || filter.load(&poses))

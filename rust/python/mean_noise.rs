@@ -1,4 +1,4 @@
-//! Noise of means: what halves of stretches say of it, and the law by which it falls with their length, across the seam.
+//! Noise of means: what halves of stretches say of it, and how it falls with their length, across the seam.
 
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 
 use super::arrays::{as_rows, flat1, flat3};
 use crate::halves::halves;
-use crate::noise_law;
+use crate::mean_noise;
 
 /// Squares, blocks in a half, depth and stretch of each.
 type Differences<'py> = (
@@ -21,12 +21,12 @@ type Differences<'py> = (
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(halves_of, module)?)?;
-    module.add_function(wrap_pyfunction!(mean_noise_law, module)?)
+    module.add_function(wrap_pyfunction!(mean_noise_terms, module)?)
 }
 
-/// Deviance and non-negative terms of a choice of columns of the law of a mean's variance.
+/// Deviance and non-negative terms of a choice of columns of the variance of a mean.
 #[pyfunction]
-fn mean_noise_law(
+fn mean_noise_terms(
     py: Python<'_>,
     design: PyReadonlyArray2<'_, f64>,
     seen: PyReadonlyArray1<'_, f64>,
@@ -35,7 +35,9 @@ fn mean_noise_law(
 ) -> PyResult<(f64, [f64; 3])> {
     let design = flat3("design", &design)?;
     let (seen, n) = (flat1(&seen), flat1(&n));
-    let found = super::run(py, || noise_law::law(as_rows(&design), &seen, &n, &chosen))?;
+    let found = super::run(py, || {
+        mean_noise::terms(as_rows(&design), &seen, &n, &chosen)
+    })?;
     Ok((found.deviance, found.terms))
 }
 

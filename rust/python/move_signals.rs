@@ -115,8 +115,8 @@ fn move_shifted<'py>(
     out.as_flattened().to_pyarray(py).reshape([n, 3])
 }
 
-/// `∫ (S a + b) (w - zero)ᵀ dt` `(3, 3)` of readings `a` and rates `w` `(n, 3)` over each of the moves `(m, 2)`, with a
-/// `zero` `(m, 3)` each; nothing where fewer than two rows of a move are numbers.
+/// `∫ (S a + b) (w - bias)ᵀ dt` `(3, 3)` of readings `a` and rates `w` `(n, 3)` over each of the moves `(m, 2)`, with a
+/// `bias` `(m, 3)` each; nothing where fewer than two rows of a move are numbers.
 #[pyfunction]
 #[expect(
     clippy::too_many_arguments,
@@ -130,12 +130,12 @@ fn move_moments<'py>(
     direct_b: PyReadonlyArray1<'py, f64>,
     rate: PyReadonlyArray2<'py, f64>,
     moves: PyReadonlyArray2<'py, i64>,
-    zero: PyReadonlyArray2<'py, f64>,
+    bias: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Vec<Option<Array2<'py>>>> {
     let n = time_s.len();
-    if reading.shape()[0] != n || rate.shape()[0] != n || zero.shape()[0] != moves.shape()[0] {
+    if reading.shape()[0] != n || rate.shape()[0] != n || bias.shape()[0] != moves.shape()[0] {
         return Err(PyValueError::new_err(
-            "readings and rates (n, 3) belong to times (n,), and a zero to every move",
+            "readings and rates (n, 3) belong to times (n,), and a bias to every move",
         ));
     }
     let moves = edges(&moves, n)?;
@@ -144,7 +144,7 @@ fn move_moments<'py>(
         flat3("reading", &reading)?,
         flat3("rate", &rate)?,
     );
-    let zero = flat3("zero", &zero)?;
+    let biases = flat3("bias", &bias)?;
     let (scale, bias) = (matrix3("S", &direct_s)?, vector3("b", &direct_b)?);
     let found = super::run(py, || {
         let (reading, rate) = (as_vectors(&reading), as_vectors(&rate));
@@ -154,7 +154,7 @@ fn move_moments<'py>(
             (&scale, &bias),
             rate,
             &moves,
-            as_vectors(&zero),
+            as_vectors(&biases),
         ))
     })?;
     let array = |moment: &Option<_>| moment.as_ref().map(|one| of3(py, one)).transpose();

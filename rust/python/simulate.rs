@@ -334,7 +334,7 @@ fn simulate_convert<'py>(
     low: f64,
     high: f64,
     dead_band: f64,
-    zero: Sample,
+    bias: Sample,
     missing_every: u32,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let converter = Converter {
@@ -342,7 +342,7 @@ fn simulate_convert<'py>(
         low,
         high,
         dead_band,
-        zero,
+        bias,
         missing_every,
     };
     stage(py, &signal, |s| converter.convert(s))

@@ -1,4 +1,4 @@
-//! Rows of the processes behind the zeros (docs/model-session.md, 11.8).
+//! Rows of the processes behind the biases (docs/model-session.md, 11.8).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,7 +6,7 @@ use super::chain::{Layout, Rows};
 use super::rows::{Domain, Group, Kind};
 use super::{N_POSE_SCATTER, Session, State, Strengths};
 
-/// Standard error that holds the accelerometer's constant zero at nothing (it is `b`), in units of its noise of 1 s.
+/// Standard error that holds the accelerometer's constant bias at nothing (it is `b`), in units of its noise of 1 s.
 const PINNED: f64 = 1e-3;
 
 /// Processes of scatter: kind, number of the strength, axes.
@@ -35,7 +35,7 @@ impl Session {
             ),
             (self.rate.as_ref(), &state.pose_rate_bias, 2, Kind::RateWalk),
         ];
-        for (s, (sensor, zero, column, walk)) in sensors.into_iter().enumerate() {
+        for (s, (sensor, bias, column, walk)) in sensors.into_iter().enumerate() {
             let domain = [Domain::StaticForce, Domain::StaticRate][s];
             let Some(sensor) = sensor else {
                 pin_missing_gyro(layout, column, out);
@@ -44,9 +44,9 @@ impl Session {
             let own_column = [11, 8][s];
             let own = &state.own[s];
             if s == 0 {
-                // The accelerometer's constant zero is b itself.
+                // The accelerometer's constant bias is b itself.
                 let sigma = sensor.density.amax().max(f64::MIN_POSITIVE) * PINNED;
-                let residual = (zero[0] - own[0]) / sigma;
+                let residual = (bias[0] - own[0]) / sigma;
                 let mut group = Group::of(
                     DVector::from_column_slice(residual.as_slice()),
                     layout,
@@ -64,7 +64,7 @@ impl Session {
                 let gap = (self.time_s[i + 1] - self.time_s[i]).max(1e-3);
                 // K with N²/τ = K²τ/3 at the corner τ.
                 let sigma = sensor.density * (3.0 * gap).sqrt() / strengths.corner_s[s];
-                let change = zero[i + 1] - own[i + 1] - zero[i] + own[i];
+                let change = bias[i + 1] - own[i + 1] - bias[i] + own[i];
                 let mut group = Group::of(DVector::zeros(3), layout, i, domain, walk);
                 group.rows.next = DMatrix::zeros(3, layout.pose);
                 for c in 0..3 {

@@ -25,7 +25,7 @@ pub struct Move {
     pub rate: Vec<Vector3<f64>>,
     /// Raw force of each sample, centred.
     pub force: Vec<Vector3<f64>>,
-    /// Where each sample lies between the anchors of the zeros: 0 before, 1 after.
+    /// Where each sample lies between the anchors of the biases: 0 before, 1 after.
     pub fraction: Vec<f64>,
     /// Where each sample lies in the move: 0 at its first, 1 at its last.
     pub progress: Vec<f64>,
@@ -104,7 +104,7 @@ impl Move {
     }
 }
 
-/// Model values that a move needs: both sensors, zeros of its two poses, verticals, distortion of each sample.
+/// Model values that a move needs: both sensors, biases of its two poses, verticals, distortion of each sample.
 #[derive(Debug)]
 pub struct Sees<'a> {
     /// |g|.
@@ -115,9 +115,9 @@ pub struct Sees<'a> {
     pub force_bias: Vector3<f64>,
     /// Gyro `S`.
     pub rate_scale: Matrix3<f64>,
-    /// Raw zeros of the gyro in the poses before and after.
+    /// Raw biases of the gyro in the poses before and after.
     pub pose_rate_bias: [Vector3<f64>; 2],
-    /// Raw zeros of the accelerometer there.
+    /// Raw biases of the accelerometer there.
     pub pose_force_bias: [Vector3<f64>; 2],
     /// Verticals there.
     pub up: [Vector3<f64>; 2],
@@ -174,14 +174,14 @@ pub fn carry(one: &Move, sees: &Sees<'_>) -> Carried {
     let mut force = Vec::with_capacity(n);
     for k in 0..n {
         let x = one.fraction[k];
-        let zero = sees.pose_rate_bias[0] * (1.0 - x) + sees.pose_rate_bias[1] * x;
-        let mut w = sees.rate_scale * (one.rate[k] - zero);
+        let bias = sees.pose_rate_bias[0] * (1.0 - x) + sees.pose_rate_bias[1] * x;
+        let mut w = sees.rate_scale * (one.rate[k] - bias);
         if let Some(effect) = sees.rate_effect {
             w -= effect[k];
         }
         rate.push(w);
-        let zero = sees.pose_force_bias[0] * (1.0 - x) + sees.pose_force_bias[1] * x;
-        let mut f = sees.force_scale * (one.force[k] - zero) + sees.force_bias;
+        let bias = sees.pose_force_bias[0] * (1.0 - x) + sees.pose_force_bias[1] * x;
+        let mut f = sees.force_scale * (one.force[k] - bias) + sees.force_bias;
         if let Some(effect) = sees.force_effect {
             f -= effect[k];
         }

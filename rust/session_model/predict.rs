@@ -80,7 +80,7 @@ impl Fit {
     /// (accelerometer, gyro), and `b_ω` itself.
     ///
     /// # Errors
-    /// When a way in which the zeros may scatter leaves the session undetermined.
+    /// When a way in which the biases may scatter leaves the session undetermined.
     pub fn linear_covariance(
         &self,
         session: &Session,
@@ -92,13 +92,13 @@ impl Fit {
         let mut beyond = Matrix3::zeros();
         if let Some(one) = self.session_bias(session) {
             let scale = &self.state.rate_scale;
-            let zero = origins[1] + one.mean;
-            bias = -(scale * zero);
+            let center = origins[1] + one.mean;
+            bias = -(scale * center);
             beyond = scale * Matrix3::from_diagonal(&one.variance) * scale.transpose();
             for i in 0..3 {
                 for j in 0..3 {
                     map[(9 + 3 * i + j, 12 + 3 * i + j)] = 1.0;
-                    map[(9 + 3 * i + j, 21 + i)] = -zero[j];
+                    map[(9 + 3 * i + j, 21 + i)] = -center[j];
                     for (h, w) in one.weights.iter().enumerate() {
                         map[(layout.at(h) + 2 + j, 21 + i)] = -scale[(i, j)] * w[j];
                     }
@@ -191,11 +191,11 @@ impl Fit {
 /// (11.16b).
 fn force_map(state: &State, layout: Layout, origin: &Vector3<f64>, n: usize) -> DMatrix<f64> {
     let mut map = DMatrix::zeros(layout.n(), n);
-    let zero = origin + state.mean_pose_force_bias();
+    let bias = origin + state.mean_pose_force_bias();
     let share = 1.0 / layout.n_poses as f64;
     for (c, &(i, j)) in LOWER.iter().enumerate() {
         map[(c, 3 * i + j)] = 1.0;
-        map[(c, 9 + i)] -= zero[j];
+        map[(c, 9 + i)] -= bias[j];
         for h in 0..layout.n_poses {
             let at = layout.at(h);
             map[(at + 5 + j, 9 + i)] = -state.force_scale[(i, j)] * share;

@@ -1,28 +1,28 @@
-//! One zero of the gyro for a session of poses that differ (docs/model-session.md, 11.16).
+//! One bias of the gyro for a session of poses that differ (docs/model-session.md, 11.16).
 
 use nalgebra::Vector3;
 
 use super::fit::Fit;
 use super::{AtRest, Session};
 
-/// One zero for the session, raw and centred.
+/// One bias for the session, raw and centred.
 #[derive(Debug, Clone)]
 pub struct SessionBias {
     /// Weight of every pose.
     pub weights: Vec<Vector3<f64>>,
-    /// The zero.
+    /// The bias.
     pub mean: Vector3<f64>,
     /// Its variance by poses that differ beyond their noise.
     pub variance: Vector3<f64>,
 }
 
 impl Fit {
-    /// The session's one zero of the gyro: weights of the poses, raw mean, variance of it by poses that differ beyond
+    /// The session's one bias of the gyro: weights of the poses, raw mean, variance of it by poses that differ beyond
     /// their noise (11.16).
     #[must_use]
     pub fn session_bias(&self, session: &Session) -> Option<SessionBias> {
         let rate = session.rate.as_ref()?;
-        let (weights, spread) = pooled(rate, &self.read_zeros(rate));
+        let (weights, spread) = pooled(rate, &self.read_biases(rate));
         let mut mean = Vector3::zeros();
         let mut variance = Vector3::zeros();
         for (w, z) in weights.iter().zip(&self.state.pose_rate_bias) {
@@ -37,7 +37,7 @@ impl Fit {
     }
 
     /// What each pose reads less what effects add there.
-    fn read_zeros(&self, rate: &AtRest) -> Vec<Vector3<f64>> {
+    fn read_biases(&self, rate: &AtRest) -> Vec<Vector3<f64>> {
         let effects = super::Distortion::at(
             self.distortion.rate.as_ref(),
             self.distortion.k,
@@ -55,12 +55,12 @@ impl Fit {
     }
 }
 
-/// A spread of the zeros counts when χ² exceeds its degrees of freedom by four of its standard deviations.
+/// A spread of the biases counts when χ² exceeds its degrees of freedom by four of its standard deviations.
 const BEYOND_CHANCE: f64 = 4.0;
 
-/// Random-effects weights of zero readings and the variance between them (`DerSimonian` and Laird 1986), axis by axis.
-fn pooled(rate: &AtRest, zeros: &[Vector3<f64>]) -> (Vec<Vector3<f64>>, Vector3<f64>) {
-    let n = zeros.len();
+/// Random-effects weights of biases and the variance between them (`DerSimonian` and Laird 1986), axis by axis.
+fn pooled(rate: &AtRest, biases: &[Vector3<f64>]) -> (Vec<Vector3<f64>>, Vector3<f64>) {
+    let n = biases.len();
     let mut weights = vec![Vector3::zeros(); n];
     let mut spread = Vector3::zeros();
     for axis in 0..3 {
@@ -68,13 +68,13 @@ fn pooled(rate: &AtRest, zeros: &[Vector3<f64>]) -> (Vec<Vector3<f64>>, Vector3<
         let total: f64 = precision.iter().sum();
         let mean = precision
             .iter()
-            .zip(zeros)
+            .zip(biases)
             .map(|(p, z)| p * z[axis])
             .sum::<f64>()
             / total;
         let chi2: f64 = precision
             .iter()
-            .zip(zeros)
+            .zip(biases)
             .map(|(p, z)| p * (z[axis] - mean).powi(2))
             .sum();
         let dof = n as f64 - 1.0;

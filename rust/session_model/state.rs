@@ -29,11 +29,11 @@ pub struct State {
     pub rate_scale: Matrix3<f64>,
     /// Vertical in the body, unit.
     pub up: Vec<Vector3<f64>>,
-    /// Raw zero of the gyro in each pose.
+    /// Raw bias of the gyro in each pose.
     pub pose_rate_bias: Vec<Vector3<f64>>,
-    /// Raw zero of the accelerometer in each pose, beside `b`.
+    /// Raw bias of the accelerometer in each pose, beside `b`.
     pub pose_force_bias: Vec<Vector3<f64>>,
-    /// The share of either zero that is one pose's alone (accelerometer, gyro); zero without scatter.
+    /// The share of either bias that is one pose's alone (accelerometer, gyro); zero without scatter.
     pub own: [Vec<Vector3<f64>>; 2],
     /// Effect parameters.
     pub effect: DVector<f64>,
@@ -99,11 +99,11 @@ impl State {
         out
     }
 
-    /// Mean of the accelerometer's raw zeros over the poses, without what is one pose's alone.
+    /// Mean of the accelerometer's raw biases over the poses, without what is one pose's alone.
     #[must_use]
     pub fn mean_pose_force_bias(&self) -> Vector3<f64> {
         let all = self.pose_force_bias.iter().zip(&self.own[0]);
-        all.map(|(zero, own)| zero - own).sum::<Vector3<f64>>() / self.pose_force_bias.len() as f64
+        all.map(|(bias, own)| bias - own).sum::<Vector3<f64>>() / self.pose_force_bias.len() as f64
     }
 
     /// Accelerometer `b`, on centred readings, with one bias for the session (docs/model-session.md, 11.16b).

@@ -54,10 +54,10 @@ pub struct Converter {
     pub low: f64,
     /// Highest code.
     pub high: f64,
-    /// Half-width of the dead band around `zero`: readings inside come out as `zero`.
+    /// Half-width of the dead band around `bias`: readings inside come out as `bias`.
     pub dead_band: f64,
     /// Reading of each channel at zero input.
-    pub zero: Sample,
+    pub bias: Sample,
     /// Every so many codes one is never given, the one below is given instead; 0: none is missing.
     pub missing_every: u32,
 }
@@ -80,8 +80,8 @@ impl Converter {
         signal.par_iter_mut().with_min_len(1 << 14).for_each(|row| {
             for k in 0..3 {
                 let mut value = row[k];
-                if (value - self.zero[k]).abs() < self.dead_band {
-                    value = self.zero[k];
+                if (value - self.bias[k]).abs() < self.dead_band {
+                    value = self.bias[k];
                 }
                 value = value.clamp(self.low, self.high);
                 if self.lsb > 0.0 {

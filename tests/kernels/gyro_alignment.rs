@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use trihedron::banded::Banded;
-use trihedron::gyro_alignment::{Alignment, Link, Model, Settings, StillPose, fit, tangent_plane};
+use trihedron::gyro_alignment::{Alignment, Link, Model, Pose, Settings, fit, tangent_plane};
 use trihedron::poisson::{MoveRange, RateModel, RateNoise, prepare_all};
 use trihedron::rotation::exp;
 
@@ -16,13 +16,13 @@ fn session(turns: &[Vector3<f64>], start: Vector3<f64>) -> Alignment {
     let (steps, h) = (200, 0.01);
     let (mut time, mut raw, mut ranges) = (Vec::new(), Vec::new(), Vec::new());
     let mut force = start;
-    let pose = |force: Vector3<f64>| StillPose {
+    let pose = |force: Vector3<f64>| Pose {
         reading: force,
         var_reading: Vector3::repeat(1e-6),
-        zero: Vector3::zeros(),
+        bias: Vector3::zeros(),
         var_bias: Vector3::repeat(1e-10),
     };
-    let mut holds = vec![pose(force)];
+    let mut poses = vec![pose(force)];
     for turn in turns {
         let first = raw.len();
         for k in 0..=steps {
@@ -39,7 +39,7 @@ fn session(turns: &[Vector3<f64>], start: Vector3<f64>) -> Alignment {
             anchor_after_s: raw.len() as f64 * h + 1.0,
         });
         force = exp(&-turn) * force;
-        holds.push(pose(force));
+        poses.push(pose(force));
     }
     let links = (0..turns.len())
         .map(|i| Link {
@@ -48,7 +48,7 @@ fn session(turns: &[Vector3<f64>], start: Vector3<f64>) -> Alignment {
         })
         .collect();
     Alignment {
-        holds,
+        poses,
         links,
         moves: prepare_all(&time, &raw, None, &ranges, RateModel::Coning).expect("valid moves"),
         used: vec![true; turns.len()],

@@ -190,7 +190,7 @@ fn a_converter_rounds_clips_skips_codes_and_sleeps_in_its_dead_band() {
         low: -4.0,
         high: 4.0,
         dead_band: 0.8,
-        zero: [0.0, 1.0, 0.0],
+        bias: [0.0, 1.0, 0.0],
         missing_every: 5,
     };
     let mut x = one_channel([0.6, 1.1, 2.4, 2.6, 9.0, -9.0].into_iter());

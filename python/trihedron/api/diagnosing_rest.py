@@ -77,10 +77,10 @@ def _turns(recording: Recording, segments: Segments) -> int:
     scale = rate_to_si(recording.gyroscope_unit)
     if recording.gyroscope is None or scale is None or segments.gyroscope_mean is None:
         return 0
-    zero = segments.gyroscope_mean.mean(axis=0)
+    bias = segments.gyroscope_mean.mean(axis=0)
     step = 1.0 / recording.rate_hz
     turned = [
-        float(np.linalg.norm(np.nansum(recording.gyroscope[m.start : m.stop] - zero, axis=0))) * scale * step
+        float(np.linalg.norm(np.nansum(recording.gyroscope[m.start : m.stop] - bias, axis=0))) * scale * step
         for m in segments.moves
     ]
     return sum(angle > TURNED_RAD for angle in turned)
@@ -102,10 +102,10 @@ def _nominal(recording: Recording, segments: Segments, gravity_m_s2: float) -> L
     if recording.gyroscope is None:
         return LinearModel(MappingProxyType(accelerometer), None)
     rate = rate_to_si(recording.gyroscope_unit) or 1.0
-    zero = -rate * np.nanmedian(recording.gyroscope, axis=0)
+    bias = -rate * np.nanmedian(recording.gyroscope, axis=0)
     gyroscope = {
-        "S": (rate * np.eye(3)).tolist(), "b": zero.tolist(), "sigma_S": (rate * off).tolist(),
-        "sigma_b": np.abs(zero).tolist(), "raw_unit": recording.gyroscope_unit.value,
+        "S": (rate * np.eye(3)).tolist(), "b": bias.tolist(), "sigma_S": (rate * off).tolist(),
+        "sigma_b": np.abs(bias).tolist(), "raw_unit": recording.gyroscope_unit.value,
     }  # fmt: skip
     return LinearModel(MappingProxyType(accelerometer), MappingProxyType(gyroscope))
 

@@ -11,7 +11,7 @@ from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
 from trihedron.channel_facts.at_rest import SHORTEST as SHORTEST_POSE
 from trihedron.errors import RefusedError
-from trihedron.estimate.kalman.identified import check_same_converter, check_same_gravity, noise_from_identified
+from trihedron.estimate.kalman.identified import check_same_adc, check_same_gravity, noise_from_identified
 from trihedron.estimate.kalman.norm_invariant import NormFrame
 from trihedron.estimate.kalman.session import calibrate_session, calibrate_session_without_references
 from trihedron.estimate.noise.identify import identify_noise
@@ -89,7 +89,7 @@ def kalman(
     given, noted, identified = _settle_noise(noise, recording)
     segments = segments_of(segments, recording, progress)
     if identified is not None and isinstance(given, Sequence):
-        _check_converter(given, recording, segments)
+        _check_adc(given, recording, segments)
     outcome: KalmanCalibration | NormKalmanCalibration
     if table is None:
         outcome = calibrate_session_without_references(
@@ -132,7 +132,7 @@ def _settle_noise(
     return noise, (), None
 
 
-def _check_converter(given: Sequence[AxisNoise], recording: Recording, segments: Segments) -> None:
+def _check_adc(given: Sequence[AxisNoise], recording: Recording, segments: Segments) -> None:
     """Refuse the noise of a static log that another ADC wrote."""
     readings = recording.accelerometer
     if readings is None or not segments.poses:
@@ -144,7 +144,7 @@ def _check_converter(given: Sequence[AxisNoise], recording: Recording, segments:
     # Codes between the poses count too: inside a hold a coarse ADC shows one.
     steps = recording.facts.of("accelerometer").step.tolist()
     octaves = [axis.octaves for axis in inside]
-    check_same_converter(given, steps, octaves, recording.rate_hz, recording.source)
+    check_same_adc(given, steps, octaves, recording.rate_hz, recording.source)
 
 
 def _identify(rest: Recording) -> Noise:

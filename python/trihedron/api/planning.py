@@ -11,9 +11,9 @@ from trihedron.errors import RefusedError
 from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
 from trihedron.estimate.gyroscope.turn_design import (
     PlannedMove,
+    design_bias_first,
     design_least_squares,
     design_moves,
-    design_zero_first,
 )
 from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan, PoseWorth, TurnPlan
 from trihedron.units import STANDARD_GRAVITY_M_S2, m_s2_from_micro_g, radians_from_degrees
@@ -68,7 +68,7 @@ def plan(
     angles = [radians_from_degrees(angle) for angle in turns_deg if angle != 0.0] * 3
     axes = [axis for axis in range(3) for angle in turns_deg if angle != 0.0]
     arguments = (axes, angles, [turn_s] * len(angles), pose_s, gyroscope_density, sigma_turn_rad)
-    both, first = design_least_squares(*arguments), design_zero_first(*arguments)
+    both, first = design_least_squares(*arguments), design_bias_first(*arguments)
     sigma = accelerometer_density / math.sqrt(pose_s) / gravity_m_s2
     angle_noise = math.hypot(math.sqrt(2.0) * sigma, gyroscope_density * math.sqrt(turn_s))
     return ExperimentPlan(
@@ -83,9 +83,9 @@ def plan(
             duration_s=turn_s,
             static_s=pose_s,
             scale=float(both.scale.max()),
-            bias=both.zero,
+            bias=both.bias,
             scale_bias_first=float(first.scale.max()),
-            bias_bias_first=first.zero,
+            bias_bias_first=first.bias,
         ),
         poses=tuple(_poses(name, sigma, gravity_m_s2) for name in POSE_SETS),
         moves=_moves(angle_noise),

@@ -38,8 +38,8 @@ def path_of(
     assert recording.gyroscope is not None
     if S is None or stop - start < 4 or segments.gyroscope_mean is None:
         return None
-    zero = 0.5 * (segments.gyroscope_mean[before] + segments.gyroscope_mean[after])
-    rate = (recording.gyroscope[start:stop] - zero) @ S.T
+    bias = 0.5 * (segments.gyroscope_mean[before] + segments.gyroscope_mean[after])
+    rate = (recording.gyroscope[start:stop] - bias) @ S.T
     steps = np.diff(recording.time_s[start : stop + 1], append=recording.time_s[stop - 1])[: len(rate), None]
     pieces = np.array_split(np.nan_to_num(rate * steps), min(len(rate), 60))
     return np.array([piece.sum(axis=0) for piece in pieces])

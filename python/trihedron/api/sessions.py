@@ -175,7 +175,7 @@ def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str)
         group,
         numbers_of(accel.S, accel.b, S_g, b_g, anchor),
         0.5 * (covariance + covariance.T),
-        _wander(result, len(covariance)),
+        _bias_drift(result, len(covariance)),
         recording.start_epoch_s,
         temperature,
         (low, high),
@@ -197,7 +197,7 @@ def _excess(sensor: SensorCalibration) -> float:
     return max(1.0, float(np.median(z**2)) / MEDIAN_CHI2) if len(z) > 3 else 1.0
 
 
-def _wander(result: CalibrationResult, n: int) -> FloatArray:
+def _bias_drift(result: CalibrationResult, n: int) -> FloatArray:
     """Variance (n,) by which zeros of a session like this differ from one to the next (eq. 9.3)."""
     out = np.zeros(n)
     accel, gyro, segments = result.accelerometer, result.gyroscope, result.segments
@@ -209,12 +209,12 @@ def _wander(result: CalibrationResult, n: int) -> FloatArray:
             noise = quality.sigma**2 / max(quality.covariance_scale, 1.0)
             out[:3] = _shared(quality.residual, noise, np.einsum("ij,ij->i", up[1:], up[:-1]))
     if gyro is not None and segments.gyroscope_mean is not None and segments.gyroscope_sigma_mean is not None:
-        zeros = segments.gyroscope_mean @ gyro.S.T
+        biases = segments.gyroscope_mean @ gyro.S.T
         noise = (segments.gyroscope_sigma_mean**2) @ (gyro.S**2).T
-        is_seen = np.all(np.isfinite(zeros) & np.isfinite(noise), axis=1)
+        is_seen = np.all(np.isfinite(biases) & np.isfinite(noise), axis=1)
         if is_seen.sum() > 3:
-            zeros, noise = zeros[is_seen] - zeros[is_seen].mean(axis=0), noise[is_seen]
-            each = [_shared(zeros[:, k], noise[:, k], np.ones(len(zeros) - 1)) for k in range(3)]
+            biases, noise = biases[is_seen] - biases[is_seen].mean(axis=0), noise[is_seen]
+            each = [_shared(biases[:, k], noise[:, k], np.ones(len(biases) - 1)) for k in range(3)]
             out[9:12] = np.mean(each)
     return out
 

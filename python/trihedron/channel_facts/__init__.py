@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts.at_rest import converter_steps
+from trihedron.channel_facts.at_rest import adc_steps
 from trihedron.channel_facts.limits import Extremes, find_limits
 from trihedron.channel_facts.quiet import Windows, look
 from trihedron.records.channel_facts import ChannelFacts, RecordingFacts
@@ -28,7 +28,7 @@ def facts_in(
     """The same of sensors (n, 3) by name whose quiet windows, and perhaps extremes, are known."""
     facts: dict[str, ChannelFacts] = {}
     for name, readings in sensors.items():
-        step = converter_steps(readings)
+        step = adc_steps(readings)
         noise = np.zeros(3) if windows is None else windows.quiet_noise(name)
         facts[name] = ChannelFacts(step, noise, find_limits(readings, noise, step, (extremes or {}).get(name)))
     return RecordingFacts(facts.get("accelerometer"), facts.get("gyroscope"))

@@ -21,7 +21,7 @@ from trihedron.transforms import cosine_transform
 PROBED = 1 << 14
 """Readings, evenly spread over a channel, whose values are looked at: sorting them takes half a millisecond."""
 TESTABLE = 8
-"""Gaps within reach, of many, that are evidence (``rust/converter_grid.rs``, where the grid's own limits stand)."""
+"""Gaps within reach, of many, that are evidence (``rust/adc_grid.rs``, where the grid's own limits stand)."""
 REPEATS = 2
 """Readings must repeat where they are few, so many times a value."""
 PARTS = 8
@@ -38,7 +38,7 @@ def probe_stride(n: int) -> int:
     return max(1, -(-n // PROBED))
 
 
-def converter_step(readings: FloatArray) -> float:
+def adc_step(readings: FloatArray) -> float:
     """Spacing of the grid on which readings (n,) lie, in their unit; 0 where they lie on none that can be seen.
 
     Readings in counts, in units converted from counts, and decimals as written are told alike. Without a code between
@@ -49,7 +49,7 @@ def converter_step(readings: FloatArray) -> float:
     --------
     >>> import numpy as np
     >>> noise = np.random.default_rng(1).normal(size=2000)
-    >>> converter_step(0.25 * np.round(2.0 * noise)), converter_step(noise)
+    >>> adc_step(0.25 * np.round(2.0 * noise)), adc_step(noise)
     (0.25, 0.0)
     """
     seen = np.ascontiguousarray(probe(readings))
@@ -63,14 +63,14 @@ def converter_step(readings: FloatArray) -> float:
     return float(np.median(steps)) if steps and all(steps) else 0.0
 
 
-def converter_steps(readings: FloatArray) -> FloatArray:
+def adc_steps(readings: FloatArray) -> FloatArray:
     """The same of every column of (n, c), (c,)."""
-    return np.array([converter_step(column) for column in readings.T], dtype=np.float64)
+    return np.array([adc_step(column) for column in readings.T], dtype=np.float64)
 
 
 def _grid(levels: FloatArray, n: int) -> float:
     """The step of a grid on which all ``levels`` (k,) of ``n`` readings lie, 0 where they lie on none."""
-    return _core.converter_grid(levels, n) or 0.0
+    return _core.adc_grid(levels, n) or 0.0
 
 
 SHORTEST = 32
@@ -99,7 +99,7 @@ class AxisAtRest:
         parts = [run for start, stop in poses for run in _unbroken(x[start:stop])]
         if not parts:
             raise RefusedError(f"{name}: no pose has {SHORTEST} readings in a row; keep the sensor still for longer")
-        step = converter_step(np.concatenate(parts))
+        step = adc_step(np.concatenate(parts))
         power = _Power.of(parts)
         keep = robust_poses(power.variance, power.dof)
         parts = [part for part, kept in zip(parts, keep, strict=True) if kept]

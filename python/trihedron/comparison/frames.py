@@ -203,10 +203,10 @@ def carried_gravity(recording: Recording, segments: Segments) -> CarriedGravity 
     attitude = Rotation.identity()
     carried, misses = [np.array([0.0, 0.0, 1.0])], []
     for move in segments.moves:
-        zero = 0.5 * (still[move.pose_before] + still[move.pose_after])
+        bias = 0.5 * (still[move.pose_before] + still[move.pose_after])
         part = slice(move.start, move.stop)
         step = np.gradient(recording.time_s[part])[:, None] if move.stop - move.start > 1 else 0.0
-        turns = (recording.gyroscope[part] - zero) * scale * step
+        turns = (recording.gyroscope[part] - bias) * scale * step
         if not np.isfinite(turns).all():
             return None
         body = world = Rotation.identity()

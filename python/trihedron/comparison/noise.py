@@ -301,10 +301,10 @@ def _octaves(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float
     corners = [one.corner_hz.lower for one in (m, r) if one.corner_hz is not None]
     there = {o.low_hz: o for o in m.octaves}
     for octave in r.octaves:
-        twin = there.get(octave.low_hz)
-        if twin is None or not (twin.density.value > 0.0 and octave.density.value > 0.0):
+        other = there.get(octave.low_hz)
+        if other is None or not (other.density.value > 0.0 and octave.density.value > 0.0):
             continue
-        ratio = ratio_of(twin.density, octave.density)
+        ratio = ratio_of(other.density, octave.density)
         beyond = ratio.value / white.value**2
         is_far = max(beyond, 1.0 / beyond) > LEAST_OCTAVE_RATIO**2
         is_off = ratio.p_value < alpha and not ratio.lower < white.value**2 < ratio.upper
@@ -314,7 +314,7 @@ def _octaves(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float
         name = "accelerometer" if sensor == "accelerometer" else "gyro"
         remark = f"Noise of the {name} {axis.upper()} at {band} is {math.sqrt(ratio.value):.3g} times the recording's."
         yield NoiseDifference(
-            sensor, axis, "octave", math.sqrt(twin.density.value), math.sqrt(octave.density.value),
+            sensor, axis, "octave", math.sqrt(other.density.value), math.sqrt(octave.density.value),
             math.sqrt(ratio.value), (math.sqrt(ratio.lower), math.sqrt(ratio.upper)),
             f"{'m/s^2' if sensor == 'accelerometer' else 'rad/s'}/sqrt(Hz)", ratio.p_value,
             bool(is_far and is_off), remark if is_far and is_off else "", (octave.low_hz, octave.high_hz),

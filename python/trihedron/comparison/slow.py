@@ -94,11 +94,11 @@ def slow_noise(model: Side, recording: Side, *, alpha: float) -> tuple[NoiseDiff
     """
     out: list[NoiseDifference] = []
     # A free curve through a simulation's zeros is no mechanism: its walk is. A recording's may be one.
-    zeros = gyro_biases(*model, with_curve=True), gyro_biases(*recording, with_curve=_has_curve(model[0]))
+    biases = gyro_biases(*model, with_curve=True), gyro_biases(*recording, with_curve=_has_curve(model[0]))
     rate_hz = model[1].rate_hz
-    if zeros[0] and zeros[1]:
+    if biases[0] and biases[1]:
         is_open = _drifts(recording[0], "gyroscope", but_curve=_has_curve(model[0]))
-        out += _rows("gyroscope", compare_slow(*zeros), rate_hz, alpha, is_open=is_open)
+        out += _rows("gyroscope", compare_slow(*biases), rate_hz, alpha, is_open=is_open)
     has_curve = _has_curve(model[0], "accelerometer")
     norms = accel_norms(*model, with_curve=True), accel_norms(*recording, with_curve=has_curve)
     if norms[0] is not None and norms[1] is not None:

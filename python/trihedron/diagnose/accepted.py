@@ -133,8 +133,8 @@ def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[dic
         extra: dict[str, Any] = {}
         curves: tuple[EffectCurve, ...] = ()
         if one.effect.walks:
-            twin, obs = model.fitted.twin, model.obs
-            path = twin.accel_bias if one.effect.sensor == 0 else twin.gyro_bias
+            state, obs = model.fitted.state, model.obs
+            path = state.accel_bias if one.effect.sensor == 0 else state.gyro_bias
             extra["curve"] = {
                 "time_s": obs.pose_time_s.tolist(), "value": path.T.tolist(),
                 "sigma": [[float(s)] * obs.n_poses for s in one.std], "unit": one.effect.unit,

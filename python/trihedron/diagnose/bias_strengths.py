@@ -122,8 +122,8 @@ def _times_error(model: Hypothesis, effect: BiasProcess) -> float:
     sensor, scatter = effect.sensor, model.strengths[1]
     if not effect.walks:
         return float(max(scatter[1:] if sensor else scatter[:1]))
-    twin = model.fitted.twin
-    path = (twin.accel_bias, twin.gyro_bias)[sensor]
+    state = model.fitted.state
+    path = (state.accel_bias, state.gyro_bias)[sensor]
     unit = _units(model)[sensor] * model.context.si_per_raw(("accelerometer", "gyroscope")[sensor])
     return float(np.sqrt(np.mean(path.var(axis=0)) / np.mean(unit**2))) if model.obs.n_poses else 0.0
 
@@ -142,8 +142,8 @@ def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArra
         raw = (scatter[1:] if effect.sensor else scatter[0]) * _units(model)[effect.sensor]
         size = raw * model.context.si_per_raw(sensor)
         return size, size / np.sqrt(2.0 * max(n - 1, 1))
-    twin = model.fitted.twin
-    path = twin.accel_bias if effect.sensor == 0 else twin.gyro_bias
+    state = model.fitted.state
+    path = state.accel_bias if effect.sensor == 0 else state.gyro_bias
     obs = model.obs
     sigma = obs.pose_force_sigma if effect.sensor == 0 else obs.pose_rate_sigma
     assert sigma is not None

@@ -13,7 +13,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
-from trihedron.diagnose.session.twin import smoothed_slope
+from trihedron.diagnose.session.state import smoothed_slope
 
 TEMPERATURE_WINDOW_S = 10.0
 """Over which a logged temperature is smoothed before its rate of change is taken: its steps are a tenth of a kelvin."""
@@ -93,24 +93,24 @@ class Context:
     @cached_property
     def gravity_in_moves(self) -> FloatArray:
         """(points, 3) minus gravity in the body, carried by the gyro from each move's start; the force in holds."""
-        path, twin, h = self.fitted.line.path, self.fitted.twin, self.obs.n_poses
+        path, state, h = self.fitted.line.path, self.fitted.state, self.obs.n_poses
         out = self.force.copy()
         for where, (before, _) in zip(self.moves, self.obs.move_poses, strict=True):
-            out[where] = twin.gravity * path.attitude[where.start - h : where.stop - h] @ twin.up[before]
+            out[where] = state.gravity * path.attitude[where.start - h : where.stop - h] @ state.up[before]
         return out
 
     # -- sensor axes ----------------------------------------------------------------------------------------------
     @cached_property
     def accel_axes(self) -> FloatArray:
         """(3, 3) columns: change of corrected force when accelerometer j alone reads 1 m/s² more along its own axis."""
-        S = self.fitted.twin.accel_S
+        S = self.fitted.state.accel_S
         out: FloatArray = S * np.linalg.norm(np.linalg.inv(S), axis=1)
         return out
 
     @cached_property
     def gyro_axes(self) -> FloatArray:
         """(3, 3) columns: the same for gyros."""
-        S = self.fitted.twin.gyro_S
+        S = self.fitted.state.gyro_S
         out: FloatArray = S * np.linalg.norm(np.linalg.inv(S), axis=1)
         return out
 
@@ -142,10 +142,10 @@ class Context:
     @cached_property
     def history(self) -> FloatArray:
         """(n, 3) specific force along each accelerometer's axis at every sample: the fitted pose in holds."""
-        obs, twin = self.obs, self.fitted.twin
-        force = obs.raw_force @ twin.accel_S.T + twin.accel_b
-        for i, hold in enumerate(obs.segments.poses):
-            force[hold.start : hold.stop] = twin.gravity * twin.up[i]
+        obs, state = self.obs, self.fitted.state
+        force = obs.raw_force @ state.accel_S.T + state.accel_b
+        for i, pose in enumerate(obs.segments.poses):
+            force[pose.start : pose.stop] = state.gravity * state.up[i]
         finite = np.where(np.isfinite(force), force, 0.0)
         out: FloatArray = finite @ np.linalg.inv(self.accel_axes).T
         return out
@@ -193,7 +193,7 @@ class Context:
     @cached_property
     def pose_power(self) -> FloatArray:
         """(poses, 3) variance of the accelerometer inside each pose, SI², along the instrument axes."""
-        obs, S = self.obs, self.fitted.twin.accel_S
+        obs, S = self.obs, self.fitted.state.accel_S
         out: FloatArray = np.einsum("ij,hjk,ik->hi", S, obs.pose_scatter, S)
         for i in np.flatnonzero(np.isnan(out).any(axis=1)):
             out[i] = np.nanvar(obs.raw_force[obs.segments.poses[i].samples()] @ S.T, axis=0)
@@ -201,8 +201,8 @@ class Context:
 
     def si_per_raw(self, sensor: str) -> FloatArray:
         """(3,) size of one raw unit along each axis of the ``"accelerometer"`` or ``"gyroscope"``, SI."""
-        twin = self.fitted.twin
-        S = twin.accel_S if sensor == "accelerometer" else twin.gyro_S
+        state = self.fitted.state
+        S = state.accel_S if sensor == "accelerometer" else state.gyro_S
         out: FloatArray = 1.0 / np.linalg.norm(np.linalg.inv(S), axis=1)
         return out
 
@@ -214,10 +214,10 @@ class Context:
         made good by the ratio that the shaken holds show.
         """
         obs = self.obs
-        holds = self.pose_power
-        floor = np.quantile(holds, 0.1, axis=0)
+        poses = self.pose_power
+        floor = np.quantile(poses, 0.1, axis=0)
         out = np.zeros((self.n_points, 3))
-        out[: obs.n_poses] = np.maximum(holds - floor, 0.0)
+        out[: obs.n_poses] = np.maximum(poses - floor, 0.0)
         width = max(round(VIBRATION_WINDOW_S * obs.recording.rate_hz), 7) | 1
 
         # What a parabola by least squares has in the middle (the filter of Savitzky and Golay).
@@ -230,11 +230,11 @@ class Context:
             return np.asarray(uniform_filter1d(away**2, width, axis=0, mode="nearest"))
 
         inside = np.array(
-            [rough(obs.raw_force[hold.start : hold.stop] @ self.fitted.twin.accel_S.T).mean(axis=0)
-             for hold in obs.segments.poses]
+            [rough(obs.raw_force[pose.start : pose.stop] @ self.fitted.state.accel_S.T).mean(axis=0)
+             for pose in obs.segments.poses]
         )  # fmt: skip
         quiet = np.quantile(inside, 0.1, axis=0)
-        passed = (inside - quiet).sum() / max(float((holds - floor).sum()), 1e-300)
+        passed = (inside - quiet).sum() / max(float((poses - floor).sum()), 1e-300)
         for where in self.moves:
             out[where] = np.maximum(rough(self.force[where]) - quiet, 0.0) / np.clip(passed, 0.1, 1.0)
         return out
@@ -255,7 +255,7 @@ class Context:
 
         Holds that no chain of moves reaches keep NaN.
         """
-        obs, twin, path = self.obs, self.fitted.twin, self.fitted.line.path
+        obs, state, path = self.obs, self.fitted.state, self.fitted.line.path
         out = np.full((obs.n_poses, 3, 3), np.nan)
 
         def levelled(x_guess: FloatArray, up: FloatArray) -> FloatArray:
@@ -263,7 +263,7 @@ class Context:
             x /= np.linalg.norm(x)
             return np.stack([x, np.cross(up, x), up], axis=1)
 
-        up = twin.up
+        up = state.up
         out[0] = levelled(np.eye(3)[np.abs(up[0]).argmin()], up[0])
         for where, (before, after) in zip(self.moves, obs.move_poses, strict=True):
             if np.isfinite(out[before]).all():
@@ -274,12 +274,12 @@ class Context:
     @cached_property
     def noise_floor(self) -> npt.NDArray[np.float64]:
         """(2, 3) white noise of one sample, SI: accelerometer, gyro."""
-        obs, twin = self.obs, self.fitted.twin
+        obs, state = self.obs, self.fitted.state
         root_rate = np.sqrt(obs.recording.rate_hz)
         out = np.zeros((2, 3))
-        out[0] = np.sqrt((twin.accel_S**2) @ obs.force_density**2) * root_rate
+        out[0] = np.sqrt((state.accel_S**2) @ obs.force_density**2) * root_rate
         if obs.rate_density is not None:
-            out[1] = np.sqrt((twin.gyro_S**2) @ obs.rate_density**2) * root_rate
+            out[1] = np.sqrt((state.gyro_S**2) @ obs.rate_density**2) * root_rate
         return out
 
 

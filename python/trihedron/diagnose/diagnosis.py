@@ -18,16 +18,16 @@ from trihedron.diagnose.effects.sample_steps import step_errors
 from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_error
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.relation_records import records
-from trihedron.diagnose.residuals.creep import settling, with_settling
 from trihedron.diagnose.residuals.effect_curves import residuals_before_after, with_covariance
 from trihedron.diagnose.residuals.goodness_of_fit import hidden_biases, judge_rows, judge_timing
+from trihedron.diagnose.residuals.settling import settling, with_settling
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
 from trihedron.diagnose.sample_evidence import Observed, look
 from trihedron.diagnose.search import Found, search, with_shapes
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
-from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_twin
-from trihedron.diagnose.session.twin import NO_DISTORTION, Prior, Twin
+from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_state
+from trihedron.diagnose.session.state import NO_DISTORTION, Prior, SessionState
 from trihedron.diagnose.shared import shared_effects
 from trihedron.errors import RefusedError
 from trihedron.records import Calibration, Recording, Segments
@@ -121,7 +121,7 @@ def diagnosed(
     if not 0.0 < alpha < LARGEST_ALPHA:
         raise RefusedError(f"alpha is a small probability such as 0.01, got {alpha}")
     obs = observe(recording, segments, calibration.averaging)
-    start = start_twin(obs, calibration)
+    start = start_state(obs, calibration)
     prior = prior_of(obs, calibration) if calibration_is_given else None
     if prior is None and is_open(calibration):
         start, prior = nominal_start(obs, calibration)
@@ -158,19 +158,19 @@ def diagnosed(
 
 def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
     """White noise, and what the bias does, of both sensors."""
-    twin, obs = model.fitted.twin, model.obs
+    state, obs = model.fitted.state, model.obs
     accel, gyro = hidden_biases(model.fitted)
     return MappingProxyType(
         {
-            "accelerometer_density": np.sqrt((twin.accel_S**2) @ obs.force_density**2).tolist(),
+            "accelerometer_density": np.sqrt((state.accel_S**2) @ obs.force_density**2).tolist(),
             "accelerometer_unit": "m/s^2/sqrt(Hz)",
-            "accelerometer_corner_s": twin.strengths[0][0],
+            "accelerometer_corner_s": state.strengths[0][0],
             "accelerometer_bias": asdict(accel),
             "gyroscope_density": None
             if obs.rate_density is None
-            else np.sqrt((twin.gyro_S**2) @ obs.rate_density**2).tolist(),
+            else np.sqrt((state.gyro_S**2) @ obs.rate_density**2).tolist(),
             "gyroscope_unit": "rad/s/sqrt(Hz)",
-            "gyroscope_corner_s": twin.strengths[0][1],
+            "gyroscope_corner_s": state.strengths[0][1],
             "gyroscope_bias": None if gyro is None else asdict(gyro),
         }
     )
@@ -189,9 +189,9 @@ class _Run:
     asked: dict[str, BiasStrength]
 
 
-def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell: Progress) -> _Run:
+def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, tell: Progress) -> _Run:
     tell(0.05, "fitting the session")
-    predicted = _with_creep(tune_noise(obs, start, NO_DISTORTION, prior), start, prior)
+    predicted = _with_settling(tune_noise(obs, start, NO_DISTORTION, prior), start, prior)
     context = Context(predicted.line.obs, predicted)
     tell(0.2, "looking at the samples")
     observed, known = look(Observed(predicted.line.obs, predicted), context, alpha, start, prior)
@@ -222,14 +222,14 @@ LOUD: Strengths = ((2.0, 2.0), (5.0,) * 4, (1.0, 1.0), (5.0, 5.0))
 
 
 def _searched(observed: Observed, prior: Prior | None, alpha: float) -> tuple[Hypothesis, Found]:
-    first = hypothesis(observed.obs, replace(observed.fitted.twin, effect=np.zeros(0)), prior)
+    first = hypothesis(observed.obs, replace(observed.fitted.state, effect=np.zeros(0)), prior)
     # From quiet noise and from loud: what strengths explain may have another optimum.
-    loud = hypothesis(observed.obs, first.fitted.twin, prior, strengths=LOUD)
+    loud = hypothesis(observed.obs, first.fitted.state, prior, strengths=LOUD)
     bare = max(first, loud, key=lambda one: one.log_evidence)
     return bare, search(bare, alpha)
 
 
-def _with_creep(predicted: Fit, start: Twin, prior: Prior | None) -> Fit:
+def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None) -> Fit:
     """The session with rates at rest and moves that allow for poses which turn while they settle, where they do."""
     rates = [one for one in judge_rows(predicted, CREEP_ALPHA) if one.domain == "static-gyro"]
     if not any(one.disagrees for one in rates):

@@ -13,16 +13,16 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out
-from trihedron.diagnose.session.twin import (
+from trihedron.diagnose.session.state import (
     Distortion,
     Linearisation,
     Prior,
-    Twin,
+    SessionState,
     contiguous,
     core_model,
     core_state,
     stacked,
-    twin_of,
+    state_of,
 )
 from trihedron.session.noise import ANYTHING, NO_SCATTER, START_STRENGTHS, Bounds, Strengths
 from trihedron.threads import side_by_side
@@ -136,7 +136,7 @@ class Hypothesis:
         covariance = self.fitted.covariance()
         n, at = self.fitted.n_effect, self.span(k)
         own = covariance[len(covariance) - n :, len(covariance) - n :]
-        return self.fitted.twin.effect[at], own[at, at]
+        return self.fitted.state.effect[at], own[at, at]
 
 
 def _columns(terms: Sequence[Term]) -> list[tuple[FloatArray | None, FloatArray | None, list[float]]]:
@@ -145,7 +145,7 @@ def _columns(terms: Sequence[Term]) -> list[tuple[FloatArray | None, FloatArray 
 
 def hypothesis(
     obs: Observations,
-    start: Twin,
+    start: SessionState,
     prior: Prior | None,
     terms: Sequence[Term] = (),
     within: Bounds = ANYTHING,
@@ -160,16 +160,16 @@ def hypothesis(
         state=core_state(start), strengths=strengths, force_effect=contiguous(distortion.force),
         rate_effect=contiguous(distortion.rate), within=within, sizes=sizes.tolist(),
     )  # fmt: skip
-    twin = twin_of(core, start.gravity)
-    fitted = Fit(twin, Linearisation(obs, twin, distortion, prior, core), has_free_strengths=True)
+    state = state_of(core, start.gravity)
+    fitted = Fit(state, Linearisation(obs, state, distortion, prior, core), has_free_strengths=True)
     return Hypothesis(obs, prior, tuple(terms), fitted, within)
 
 
 def again(known: Hypothesis, terms: Sequence[Term], within: Bounds | None = None) -> Hypothesis:
     """The same observations with other effects or bounds, from where they were fitted."""
-    twin = replace(known.fitted.twin, effect=np.zeros(0))
+    state = replace(known.fitted.state, effect=np.zeros(0))
     within = known.within if within is None else within
-    return hypothesis(known.obs, twin, known.prior, terms, within, known.strengths)
+    return hypothesis(known.obs, state, known.prior, terms, within, known.strengths)
 
 
 def without_each(known: Hypothesis) -> tuple[Hypothesis, ...]:

@@ -13,7 +13,7 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, tune_noise
-from trihedron.diagnose.session.twin import DYNAMICS, MOVES, NO_DISTORTION, Prior, Twin
+from trihedron.diagnose.session.state import DYNAMICS, MOVES, NO_DISTORTION, Prior, SessionState
 from trihedron.records.diagnosis import Candidate
 
 VISIBLE = 0.98
@@ -55,7 +55,12 @@ class Observed:
 
 
 def look(
-    observed: Observed, context: Context, alpha: float, start: Twin, prior: Prior | None, only: Collection[str] = ()
+    observed: Observed,
+    context: Context,
+    alpha: float,
+    start: SessionState,
+    prior: Prior | None,
+    only: Collection[str] = (),
 ) -> tuple[Observed, dict[str, Candidate]]:
     """Observations with every effect whose own test finds it in a context, and what every such test said."""
     held = {one.effect.id for one in observed.seen if not one.effect.repeatable} | observed.refused
@@ -80,13 +85,13 @@ def look(
 
 
 def _with_one(
-    observed: Observed, effect: DirectEffect, evidence: Evidence, start: Twin, prior: Prior | None
+    observed: Observed, effect: DirectEffect, evidence: Evidence, start: SessionState, prior: Prior | None
 ) -> Observed:
     gain, fitted = float(evidence.strength), observed.fitted
     if evidence.reweigh is not None:
         found = [*(one.evidence for one in observed.seen), evidence]
         obs = evidence.reweigh(observed.obs) if evidence.touched is None else _changed(observed.bare, found)
-        begin = fitted.twin if obs.n_poses == observed.obs.n_poses else start
+        begin = fitted.state if obs.n_poses == observed.obs.n_poses else start
         fitted = tune_noise(obs, replace(begin, effect=np.zeros(0)), NO_DISTORTION, prior)
         if not effect.is_proof and not _mends(observed.fitted, fitted, evidence.touched):
             return replace(observed, refused=observed.refused | {effect.id})

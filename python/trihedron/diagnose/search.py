@@ -20,7 +20,7 @@ from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again, hypothesis, without_each
 from trihedron.diagnose.relations.search import Related, related
 from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
-from trihedron.diagnose.session.twin import (
+from trihedron.diagnose.session.state import (
     DYNAMICS,
     MOVES,
     STATIC_ACCEL,
@@ -227,8 +227,8 @@ def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Te
 
 def _fitted_beside(model: Hypothesis, tried: Tried) -> tuple[Term, Hypothesis]:
     term = _fitting(model, tried)
-    twin = model.fitted.twin
-    start = replace(twin, effect=np.concatenate([twin.effect, np.zeros(term.distortion.n_parameters)]))
+    state = model.fitted.state
+    start = replace(state, effect=np.concatenate([state.effect, np.zeros(term.distortion.n_parameters)]))
     strengths = tried.asked.strengths
     return term, hypothesis(model.obs, start, model.prior, (*model.terms, term), model.within, strengths)
 

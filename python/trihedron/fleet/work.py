@@ -107,6 +107,6 @@ def _row(result: Any) -> Row:
         "gyroscope": None if gyro is None else {"S": gyro.S.tolist(), "b": gyro.b.tolist()},
         "parameters": session.numbers.tolist(),
         "covariance": session.covariance.tolist(),
-        "bias_drift_variance": session.wander.tolist(),
+        "bias_drift_variance": session.drift.tolist(),
         "calibration": calibration_document(result.calibration),
     }

@@ -116,10 +116,10 @@ def _keep(
     instance = str(fields.get("I", int(number or 1) - 1))
     key = (word, instance)
     if key not in names:
-        stamp, unit = next(((s, u) for s, u in _TIMESTAMPS if s in fields), ("", ""))
-        if not stamp:
+        timestamp, unit = next(((s, u) for s, u in _TIMESTAMPS if s in fields), ("", ""))
+        if not timestamp:
             raise RefusedError(f"{message.get_type()} has no timestamp")
-        names[key] = [f"{stamp} [{unit}]", *(name for name in _FIELDS[word] if name in fields)]
+        names[key] = [f"{timestamp} [{unit}]", *(name for name in _FIELDS[word] if name in fields)]
         rows[key] = []
     plain = [names[key][0].split(" ")[0], *names[key][1:]]
     rows[key].append([float(fields[name]) for name in plain])

@@ -154,8 +154,8 @@ def _table(
     findings: tuple[Finding, ...],
 ) -> Table:
     # The sample's own timestamp, where the log has it; `timestamp` is when the message was published.
-    stamp = _timestamp(data)
-    names, columns = ["timestamp [us]"], [np.asarray(data[stamp], dtype=np.float64)]
+    timestamp = _timestamp(data)
+    names, columns = ["timestamp [us]"], [np.asarray(data[timestamp], dtype=np.float64)]
     for name, values in data.items():
         if name not in _SKIP and np.asarray(values).dtype.kind in "iufb":
             word = {"sensor_accel": "acc", "sensor_gyro": "gyr"}.get(topic, "")
@@ -181,8 +181,8 @@ def _onboard(log: Any, topic: str, instance: int) -> Onboard | None:
     for name, value in log.initial_parameters.items():
         held.note(name, value, has_readings=False)
     first = float(min((data["timestamp"][0] for data in columns.values() if len(data["timestamp"])), default=0.0))
-    for stamp, name, value in log.changed_parameters:
-        held.note(name, value, has_readings=stamp > first)
+    for timestamp, name, value in log.changed_parameters:
+        held.note(name, value, has_readings=timestamp > first)
     numbers = []
     for word, device in (("ACC", "accel_device_id"), ("GYRO", "gyro_device_id")):
         other = columns.get((topic.replace("accel", "gyro"), instance), {}) if word == "GYRO" else own

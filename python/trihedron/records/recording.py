@@ -58,16 +58,16 @@ def spread_timestamps(time_s: FloatArray, step_s: float) -> FloatArray:
         return time_s
     first = np.flatnonzero(np.diff(time_s, prepend=-np.inf) > 0)
     size = np.diff(first, append=len(time_s))
-    stamp = time_s[first]
-    before = np.diff(stamp, prepend=stamp[0] - step_s * size[0])
-    after = np.diff(stamp, append=stamp[-1] + step_s * size[-1])
+    timestamp = time_s[first]
+    before = np.diff(timestamp, prepend=timestamp[0] - step_s * size[0])
+    after = np.diff(timestamp, append=timestamp[-1] + step_s * size[-1])
     shared = size > 1
     inner = shared & (np.arange(len(size)) > 0) & (np.arange(len(size)) < len(size) - 1)
     is_before = before[inner].sum() >= after[inner].sum()
     apart = np.minimum((before if is_before else after) / size, step_s)
     within = np.arange(len(time_s)) - np.repeat(first, size)
     place = within - (np.repeat(size, size) - 1 if is_before else 0)
-    out = np.repeat(stamp, size) + place * np.repeat(apart, size)
+    out = np.repeat(timestamp, size) + place * np.repeat(apart, size)
     out = np.asarray(out - out[0], dtype=np.float64)
     # Timestamps a rounding apart leave no room for what they share: the smallest number apart will do.
     for k in np.flatnonzero(np.diff(out) <= 0):

@@ -56,7 +56,7 @@ class Session(Frozen):
     """One calibrated recording as the comparison needs it.
 
     ``numbers`` (9,) or (21,) in the order of :data:`PARAMETERS`, ``covariance`` of the same size: the error of the
-    session's own estimate; ``wander`` (same size) variance by which a bias moves within a session like this one.
+    session's own estimate; ``drift`` (same size) variance by which a bias moves within a session like this one.
     ``group`` is the day or the device. Temperatures are those of the poses, NaN where the log has none; ``branch`` is
     +1 while it was heating, -1 while cooling, 0 where neither is told.
     """
@@ -65,7 +65,7 @@ class Session(Frozen):
     group: str
     numbers: FloatArray
     covariance: FloatArray
-    wander: FloatArray
+    drift: FloatArray
     start_epoch_s: float = 0.0
     temperature_degc: float = float("nan")
     temperature_range_degc: tuple[float, float] = (float("nan"), float("nan"))

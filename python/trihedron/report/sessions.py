@@ -268,7 +268,7 @@ def sessions_columns(model: SessionsModel) -> Columns:
 
 def session_record(session: Session) -> dict[str, object]:
     """One recording's parameters for machines: ``values`` with their ``covariance``, the variance of the bias drift."""
-    named = {"numbers": "values", "wander": "bias_drift_variance"}
+    named = {"numbers": "values", "drift": "bias_drift_variance"}
     record = {named.get(name, name): value for name, value in vars(session).items()}
     return {**record, "temperature_range_degc": list(session.temperature_range_degc)}
 

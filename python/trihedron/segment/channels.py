@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.channel_facts.at_rest import converter_steps, probe_stride
+from trihedron.channel_facts.at_rest import adc_steps, probe_stride
 from trihedron.records import Recording
 
 BLOCK_S = 0.1
@@ -96,7 +96,7 @@ class BlockSums:
     def channels(self) -> Channels:
         """All blocks so far."""
         mean, variance, is_valid = (np.concatenate([part[k] for part in self.parts]) for k in range(3))
-        steps = [converter_steps(np.concatenate(probe)) for probe in self.probes]
+        steps = [adc_steps(np.concatenate(probe)) for probe in self.probes]
         quantum = _not_below_arithmetic(np.concatenate(steps), mean)
         gyroscope = np.repeat(self.is_gyroscope, 3)
         return Channels(self.length, self.length / self.rate_hz, mean, variance, is_valid, quantum, gyroscope)

@@ -41,7 +41,7 @@ class Activity:
     white_variance: FloatArray
     slow_variance: FloatArray
 
-    def is_wandering(self, channels: Channels) -> bool:
+    def is_drifting(self, channels: Channels) -> bool:
         """The floor itself moves: block means scatter as those of a random walk do, or more.
 
         For white noise the variance of block means is that of a reading over the block's length n; for a random walk
@@ -65,7 +65,7 @@ def measure_activity(channels: Channels, ends: Sequence[RangeEnd] = ()) -> Activ
     """
     width = min(WINDOW_BLOCKS, channels.n_blocks)
     freedom = max(width - 1, 1)
-    fast, slow, limits, is_quiet, white, wander = _core.noise_floor(
+    fast, slow, limits, is_quiet, white, drift = _core.noise_floor(
         channels.mean,
         channels.variance,
         channels.is_valid,
@@ -75,7 +75,7 @@ def measure_activity(channels: Channels, ends: Sequence[RangeEnd] = ()) -> Activ
         (width, channels.blocks(SEED_S), probability.chdtri(freedom, 0.5) / freedom),
         TAILS,
     )
-    return Activity(fast, slow, limits[0], limits[1], is_quiet, white, wander)
+    return Activity(fast, slow, limits[0], limits[1], is_quiet, white, drift)
 
 
 def quiet_channels(channels: Channels, activity: Activity, which: BoolArray) -> BoolArray:

@@ -69,9 +69,9 @@ def average_poses(
     if up is None:
         return out
     upward = along(channels, runs, up)
-    law = noise_along(upward, runs)
-    ratio, freedom = _excess(upward, runs, law)
-    own = law.variance(duration[:, None])[:, 0] * _shrunk(ratio[:, :1], freedom, steady)[:, 0]
+    model = noise_along(upward, runs)
+    ratio, freedom = _excess(upward, runs, model)
+    own = model.variance(duration[:, None])[:, 0] * _shrunk(ratio[:, :1], freedom, steady)[:, 0]
     return replace(out, up=up, sigma_up=np.sqrt(own + up**2 @ rounding[:3]))
 
 

@@ -104,7 +104,7 @@ def _fit(design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int])
     if len(seen) < len(chosen):
         # Too few lengths leave the terms open; which are then zero is a matter of the method.
         return _fit_open(design, seen, n, chosen)
-    deviance, terms = _core.mean_noise_law(design, seen, n, chosen)
+    deviance, terms = _core.mean_noise_terms(design, seen, n, chosen)
     return deviance, np.array(terms)
 
 

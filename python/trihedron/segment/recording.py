@@ -89,7 +89,7 @@ def segment_blocks(
         return _nothing_found(recording, channels)
     ends = range_ends(channels, limits)
     activity = measure_activity(channels, ends)
-    if activity.is_wandering(channels):
+    if activity.is_drifting(channels):
         return _nothing_found(recording, channels)
     report(0.4, "static stretches")
     quiet = widen(close_gaps(activity.is_quiet, channels.is_valid), channels.is_valid)
@@ -278,7 +278,7 @@ def radians_per_reading(
     if not gyro.any() or gyro.all():
         return None
     edges = np.array(ranges, dtype=np.int64).reshape(-1, 2)
-    zeros = _core.column_means(channels.mean, edges, np.arange(len(edges)), len(edges))[:, gyro]
+    biases = _core.column_means(channels.mean, edges, np.arange(len(edges)), len(edges))[:, gyro]
     force = channels.mean[:, ~gyro] - centre
     before, after = force[edges[:-1, 1] - 1], force[edges[1:, 0]]
     size = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
@@ -288,8 +288,8 @@ def radians_per_reading(
     length = edges[1:, 0] - edges[:-1, 1]
     move = np.repeat(np.arange(len(length)), length)
     block = np.arange(len(move)) + (edges[1:, 0] - np.cumsum(length))[move]
-    zero = 0.5 * (zeros[:-1] + zeros[1:])
-    rate = np.linalg.norm(channels.mean[block][:, gyro] - zero[move], axis=1)
+    bias = 0.5 * (biases[:-1] + biases[1:])
+    rate = np.linalg.norm(channels.mean[block][:, gyro] - bias[move], axis=1)
     path = np.bincount(move, np.where(channels.is_valid[block], rate, 0.0), len(angle)) * channels.step_s
     told = (angle >= LEAST_TURN_RAD) & (path > 0.0)
     return quantile(angle[told] / path[told], USUAL) if told.any() else None

@@ -173,13 +173,13 @@ def _shaken(
         return []
     assert segments.accelerometer_sigma is not None
     block = max(round(block_s * recording.rate_hz), 5)
-    zero = np.median(segments.gyroscope_mean, axis=0)
+    bias = np.median(segments.gyroscope_mean, axis=0)
     assert segments.gyroscope_sigma is not None
     spread = np.maximum(np.std(segments.gyroscope_mean, axis=0), segments.gyroscope_sigma / np.sqrt(block))
     # A bias that follows the shaking is no motion: rates far below those of real moves count as none.
     moving = np.concatenate([recording.gyroscope[m.start : m.stop] for m in segments.moves] or [np.zeros((1, 3))])
-    spread = np.maximum(spread, RESTING * float(np.sqrt(np.nanmean((moving - zero) ** 2))))
-    fastest = float(np.nanmax(np.abs(recording.gyroscope - zero)))
+    spread = np.maximum(spread, RESTING * float(np.sqrt(np.nanmean((moving - bias) ** 2))))
+    fastest = float(np.nanmax(np.abs(recording.gyroscope - bias)))
     white = (segments.accelerometer_sigma**2, segments.gyroscope_sigma**2)
     out: list[tuple[int, int]] = []
     for move in segments.moves:
@@ -194,7 +194,7 @@ def _shaken(
         force_mean = np.nanmean(accel, axis=1)
         force_own = np.nanstd(accel, axis=1)
         # Zero rate within its own scatter, and force that steps from block to block by less than it shakes in one.
-        still = (np.abs(rate_mean - zero) < 5.0 * np.hypot(own, spread)).all(axis=1)
+        still = (np.abs(rate_mean - bias) < 5.0 * np.hypot(own, spread)).all(axis=1)
         step = np.abs(np.diff(force_mean, axis=0, prepend=force_mean[:1]))
         calm = (step < 4.0 * np.sqrt(2.0 / block) * np.maximum(force_own, segments.accelerometer_sigma)).all(axis=1)
         shaking = (force_own > 3.0 * segments.accelerometer_sigma).any(axis=1)

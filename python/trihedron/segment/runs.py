@@ -109,8 +109,8 @@ def speed_of_moves(channels: Channels, quiet: BoolArray) -> float:
     gyro = channels.is_gyroscope
     if not moving.any() or not quiet.any() or not gyro.any():
         return float("inf")
-    zero = medians(channels.mean[quiet][:, gyro])
-    return float(quantiles(np.abs(channels.mean[moving][:, gyro] - zero), [0.9]).max())
+    bias = medians(channels.mean[quiet][:, gyro])
+    return float(quantiles(np.abs(channels.mean[moving][:, gyro] - bias), [0.9]).max())
 
 
 def join_quiet(channels: Channels, quiet: BoolArray, loose: BoolArray, noise: MeanNoise) -> list[Run]:
@@ -176,8 +176,8 @@ def _comes_back(channels: Channels, before: Run, after: Run, noise: MeanNoise, c
     is_valid = channels.is_valid[between]
     if not len(gyro) or not is_valid.any():
         return True
-    zero = 0.5 * (run_mean(channels, before)[0] + run_mean(channels, after)[0])[gyro]
-    rate = channels.mean[between][is_valid][:, gyro] - zero
+    bias = 0.5 * (run_mean(channels, before)[0] + run_mean(channels, after)[0])[gyro]
+    rate = channels.mean[between][is_valid][:, gyro] - bias
     net = rate.mean(axis=0)
     variance = noise.variance(len(rate) * channels.step_s)[gyro]
     live = variance > 0.0
@@ -213,7 +213,7 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
         # A calm fringe of a steady pose is its settling, not another pose.
         free[slice(*grown(free, (run.first, run.last)))] = False
     attitude = channels.mean[:, accelerometer] / gravity
-    zero = (
+    bias = (
         medians(np.vstack([channels.mean[a:b] for run in steady for a, b in run.quiet_ranges()])) if (steady) else None
     )
     shortest, bump = channels.blocks(MIN_POSE_S), channels.blocks(BUMP_S)
@@ -222,7 +222,7 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
         run = Run(first, last, (), True)
         if last - first < shortest or _sway(attitude, [run]) > SWAY_RAD:
             continue
-        if zero is not None and turns_on(channels, first, last, zero):
+        if bias is not None and turns_on(channels, first, last, bias):
             continue
         if any(
             max(first - near.last, near.first - last) < bump and _sway(attitude, [near, run]) < SWAY_RAD
@@ -254,7 +254,7 @@ def without_approaches(channels: Channels, steady: list[Run]) -> list[Run]:
     return kept
 
 
-def turns_on(channels: Channels, first: int, last: int, zero: FloatArray) -> bool:
+def turns_on(channels: Channels, first: int, last: int, bias: FloatArray) -> bool:
     """The gyro's reading follows a straight line: a slow move, or its pause, turning back or on about another axis.
 
     A hand that tries to hold still goes to and fro.
@@ -263,7 +263,7 @@ def turns_on(channels: Channels, first: int, last: int, zero: FloatArray) -> boo
     is_valid = channels.is_valid[first:last]
     if not gyro.any() or np.count_nonzero(is_valid) < 2:
         return False
-    rate = channels.mean[first:last][is_valid][:, gyro] - zero[gyro]
+    rate = channels.mean[first:last][is_valid][:, gyro] - bias[gyro]
     t = np.flatnonzero(is_valid) - np.mean(np.flatnonzero(is_valid))
     along = np.sum(rate.mean(axis=0) ** 2) + np.sum((t @ rate) ** 2) / (np.sum(t**2) * len(t))
     return float(along) > ONE_WAY * float(np.mean(np.sum(rate**2, axis=1)))
@@ -277,10 +277,10 @@ def _sway(attitude: FloatArray, runs: list[Run]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class EdgeNoise:
-    """What an end of a pose is compared by: the ``law`` (3, c) of a mean's noise, its ``variance`` (k, c) over
+    """What an end of a pose is compared by: the ``terms`` (3, c) of a mean's noise, its ``variance`` (k, c) over
     ``EDGE_BLOCKS``, and the ``limit`` of χ² of the channels that are ``live`` (c,)."""
 
-    law: FloatArray
+    terms: FloatArray
     variance: FloatArray
     live: BoolArray
     limit: float
@@ -303,7 +303,7 @@ def trim_edges(channels: Channels, run: Run, edges: EdgeNoise) -> Run:
     start, tail = _core.ends_to_trim(
         channels.mean[run.first : run.last],
         [(a - run.first, b - run.first) for a, b in run.bumps],
-        edges.law,
+        edges.terms,
         channels.quantisation_variance,
         channels.step_s,
         edges.variance,

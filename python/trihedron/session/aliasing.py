@@ -63,19 +63,19 @@ def unresolved_variance(
     (moves, 3) array, (raw unit · s)²
     """
     moves = np.array(move_ranges, dtype=np.int64).reshape(-1, 2)
-    holds = np.array([(a, b) for a, b in pose_ranges if b - a > 8], dtype=np.int64).reshape(-1, 2)
+    poses = np.array([(a, b) for a, b in pose_ranges if b - a > 8], dtype=np.int64).reshape(-1, 2)
     n_whole = np.maximum(moves[:, 1] - moves[:, 0] - (LENGTH - 1), 0)[:, None]
-    n_poses = (holds[:, 1] - holds[:, 0] - (LENGTH - 1))[:, None]
+    n_poses = (poses[:, 1] - poses[:, 0] - (LENGTH - 1))[:, None]
     pieces, of_move = _between_gaps(moves, time_s, step_s)
     n_moves = np.bincount(of_move, pieces[:, 1] - pieces[:, 0] - (LENGTH - 1), len(moves))[:, None]
 
     def excess(taps: list[float]) -> FloatArray:
-        power = _core.band_power(readings, taps, np.concatenate([holds, pieces]))
-        level = medians(power[: len(holds)] / n_poses) if len(holds) else np.zeros(3)
+        power = _core.band_power(readings, taps, np.concatenate([poses, pieces]))
+        level = medians(power[: len(poses)] / n_poses) if len(poses) else np.zeros(3)
         level = np.maximum(level, quantum**2 / 12.0)
         # Neighbouring outputs of five taps share samples: about a third as many independent squares.
         usual = level * (1.0 + MARGIN * np.sqrt(6.0 / np.maximum(n_moves, 1)))
-        of_moves = np.stack([np.bincount(of_move, p, len(moves)) for p in power[len(holds) :].T], axis=1)
+        of_moves = np.stack([np.bincount(of_move, p, len(moves)) for p in power[len(poses) :].T], axis=1)
         # What lies across gaps is as lively as the rest.
         out: FloatArray = np.maximum(of_moves - usual * n_moves, 0.0) * (n_whole / np.maximum(n_moves, 1))
         return out

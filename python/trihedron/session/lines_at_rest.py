@@ -61,9 +61,9 @@ def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segmen
         # How far errors of means exceed white noise: a line does not change what slow noise there is.
         colour = np.maximum(np.median(error / np.maximum(white, 1e-300), axis=0), 1.0)
         new_mean, new_error = mean.copy(), error.copy()
-        for k, hold in enumerate(segments.poses):
-            part = readings[hold.start : hold.stop]
-            if hold.disturbed or len(part) < FEWEST_SAMPLES or not np.isfinite(part).all():
+        for k, pose in enumerate(segments.poses):
+            part = readings[pose.start : pose.stop]
+            if pose.disturbed or len(part) < FEWEST_SAMPLES or not np.isfinite(part).all():
                 continue
             lines, has_line = _known_lines(part)
             if not lines:

@@ -85,7 +85,7 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
         np.asarray(segments.accelerometer_sigma) * np.sqrt(step_s),
         None if not has_rate else np.asarray(segments.gyroscope_sigma) * np.sqrt(step_s),
     )
-    spans = [(hold.start, hold.stop) for hold in segments.poses]
+    spans = [(pose.start, pose.stop) for pose in segments.poses]
     lasts = np.array([(stop - start) * step_s for start, stop in spans])
     moves_last = np.array([recording.time_s[b - 1] - recording.time_s[a] for a, b in ranges])
     variances = np.zeros((len(ranges), 2, 3))

@@ -254,14 +254,14 @@ def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: f
     return np.where(axes, np.sqrt(rest), density)
 
 
-def common_bias(zero: FloatArray, var_bias: FloatArray, axes: BoolArray) -> tuple[FloatArray, FloatArray]:
+def common_bias(bias: FloatArray, var_bias: FloatArray, axes: BoolArray) -> tuple[FloatArray, FloatArray]:
     """Biases (n, 3) and variances of undithered axes: one zero for all poses, as uncertain between them as it scatters.
 
     A mean that rounding has moved says nothing of its own pose; what is common to all poses is left to the moves.
     """
-    zero, var_bias = zero.copy(), var_bias.copy()
+    bias, var_bias = bias.copy(), var_bias.copy()
     for axis in np.flatnonzero(axes):
-        scatter = float(np.var(zero[:, axis]))
-        zero[:, axis] = float(np.mean(zero[:, axis]))
+        scatter = float(np.var(bias[:, axis]))
+        bias[:, axis] = float(np.mean(bias[:, axis]))
         var_bias[:, axis] = var_bias[:, axis] + scatter
-    return np.ascontiguousarray(zero), np.ascontiguousarray(var_bias)
+    return np.ascontiguousarray(bias), np.ascontiguousarray(var_bias)

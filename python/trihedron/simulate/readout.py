@@ -40,9 +40,9 @@ class Adc:
         """Whether it changes anything."""
         return self != Adc()
 
-    def convert(self, raw: FloatArray, zero: Triple = NONE) -> FloatArray:
+    def convert(self, raw: FloatArray, bias: Triple = NONE) -> FloatArray:
         """(n, 3) raw → (n, 3) codes times ``lsb``; ``zero`` is the reading at zero input."""
-        return _core.simulate_convert(raw, self.lsb, self.low, self.high, self.dead_band, zero, self.missing_every)
+        return _core.simulate_convert(raw, self.lsb, self.low, self.high, self.dead_band, bias, self.missing_every)
 
 
 @dataclass(frozen=True)

@@ -140,9 +140,9 @@ def _read(
     if sensor.electronics.ratiometric:
         supply = place.supply.at(time_s) / place.supply.nominal_v
         raw *= 1.0 + sensor.electronics.ratiometric * (supply[:, None] - 1.0)
-    zero: Triple = (float(offset[0]), float(offset[1]), float(offset[2]))
+    bias: Triple = (float(offset[0]), float(offset[1]), float(offset[2]))
     adc = sensor.adc
-    return adc.convert(raw, zero) if adc.is_there else raw
+    return adc.convert(raw, bias) if adc.is_there else raw
 
 
 def _die(sensor: Sensor, place: Environment, time_s: FloatArray, dt: float) -> FloatArray | None:

@@ -52,14 +52,14 @@ fn transition<'a>(
     shapings: &[Shaping; 3],
     n_noise: usize,
     gap: f64,
-    hold: f64,
+    pose_s: f64,
 ) -> &'a Transition {
-    steps.get(gap, hold, || {
+    steps.get(gap, pose_s, || {
         let mut phi = DMatrix::zeros(n_noise, n_noise);
         let mut q = DMatrix::zeros(n_noise, n_noise);
         let mut at = 0;
         for shaping in shapings {
-            let (phi_axis, q_axis) = shaping.step(gap, hold);
+            let (phi_axis, q_axis) = shaping.step(gap, pose_s);
             let k = phi_axis.nrows();
             phi.view_mut((at, at), (k, k)).copy_from(&phi_axis);
             q.view_mut((at, at), (k, k)).copy_from(&q_axis);
@@ -139,11 +139,11 @@ impl NormFilter {
         UdFilter::new(x, Factors::of(&covariance))
     }
 
-    fn move_noise(&mut self, start: f64, hold: f64) -> Result<()> {
-        let gap = self.timeline.gap(start, hold)?;
-        let step = transition(&mut self.steps, &self.shapings, self.n_noise, gap, hold);
+    fn move_noise(&mut self, start: f64, pose_s: f64) -> Result<()> {
+        let gap = self.timeline.gap(start, pose_s)?;
+        let step = transition(&mut self.steps, &self.shapings, self.n_noise, gap, pose_s);
         self.filter.predict(step);
-        self.timeline.pass(start, hold);
+        self.timeline.pass(start, pose_s);
         Ok(())
     }
 
@@ -160,7 +160,7 @@ impl NormFilter {
         let mut at = 0;
         for (axis, shaping) in self.shapings.iter().enumerate() {
             let k = shaping.layout().n();
-            shaping.measurement_row(pose.hold, &mut row[at..at + k]);
+            shaping.measurement_row(pose.pose_s, &mut row[at..at + k]);
             a[axis] -= row[at..at + k]
                 .iter()
                 .zip(&noise[at..at + k])
@@ -186,7 +186,7 @@ impl NormFilter {
         }
         self.frame.row(&u, &a, &mut row[self.n_noise..]);
         let white = Vector3::from_fn(|i, _| {
-            self.models[i].white_variance(pose.hold) + pose.extra_variance[i]
+            self.models[i].white_variance(pose.pose_s) + pose.extra_variance[i]
         });
         let variance = along.component_mul(&along).dot(&white);
         // Noise across the vertical lengthens the vector on average: E|f + ε| = |f| + tr((I − u uᵀ) Σ) / 2|f|.
@@ -219,7 +219,7 @@ impl NormFilter {
                 "pose {number}: the readings must be finite and their extra variances not negative"
             )));
         }
-        self.timeline.gap(pose.start, pose.hold).map(|_| ())
+        self.timeline.gap(pose.start, pose.pose_s).map(|_| ())
     }
 
     /// Take one more pose, iterating its update until the point of linearisation is the estimate itself.
@@ -228,7 +228,7 @@ impl NormFilter {
     /// When the pose is not finite or out of order.
     pub fn add(&mut self, pose: &NormPose) -> Result<Innovation> {
         self.check(pose)?;
-        self.move_noise(pose.start, pose.hold)?;
+        self.move_noise(pose.start, pose.pose_s)?;
         let before = self.filter.clone();
         let mut theta = before.x[self.n_noise..].to_vec();
         let mut first = None;
@@ -293,7 +293,7 @@ impl NormFilter {
     pub fn load(&mut self, poses: &[NormPose]) -> Result<()> {
         for pose in poses {
             self.check(pose)?;
-            self.timeline.pass(pose.start, pose.hold);
+            self.timeline.pass(pose.start, pose.pose_s);
             self.poses.push(*pose);
         }
         Ok(())

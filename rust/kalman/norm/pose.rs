@@ -10,7 +10,7 @@ pub struct NormPose {
     /// Start of the pose, s.
     pub start: f64,
     /// Length of the pose, s.
-    pub hold: f64,
+    pub pose_s: f64,
     /// Variance on top of the noise model per axis, raw².
     pub extra_variance: [f64; 3],
 }

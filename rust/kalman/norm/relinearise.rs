@@ -22,15 +22,15 @@ impl NormFilter {
         let mut innovations = Vec::with_capacity(self.poses.len());
         for i in 0..self.poses.len() {
             let pose = self.poses[i];
-            let gap = timeline.gap(pose.start, pose.hold)?;
+            let gap = timeline.gap(pose.start, pose.pose_s)?;
             filter.predict(transition(
                 &mut self.steps,
                 &self.shapings,
                 self.n_noise,
                 gap,
-                pose.hold,
+                pose.pose_s,
             ));
-            timeline.pass(pose.start, pose.hold);
+            timeline.pass(pose.start, pose.pose_s);
             innovations.push(self.update_at(&mut filter, &pose, theta));
         }
         Ok((filter, innovations))

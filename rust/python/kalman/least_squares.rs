@@ -26,7 +26,7 @@ pub(super) fn kalman_noise_covariance<'py>(
             "start_s, pose_s and extra_variance must have the same length",
         ));
     }
-    let (t, hold, extra) = (
+    let (t, pose_s, extra) = (
         start_s.as_array(),
         pose_s.as_array(),
         extra_variance.as_array(),
@@ -36,7 +36,7 @@ pub(super) fn kalman_noise_covariance<'py>(
             reading: 0.0,
             reference: [0.0; 3],
             start: t[i],
-            hold: hold[i],
+            pose_s: pose_s[i],
             extra_variance: extra[i],
         })
         .collect();
@@ -72,7 +72,7 @@ pub(super) fn kalman_least_squares(
             reading: *z,
             reference: (*f).into(),
             start: 0.0,
-            hold: 1.0,
+            pose_s: 1.0,
             extra_variance: 0.0,
         })
         .collect();

@@ -38,7 +38,7 @@ impl KalmanPoses {
                 )));
             }
         }
-        let (z, t, hold, extra) = (
+        let (z, t, pose_s, extra) = (
             readings.as_array(),
             start_s.as_array(),
             pose_s.as_array(),
@@ -49,7 +49,7 @@ impl KalmanPoses {
                 reading: z[i],
                 reference: rows[i].into(),
                 start: t[i],
-                hold: hold[i],
+                pose_s: pose_s[i],
                 extra_variance: extra[i],
             })
             .collect();

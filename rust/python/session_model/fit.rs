@@ -295,7 +295,7 @@ impl SessionFit {
     }
 
     /// `(24, 24)` covariance of `(S_a, b_a, S_w, b_w)` on raw readings centred at two origins, and `b_w` `(3,)`; one
-    /// zero of either sensor for the session.
+    /// bias of either sensor for the session.
     #[allow(clippy::type_complexity)]
     fn linear_covariance<'py>(
         &self,

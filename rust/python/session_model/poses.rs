@@ -45,7 +45,7 @@ impl SessionPoses {
         type Along<'a> = Option<(&'a [Vector3<f64>], &'a [f64])>;
         let at_rest =
             |mean: &Array2<'_>, sigma: &Array2<'_>, density: &Array1<'_>, along: Along<'_>| {
-                let (mean, sigma) = (rows3("hold means", mean)?, rows3("hold sigmas", sigma)?);
+                let (mean, sigma) = (rows3("pose means", mean)?, rows3("pose sigmas", sigma)?);
                 AtRest::of(mean, sigma, vector3("density", density)?, along)
                     .map_err(|error| PyValueError::new_err(error.to_string()))
             };
@@ -118,7 +118,7 @@ pub(super) struct SessionState {
 
 #[pymethods]
 impl SessionState {
-    /// `S_a`, `b_a`, `S_w` on centred readings; of every pose the vertical and both zeros, raw, `(h, 3)`; effects `(k,)`.
+    /// `S_a`, `b_a`, `S_w` on centred readings; of every pose the vertical and both biases, raw, `(h, 3)`; effects `(k,)`.
     #[new]
     #[pyo3(signature = (*, force_scale, force_bias, rate_scale, up, pose_rate_bias, pose_force_bias, effect))]
     fn new(
@@ -144,7 +144,7 @@ impl SessionState {
         };
         if [state.pose_rate_bias.len(), state.pose_force_bias.len()] != [h; 2] {
             return Err(PyValueError::new_err(format!(
-                "the state needs one zero of each sensor for each of {h} poses"
+                "the state needs one bias of each sensor for each of {h} poses"
             )));
         }
         Ok(Self { state })
@@ -166,7 +166,7 @@ fn moves_of(
     }
     if ranges.shape()[1] != 2 || before.as_array().len() != m || unresolved.shape() != [m, 2, 3] {
         return Err(PyValueError::new_err(format!(
-            "{m} moves need ranges ({m}, 2), holds ({m},) and unresolved variances ({m}, 2, 3)"
+            "{m} moves need ranges ({m}, 2), poses ({m},) and unresolved variances ({m}, 2, 3)"
         )));
     }
     let Some(rate) = rate else {
@@ -193,7 +193,7 @@ fn moves_of(
     let mut out = Vec::with_capacity(m);
     let mut first_point = 0;
     for k in 0..m {
-        let (start, stop, hold) = (
+        let (start, stop, pose) = (
             index(ranges[[k, 0]])?,
             index(ranges[[k, 1]])?,
             index(before[k])?,
@@ -204,18 +204,18 @@ fn moves_of(
                 time_s.len()
             )));
         }
-        if hold + 1 >= pose_time_s.len() {
+        if pose + 1 >= pose_time_s.len() {
             return Err(PyValueError::new_err(format!(
-                "move {k} begins in pose {hold} and there is none after it"
+                "move {k} begins in pose {pose} and there is none after it"
             )));
         }
         let extra = [0, 1].map(|s| Vector3::from_fn(|i, _| unresolved[[k, s, i]]));
         out.push(Move::new(
-            hold,
+            pose,
             &time_s[start..stop],
             rows(&rate, start, stop),
             rows(&force, start, stop),
-            [pose_time_s[hold], pose_time_s[hold + 1]],
+            [pose_time_s[pose], pose_time_s[pose + 1]],
             extra,
             first_point,
         ));

@@ -70,8 +70,8 @@ class FittedModel:
     gyro_b: FloatArray | None
     gyro_unit: str
     covariance: FloatArray
-    accel_wander: FloatArray
-    gyro_wander: FloatArray
+    accel_bias_drift: FloatArray
+    gyro_bias_drift: FloatArray
 
 
 def model_of_calibration(calibration: Calibration) -> FittedModel:

@@ -33,7 +33,7 @@ Sensor = Literal["accelerometer", "gyroscope", "both"]
 SPREAD_DOF = 100.0
 """Degrees of freedom of the covariances: those of a session of some tens of poses. F(3, 100) instead of χ² keeps the
 false alarms of 72 simulated pairs at their level; with 60 or 200 the 1 % point moves by 2 %."""
-WANDER_DOF = 10.0
+DRIFT_DOF = 10.0
 """The same for zeros: their wander is read off one or two sessions, and scatters by 70 % from one to the next (28
 simulated sessions of 20 to 32 poses), which is that of a variance with 4 degrees of freedom a session."""
 RANGE_TOLERANCE = 0.05
@@ -51,7 +51,7 @@ MISTAKEN_UNITS: Mapping[str, tuple[tuple[float, str, str], ...]] = MappingProxyT
     }
 )
 """Reading over truth where it is written in the first unit and taken for the second."""
-NO_ZERO = 0.05
+NO_BIAS = 0.05
 """Three zeros that are none look like this, or less, by chance in one model of twenty."""
 WOULD_SHOW = 0.1
 """A model knows its zeros ten times better than the recording's are large."""
@@ -182,7 +182,7 @@ def _groups(model: FittedModel, recording: FittedModel) -> tuple[list[_Group], t
     blocks = model.covariance[:12, :12], recording.covariance[:12, :12]
     units = _known_acceleration(model.accel_unit), _known_acceleration(recording.accel_unit)
     is_same = model.accel_unit == recording.accel_unit
-    more, factor = _sensor("accel", accel, blocks, units, is_same, model.accel_wander, recording.accel_wander)
+    more, factor = _sensor("accel", accel, blocks, units, is_same, model.accel_bias_drift, recording.accel_bias_drift)
     groups += more
     factors += [factor] if factor else []
     if model.gyro_S is None or model.gyro_b is None or recording.gyro_S is None or recording.gyro_b is None:
@@ -191,7 +191,7 @@ def _groups(model: FittedModel, recording: FittedModel) -> tuple[list[_Group], t
     blocks = model.covariance[12:, 12:], recording.covariance[12:, 12:]
     units = _known_rate(model.gyro_unit), _known_rate(recording.gyro_unit)
     is_same = model.gyro_unit == recording.gyro_unit
-    more, factor = _sensor("gyro", gyro, blocks, units, is_same, model.gyro_wander, recording.gyro_wander)
+    more, factor = _sensor("gyro", gyro, blocks, units, is_same, model.gyro_bias_drift, recording.gyro_bias_drift)
     groups += more
     factors += [factor] if factor else []
     groups.append(_triads(model, recording))
@@ -212,8 +212,8 @@ def _sensor(
     covariances: tuple[FloatArray, FloatArray],
     units: tuple[float | None, float | None],
     is_same_unit: bool,
-    wander_model: FloatArray,
-    wander_recording: FloatArray,
+    drift_model: FloatArray,
+    drift_recording: FloatArray,
 ) -> tuple[list[_Group], CommonFactor | None]:
     """Zero, scale and misalignment of one sensor, and the common factor of its scales where it has a name."""
     (S_m, b_m), (S_r, b_r) = pair
@@ -221,8 +221,8 @@ def _sensor(
     J_m, J_r = jacobian(S_m, b_m), jacobian(S_r, b_r)
     covariance = J_m @ covariances[0] @ J_m.T + J_r @ covariances[1] @ J_r.T
     # A file without a record of wander: the same unit wanders as the recording shows.
-    before = wander_model if np.any(wander_model) else wander_recording
-    covariance[:3, :3] += np.diag(before + wander_recording)
+    before = drift_model if np.any(drift_model) else drift_recording
+    covariance[:3, :3] += np.diag(before + drift_recording)
     sensor: Sensor = "accelerometer" if prefix == "accel" else "gyroscope"
     unit = "m/s^2" if prefix == "accel" else "rad/s"
     log_m, log_r, is_relative = _log_scales(a, r, units, is_same_unit)
@@ -239,8 +239,8 @@ def _sensor(
     assert len(names) == len(PAIRS)
     # S is SI per raw unit: what reads a larger count for the same truth has the smaller S, so a scale is -ln k.
     groups = [
-        _Group(f"{prefix}-bias", sensor, AXES, a.zero, r.zero, r.zero - a.zero, covariance[:3, :3], unit, WANDER_DOF,
-               _never_added(prefix, a.zero, r.zero, J_m @ covariances[0] @ J_m.T, wander_model)),
+        _Group(f"{prefix}-bias", sensor, AXES, a.bias, r.bias, r.bias - a.bias, covariance[:3, :3], unit, DRIFT_DOF,
+               _never_added(prefix, a.bias, r.bias, J_m @ covariances[0] @ J_m.T, drift_model)),
         _Group(
             f"{prefix}-scale", sensor, AXES, np.exp(log_m), np.exp(log_r), change, scale_covariance, "1",
             remark=_relative_to(prefix, a, r, units) if is_relative else "", is_relative=is_relative,
@@ -253,11 +253,11 @@ def _sensor(
 
 
 def _never_added(
-    prefix: str, model: FloatArray, recording: FloatArray, covariance: FloatArray, wander: FloatArray
+    prefix: str, model: FloatArray, recording: FloatArray, covariance: FloatArray, drift: FloatArray
 ) -> str:
     """What a model whose zeros are none resembles, where it would show zeros like the recording's."""
-    sigma = np.sqrt(np.maximum(np.diag(covariance)[:3] + wander, 1e-300))
-    is_none = float(np.sum((model / sigma) ** 2)) < float(chi2.isf(NO_ZERO, 3))
+    sigma = np.sqrt(np.maximum(np.diag(covariance)[:3] + drift, 1e-300))
+    is_none = float(np.sum((model / sigma) ** 2)) < float(chi2.isf(NO_BIAS, 3))
     would_show = bool(np.all(sigma < WOULD_SHOW * np.sqrt(np.mean(recording**2))))
     if not (is_none and would_show):
         return ""

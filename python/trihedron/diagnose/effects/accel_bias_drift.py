@@ -8,7 +8,7 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.bias_drift import BiasDrift
 from trihedron.diagnose.effects.contract import force_only
-from trihedron.diagnose.session.twin import Distortion
+from trihedron.diagnose.session.state import Distortion
 
 FEWEST_OF_WAVES = ((25, 4), (18, 2))
 """Poses from which a curve of so many cosines an axis is tried: one length a pose, nine spent on S and b, three a

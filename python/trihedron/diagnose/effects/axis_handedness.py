@@ -20,7 +20,7 @@ class AxisHandedness(DirectEffect):
     id = "axis-handedness"
 
     def find(self, context: Context) -> Evidence | None:
-        S = context.fitted.twin.gyro_S
+        S = context.fitted.state.gyro_S
         if context.obs.raw_rate is None or len(context.moves) < 3:
             return None
         unit = S / np.linalg.norm(S, axis=0)

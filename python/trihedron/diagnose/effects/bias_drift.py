@@ -12,7 +12,7 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.bias_process import BiasProcess, per_axis_parameters
 from trihedron.diagnose.effects.contract import Variant, per_axis
-from trihedron.diagnose.session.twin import Distortion
+from trihedron.diagnose.session.state import Distortion
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.session.twin import Distortion
+from trihedron.diagnose.session.state import Distortion
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain
 from trihedron.records.words import Words, effect_words, experiment_for

@@ -66,8 +66,8 @@ class DirectEffect(Effect):
 
 
 def without_moves(
-    ranges: tuple[tuple[int, int], ...], holds: npt.NDArray[np.intp], bad: set[int]
+    ranges: tuple[tuple[int, int], ...], poses: npt.NDArray[np.intp], bad: set[int]
 ) -> tuple[tuple[tuple[int, int], ...], npt.NDArray[np.intp]]:
     """Move ranges and their poses without some of them."""
     keep = [m for m in range(len(ranges)) if m not in bad]
-    return tuple(ranges[m] for m in keep), holds[keep]
+    return tuple(ranges[m] for m in keep), poses[keep]

@@ -14,7 +14,7 @@ from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_r
 from trihedron.diagnose.residuals.within_poses import LOUD, pose_scatter
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, folds_of, predict_held_out
-from trihedron.diagnose.session.twin import NO_DISTORTION, STATIC_ACCEL
+from trihedron.diagnose.session.state import NO_DISTORTION, STATIC_ACCEL
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import Words
@@ -78,16 +78,16 @@ def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
 
 def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
     """Held-out prediction with every pose averaged over its bumps, against the poses cut there; empty if no better."""
-    obs, twin = context.obs, context.fitted.twin
-    if len(twin.effect):
+    obs, state = context.obs, context.fitted.state
+    if len(state.effect):
         return ()
     whole = replace(observe(obs.recording, obs.whole, obs.averaging), jitter_s=obs.jitter_s)
-    force = whole.pose_force @ twin.accel_S.T + twin.accel_b
+    force = whole.pose_force @ state.accel_S.T + state.accel_b
     n = whole.n_poses
     start = replace(
-        twin,
+        state,
         up=force / np.linalg.norm(force, axis=1, keepdims=True),
-        gyro_bias=np.zeros((n, 3)) if whole.pose_rate is None else whole.pose_rate @ twin.gyro_S.T,
+        gyro_bias=np.zeros((n, 3)) if whole.pose_rate is None else whole.pose_rate @ state.gyro_S.T,
         accel_bias=np.zeros((n, 3)),
     )
     fits = (fit(whole, start, NO_DISTORTION, context.fitted.line.prior), context.fitted)
@@ -107,13 +107,13 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
 def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
     """Poses that shake throughout: the level of one half, not that of the other poses, predicts the other half."""
     scatter = pose_scatter(obs)
-    own = np.array([not hold.is_unsteady for hold in obs.segments.poses])
+    own = np.array([not pose.is_unsteady for pose in obs.segments.poses])
     loud = own[:, None] & (scatter.ratio > LOUD) & (scatter.p_value * scatter.p_value.size < SHAKES_P)
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     found, before, after = [], [], []
     for i in np.flatnonzero(loud.any(axis=1)):
-        hold = obs.segments.poses[i]
-        steps = np.diff(x[hold.start : hold.stop][:, loud[i]], axis=0)
+        pose = obs.segments.poses[i]
+        steps = np.diff(x[pose.start : pose.stop][:, loud[i]], axis=0)
         early, late = (np.nanvar(half, axis=0) for half in np.array_split(steps, 2))
         usual = np.nanvar(steps, axis=0) / scatter.ratio[i, loud[i]]
         if (np.minimum(early, late) > IN_EITHER_HALF * LOUD * usual).any():
@@ -174,8 +174,8 @@ class DisturbedPose(DirectEffect):
         if not bumped and not restless:
             return None
         t = obs.time_s
-        holds = obs.segments.poses
-        spans = tuple(bumped) + tuple((float(t[holds[i].start]), float(t[holds[i].stop - 1])) for i in restless)
+        poses = obs.segments.poses
+        spans = tuple(bumped) + tuple((float(t[poses[i].start]), float(t[poses[i].stop - 1])) for i in restless)
         # A nuisance that the twin has already cut out: it ranks behind whatever the fit gains by.
         strength = 10.0 * (len(bumped) + len(restless))
         names = list(dict.fromkeys(obs.pose_names(restless)))

@@ -13,7 +13,7 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence, without_mo
 from trihedron.diagnose.effects.sample_steps import MAX_LOST, Loss, find_losses
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, move_misfit
-from trihedron.diagnose.session.twin import NO_DISTORTION, Twin
+from trihedron.diagnose.session.state import NO_DISTORTION, SessionState
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
@@ -47,11 +47,13 @@ def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
 def _by_gravity(context: Context, losses: list[Loss]) -> tuple[dict[int, int], dict[int, float]]:
     counts = {loss.sample: loss.count for loss in losses}
     sigmas = {loss.sample: 0.5 + UNSETTLED * loss.count for loss in losses}
-    obs, twin = context.obs, context.fitted.twin
-    ranges, holds = without_moves(obs.move_ranges, obs.move_poses, {loss.move for loss in losses})
-    if not losses or len(ranges) < 3 or len(twin.effect):
+    obs, state = context.obs, context.fitted.state
+    ranges, poses = without_moves(obs.move_ranges, obs.move_poses, {loss.move for loss in losses})
+    if not losses or len(ranges) < 3 or len(state.effect):
         return counts, sigmas
-    clean = fit(replace(obs, move_ranges=ranges, move_poses=holds), twin, NO_DISTORTION, context.fitted.line.prior).twin
+    clean = fit(
+        replace(obs, move_ranges=ranges, move_poses=poses), state, NO_DISTORTION, context.fitted.line.prior
+    ).state
     for m in sorted({loss.move for loss in losses}):
         own = sorted((loss for loss in losses if loss.move == m), key=lambda one: -one.gain)
         trial = {loss.sample: loss.count for loss in own}
@@ -74,7 +76,7 @@ def _by_gravity(context: Context, losses: list[Loss]) -> tuple[dict[int, int], d
     return counts, sigmas
 
 
-def _misfit(obs: Observations, twin: Twin, m: int, losses: dict[int, int]) -> float:
+def _misfit(obs: Observations, state: SessionState, m: int, losses: dict[int, int]) -> float:
     """Chi-square of gravity and velocity after one move with samples put back behind those named."""
     a, b = obs.move_ranges[m]
     assert obs.raw_rate is not None
@@ -94,7 +96,7 @@ def _misfit(obs: Observations, twin: Twin, m: int, losses: dict[int, int]) -> fl
         move_ranges=((0, len(time)),),
         move_poses=obs.move_poses[m : m + 1],
     )
-    return float(move_misfit(one, twin)[0])
+    return float(move_misfit(one, state)[0])
 
 
 class DroppedSamples(DirectEffect):
@@ -211,19 +213,19 @@ def insert_samples(recording: Recording, segments: Segments, losses: dict[int, i
     def at(index: int) -> int:
         return int(new_index[index]) if index < n_old else total
 
-    holds = tuple(
+    poses = tuple(
         replace(
-            hold,
-            start=at(hold.start),
-            stop=at(hold.stop - 1) + 1,
-            outer_start=at(hold.outer_start),
-            outer_stop=at(hold.outer_stop - 1) + 1,
-            disturbed=tuple((at(a), at(b - 1) + 1) for a, b in hold.disturbed),
+            pose,
+            start=at(pose.start),
+            stop=at(pose.stop - 1) + 1,
+            outer_start=at(pose.outer_start),
+            outer_stop=at(pose.outer_stop - 1) + 1,
+            disturbed=tuple((at(a), at(b - 1) + 1) for a, b in pose.disturbed),
         )
-        for hold in segments.poses
+        for pose in segments.poses
     )
     moves = tuple(
-        replace(move, start=holds[move.pose_before].stop, stop=holds[move.pose_after].start) for move in segments.moves
+        replace(move, start=poses[move.pose_before].stop, stop=poses[move.pose_after].start) for move in segments.moves
     )
-    mid = np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in holds])
-    return mended, replace(segments, poses=holds, moves=moves, time_mid_s=mid, whole=None)
+    mid = np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in poses])
+    return mended, replace(segments, poses=poses, moves=moves, time_mid_s=mid, whole=None)

@@ -120,7 +120,7 @@ class EarthRate(Effect):
         return [
             Variant(
                 rate_only(context.between_poses(attitude)), ("horizontal_x", "horizontal_y", "vertical"),
-                ("rad/s",) * 3, given={"gravity": context.fitted.twin.gravity},
+                ("rad/s",) * 3, given={"gravity": context.fitted.state.gravity},
             )
         ]  # fmt: skip
 

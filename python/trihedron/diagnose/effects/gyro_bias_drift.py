@@ -8,7 +8,7 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.bias_drift import BiasDrift
 from trihedron.diagnose.effects.contract import rate_only
-from trihedron.diagnose.session.twin import Distortion
+from trihedron.diagnose.session.state import Distortion
 
 
 class GyroBiasDrift(BiasDrift):

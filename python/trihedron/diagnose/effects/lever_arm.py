@@ -134,7 +134,7 @@ def _true_moves(context: Context) -> list[slice]:
 
 
 def _written(context: Context) -> _Moves:
-    holds = context.obs.n_poses
+    poses = context.obs.n_poses
     spans = _true_moves(context)
     short = float(np.quantile([where.stop - where.start for where in spans], SHORT))
     n_shapes = int(np.clip(short // SAMPLES_PER_SHAPE, 1, N_SHAPES))
@@ -150,7 +150,7 @@ def _written(context: Context) -> _Moves:
         e = _smooth(context.force[where], width) - gravity
         # a × r + w × (w × r), as a matrix on r; a delay reads gravity as it turned: d/dt of -g is -w × (-g).
         made = np.concatenate([_cross(a) + _cross(w) @ _cross(w), -np.cross(w, gravity)[:, :, None]], axis=2)
-        begun = context.fitted.line.path.attitude[where.start - holds : where.stop - holds].transpose(0, 2, 1)
+        begun = context.fitted.line.path.attitude[where.start - poses : where.stop - poses].transpose(0, 2, 1)
         shapes = _shapes(t, n_shapes)
         targets.append(shapes.T @ (begun @ e[:, :, None])[:, :, 0])
         columns.append(np.tensordot(shapes.T, begun @ made, axes=1))

@@ -31,9 +31,9 @@ class PeriodicInterference(DirectEffect):
         parameters = [
             EffectParameter("frequency", strongest.frequency_hz, strongest.frequency_sigma_hz, "Hz"),
         ]
-        twin = context.fitted.twin
+        state = context.fitted.state
         for line in same:
-            S = twin.accel_S if line.channel[0] == "a" else twin.gyro_S
+            S = state.accel_S if line.channel[0] == "a" else state.gyro_S
             scale = float(1.0 / np.linalg.norm(np.linalg.inv(S)[line.axis]))
             unit = "m/s^2" if line.channel[0] == "a" else "rad/s"
             parameters.append(

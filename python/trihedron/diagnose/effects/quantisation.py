@@ -58,9 +58,9 @@ class Lattice:
     dead: float
 
 
-def missing_codes(holds: list[FloatArray], sigma: float, step: float) -> int | None:
+def missing_codes(poses: list[FloatArray], sigma: float, step: float) -> int | None:
     """Number of codes skipped amid visited ones on the converter's grid, or ``None`` where the poses show no grid."""
-    values = np.concatenate(holds)
+    values = np.concatenate(poses)
     codes = np.unique(values)
     if step == 0.0 or len(codes) < FEWEST_CODES or len(codes) > MOST_CODES * len(values):
         return None
@@ -70,7 +70,7 @@ def missing_codes(holds: list[FloatArray], sigma: float, step: float) -> int | N
     # Gap by gap: over hundreds of codes even a step known to a part in a thousand would miss its place.
     place = np.concatenate([[0], np.cumsum(np.rint(np.diff(codes) / step))]).astype(int)
     visited = set(place.tolist())
-    for one in holds if sigma > REACHES * step else []:
+    for one in poses if sigma > REACHES * step else []:
         own, seen = np.unique(place[np.searchsorted(codes, one)], return_counts=True)
         count = dict(zip(own.tolist(), seen.tolist(), strict=True))
         for k in own.tolist():
@@ -79,7 +79,7 @@ def missing_codes(holds: list[FloatArray], sigma: float, step: float) -> int | N
     return sum(value > MISSED for value in expected.values())
 
 
-def before_converter(holds: list[FloatArray], step: float) -> tuple[float, FloatArray, FloatArray]:
+def before_adc(poses: list[FloatArray], step: float) -> tuple[float, FloatArray, FloatArray]:
     """Noise in front of the converter and the true mean of every pose, by likelihood of the codes seen.
 
     A hold that sits on a code's middle shows no scatter and one on its edge half a step, whatever the noise: the plain
@@ -89,7 +89,7 @@ def before_converter(holds: list[FloatArray], step: float) -> tuple[float, Float
     """
     offsets = np.linspace(-0.75, 0.75, 61)
     tables = []
-    for values in holds:
+    for values in poses:
         k = np.round((values - values.min()) / step)
         codes, counts = np.unique(k, return_counts=True)
         tables.append((codes, counts, float(k.mean())))
@@ -164,27 +164,27 @@ class Quantisation(DirectEffect):
         raw = obs.raw_force if c < 3 else obs.raw_rate
         assert raw is not None
         x = np.round(raw[:, c % 3], 9)
-        holds = [x[hold.samples()] for hold in obs.segments.poses]
-        holds = [values[np.isfinite(values)] for values in holds]
-        if min(len(values) for values in holds) < FEWEST_READINGS:
+        poses = [x[pose.samples()] for pose in obs.segments.poses]
+        poses = [values[np.isfinite(values)] for values in poses]
+        if min(len(values) for values in poses) < FEWEST_READINGS:
             return None
-        still = np.concatenate(holds)
-        scatter = float(np.sqrt(np.median([np.var(values) for values in holds])))
+        still = np.concatenate(poses)
+        scatter = float(np.sqrt(np.median([np.var(values) for values in poses])))
         moving = np.concatenate([x[a:b] for a, b in obs.move_ranges]) if obs.move_ranges else still
         step = float(obs.recording.facts.steps[c])
-        missing = missing_codes(holds, scatter, step)
+        missing = missing_codes(poses, scatter, step)
         if missing is None:
             dead = dead_zone(still, moving[np.isfinite(moving)], step)
             if not dead:
                 return None
-            size = np.full(len(holds), dead / np.sqrt(3.0))  # anywhere inside the zone
-            return Lattice(c, dead, dead / np.sqrt(3.0), dead, np.zeros(len(holds)), size, 0, dead)
+            size = np.full(len(poses), dead / np.sqrt(3.0))  # anywhere inside the zone
+            return Lattice(c, dead, dead / np.sqrt(3.0), dead, np.zeros(len(poses)), size, 0, dead)
         if scatter > NOISE_ENOUGH * step and not (missing and scatter < 2.0 * NOISE_ENOUGH * step):
             return None
-        sigma, shift, spread = before_converter(holds, step)
+        sigma, shift, spread = before_adc(poses, step)
         if missing and scatter < 2.0 * NOISE_ENOUGH * step:
             return Lattice(
-                c, step, sigma * step, sigma * step, 0.0 * shift, np.full(len(holds), 0.25 * step), missing, 0.0
+                c, step, sigma * step, sigma * step, 0.0 * shift, np.full(len(poses), 0.25 * step), missing, 0.0
             )
         if sigma > COARSE:
             return None
@@ -211,7 +211,7 @@ def _parameters(context: Context, found: list[Lattice]) -> tuple[EffectParameter
 def _scale_of(context: Context, channel: int) -> tuple[float, float]:
     """SI per raw unit along one channel's axis, and its relative standard error."""
     is_accel, k = channel < 3, channel % 3
-    S = context.fitted.twin.accel_S if is_accel else context.fitted.twin.gyro_S
+    S = context.fitted.state.accel_S if is_accel else context.fitted.state.gyro_S
     place = (0, 2, 5)[k] if is_accel else 9 + 4 * k  # S is lower triangular for the accelerometer
     sigma = float(np.sqrt(max(context.fitted.covariance()[place, place], 0.0)))
     scale = context.si_per_raw("accelerometer" if is_accel else "gyroscope")[k]

@@ -15,7 +15,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence, without_moves
 from trihedron.diagnose.effects.plateaus import Plateau, plateaus_of
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.twin import DYNAMICS, MOVES
+from trihedron.diagnose.session.state import DYNAMICS, MOVES
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 
@@ -75,8 +75,8 @@ class _Saturation(DirectEffect):
         bad = set(touched)
 
         def reweigh(old: Observations) -> Observations:
-            ranges, holds = without_moves(old.move_ranges, old.move_poses, bad)
-            return replace(old, move_ranges=ranges, move_poses=holds)
+            ranges, poses = without_moves(old.move_ranges, old.move_poses, bad)
+            return replace(old, move_ranges=ranges, move_poses=poses)
 
         prefix = "g" if is_gyro else "a"
         channels = tuple(sorted({prefix + AXES[r.axis] for r in runs}))
@@ -99,25 +99,25 @@ class _Saturation(DirectEffect):
         """SI per raw unit along each axis, and what a centred raw reading of zero means in SI."""
         if self.sensor == "gyro":
             return context.si_per_raw("gyroscope"), np.zeros(3)
-        return context.si_per_raw("accelerometer"), context.fitted.twin.accel_b
+        return context.si_per_raw("accelerometer"), context.fitted.state.accel_b
 
     def _near_limit(self, context: Context, runs: list[Plateau], touched: list[int]) -> list[int]:
         """Moves with a plateau and those that come close to the same limit on any axis and side."""
-        twin, obs = context.fitted.twin, context.obs
+        state, obs = context.fitted.state, context.obs
         is_gyro = self.sensor == "gyro"
         raw = obs.raw_rate if is_gyro else obs.raw_force
         assert raw is not None
-        scale, zero = self._scale_and_bias(context)
+        scale, bias = self._scale_and_bias(context)
         origin = obs.rate_origin if is_gyro else obs.force_origin
-        limit = min(abs((run.limit.value - origin[run.axis]) * scale[run.axis] + zero[run.axis]) for run in runs)
+        limit = min(abs((run.limit.value - origin[run.axis]) * scale[run.axis] + bias[run.axis]) for run in runs)
         close = {m for m, (a, b) in enumerate(obs.move_ranges)
-                 if (np.abs(raw[a:b] * scale + zero).max(axis=0) > NEAR_LIMIT * limit).any()}  # fmt: skip
+                 if (np.abs(raw[a:b] * scale + bias).max(axis=0) > NEAR_LIMIT * limit).any()}  # fmt: skip
         # An accelerometer that ends at little more than 1 g comes close in every pose: then only plateaus count.
-        return sorted(close | set(touched)) if is_gyro or limit > ABOVE_REST * twin.gravity else touched
+        return sorted(close | set(touched)) if is_gyro or limit > ABOVE_REST * state.gravity else touched
 
     def _limits(self, context: Context, runs: list[Plateau], sigma: FloatArray) -> tuple[EffectParameter, ...]:
         """Limits in SI along every channel, with the exact code where readings end on one."""
-        scale, zero = self._scale_and_bias(context)
+        scale, bias = self._scale_and_bias(context)
         obs = context.obs
         is_gyro = self.sensor == "gyro"
         origin = obs.rate_origin if is_gyro else obs.force_origin
@@ -125,7 +125,7 @@ class _Saturation(DirectEffect):
         limits = {(run.axis, -run.sign): run.limit for run in runs}
         for (axis, _), limit in sorted(limits.items()):
             name = f"limit_{AXES[axis]}{'+' if limit.is_high else '-'}"
-            value = float((limit.value - origin[axis]) * scale[axis] + zero[axis])
+            value = float((limit.value - origin[axis]) * scale[axis] + bias[axis])
             out.append(EffectParameter(name, value, float(sigma[axis] * scale[axis]), "rad/s" if is_gyro else "m/s^2"))
             if limit.sigma == 0.0:  # every sample is the same number: it is exact, whatever the scale factor
                 out.append(EffectParameter(f"raw_{name}", round(limit.value, 9), 0.0, "raw"))

@@ -51,20 +51,20 @@ class TableTilt(DirectEffect):
         return None
 
     def find(self, context: Context) -> Evidence | None:
-        twin, obs = context.fitted.twin, context.obs
+        state, obs = context.fitted.state, context.obs
         chi2, dof, tilts, weights, noises = 0.0, 0, [], [], []
         for turn in table_turns(context):
             before, after = obs.move_poses[turn.move]
             half = abs(np.sin(turn.angle_rad / 2.0))
             if half < LEAST_SINE:
                 continue
-            change = twin.up[after] - twin.up[before]
+            change = state.up[after] - state.up[before]
             sigma = float(
                 np.sqrt(
-                    ((twin.accel_S**2) @ (obs.pose_force_sigma[before] ** 2 + obs.pose_force_sigma[after] ** 2)).mean()
+                    ((state.accel_S**2) @ (obs.pose_force_sigma[before] ** 2 + obs.pose_force_sigma[after] ** 2)).mean()
                 )
             )
-            sigma /= twin.gravity
+            sigma /= state.gravity
             chi2 += float(change @ change) / sigma**2
             dof += 2
             tilts.append(float(np.linalg.norm(change)) / (2.0 * half))

@@ -32,12 +32,12 @@ class TableTurn:
 
 def table_turns(context: Context) -> list[TableTurn]:
     """Moves whose axis is the vertical throughout: the vertical ends where it began in the body."""
-    twin = context.fitted.twin
+    state = context.fitted.state
     out = []
     for m, where in enumerate(context.moves):
         before, after = context.obs.move_poses[m]
-        up = twin.up[before]
-        if up @ twin.up[after] < np.cos(np.radians(MOST_SWING_DEG)):
+        up = state.up[before]
+        if up @ state.up[after] < np.cos(np.radians(MOST_SWING_DEG)):
             continue
         t = context.time_s[where]
         about_up = context.rate[where] @ up

@@ -9,7 +9,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, per_axis
-from trihedron.diagnose.session.twin import Distortion
+from trihedron.diagnose.session.state import Distortion
 
 LEAST_RATE_RANGE = 0.3
 """Share of its largest value that the rate of temperature must differ by between points, to be told from a constant."""

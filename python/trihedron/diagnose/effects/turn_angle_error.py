@@ -64,7 +64,7 @@ def _without_common_scale(context: Context, turns: list[TableTurn]) -> tuple[Flo
     """
     noise = context.noise_floor[1].mean() / np.sqrt(context.obs.recording.rate_hz)
     axes = np.array(
-        [int(np.abs(context.fitted.twin.up[context.obs.move_poses[turn.move][0]]).argmax()) for turn in turns]
+        [int(np.abs(context.fitted.state.up[context.obs.move_poses[turn.move][0]]).argmax()) for turn in turns]
     )
     errors, angles = np.array([turn.error_rad for turn in turns]), np.array([turn.angle_rad for turn in turns])
     sigmas = np.zeros(len(turns))

@@ -64,7 +64,7 @@ def _centred(signal: Signal, n_poses: int) -> Signal:
 
 
 def _forces(context: Context, sensor: Sensor) -> list[Signal]:
-    f = context.force / context.fitted.twin.gravity
+    f = context.force / context.fitted.state.gravity
     return [
         Signal(sensor, "force", (f"u_{AXES[a]} u_{AXES[b]}",), (f[:, a] * f[:, b])[:, None], ("g^2",))
         for a, b in combinations(range(3), 2)
@@ -72,11 +72,11 @@ def _forces(context: Context, sensor: Sensor) -> list[Signal]:
 
 
 def _gyro_only(context: Context) -> list[Signal]:
-    f = context.force / context.fitted.twin.gravity
+    f = context.force / context.fitted.state.gravity
     out = [Signal("gyroscope", "force", (f"u_{AXES[a]}^2",), f[:, [a]] ** 2, ("g^2",)) for a in range(3)]
     out += [Signal("gyroscope", "force", (f"u_{AXES[a]}^3",), f[:, [a]] ** 3, ("g^3",)) for a in range(3)]
     out += [Signal("gyroscope", "force", (f"|u_{AXES[a]}|",), np.abs(f[:, [a]]), ("g",)) for a in range(3)]
-    up = context.fitted.twin.up
+    up = context.fitted.state.up
     before = context.between_poses(np.vstack([up[:1], up[:-1]]))
     return out + [
         Signal("gyroscope", "previous pose", (f"previous u_{AXES[a]}",), before[:, [a]], ("g",)) for a in range(3)
@@ -85,7 +85,7 @@ def _gyro_only(context: Context) -> list[Signal]:
 
 def _history(context: Context, sensor: Sensor) -> list[Signal]:
     """The rotation that led to a pose."""
-    turn = np.zeros_like(context.fitted.twin.up)
+    turn = np.zeros_like(context.fitted.state.up)
     for where, (_, after) in zip(context.moves, context.obs.move_poses, strict=True):
         turn[after] = np.trapezoid(context.rate[where], context.time_s[where], axis=0)
     angle, sign = context.between_poses(turn), context.between_poses(np.sign(turn))
@@ -106,7 +106,7 @@ def _warming(context: Context, sensor: Sensor) -> list[Signal]:
 
 
 def _motion(context: Context) -> list[Signal]:
-    w, f = context.rate, context.force / context.fitted.twin.gravity
+    w, f = context.rate, context.force / context.fitted.state.gravity
     out = [
         Signal(
             "gyroscope", "rate products", (f"w_{AXES[a]} w_{AXES[b]}",), (w[:, a] * w[:, b])[:, None],

@@ -53,33 +53,33 @@ def residuals_before_after(before: Fit, after: Fit, named: Collection[int] = ())
 
 
 def _shown(fitted: Fit, named: Collection[int] = ()) -> dict[str, _Shown]:
-    line, twin, obs = fitted.line, fitted.twin, fitted.line.obs
+    line, state, obs = fitted.line, fitted.state, fitted.line.obs
     h = obs.n_poses
     poses = obs.pose_names(range(h))
     out: dict[str, _Shown] = {}
-    force = obs.pose_force @ twin.accel_S.T + (
-        line.core.force_bias - twin.accel_bias if 0 in named else line.core.session_force_bias
+    force = obs.pose_force @ state.accel_S.T + (
+        line.core.force_bias - state.accel_bias if 0 in named else line.core.session_force_bias
     )
     if line.distortion.force is not None:
-        force = force - line.distortion.force[:h] @ twin.effect
+        force = force - line.distortion.force[:h] @ state.effect
     size = np.linalg.norm(force, axis=1)
-    along = (force / size[:, None]) @ twin.accel_S
+    along = (force / size[:, None]) @ state.accel_S
     sigma = obs.norm_sigma(along)
-    out["static-accel"] = _Shown(obs.pose_time_s, (size - twin.gravity)[:, None], sigma, poses)
+    out["static-accel"] = _Shown(obs.pose_time_s, (size - state.gravity)[:, None], sigma, poses)
     if obs.pose_rate is not None and obs.pose_rate_sigma is not None:
-        rate = obs.pose_rate @ twin.gyro_S.T
+        rate = obs.pose_rate @ state.gyro_S.T
         if line.distortion.rate is not None:
-            rate = rate - line.distortion.rate[:h] @ twin.effect
-        spread = np.sqrt((obs.pose_rate_sigma**2 @ (twin.gyro_S**2).T).mean(axis=1))
-        bias = twin.gyro_bias if 1 in named else rate.mean(axis=0)
+            rate = rate - line.distortion.rate[:h] @ state.effect
+        spread = np.sqrt((obs.pose_rate_sigma**2 @ (state.gyro_S**2).T).mean(axis=1))
+        bias = state.gyro_bias if 1 in named else rate.mean(axis=0)
         out["static-gyro"] = _Shown(obs.pose_time_s, rate - bias, spread, poses)
     if obs.n_moves:
         residual, noise = line.move_errors
         variance = np.einsum("mii->mi", noise)
         moves = obs.move_names(range(obs.n_moves))
         middle = np.array([0.5 * (obs.time_s[a] + obs.time_s[b - 1]) for a, b in obs.move_ranges])
-        angle = np.degrees(np.hypot(residual[:, 0], residual[:, 1]) / twin.gravity)
-        expected = np.degrees(np.sqrt(variance[:, :2].sum(axis=1)) / twin.gravity)
+        angle = np.degrees(np.hypot(residual[:, 0], residual[:, 1]) / state.gravity)
+        expected = np.degrees(np.sqrt(variance[:, :2].sum(axis=1)) / state.gravity)
         out["moves"] = _Shown(middle, angle[:, None], expected, moves)
         out["dynamics"] = _Shown(middle, residual[:, 2:], np.sqrt(variance[:, 2:].mean(axis=1)), moves)
     return out

@@ -13,7 +13,7 @@ from scipy.special import fdtrc, ndtr
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.jumps import jumps_in_poses
 from trihedron.diagnose.session.solve import Fit
-from trihedron.diagnose.session.twin import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
+from trihedron.diagnose.session.state import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
 from trihedron.records.domains import Domain, DomainTest, Where
 from trihedron.session.noise import NOISE_CORNER_S
 
@@ -135,10 +135,10 @@ def _inside_poses(fitted: Fit, label: int) -> tuple[float, float, Where]:
         return 1.0, 1.0, Where()  # what an effect changes inside a pose is not known here
     k = 0 if label == STATIC_ACCEL else 1
     found = jumps_in_poses(fitted.line.obs)
-    holds, t = found.holds[k], fitted.line.obs.time_s
-    parts = [fitted.line.obs.segments.poses[i] for i in holds]
-    spans = tuple((float(t[hold.start]), float(t[hold.stop - 1])) for hold in parts)
-    return found.p_value[k], found.ratio[k], Where((), fitted.line.obs.pose_names(holds), spans)
+    poses, t = found.poses[k], fitted.line.obs.time_s
+    parts = [fitted.line.obs.segments.poses[i] for i in poses]
+    spans = tuple((float(t[pose.start]), float(t[pose.stop - 1])) for pose in parts)
+    return found.p_value[k], found.ratio[k], Where((), fitted.line.obs.pose_names(poses), spans)
 
 
 AT_END = 1.01
@@ -175,23 +175,23 @@ class HiddenBias:
 
 def hidden_biases(fitted: Fit) -> tuple[HiddenBias, HiddenBias | None]:
     """Accelerometer, gyro: biases of the poses about their session mean, absorbed by hidden states."""
-    twin, obs = fitted.twin, fitted.line.obs
+    state, obs = fitted.state, fitted.line.obs
     edge = [corner <= AT_END * NOISE_CORNER_S for corner in fitted.line.core.strengths[0]]
     out: list[HiddenBias | None] = []
     rates = obs.pose_rate_sigma
     sides = (
-        (twin.accel_bias, obs.norm_sigma(twin.up @ twin.accel_S), edge[0]),
+        (state.accel_bias, obs.norm_sigma(state.up @ state.accel_S), edge[0]),
         (
-            twin.gyro_bias,
-            None if rates is None else rates / np.linalg.norm(np.linalg.inv(twin.gyro_S), axis=1),
+            state.gyro_bias,
+            None if rates is None else rates / np.linalg.norm(np.linalg.inv(state.gyro_S), axis=1),
             edge[1],
         ),
     )
-    for zero, noise, is_at_edge in sides:
+    for bias, noise, is_at_edge in sides:
         if noise is None:
             out.append(None)
             continue
-        rms = float(np.sqrt(np.mean((zero - zero.mean(axis=0)) ** 2)))
+        rms = float(np.sqrt(np.mean((bias - bias.mean(axis=0)) ** 2)))
         out.append(HiddenBias(rms, float(np.median(noise)), bool(is_at_edge)))
     assert out[0] is not None
     return out[0], out[1]
@@ -229,7 +229,7 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[
     direct = system.walk == 0
     rows = np.flatnonzero((system.domain == STATIC_ACCEL) & direct)
     error = np.linalg.solve(line.accel_white, r[rows].reshape(h, 3, 1))[:, :, 0]
-    out[STATIC_ACCEL] = float(np.sqrt(np.mean(np.einsum("ni,ni->n", error, line.twin.up) ** 2)))
+    out[STATIC_ACCEL] = float(np.sqrt(np.mean(np.einsum("ni,ni->n", error, line.state.up) ** 2)))
     if line.gyro_white is not None:
         rows = np.flatnonzero((system.domain == STATIC_GYRO) & direct)
         error = np.linalg.solve(line.gyro_white, r[rows].reshape(h, 3, 1))[:, :, 0]
@@ -237,7 +237,7 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[
     of_moves = np.flatnonzero(np.isin(system.domain, (MOVES, DYNAMICS)) & direct)
     if len(of_moves):
         error = np.linalg.solve(line.move_white, r[of_moves].reshape(-1, ROWS_OF_MOVE, 1))[:, :, 0]
-        angle = (error[:, :2] ** 2).sum(axis=1) / line.twin.gravity**2
+        angle = (error[:, :2] ** 2).sum(axis=1) / line.state.gravity**2
         out[MOVES] = float(np.degrees(np.sqrt(np.mean(angle))))
         out[DYNAMICS] = float(np.sqrt(np.mean(error[:, 2:] ** 2)))
     return out, {STATIC_ACCEL: "m/s^2", STATIC_GYRO: "rad/s", MOVES: "deg", DYNAMICS: "m/s"}

@@ -43,7 +43,7 @@ class Jumps:
 
     p_value: tuple[float, float]
     ratio: tuple[float, float]
-    holds: tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
+    poses: tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +65,12 @@ def jumps_in_poses(obs: Observations) -> Jumps:
     the largest is the p-value.
     A step at which the other sensor reads a motion is a pose that slipped.
     """
-    still = np.array([not hold.is_unsteady for hold in obs.segments.poses])
-    still &= np.array([hold.stop - hold.start >= LEAST_SAMPLES for hold in obs.segments.poses])
+    still = np.array([not pose.is_unsteady for pose in obs.segments.poses])
+    still &= np.array([pose.stop - pose.start >= LEAST_SAMPLES for pose in obs.segments.poses])
     which = np.flatnonzero(still)
-    p, ratio, holds = [1.0, 1.0], [1.0, 1.0], [np.zeros(0, dtype=np.intp)] * 2
+    p, ratio, poses = [1.0, 1.0], [1.0, 1.0], [np.zeros(0, dtype=np.intp)] * 2
     if len(which) < FEWEST_POSES:
-        return Jumps((p[0], p[1]), (ratio[0], ratio[1]), (holds[0], holds[1]))
+        return Jumps((p[0], p[1]), (ratio[0], ratio[1]), (poses[0], poses[1]))
     sides = [None if raw is None else _block_means(obs, raw, which) for raw in (obs.raw_force, obs.raw_rate)]
     steps = [None if side is None else _steps(side) for side in sides]
     for k, own in enumerate(steps):
@@ -86,8 +86,8 @@ def jumps_in_poses(obs: Observations) -> Jumps:
             p[k] = min(1.0, N_LOOKS * chance)
         found = np.flatnonzero(counted[:, axis])
         ratio[k] = 1.0 + float(counted[:, axis].max())
-        holds[k] = which[found[np.argsort(-counted[found, axis])]][: max(1, len(which) // 10)]
-    return Jumps((p[0], p[1]), (ratio[0], ratio[1]), (holds[0], holds[1]))
+        poses[k] = which[found[np.argsort(-counted[found, axis])]][: max(1, len(which) // 10)]
+    return Jumps((p[0], p[1]), (ratio[0], ratio[1]), (poses[0], poses[1]))
 
 
 def _block_means(obs: Observations, raw: FloatArray, which: npt.NDArray[np.intp]) -> FloatArray:

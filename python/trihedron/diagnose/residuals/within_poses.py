@@ -268,8 +268,8 @@ def pose_scatter(obs: Observations) -> PoseScatter:
     """Variance of first differences per pose over the median of all: blind to slow drift, sharp on shaking."""
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     ratio, dof = [], []
-    for hold in obs.segments.poses:
-        part = x[hold.start : hold.stop]
+    for pose in obs.segments.poses:
+        part = x[pose.start : pose.stop]
         steps = np.diff(part, axis=0)
         own = np.var(steps, axis=0)
         ratio.append(np.nanvar(steps, axis=0) if np.isnan(own).any() else own)
@@ -289,7 +289,7 @@ def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
     scatter = pose_scatter(obs)
     n_looks = scatter.p_value.size
     # A pose that was found shaking is said to, and weighed by its own scatter: nothing is left to explain.
-    steady = np.array([not hold.is_unsteady for hold in obs.segments.poses])
+    steady = np.array([not pose.is_unsteady for pose in obs.segments.poses])
     loud = np.where(steady[:, None] & (scatter.ratio > LOUD), scatter.p_value, 1.0)
     p_scatter = float(min(1.0, loud.min() * n_looks)) if n_looks else 1.0
     lines = [line for line in find_lines(obs) if line.has_size]
@@ -301,11 +301,11 @@ def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
     disagrees = p < alpha / N_DOMAINS_TESTED
     where = Where()
     if disagrees:
-        holds = np.flatnonzero(loud.min(axis=1) * n_looks < alpha)[:8]
+        poses = np.flatnonzero(loud.min(axis=1) * n_looks < alpha)[:8]
         t = obs.time_s
-        spans = tuple((float(t[obs.segments.poses[i].start]), float(t[obs.segments.poses[i].stop - 1])) for i in holds)
+        spans = tuple((float(t[obs.segments.poses[i].start]), float(t[obs.segments.poses[i].stop - 1])) for i in poses)
         strong = [line for line in lines if line.p_value < alpha]
         loud_channels = [CHANNELS[c] for c in np.flatnonzero(loud.min(axis=0) * n_looks < alpha)]
         channels = tuple(dict.fromkeys([line.channel for line in strong] + loud_channels))
-        where = Where(channels, obs.pose_names(holds), spans, tuple(line.frequency_hz for line in strong))
+        where = Where(channels, obs.pose_names(poses), spans, tuple(line.frequency_hz for line in strong))
     return DomainTest("within-static", chi2_per_dof, dof, p, disagrees, where, 0.0, "")

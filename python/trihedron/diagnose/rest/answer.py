@@ -70,7 +70,7 @@ def diagnose_rest(recording: Recording, model: LinearModel, gravity_m_s2: float,
         sensors: list[Sensor] = ["gyroscope", "accelerometer"] if pieces.rate is not None else ["accelerometer"]
         for sensor in sensors:
             unit = _unit(recording, model, sensor)
-            before, after, found, candidates = _zeros(pieces, sensor, _sizes(model, sensor), unit, alpha)
+            before, after, found, candidates = _biases(pieces, sensor, _sizes(model, sensor), unit, alpha)
             domains.append(before)
             remaining.append(after)
             effects += found
@@ -128,7 +128,7 @@ def _noise(recording: Recording, pieces: RestPieces | None, model: LinearModel) 
     return out
 
 
-def _zeros(
+def _biases(
     pieces: RestPieces, sensor: Sensor, size: FloatArray, unit: str, alpha: float
 ) -> tuple[DomainTest, DomainTest, list[AcceptedEffect], list[Candidate]]:
     """One sensor's zeros: as they run, what temperature or a smooth drift takes of them, what stays."""
@@ -306,13 +306,13 @@ def _lines(
         slow = np.stack([np.interp(t, pieces.time_s, m) for m in means.T], axis=1)
         return np.asarray(values - slow)
 
-    holds = tuple(Pose(k, a, b, a, b) for k, (a, b) in enumerate(pieces.spans))
+    poses = tuple(Pose(k, a, b, a, b) for k, (a, b) in enumerate(pieces.spans))
     force = quick(recording.accelerometer, pieces.force)
     rate = None if recording.gyroscope is None or pieces.rate is None else quick(recording.gyroscope, pieces.rate)
-    samples = cast(Observations, _Samples(recording, t, force, rate, SimpleNamespace(poses=holds)))
+    samples = cast(Observations, _Samples(recording, t, force, rate, SimpleNamespace(poses=poses)))
     test = judge_within_poses(samples, alpha)
     S = [np.eye(3) if side is None else np.array(side["S"]) for side in (model.accelerometer, model.gyroscope)]
-    fitted = cast(Fit, SimpleNamespace(twin=SimpleNamespace(accel_S=S[0], gyro_S=S[1])))
+    fitted = cast(Fit, SimpleNamespace(state=SimpleNamespace(accel_S=S[0], gyro_S=S[1])))
     effect = PeriodicInterference()
     found = effect.find(Context(samples, fitted))
     if found is None or found.p_value * len(catalogue()) >= alpha / 2.0:

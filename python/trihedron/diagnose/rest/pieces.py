@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.rest.process import BiasReadings
-from trihedron.diagnose.session.twin import smoothed_slope
+from trihedron.diagnose.session.state import smoothed_slope
 from trihedron.records import Recording
 from trihedron.records.channel_facts import ChannelFacts
 

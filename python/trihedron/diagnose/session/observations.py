@@ -104,7 +104,7 @@ class Observations:
     @cached_property
     def _still(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], FloatArray]:
         """Samples of all poses one after the other, the first of each among them, and how many each has."""
-        samples = [hold.samples() for hold in self.segments.poses]
+        samples = [pose.samples() for pose in self.segments.poses]
         lengths = np.array([len(one) for one in samples])
         return np.concatenate(samples), np.cumsum(lengths) - lengths, lengths.astype(np.float64)
 
@@ -129,7 +129,7 @@ class Observations:
         """(poses, parts, 3) the same over that many equal parts."""
 
         def of(raw: FloatArray) -> FloatArray:
-            every = [np.array_split(raw[hold.start : hold.stop], parts) for hold in self.segments.poses]
+            every = [np.array_split(raw[pose.start : pose.stop], parts) for pose in self.segments.poses]
             return np.array([[np.nanmean(part, axis=0) for part in of_pose] for of_pose in every])
 
         return of(self.raw_force), None if self.raw_rate is None else of(self.raw_rate)
@@ -138,8 +138,8 @@ class Observations:
     def pose_scatter(self) -> FloatArray:
         """(poses, 3, 3) covariance of raw accelerometer readings inside every pose; NaN where some are missing."""
         out = np.empty((self.n_poses, 3, 3))
-        for i, hold in enumerate(self.segments.poses):
-            away = self.raw_force[hold.start : hold.stop]
+        for i, pose in enumerate(self.segments.poses):
+            away = self.raw_force[pose.start : pose.stop]
             away = away - away.mean(axis=0)
             out[i] = away.T @ away / len(away)
         return out
@@ -185,7 +185,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         )
     t = recording.time_s
     whole = segments if segments.whole is None else segments.whole
-    bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for hold in whole.poses for a, b in hold.disturbed)
+    bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for pose in whole.poses for a, b in pose.disturbed)
     force_origin = segments.accelerometer_mean.mean(axis=0)
     rate_origin = np.zeros(3)
     raw_rate = pose_rate = None
@@ -193,7 +193,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         rate_origin = segments.gyroscope_mean.mean(axis=0)
         raw_rate = recording.gyroscope - rate_origin
         pose_rate = segments.gyroscope_mean - rate_origin
-    ranges, holds = [], []
+    ranges, poses = [], []
     for move in segments.moves:
         start, stop = max(move.start - 1, 0), min(move.stop + 1, recording.n_samples)
         values = recording.accelerometer[start:stop]
@@ -202,12 +202,12 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         is_short = recording.time_s[stop - 1] - recording.time_s[start] <= LONGEST_MOVE_S
         if finite and is_short and stop - start >= 3:
             ranges.append((start, stop))
-            holds.append((move.pose_before, move.pose_after))
+            poses.append((move.pose_before, move.pose_after))
     noise = measure_noise(recording, segments, ranges)
     if noise.rate_sigma is not None:
-        lasts = np.array([t[hold.stop - 1] - t[hold.start] for hold in segments.poses])
+        lasts = np.array([t[pose.stop - 1] - t[pose.start] for pose in segments.poses])
         swing = swing + np.stack([np.zeros_like(noise.rate_sigma), _turned_at_ends(noise.rate_sigma, lasts)], axis=1)
-    unresolved = [own + swing[list(ends)].sum(axis=0) for own, ends in zip(noise.unresolved, holds, strict=True)]
+    unresolved = [own + swing[list(ends)].sum(axis=0) for own, ends in zip(noise.unresolved, poses, strict=True)]
     return Observations(
         recording=recording,
         segments=segments,
@@ -221,16 +221,16 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         pose_rate=pose_rate,
         pose_force_sigma=noise.force_sigma,
         pose_rate_sigma=noise.rate_sigma,
-        pose_time_s=np.array([0.5 * (t[hold.start] + t[hold.stop - 1]) for hold in segments.poses]),
+        pose_time_s=np.array([0.5 * (t[pose.start] + t[pose.stop - 1]) for pose in segments.poses]),
         move_ranges=tuple(ranges) if raw_rate is not None else (),
-        move_poses=np.array(holds if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
+        move_poses=np.array(poses if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
         force_density=noise.force_density,
         rate_density=noise.rate_density,
         bumped_s=bumped,
         force_up=noise.force_up,
         force_scatter=noise.force_scatter,
         rate_scatter=noise.rate_scatter,
-        unresolved=dict(zip(holds, unresolved, strict=True)),
+        unresolved=dict(zip(poses, unresolved, strict=True)),
         averaging=averaging,
     )
 

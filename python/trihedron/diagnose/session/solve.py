@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.twin import (
+from trihedron.diagnose.session.state import (
     DYNAMICS,
     MOVES,
     STATIC_ACCEL,
@@ -21,12 +21,12 @@ from trihedron.diagnose.session.twin import (
     Distortion,
     Linearisation,
     Prior,
+    SessionState,
     System,
-    Twin,
     contiguous,
     core_model,
     core_state,
-    twin_of,
+    state_of,
 )
 from trihedron.session.noise import PART_NOISE, START_STRENGTHS, Bounds
 
@@ -41,7 +41,7 @@ class Fit:
     The arithmetic stays in ``line.core``; what the rest of the diagnosis asks for is here.
     """
 
-    twin: Twin
+    state: SessionState
     line: Linearisation
     has_free_strengths: bool = False
 
@@ -86,15 +86,19 @@ class Fit:
         """
         obs, core = self.line.obs, self.line.core
         if not self.has_free_strengths:
-            core = core_model(obs, self.twin.gravity, self.line.prior, is_scatter_free=True).fit(
-                state=core_state(self.twin), strengths=(core.strengths[0], *START_STRENGTHS[1:]),
+            core = core_model(obs, self.state.gravity, self.line.prior, is_scatter_free=True).fit(
+                state=core_state(self.state), strengths=(core.strengths[0], *START_STRENGTHS[1:]),
                 force_effect=contiguous(self.line.distortion.force), rate_effect=contiguous(self.line.distortion.rate),
             )  # fmt: skip
         return core.linear_covariance(np.ascontiguousarray(obs.force_origin), np.ascontiguousarray(obs.rate_origin))
 
 
 def fit(
-    obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None = None, within: Bounds | None = None
+    obs: Observations,
+    start: SessionState,
+    distortion: Distortion,
+    prior: Prior | None = None,
+    within: Bounds | None = None,
 ) -> Fit:
     """Gauss-Newton on every row to convergence, noise corners as they are (eq. 11.9), or free ``within`` bounds."""
     if len(start.effect) != distortion.n_parameters:
@@ -106,18 +110,18 @@ def fit(
         rate_effect=contiguous(distortion.rate),
         within=within,
     )
-    twin = twin_of(core, start.gravity)
-    return Fit(twin, Linearisation(obs, twin, distortion, prior, core))
+    state = state_of(core, start.gravity)
+    return Fit(state, Linearisation(obs, state, distortion, prior, core))
 
 
-def tune_noise(obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None) -> Fit:
+def tune_noise(obs: Observations, start: SessionState, distortion: Distortion, prior: Prior | None) -> Fit:
     """The same with walks as strong as is likeliest, no stronger than the noise of parts makes them (eq. 11.18)."""
     return fit(obs, start, distortion, prior, PART_NOISE)
 
 
-def move_misfit(obs: Observations, twin: Twin) -> FloatArray:
+def move_misfit(obs: Observations, state: SessionState) -> FloatArray:
     """(moves,) chi-square of gravity and velocity after every move at a point, nothing fitted."""
-    residual = core_model(obs, twin.gravity, None).move_residuals(core_state(twin))
+    residual = core_model(obs, state.gravity, None).move_residuals(core_state(state))
     out: FloatArray = (residual**2).sum(axis=1)
     return out
 

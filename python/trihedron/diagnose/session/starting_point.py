@@ -12,7 +12,7 @@ from scipy.integrate import trapezoid
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
-from trihedron.diagnose.session.twin import _LOWER, Prior, Twin
+from trihedron.diagnose.session.state import _LOWER, Prior, SessionState
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.records.diagnosis import LinearModel
 from trihedron.units import acceleration_to_si, rate_to_si
@@ -41,7 +41,7 @@ def lower_frame(S: FloatArray) -> tuple[FloatArray, FloatArray]:
     return Q * signs, signs[:, None] * L
 
 
-def start_twin(obs: Observations, calibration: Calibration) -> Twin:
+def start_state(obs: Observations, calibration: Calibration) -> SessionState:
     """The calibration in the lower frame on centred readings, every pose at its measured vertical and bias."""
     Q, L = lower_frame(calibration.accelerometer.S)
     b = Q.T @ calibration.accelerometer.b + L @ obs.force_origin
@@ -49,7 +49,7 @@ def start_twin(obs: Observations, calibration: Calibration) -> Twin:
     force = obs.pose_force @ L.T + b
     n = obs.n_poses
     bias = np.zeros((n, 3)) if obs.pose_rate is None else obs.pose_rate @ gyro_S.T
-    return Twin(
+    return SessionState(
         gravity=calibration.gravity_m_s2,
         accel_S=L,
         accel_b=b,
@@ -70,7 +70,7 @@ def is_open(calibration: Calibration) -> bool:
     return bool(of_biases > OPEN_BIAS_M_S2 or of_scales > OPEN_SCALE * scale)
 
 
-def nominal_start(obs: Observations, calibration: Calibration) -> tuple[Twin, Prior]:
+def nominal_start(obs: Observations, calibration: Calibration) -> tuple[SessionState, Prior]:
     """Where the poses do not determine the model: a plain triad of the unit's scale, and how far real ones stray.
 
     The accelerometer's scale is that of its unit, or of counts the one that makes |g| of the typical pose; the gyro's
@@ -91,7 +91,7 @@ def nominal_start(obs: Observations, calibration: Calibration) -> tuple[Twin, Pr
         else:
             rate_scales = np.full(3, known_rate)
     n = obs.n_poses
-    twin = Twin(
+    state = SessionState(
         gravity=calibration.gravity_m_s2,
         accel_S=scale * np.eye(3),
         accel_b=scale * obs.force_origin,
@@ -101,11 +101,11 @@ def nominal_start(obs: Observations, calibration: Calibration) -> tuple[Twin, Pr
         accel_bias=np.zeros((n, 3)),
         effect=np.zeros(0),
     )
-    mean = np.concatenate([[twin.accel_S[i, j] for i, j in _LOWER], twin.accel_b, twin.gyro_S.ravel()])
+    mean = np.concatenate([[state.accel_S[i, j] for i, j in _LOWER], state.accel_b, state.gyro_S.ravel()])
     lower = [(TYPICAL_SCALE if i == j else TYPICAL_ANGLE) * scale for i, j in _LOWER]
     full = [(rate_sigma[i] if i == j else TYPICAL_ANGLE) * rate_scales[j] for i in range(3) for j in range(3)]
     sigma = np.array([*lower, *[TYPICAL_BIAS_M_S2] * 3, *full])
-    return twin, Prior(mean, np.diag(sigma**2), is_weak=True)
+    return state, Prior(mean, np.diag(sigma**2), is_weak=True)
 
 
 def _rate_scales_of_counts(obs: Observations, up: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
@@ -168,12 +168,12 @@ def prior_of(obs: Observations, calibration: Calibration) -> Prior:
 
 def linear_model(fitted: Fit) -> LinearModel:
     """S, b of both sensors from a fitted session, with standard errors, on raw readings; one bias for the session."""
-    twin, obs = fitted.twin, fitted.line.obs
+    state, obs = fitted.state, fitted.line.obs
     covariance, gyro_b = fitted.linear
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     accel: dict[str, Any] = {
-        "S": twin.accel_S.tolist(),
-        "b": (fitted.line.core.session_force_bias - twin.accel_S @ obs.force_origin).tolist(),
+        "S": state.accel_S.tolist(),
+        "b": (fitted.line.core.session_force_bias - state.accel_S @ obs.force_origin).tolist(),
         "sigma_S": sigma[:9].reshape(3, 3).tolist(),
         "sigma_b": sigma[9:12].tolist(),
         "raw_unit": obs.recording.accelerometer_unit.value,
@@ -181,7 +181,7 @@ def linear_model(fitted: Fit) -> LinearModel:
     if obs.raw_rate is None:
         return LinearModel(MappingProxyType(accel), None)
     gyro: dict[str, Any] = {
-        "S": twin.gyro_S.tolist(),
+        "S": state.gyro_S.tolist(),
         "b": gyro_b.tolist(),
         "sigma_S": sigma[12:21].reshape(3, 3).tolist(),
         "sigma_b": sigma[21:24].tolist(),

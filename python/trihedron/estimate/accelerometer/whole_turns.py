@@ -46,9 +46,9 @@ def opposite_headings(
         if angle == 0.0 or angle % 360.0 != 0.0 or move.stop - move.start < FEWEST:
             continue
         rows = slice(move.start, move.stop)
-        zero = 0.5 * (segments.gyroscope_mean[move.pose_before] + segments.gyroscope_mean[move.pose_after])
+        bias = 0.5 * (segments.gyroscope_mean[move.pose_before] + segments.gyroscope_mean[move.pose_after])
         rest = 0.5 * (mean[move.pose_before] + mean[move.pose_after])
-        one = _first_harmonic(recording.time_s[rows], force[rows] - rest, gyro[rows] - zero, np.radians(angle))
+        one = _first_harmonic(recording.time_s[rows], force[rows] - rest, gyro[rows] - bias, np.radians(angle))
         if one is not None:
             found.setdefault(placed, []).append(one)
     if not found:

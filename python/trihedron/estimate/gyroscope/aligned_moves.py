@@ -55,7 +55,7 @@ def integral_start(
         accelerometer.b,
         measured.rate,
         np.asarray(measured.edges, dtype=np.int64),
-        0.5 * (measured.zero[before] + measured.zero[after]),
+        0.5 * (measured.bias[before] + measured.bias[after]),
     )
     force = measured.reading @ accelerometer.S.T + accelerometer.b
     used = [k for k, moment in enumerate(moments) if moment is not None and not measured.is_lost[k]]
@@ -114,7 +114,7 @@ def turned_starts(
     up = force / np.linalg.norm(force, axis=1, keepdims=True)
     courses = []
     for (a, b), (before, after), lost in zip(measured.edges, measured.links, measured.is_lost, strict=True):
-        rate = measured.rate[a:b] - 0.5 * (measured.zero[before] + measured.zero[after])
+        rate = measured.rate[a:b] - 0.5 * (measured.bias[before] + measured.bias[after])
         if not lost and b - a > 1 and np.isfinite(rate).all():
             courses.append((measured.time_s[a:b], rate, up[before], up[after]))
     if len(courses) < FEWEST_MOVES:

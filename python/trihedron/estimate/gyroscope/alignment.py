@@ -163,7 +163,7 @@ def align(
         poses=_core.AlignmentPoses(
             reading=measured.reading,
             var_reading=measured.var_reading,
-            zero=measured.zero,
+            bias=measured.bias,
             var_bias=measured.var_bias,
             var_bias_walk=measured.var_bias_walk,
         ),

@@ -132,11 +132,11 @@ def _attitude_findings(measured: MoveMeasurements, S: FloatArray) -> list[Findin
 
 
 def _drift_findings(measured: MoveMeasurements, S: FloatArray) -> list[Finding]:
-    dof = len(measured.zero) - 1
+    dof = len(measured.bias) - 1
     if dof < 1 or chdtrc(dof, float(measured.bias_excess.max())) > FALSE_ALARM / 3.0:
         return []
     rates = np.abs(np.diagonal(S)) if np.all(np.abs(np.diagonal(S)) > 0) else np.linalg.norm(S, axis=0)
-    change = np.ptp(measured.zero, axis=0) * rates
+    change = np.ptp(measured.bias, axis=0) * rates
     axis = int(np.argmax(measured.bias_excess))
     return [
         Finding.of(

@@ -72,7 +72,7 @@ class MoveMeasurements:
     durations_s: FloatArray
     reading: FloatArray
     var_reading: FloatArray
-    zero: FloatArray
+    bias: FloatArray
     var_bias: FloatArray
     bias_mean: FloatArray
     var_bias_walk: FloatArray
@@ -161,15 +161,15 @@ def measure_moves(
     accelerometer_mean, gyroscope_mean = _both_means(segments)
     in_log, links = _edges_and_links(_moves_of(recording, segments))
     rows, edges = rows_beside(in_log, BESIDE, recording.n_samples)
-    reading, zero = (np.ascontiguousarray(mean, dtype=np.float64) for mean in (accelerometer_mean, gyroscope_mean))
+    reading, bias = (np.ascontiguousarray(mean, dtype=np.float64) for mean in (accelerometer_mean, gyroscope_mean))
     quantum = recording.facts.of("gyroscope").step
     var_bias = _mean_variance(segments.gyroscope_sigma_mean)
     force = reading @ accelerometer.S.T + accelerometer.b
     undithered = _undithered(quantum, segments.gyroscope_sigma)
-    attitude = attitude_dependence(zero, var_bias, force)
+    attitude = attitude_dependence(bias, var_bias, force)
     if attitude is not None and attitude.is_present:
         rate = gyroscope[rows] - (raw_force[rows] @ accelerometer.S.T + accelerometer.b) @ attitude.A.T
-        zero = np.ascontiguousarray(zero - force @ attitude.A.T)
+        bias = np.ascontiguousarray(bias - force @ attitude.A.T)
     else:
         attitude, rate = None, gyroscope[rows]
     clipped = bridge_clipping(recording) if is_bridged else None
@@ -181,13 +181,13 @@ def measure_moves(
     mid_s = np.ascontiguousarray(segments.time_mid_s[links])
     prepared = Moves(time_s, rate, edges, mid_s, links, RATE_DEGREE, extra)
     var_reading = _mean_variance(segments.accelerometer_sigma_mean)
-    bias_read, var_bias_read = zero, var_bias
-    walk = excess_variance(zero[links[:, 1]] - zero[links[:, 0]], var_bias[links[:, 1]] + var_bias[links[:, 0]])
-    mean, excess, _ = pool_biases(zero, var_bias)
-    zero, var_bias = shrink(zero, var_bias, mean)
+    bias_read, var_bias_read = bias, var_bias
+    walk = excess_variance(bias[links[:, 1]] - bias[links[:, 0]], var_bias[links[:, 1]] + var_bias[links[:, 0]])
+    mean, excess, _ = pool_biases(bias, var_bias)
+    bias, var_bias = shrink(bias, var_bias, mean)
     if np.any(undithered):
-        zero, var_bias = _with_hidden_bias(zero, var_bias, segments, quantum, undithered)
-        mean = np.where(undithered, zero.mean(axis=0), mean)
+        bias, var_bias = _with_hidden_bias(bias, var_bias, segments, quantum, undithered)
+        mean = np.where(undithered, bias.mean(axis=0), mean)
     hidden = np.zeros(rate.shape)
     if np.any(undithered):
         coarse = _coarse(recording, segments, undithered)
@@ -204,7 +204,7 @@ def measure_moves(
         durations_s=prepared.durations_s(),
         reading=reading,
         var_reading=var_reading + _unexplained_reading_variance(accelerometer),
-        zero=zero,
+        bias=bias,
         var_bias=var_bias,
         bias_mean=mean,
         var_bias_walk=walk,
@@ -255,12 +255,12 @@ def _bridged(
 
 
 def _with_hidden_bias(
-    zero: FloatArray, var_bias: FloatArray, segments: Segments, quantum: FloatArray, undithered: BoolArray
+    bias: FloatArray, var_bias: FloatArray, segments: Segments, quantum: FloatArray, undithered: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
     # Rounding hides the same part of every pose's zero: what it hides is fitted to the moves, as one offset.
     hidden = np.where(undithered, quantum**2 / 12.0, 0.0)
     own = np.maximum(np.asarray(segments.gyroscope_sigma_mean, dtype=np.float64) ** 2 - hidden, 0.0)
-    return common_bias(zero, np.where(undithered, own, var_bias), undithered)
+    return common_bias(bias, np.where(undithered, own, var_bias), undithered)
 
 
 def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:

@@ -107,8 +107,8 @@ class MeasuredTurns:
 
     raw_angle: FloatArray
     duration_s: FloatArray
-    zero_angle: FloatArray
-    zero_duration_s: FloatArray
+    static_angle: FloatArray
+    static_duration_s: FloatArray
     var_rate: FloatArray
     bias_spread: FloatArray
     bias_excess: FloatArray
@@ -116,7 +116,7 @@ class MeasuredTurns:
     hidden: HiddenAngles | None = None
 
 
-def measure_turns(recording: Recording, turns: Sequence[Turn], zeros: Sequence[tuple[int, int]]) -> MeasuredTurns:
+def measure_turns(recording: Recording, turns: Sequence[Turn], static: Sequence[tuple[int, int]]) -> MeasuredTurns:
     """Integrate turns and zero turns; noise from the zero turns.
 
     Raises
@@ -128,16 +128,16 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], zeros: Sequence[t
         raise RefusedError("the recording has no gyroscope")
     if not turns:
         raise RefusedError("method 1 needs turns: none were given and none were found")
-    if not zeros:
+    if not static:
         raise RefusedError("method 1 needs a stretch without rotation: keep the sensor still for some seconds")
     gyroscope = recording.gyroscope
     edges = np.array([[turn.start, turn.stop] for turn in turns], dtype=np.int64)
     raw_angle, duration = integrate_raw_rate(recording.time_s, gyroscope, edges, 3)
-    zero_edges = np.array([[a, b] for a, b in zeros], dtype=np.int64)
-    zero_angle, zero_duration = integrate_raw_rate(recording.time_s, gyroscope, zero_edges, 1)
+    static_edges = np.array([[a, b] for a, b in static], dtype=np.int64)
+    static_angle, static_duration = integrate_raw_rate(recording.time_s, gyroscope, static_edges, 1)
     step_s = 1.0 / recording.rate_hz
     sums, count = np.zeros(3), 0
-    for start, stop in zeros:
+    for start, stop in static:
         block = gyroscope[start:stop]
         block = block[np.all(np.isfinite(block), axis=1)]
         length = min(max(1, round(BLOCK_S / step_s)), len(block) // 4)
@@ -151,13 +151,13 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], zeros: Sequence[t
             "the stretches without rotation are too short to measure the gyro's noise: keep still for some seconds"
         )
     var_rate = np.maximum(sums / count, recording.facts.of("gyroscope").step ** 2 / 12.0 * step_s)
-    zero_s = np.array(zero_duration)
-    rates = zero_angle / zero_s[:, None]
-    mean, excess, spread = pool_biases(rates, var_rate / zero_s[:, None])
+    static_s = np.array(static_duration)
+    rates = static_angle / static_s[:, None]
+    mean, excess, spread = pool_biases(rates, var_rate / static_s[:, None])
     hidden = hidden_angles(
-        gyroscope, step_s, recording.facts.of("gyroscope").step, [(t.start, t.stop) for t in turns], zeros, raw_angle
+        gyroscope, step_s, recording.facts.of("gyroscope").step, [(t.start, t.stop) for t in turns], static, raw_angle
     )
-    return MeasuredTurns(raw_angle, np.array(duration), zero_angle, zero_s, var_rate, spread, excess, mean, hidden)
+    return MeasuredTurns(raw_angle, np.array(duration), static_angle, static_s, var_rate, spread, excess, mean, hidden)
 
 
 AMBIGUOUS = (

@@ -128,8 +128,8 @@ def axis_of_turn(
     edges = np.stack([cuts, np.minimum(cuts + length + 1, stop)], axis=1).astype(np.int64)
     raw, duration = integrate_raw_rate(recording.time_s, recording.gyroscope, edges, 1)
     assert segments.gyroscope_mean is not None
-    zero = segments.gyroscope_mean[[move.pose_before, move.pose_after]].mean(axis=0)
-    turned = np.asarray(raw) - np.outer(duration, zero)
+    bias = segments.gyroscope_mean[[move.pose_before, move.pose_after]].mean(axis=0)
+    turned = np.asarray(raw) - np.outer(duration, bias)
     # Along the turn, by the gyro's own reading of it: its scale is that of the stated angle.
     inside = (cuts >= move.start - length) & (cuts < move.stop)
     whole = turned[inside].sum(axis=0)

@@ -19,14 +19,14 @@ class TurnDesign:
     reading's own unit per rad, and ``zero`` of ``b_w``. With the noise in rad/s/√Hz both are relative and rad/s."""
 
     scale: FloatArray
-    zero: float
+    bias: float
 
 
 def design_least_squares(
     axes: Sequence[int],
     angles_rad: Sequence[float],
     durations_s: Sequence[float],
-    zero_s: float,
+    static_s: float,
     noise_density: float,
     sigma_turn_rad: float = 0.0,
 ) -> TurnDesign:
@@ -43,18 +43,18 @@ def design_least_squares(
     if not 1e-30 < noise_density < 1e30:
         raise RefusedError(f"a noise density of {noise_density:g} is that of no gyro")
     q, p, t = _sums(axes, angles_rad, durations_s, noise_density, sigma_turn_rad)
-    information = t + zero_s / noise_density**2 - float(np.sum(p**2 / q))
-    if not information > 1e-12 * (t + zero_s / noise_density**2):
+    information = t + static_s / noise_density**2 - float(np.sum(p**2 / q))
+    if not information > 1e-12 * (t + static_s / noise_density**2):
         raise RefusedError("nothing determines the bias: turn there and back, or keep still for some seconds")
     var_bias = 1.0 / information
     return TurnDesign(np.sqrt(1.0 / q + (p / q) ** 2 * var_bias), math.sqrt(var_bias))
 
 
-def design_zero_first(
+def design_bias_first(
     axes: Sequence[int],
     angles_rad: Sequence[float],
     durations_s: Sequence[float],
-    zero_s: float,
+    static_s: float,
     noise_density: float,
     sigma_turn_rad: float = 0.0,
 ) -> TurnDesign:
@@ -68,9 +68,9 @@ def design_zero_first(
         When the turns do not determine an axis, or there is no zero turn.
     """
     q, p, _ = _sums(axes, angles_rad, durations_s, noise_density, sigma_turn_rad)
-    if not zero_s > 0.0:
+    if not static_s > 0.0:
         raise RefusedError("this route needs a stretch without rotation: keep still for some seconds")
-    var_bias = noise_density**2 / zero_s
+    var_bias = noise_density**2 / static_s
     return TurnDesign(np.sqrt(1.0 / q + (p / q) ** 2 * var_bias), math.sqrt(var_bias))
 
 

@@ -70,7 +70,7 @@ def _not_a_multiple(index: int, turn: KnownTurn) -> Finding:
 
 def _drift(screened: Screened) -> list[Finding]:
     measured = screened.system.measured
-    dof = len(measured.zero_duration_s) - 1
+    dof = len(measured.static_duration_s) - 1
     if dof < 1 or chdtrc(dof, float(measured.bias_excess.max())) > FALSE_ALARM / 3.0:
         return []
     axis = int(np.argmax(measured.bias_excess))

@@ -77,7 +77,7 @@ class HiddenAngles:
     """
 
     turns: FloatArray
-    zeros: FloatArray
+    static: FloatArray
     passing: FloatArray
 
     def variance_of_turns(self) -> FloatArray:
@@ -87,7 +87,7 @@ class HiddenAngles:
 
     def variance_of_biases(self) -> FloatArray:
         """(z, 3) raw²."""
-        out: FloatArray = np.sum(self.zeros**2, axis=2)
+        out: FloatArray = np.sum(self.static**2, axis=2)
         return out
 
 
@@ -96,7 +96,7 @@ def hidden_angles(
     step_s: float,
     quantum: FloatArray,
     turns: Sequence[tuple[int, int]],
-    zeros: Sequence[tuple[int, int]],
+    static: Sequence[tuple[int, int]],
     raw_angle: FloatArray,
 ) -> HiddenAngles | None:
     """What rounding to ``quantum`` (3,) hides of turns and zero turns; ``None`` where noise dithers every axis.
@@ -107,7 +107,7 @@ def hidden_angles(
     have their own: with w' = z at rest and z ± mω across a turn there and back, all read alike, (z, mω) is uniform on
     ``|z| + |mω| < q/2``, where mω has the variance q²/24 that two independent errors give it.
     """
-    still = np.concatenate([readings[a:b] for a, b in zeros])
+    still = np.concatenate([readings[a:b] for a, b in static])
     axes = _undithered(still, quantum)
     if not np.any(axes):
         return None
@@ -130,10 +130,10 @@ def hidden_angles(
                 at_rest = is_end and abs(level - rest[axis]) < AT_REST * quantum[axis]
                 key = (axis, 0.0, 0) if at_rest else (axis, round(level / float(quantum[axis])), sense)
                 entries.append((row, axis, groups.setdefault(key, len(groups)), size * time))
-        for row, (a, b) in enumerate(zeros):
+        for row, (a, b) in enumerate(static):
             key = (axis, 0.0, 0)
             entries.append((len(turns) + row, axis, groups.setdefault(key, len(groups)), size * (b - a) * step_s))
-    out = np.zeros((len(turns) + len(zeros), 3, len(groups)))
+    out = np.zeros((len(turns) + len(static), 3, len(groups)))
     for row, axis, group, angle in entries:
         out[row, axis, group] += angle
     return HiddenAngles(out[: len(turns)], out[len(turns) :], passing)

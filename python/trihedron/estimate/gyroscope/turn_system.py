@@ -68,7 +68,7 @@ class TurnSystem:
     def noise_of_biases(self) -> FloatArray:
         """(z, 3, 3) of the raw zero turns."""
         hidden = self.measured.hidden
-        return self._noise(self.measured.zero_duration_s, None if hidden is None else hidden.variance_of_biases())
+        return self._noise(self.measured.static_duration_s, None if hidden is None else hidden.variance_of_biases())
 
     def _noise(self, duration_s: FloatArray, rounding: FloatArray | None) -> FloatArray:
         t = duration_s[:, None]
@@ -93,10 +93,10 @@ class TurnSystem:
         design = factor @ self.designs(self.angles[used], measured.duration_s[used]).reshape(-1, 12)
         side = factor @ measured.raw_angle[used].ravel()
         if with_biases:
-            still = self.designs(np.zeros_like(measured.zero_angle), measured.zero_duration_s)
+            still = self.designs(np.zeros_like(measured.static_angle), measured.static_duration_s)
             of_biases = np.linalg.inv(np.linalg.cholesky(self.noise_of_biases()))
             design = np.concatenate([design, (of_biases @ still).reshape(-1, 12)])
-            side = np.concatenate([side, (of_biases @ measured.zero_angle[:, :, None]).ravel()])
+            side = np.concatenate([side, (of_biases @ measured.static_angle[:, :, None]).ravel()])
         return design, side
 
     def pull(self, fit: Solution, used: BoolArray, errors: FloatArray) -> FloatArray:
@@ -113,7 +113,7 @@ class TurnSystem:
         matrix, _ = self.whitened(used)
         n = 3 * int(np.count_nonzero(used))
         of_biases = np.linalg.inv(np.linalg.cholesky(self.noise_of_biases()))
-        errors = np.concatenate([hidden.turns[used], hidden.zeros])
+        errors = np.concatenate([hidden.turns[used], hidden.static])
         # (n, 12, 3): by what an error of each row pulls the solution.
         pulls = matrix @ fit.covariance
         of_turns = (self.factor(used).T @ pulls[:n]).reshape(-1, 3, 12)

@@ -35,7 +35,7 @@ from trihedron.units import rate_to_si
 def calibrate_turns(
     recording: Recording,
     turns: Sequence[Turn],
-    zeros: Sequence[tuple[int, int]],
+    static: Sequence[tuple[int, int]],
     *,
     nominal_scale: FloatArray | float | None = None,
     nominal_tolerance: float = SCALE_TOLERANCE,
@@ -74,7 +74,7 @@ def calibrate_turns(
     -----
     White rate noise ``N`` [unit/√Hz] gives ``var δφ = N² Δt``.
     """
-    measured = measure_turns(recording, turns, zeros)
+    measured = measure_turns(recording, turns, static)
     nominal = nominal_matrix(recording, measured, turns, nominal_scale)
     known = identify_turns(measured, turns, nominal, nominal_tolerance)
     used = np.array([turn.is_used for turn in known], dtype=bool)

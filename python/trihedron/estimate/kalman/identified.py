@@ -150,7 +150,7 @@ def _factor(axis: IdentifiedAxis, raw_unit: AccelerationUnit) -> float:
     return factor
 
 
-def check_same_converter(
+def check_same_adc(
     given: Sequence[AxisNoise],
     steps: Sequence[float],
     octaves: Sequence[Sequence[OctaveNoise]],

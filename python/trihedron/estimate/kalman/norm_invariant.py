@@ -27,21 +27,21 @@ from trihedron.records.kalman import AxisNoise, NormKalmanCalibration
 
 @dataclass(frozen=True, eq=False)
 class NormStart:
-    """Where the filter starts: ``f = S (raw − zero)`` with S (3, 3) and bias (3,).
+    """Where the filter starts: ``f = S (raw − bias)`` with S (3, 3) and bias (3,).
 
     S is good to ``sigma_relative`` of its size, the bias to ``sigma_bias_m_s2``. The signs of S decide
     the signs of the result: the length of a vector cannot.
     """
 
     S: FloatArray
-    zero: FloatArray
+    bias: FloatArray
     sigma_relative: float = 0.1
     sigma_bias_m_s2: float = 1.0
 
     def __post_init__(self) -> None:
-        S, zero = np.array(self.S, dtype=np.float64), np.array(self.zero, dtype=np.float64)
-        if S.shape != (3, 3) or zero.shape != (3,) or not (np.all(np.isfinite(S)) and np.all(np.isfinite(zero))):
-            raise RefusedError(f"a start needs finite S (3, 3) and bias (3,), got shapes {S.shape} and {zero.shape}")
+        S, bias = np.array(self.S, dtype=np.float64), np.array(self.bias, dtype=np.float64)
+        if S.shape != (3, 3) or bias.shape != (3,) or not (np.all(np.isfinite(S)) and np.all(np.isfinite(bias))):
+            raise RefusedError(f"a start needs finite S (3, 3) and bias (3,), got shapes {S.shape} and {bias.shape}")
         if np.linalg.matrix_rank(S) < 3:
             raise RefusedError(
                 "a start needs three independent axes: S = 0 is no calibration, but the filter would stay there"
@@ -49,7 +49,7 @@ class NormStart:
         if not (self.sigma_relative > 0 and self.sigma_bias_m_s2 > 0):
             raise RefusedError("the uncertainty of a start must be positive")
         object.__setattr__(self, "S", S)
-        object.__setattr__(self, "zero", zero)
+        object.__setattr__(self, "bias", bias)
 
     @classmethod
     def from_range(cls, readings: npt.ArrayLike, gravity_m_s2: float) -> NormStart:
@@ -64,8 +64,8 @@ class NormStart:
         half = (a.max(axis=0) - a.min(axis=0)) / 2.0
         if np.any(half <= 0):
             raise RefusedError(f"{XYZ[int(np.argmin(half))]} never changed: turn it both ways up, or give a start")
-        zero = (a.max(axis=0) + a.min(axis=0)) / 2.0
-        return cls(np.diag(gravity_m_s2 / half), zero, sigma_relative=0.3, sigma_bias_m_s2=3.0)
+        bias = (a.max(axis=0) + a.min(axis=0)) / 2.0
+        return cls(np.diag(gravity_m_s2 / half), bias, sigma_relative=0.3, sigma_bias_m_s2=3.0)
 
 
 NormFrame = Literal["lower", "symmetric"]
@@ -107,7 +107,7 @@ class NormFilter:
     ) -> None:
         self.frame: NormFrame = frame
         self._gravity = gravity_m_s2
-        self._zero = start.zero
+        self._bias = start.bias
         options = options or ShapingOptions()
         models = [shaping_model(n, options, session_s=session_s, pose_s=pose_s) for n in noise_per_axis(noise)]
         size = np.abs(np.diag(start.S)).mean()
@@ -126,11 +126,11 @@ class NormFilter:
         ValueError
             When the reading is not finite or the pose is earlier than the last one.
         """
-        self._filter.add([float(v) for v in reading - self._zero], start_s, pose_s, [float(v) for v in extra_variance])
+        self._filter.add([float(v) for v in reading - self._bias], start_s, pose_s, [float(v) for v in extra_variance])
 
     def load(self, readings: FloatArray, start_s: FloatArray, pose_s: FloatArray, extra_variance: FloatArray) -> None:
         """Take many poses at once, (n, 3), (n,), (n,), (n, 3); :meth:`relinearise` then estimates from all of them."""
-        self._filter.load(readings - self._zero, start_s, pose_s, np.ascontiguousarray(extra_variance))
+        self._filter.load(readings - self._bias, start_s, pose_s, np.ascontiguousarray(extra_variance))
 
     def relinearise(self, most: int = MOST_RUNS) -> bool:
         """Repeat the run over all poses until the constants stay; whether they did within ``most`` runs."""
@@ -141,11 +141,11 @@ class NormFilter:
     def calibration(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """``S`` (3, 3), ``b`` (3,) and covariance (12, 12) of ``f = S raw + b``."""
         S, b = self._centred()
-        # b = b_centred − S zero
+        # b = b_centred − S bias
         jacobian = self._expand()
         for k in range(3):
-            jacobian[9 + k] -= self._zero @ jacobian[3 * k : 3 * k + 3]
-        return S, b - S @ self._zero, jacobian @ self._filter.covariance @ jacobian.T
+            jacobian[9 + k] -= self._bias @ jacobian[3 * k : 3 * k + 3]
+        return S, b - S @ self._bias, jacobian @ self._filter.covariance @ jacobian.T
 
     def _expand(self) -> FloatArray:
         """(12, 9) derivative of S row by row and b with respect to the nine parameters."""

@@ -119,17 +119,17 @@ def levels(sizes: Sequence[float]) -> FloatArray:
     return np.concatenate([[0.0], np.geomspace(low, high, n)])
 
 
-def _table(zeros: PoseBiases, b: FloatArray, k: FloatArray) -> FloatArray:
+def _table(biases: PoseBiases, b: FloatArray, k: FloatArray) -> FloatArray:
     """(b, k) log-likelihood of the contrasts that are free of the constant, the best scatter for each."""
-    basis = np.linalg.qr(np.ones((len(zeros.values), 1)), mode="complete")[0][:, 1:]
-    white, flicker, walk = (basis.T @ kernel @ basis for kernel in (np.diag(zeros.sigma**2), *kernels(zeros)))
-    return best_scatter(basis.T @ zeros.values, (white, flicker, walk), zeros, b, k)
+    basis = np.linalg.qr(np.ones((len(biases.values), 1)), mode="complete")[0][:, 1:]
+    white, flicker, walk = (basis.T @ kernel @ basis for kernel in (np.diag(biases.sigma**2), *kernels(biases)))
+    return best_scatter(basis.T @ biases.values, (white, flicker, walk), biases, b, k)
 
 
 def best_scatter(
     contrasts: FloatArray,
     covariances: tuple[FloatArray, FloatArray, FloatArray],
-    zeros: PoseBiases,
+    biases: PoseBiases,
     b: FloatArray,
     k: FloatArray,
 ) -> FloatArray:
@@ -137,7 +137,7 @@ def best_scatter(
 
     ``covariances`` (m, m) are those of white noise, per B² and per K².
     """
-    s = np.concatenate([[0.0], np.geomspace(0.15, 1.5, 5) * zeros.spread]) if zeros.scatters else np.zeros(1)
+    s = np.concatenate([[0.0], np.geomspace(0.15, 1.5, 5) * biases.spread]) if biases.scatters else np.zeros(1)
     out: FloatArray = _log_likelihood(contrasts, covariances, b, k, s).max(axis=2)
     return out
 
@@ -182,9 +182,9 @@ def _ratios(b: FloatArray, k: FloatArray, p: FloatArray, q: FloatArray) -> dict[
     return out
 
 
-def kernels(zeros: PoseBiases) -> tuple[FloatArray, FloatArray]:
+def kernels(biases: PoseBiases) -> tuple[FloatArray, FloatArray]:
     """(n, n) covariance of the means of the poses per B² and per K², beside a free constant."""
-    t, length = zeros.time_s - zeros.time_s[0], zeros.length_s
+    t, length = biases.time_s - biases.time_s[0], biases.length_s
     begin, end = t - length / 2.0, t + length / 2.0
     mean_log = (
         _twice_integrated(np.subtract.outer(end, begin)) - _twice_integrated(np.subtract.outer(end, end))

@@ -95,12 +95,12 @@ def _free_of_calibration(one: PoseNorms) -> PoseNorms:
 
 def _parts(one: PoseNorms, least: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Contrasts (m,), their white covariance (m, m), and those of each axis per B² and per K² (3, m, m)."""
-    basis, zeros = one.basis, one.norms
-    flicker, walk = kernels(zeros)
+    basis, biases = one.basis, one.norms
+    flicker, walk = kernels(biases)
     gram = np.einsum("ik,jk->kij", one.up, one.up)
     of_b, of_k = (np.einsum("ia,kij,jb->kab", basis, gram * kernel, basis) for kernel in (flicker, walk))
-    white = basis.T @ np.diag(zeros.sigma**2 + (LOWEST * least) ** 2) @ basis
-    return basis.T @ zeros.values, white, of_b, of_k
+    white = basis.T @ np.diag(biases.sigma**2 + (LOWEST * least) ** 2) @ basis
+    return basis.T @ biases.values, white, of_b, of_k
 
 
 def _of_all_axes(one: PoseNorms, b: FloatArray, k: FloatArray, least: float) -> FloatArray:

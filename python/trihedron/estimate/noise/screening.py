@@ -15,7 +15,7 @@ from scipy.special import chdtri
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts.at_rest import converter_step
+from trihedron.channel_facts.at_rest import adc_step
 from trihedron.channel_facts.limits import share_at_limits
 
 FALSE_ALARM = 1e-4
@@ -147,7 +147,7 @@ def readout(x: FloatArray) -> Readout:
     if len(values) < 2:
         return Readout(0.0, 0.0, 0.0, 0.0)
     change = np.abs(np.concatenate([np.diff(part) for part in parts]))
-    resolution = converter_step(values)
+    resolution = adc_step(values)
     sigma = float(np.sqrt(0.5 * np.mean(np.square(change))))
     clipped = share_at_limits(values, sigma, resolution)
     return Readout(resolution, sigma, float(np.mean(change == 0.0)), clipped)

@@ -200,7 +200,7 @@ def _wrt_clock(influence: FloatArray, left: Callable[[FloatArray], FloatArray], 
     """(n, k) errors of numbers whose ``influence`` (n, k, 3) acts on what is left (k, 3) at times (n,), by its change
     with them."""
     change = (left(time + CLOCK_STEP_S) - left(time - CLOCK_STEP_S)) / (2.0 * CLOCK_STEP_S)
-    return -np.einsum("nka,ka->nk", influence, change)
+    return np.asarray(-np.einsum("nka,ka->nk", influence, change))
 
 
 def _turning(windows: Windows, reference: Reference, time: FloatArray) -> FloatArray:

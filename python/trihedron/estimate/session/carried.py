@@ -213,11 +213,11 @@ def carried_each(
     S_a, S_w, b_a = np.zeros((m, 3, 3)), np.zeros((m, 3, 3)), np.zeros((m, 3))
     noise = _core.RateNoise(measured.noise_density, measured.sigma_time_s, measured.nominal_step_s)
     for one in models:
-        at, zero = one.moves, -measured.zero @ one.S_w.T
+        at, bias = one.moves, -measured.bias @ one.S_w.T
         S_a[at], b_a[at], S_w[at] = one.S_a, one.b_a, one.S_w
         rotation[at], wrt_scale[at], wrt_before[at], wrt_after[at], cov_rate[at] = _core.integrate_moves(
             measured.time_s, measured.rate, measured.edges[at], np.ascontiguousarray(anchors_s[at]),
-            np.ascontiguousarray(one.S_w), zero[before[at]], zero[after[at]], 3, noise,
+            np.ascontiguousarray(one.S_w), bias[before[at]], bias[after[at]], 3, noise,
         )  # fmt: skip
     start = np.einsum("mij,mj->mi", S_a, measured.reading[before]) + b_a
     end = np.einsum("mij,mj->mi", S_a, measured.reading[after]) + b_a
@@ -245,8 +245,8 @@ def carried_each(
         wrt_S = wrt_scale.copy()
         for i in range(3):
             wrt_S[:, :, 3 * i : 3 * i + 3] -= (
-                wrt_before[:, :, i : i + 1] * measured.zero[before][:, None, :]
-                + wrt_after[:, :, i : i + 1] * measured.zero[after][:, None, :]
+                wrt_before[:, :, i : i + 1] * measured.bias[before][:, None, :]
+                + wrt_after[:, :, i : i + 1] * measured.bias[after][:, None, :]
             )
         model2 = np.sum((across @ turn @ wrt_S @ _root(covariance_S_w)) ** 2, axis=(1, 2))
     return Carried(residual, np.sqrt(np.sum(root**2, axis=2)), angle, floor2, model2)

@@ -63,7 +63,7 @@ class SessionSolution:
         axes = np.flatnonzero(measured.is_undithered)
         place = np.zeros(3)
         place[axes] = self.core.effect[: len(axes)]
-        return replace(measured, rate=measured.rate - measured.is_hidden * place, zero=measured.zero - place)
+        return replace(measured, rate=measured.rate - measured.is_hidden * place, bias=measured.bias - place)
 
     @property
     def parameters(self) -> FloatArray:

@@ -88,14 +88,14 @@ def arranged(
     readings = recording.accelerometer[rows]
     ranges: list[tuple[int, int]] = []
     before = []
-    for (start, stop), (hold, after), is_used in zip(measured.edges, measured.links, used, strict=True):
+    for (start, stop), (pose, after), is_used in zip(measured.edges, measured.links, used, strict=True):
         a, b = int(start) - int(rows[start] > 0), int(stop) + int(rows[stop - 1] < n - 1)
-        if not is_used or after != hold + 1 or b - a < 3 or not np.isfinite(readings[a:b]).all():
+        if not is_used or after != pose + 1 or b - a < 3 or not np.isfinite(readings[a:b]).all():
             continue
         if not np.isfinite(measured.rate[a:b]).all():
             continue
         ranges.append((a, b))
-        before.append(hold)
+        before.append(pose)
     noise = measure_noise(recording, segments, [(int(rows[a]), int(rows[b - 1]) + 1) for a, b in ranges])
     force = sharpened(readings, measured.time_s, measured.averaging.share)
     assert noise.rate_sigma is not None
@@ -120,7 +120,7 @@ def arranged(
         # Where readings dither too little their rounding does not average out: the larger of the two.
         pose_force_sigma=np.maximum(noise.force_sigma, np.sqrt(measured.var_reading_noise)),
         force_density=noise.force_density,
-        pose_rate=np.where(is_coarse, measured.zero, measured.bias_read) - rate_origin,
+        pose_rate=np.where(is_coarse, measured.bias, measured.bias_read) - rate_origin,
         pose_rate_sigma=np.where(is_coarse, of_coarse, np.maximum(noise.rate_sigma, np.sqrt(measured.var_bias_read))),
         rate_density=np.where(is_coarse, measured.noise_density, noise.rate_density),
         moves=_core.SessionMoves(

@@ -17,7 +17,7 @@ from trihedron.arrays import FloatArray
 from trihedron.probability import fdtrc
 from trihedron.records.sessions import PARAMETERS, Change, ChangeKind, Session
 
-SPREAD_DOF, WANDER_DOF = 25.0, 5.0
+SPREAD_DOF, DRIFT_DOF = 25.0, 5.0
 """Degrees of freedom a session that its covariance and its wander bring: some 25 poses, and half of what was measured
 for the wander of a pair of sessions (:mod:`trihedron.diagnose.against.numbers`). An inverse of an estimate is too large
 by ν/(ν - 2) on average; the weights of sessions are taken back by it, or ten sessions would be called changed by chance
@@ -59,8 +59,8 @@ def _change(sessions: Sequence[Session], name: str) -> Change:
     picked = [k for k, parameter in enumerate(PARAMETERS) if parameter.id == name]
     values = np.array([session.numbers[picked] for session in sessions])
     # The wander of one session is read off few poses: that of the unit is the mean over its sessions.
-    wander = np.mean([session.wander[picked] for session in sessions], axis=0)
-    weights = np.array([_weight(session, picked, wander) for session in sessions])
+    drift = np.mean([session.drift[picked] for session in sessions], axis=0)
+    weights = np.array([_weight(session, picked, drift) for session in sessions])
     names = tuple(PARAMETERS[k].name for k in picked)
     p_value, values, weights, name, names = _as_gravity(name, names, values, weights)
     best, rest_p = _best(values, weights, name)
@@ -87,15 +87,15 @@ MIN_REST_P = 0.01
 """What is left after the change named may be chance: at 1 % one change in a hundred is called scatter instead."""
 
 
-def _weight(session: Session, picked: list[int], wander: FloatArray) -> FloatArray:
-    covariance = session.covariance[np.ix_(picked, picked)] + np.diag(wander)
+def _weight(session: Session, picked: list[int], drift: FloatArray) -> FloatArray:
+    covariance = session.covariance[np.ix_(picked, picked)] + np.diag(drift)
     ridge = RIDGE * max(float(np.trace(covariance)) / len(picked), 1e-300)
     shrunk = (SPREAD_DOF - 2.0) / SPREAD_DOF
     return np.asarray(shrunk * np.linalg.inv(covariance + ridge * np.eye(len(picked))), dtype=np.float64)
 
 
 def _dof(name: str, n_sessions: int) -> float:
-    return n_sessions * (WANDER_DOF if name.endswith("bias") else SPREAD_DOF)
+    return n_sessions * (DRIFT_DOF if name.endswith("bias") else SPREAD_DOF)
 
 
 def _left(values: FloatArray, weights: FloatArray, column: FloatArray | None) -> float:

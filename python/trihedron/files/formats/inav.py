@@ -18,7 +18,7 @@ from trihedron.records import Calibration
 from trihedron.units import acceleration_lsb_to_si, rate_lsb_to_si
 
 UNIT_GAIN = 4096
-LARGEST_GAIN, LARGEST_ZERO = 8192, 32767
+LARGEST_GAIN, LARGEST_OFFSET = 8192, 32767
 """Of the settings' ranges."""
 
 
@@ -62,7 +62,7 @@ def _size_of_a_count(name: str, options: ExportOptions) -> float:
 
 def _lines(name: str, one: Composed, count: float) -> list[str]:
     is_accel = name == "accelerometer"
-    lines = _settings("acczero" if is_accel else "gyro_zero", one.offset / count, -LARGEST_ZERO, LARGEST_ZERO)
+    lines = _settings("acczero" if is_accel else "gyro_zero", one.offset / count, -LARGEST_OFFSET, LARGEST_OFFSET)
     return lines + (_settings("accgain", UNIT_GAIN * one.scale, 1, LARGEST_GAIN) if is_accel else [])
 
 

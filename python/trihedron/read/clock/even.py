@@ -92,7 +92,7 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
     else:
         width = block_rows(time_s, period, found.coherence)
         period, tick, pauses, moved_back = track(time_s, period, width, sees, found.coherence > 0.9, room)
-    even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False, room)
+    even, mean_period, sigma, drifts = _lay(time_s, tick, period, pauses, width, False, room)
     error = _error(time_s, even)
     for _ in range(3 if counter is None and sees else 0):
         # Followed loosely: a loss counted too early makes a dip that the clock must not follow.
@@ -100,9 +100,9 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
         if moved is tick:
             break
         tick = moved
-        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False, room)
+        even, mean_period, sigma, drifts = _lay(time_s, tick, period, pauses, width, False, room)
         error = _error(time_s, even)
-    if wanders:
+    if drifts:
         even, mean_period, sigma, _ = _lay(time_s, tick, period, pauses, width, False, room, CLOSE_PIECES)
         error = _error(time_s, even)
     on_grid = 0.0 < found.grid_s < 1.3 * period and _range(error) < 1.3 * found.grid_s
@@ -148,14 +148,14 @@ def _lay(
     pieces: int = 12,
 ) -> tuple[FloatArray, float, float, bool]:
     """The even clock (n,) under the earliest timestamps, or through the middle of all; its mean period over the
-    longest stretch and the standard error of that; whether its rate wanders, followed in so many ``pieces``.
+    longest stretch and the standard error of that; whether its rate drifts, followed in so many ``pieces``.
 
     ``least`` rows make a block at least; ``room`` (n,) takes the clock."""
     late = lateness(time_s, tick, period, room)
     # Each stretch of the clock takes the place of the lateness that it was found from.
     even = late
     edges = np.concatenate([[0], pauses + 1, [len(late)]])
-    sigma, longest, wanders, slope = np.inf, 0, False, 0.0
+    sigma, longest, drifts, slope = np.inf, 0, False, 0.0
     for a, b in pairwise(edges):
         piece = late[a:b]
         # A clock drifts over minutes: more blocks than this show no more of it and take room.
@@ -182,7 +182,7 @@ def _lay(
         curved = float(np.std(smooth)) > max(8.0 * noise / np.sqrt(size), UNSEEN * period)
         course = None
         if curved and len(y) >= 24:
-            wanders = True
+            drifts = True
             course = _core.running_median(left, min(max(len(y) // pieces, 5), 101) | 1)
         _core.lay_even_clock(tick[a:b], line, x0, scale, period, even[a:b])
         if course is not None:
@@ -194,7 +194,7 @@ def _lay(
             # Neighbouring blocks share what delays them: four count as one.
             sigma = spread / scale / max(float(np.std(u)), 1e-9) / np.sqrt(max(len(y) / 4.0, 1.0))
     digits = float(np.spacing(max(abs(time_s[0]), abs(time_s[-1])))) / max(int(tick[-1] - tick[0]), 1)
-    return even, period + slope, float(np.hypot(sigma, digits)), wanders
+    return even, period + slope, float(np.hypot(sigma, digits)), drifts
 
 
 def _parts(first: int, stop: int) -> Iterator[slice]:

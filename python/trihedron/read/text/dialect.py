@@ -75,10 +75,10 @@ def rewrite(text: str) -> Rewritten | None:
     filled = [rest for rest in rests if re.match(rf"\s*{_NUMBER}\s*[,;\t ]", rest)]
     glue = next((s for s in (",", ";", "\t") if filled and s in filled[-1]), " ")
     rows = []
-    for stamp, rest in zip(timestamps, rests, strict=True):
-        if stamp and rest.strip():
+    for timestamp, rest in zip(timestamps, rests, strict=True):
+        if timestamp and rest.strip():
             is_row = re.match(r"\s*[-+.\d]", rest) is not None
-            rows.append(f"{stamp if is_row else 'arrival time'}{glue}{rest}")
+            rows.append(f"{timestamp if is_row else 'arrival time'}{glue}{rest}")
         else:
             rows.append(rest)
     return _joined(rows, list(range(1, len(rows) + 1)))

@@ -134,16 +134,16 @@ def _spread(packets: list[Any]) -> list[list[Row]]:
         return [[row] for row in flat]
     out: list[list[Row]] = []
     for i, (row, arrays) in enumerate(zip(flat, samples, strict=True)):
-        stamp = next((k for k in row if k.rsplit(".", 1)[-1].lower() in _TIMESTAMPS), "")
+        timestamp = next((k for k in row if k.rsplit(".", 1)[-1].lower() in _TIMESTAMPS), "")
         n = max(map(len, arrays.values()), default=1)
         near = flat[i + 1] if i + 1 < len(flat) else flat[i - 1]
-        start, other = _finite(row.get(stamp)), _finite(near.get(stamp))
+        start, other = _finite(row.get(timestamp)), _finite(near.get(timestamp))
         step = abs(other - start) / n if start is not None and other is not None else 0.0
         rows = []
         for j in range(n):
             one: Row = {k: v for k, v in row.items() if k not in arrays}
             if start is not None and step > 0.0:
-                one[stamp] = start + j * step
+                one[timestamp] = start + j * step
             for name, values in arrays.items():
                 word = name.rsplit(".", 1)[-1].removeprefix("Array").lower()
                 if j < len(values) and isinstance(values[j], Mapping):

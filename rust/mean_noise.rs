@@ -1,4 +1,4 @@
-//! The law by which the variance of a mean falls with its length, from variances at several lengths.
+//! How the variance of a mean falls with its length: three terms, from variances at several lengths.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,7 +11,7 @@ const LEAST: f64 = 1e-3;
 
 /// Deviance and terms of one choice of columns.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Law {
+pub struct Terms {
     /// `Σ n (s/v - 1 - ln(s/v))`.
     pub deviance: f64,
     /// Non-negative; zero where not chosen.
@@ -24,14 +24,14 @@ pub struct Law {
 ///
 /// # Errors
 /// `BadInput` when lengths differ, or fewer variances than columns leave the terms open.
-pub fn law(design: &[[f64; 3]], seen: &[f64], n: &[f64], chosen: &[usize]) -> Result<Law> {
+pub fn terms(design: &[[f64; 3]], seen: &[f64], n: &[f64], chosen: &[usize]) -> Result<Terms> {
     if design.len() != seen.len() || n.len() != seen.len() || seen.len() < chosen.len() {
         return Err(Error::bad_input(
-            "a law needs a variance for each of its terms",
+            "mean noise needs a variance for each of its terms",
         ));
     }
     if chosen.iter().any(|&c| c > 2) || chosen.is_empty() {
-        return Err(Error::bad_input("the terms of the law are 0, 1 and 2"));
+        return Err(Error::bad_input("the terms of mean noise are 0, 1 and 2"));
     }
     let largest = seen.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let least: Vec<f64> = design
@@ -61,7 +61,7 @@ pub fn law(design: &[[f64; 3]], seen: &[f64], n: &[f64], chosen: &[usize]) -> Re
             n * (ratio - 1.0 - ratio.ln())
         })
         .sum();
-    Ok(Law { deviance, terms })
+    Ok(Terms { deviance, terms })
 }
 
 /// Non-negative weighted least squares of at most three columns: the best of all sets of columns whose free solution

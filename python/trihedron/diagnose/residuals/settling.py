@@ -12,30 +12,30 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.observations import Observations
 
 FEWEST_POSES = 6
-"""Poses below which their creep has no variance of its own."""
+"""Poses below which their settling has no variance of its own."""
 N_BLOCKS = 6
-"""Stretches of a pose whose means tell a rate that dies away from one that stays."""
+"""Stretches of a pose whose means separate a rate that dies away from one that stays."""
 SETTLES_S = (0.7, 1.4, 2.8, 5.6)
 """Time constants with which supports give: foam and skin, not hours of a glue."""
 SIZES = np.concatenate([[0.0], np.logspace(-1.0, 4.0, 31)])
-"""Scatter and creep tried, in rms of the readings' error: a quarter of an LSB is 10 %."""
+"""Scatter and settling tried, in rms of the readings' error: a quarter of an LSB is 10 %."""
 LEVEL = 0.5
 """Cosine to the vertical that parts the level axes (0) from it (1)."""
 CERTAIN = 20.0
-"""Twice the log-likelihood that creep wins beside scatter: one in 10⁵ of chi-square with one degree of freedom, with
-four time constants paid for."""
+"""Twice the log-likelihood that settling wins beside scatter: one in 10⁵ of chi-square with one degree of freedom, with
+four time constants counted."""
 STILL_SCATTERS = 0.01
-"""p-value of a scatter beside creep from which the scatter stands."""
+"""p-value of a scatter beside settling from which the scatter stands."""
 
 
 @dataclass(frozen=True)
 class Settling:
-    """Rates at rest described by creep alone, by scatter alone, by both: twice the log-likelihood over neither.
+    """Rates at rest described by settling alone, by scatter alone, by both: twice the log-likelihood over neither.
 
-    ``rate_rad_s`` is the creep's standard deviation on setting down beside scatter, ``tau_s`` how fast it dies away.
+    ``rate_rad_s`` is the settling's standard deviation on setting down beside scatter, ``tau_s`` how fast it dies away.
     """
 
-    creep: float
+    settling: float
     scatter: float
     both: float
     rate_rad_s: float = 0.0
@@ -43,22 +43,22 @@ class Settling:
 
     @property
     def is_motion(self) -> bool:
-        """Whether creep describes them at least as well as scatter and leaves nothing for it to explain."""
-        beside = max(self.both - self.creep, 0.0)
+        """Whether settling describes them at least as well as scatter and leaves nothing for it to explain."""
+        beside = max(self.both - self.settling, 0.0)
         p = 0.5 * float(chdtrc(1.0, beside)) if beside > 0.0 else 1.0
-        return self.creep > self.scatter and p > STILL_SCATTERS
+        return self.settling > self.scatter and p > STILL_SCATTERS
 
     @property
     def is_seen(self) -> bool:
-        """Whether there is creep for certain, with or without scatter beside it."""
+        """Whether there is settling for certain, with or without scatter beside it."""
         return self.both - self.scatter > CERTAIN
 
 
 def settling(context: Context) -> Settling:
-    """Creep against scatter in the rates of the poses: w = z + s + k exp(-t/τ), tilt k τ (1 - exp(-t/τ)) (eq. 8.7d).
+    """Settling against scatter in the rates of the poses: w = z + s + k exp(-t/τ), tilt k τ (1 - exp(-t/τ)) (eq. 8.7d).
 
     ``s`` and ``k`` are drawn anew in every pose, the same on all axes; the accelerometer shows what of ``k`` lies
-    across the vertical, the shape in time all of it. One zero ``z`` for the session, restricted likelihood.
+    across the vertical, the shape in time all of it. One bias ``z`` for the session, restricted likelihood.
     """
     directions = _directions(context)
     tables = [table for tau in SETTLES_S if (table := _table(directions, tau)) is not None]
@@ -68,14 +68,14 @@ def settling(context: Context) -> Settling:
     none = tables[0].log_likelihood(np.zeros(1), np.zeros(1))[0]
     scatter = float(tables[0].log_likelihood((scale * SIZES) ** 2, np.zeros(len(SIZES))).max())
     a, b = ((scale * g.ravel()) ** 2 for g in np.meshgrid(SIZES, SIZES, indexing="ij"))
-    creep, both = [], []
+    alone, both = [], []
     for table, tau in zip(tables, SETTLES_S, strict=False):
         values = table.log_likelihood(a, b)
-        creep.append(float(values[a == 0.0].max()))
+        alone.append(float(values[a == 0.0].max()))
         best = int(values.argmax())
         both.append((float(values[best]), float(np.sqrt(b[best])), tau))
     most, rate, tau = max(both)
-    return Settling(2.0 * (max(creep) - none), 2.0 * (scatter - none), 2.0 * (most - none), rate, tau)
+    return Settling(2.0 * (max(alone) - none), 2.0 * (scatter - none), 2.0 * (most - none), rate, tau)
 
 
 def with_settling(context: Context, found: Settling) -> Observations:
@@ -84,7 +84,7 @@ def with_settling(context: Context, found: Settling) -> Observations:
     """
     obs = context.obs
     assert obs.pose_rate_sigma is not None
-    lasts = np.array([hold.stop - hold.start for hold in obs.segments.poses]) / obs.recording.rate_hz
+    lasts = np.array([pose.stop - pose.start for pose in obs.segments.poses]) / obs.recording.rate_hz
     fades = np.exp(-lasts / found.tau_s)
     mean = found.tau_s * (1.0 - fades) / lasts
     turned = found.rate_rad_s * found.tau_s
@@ -96,16 +96,16 @@ def with_settling(context: Context, found: Settling) -> Observations:
         wider = np.zeros((2, 3)) if key not in unresolved else unresolved[key].copy()
         wider[1] += (ends[before] ** 2 + begins[after] ** 2) / si_per_raw**2
         unresolved[key] = wider
-    creep = found.rate_rad_s * mean[:, None] / si_per_raw
+    settles = found.rate_rad_s * mean[:, None] / si_per_raw
     return replace(
-        obs, unresolved=unresolved, pose_rate_sigma=np.hypot(obs.pose_rate_sigma, creep), pose_settling=creep
+        obs, unresolved=unresolved, pose_rate_sigma=np.hypot(obs.pose_rate_sigma, settles), pose_settling=settles
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Table:
     """Sums over the readings of every pose and direction (n,), noise divided out: products of the columns of scatter
-    ``a`` and creep ``b`` with one another and with the readings ``y``; ``axes`` (n, 3) the directions in the body;
+    ``a`` and settling ``b`` with one another and with the readings ``y``; ``axes`` (n, 3) the directions in the body;
     ``unit`` the error of a pose's mean, rad/s."""
 
     aa: FloatArray
@@ -117,9 +117,9 @@ class _Table:
     axes: FloatArray
     unit: float
 
-    def log_likelihood(self, scatter: FloatArray, creep: FloatArray) -> FloatArray:
-        """(m,) restricted log-likelihood of variances (m,) of scatter and creep; the zero has a flat prior."""
-        p, q = scatter[:, None], creep[:, None]
+    def log_likelihood(self, scatter: FloatArray, settling: FloatArray) -> FloatArray:
+        """(m,) restricted log-likelihood of variances (m,) of scatter and settling; the bias has a flat prior."""
+        p, q = scatter[:, None], settling[:, None]
         # (I + V G)⁻¹ V of two columns, written out.
         det = (1.0 + p * self.aa) * (1.0 + q * self.bb) - p * q * self.ab**2
         m00, m11, m01 = p * (1.0 + q * self.bb) / det, q * (1.0 + p * self.aa) / det, -p * q * self.ab / det
@@ -153,30 +153,30 @@ class _Direction:
 
 
 def _directions(context: Context) -> list[_Direction]:
-    obs, twin = context.obs, context.fitted.twin
+    obs, state = context.obs, context.fitted.state
     noise = obs.pose_rate_noise
     if obs.raw_rate is None or noise is None:
         return []
     out = []
-    for i, hold in enumerate(obs.segments.poses):
-        n = (hold.stop - hold.start) // N_BLOCKS
+    for i, pose in enumerate(obs.segments.poses):
+        n = (pose.stop - pose.start) // N_BLOCKS
         if n < 2:
             continue
-        span = slice(hold.start, hold.start + n * N_BLOCKS)
-        rate = np.nanmean(obs.raw_rate[span].reshape(N_BLOCKS, n, 3), axis=1) @ twin.gyro_S.T
-        force = np.nanmean(obs.raw_force[span].reshape(N_BLOCKS, n, 3), axis=1) @ twin.accel_S.T / twin.gravity
-        up = twin.up[i]
+        span = slice(pose.start, pose.start + n * N_BLOCKS)
+        rate = np.nanmean(obs.raw_rate[span].reshape(N_BLOCKS, n, 3), axis=1) @ state.gyro_S.T
+        force = np.nanmean(obs.raw_force[span].reshape(N_BLOCKS, n, 3), axis=1) @ state.accel_S.T / state.gravity
+        up = state.up[i]
         # What the vertical has turned by since the mean of the pose, across it.
         angle = np.cross(force - force.mean(axis=0), up)
         begins = np.arange(N_BLOCKS) * n / obs.recording.rate_hz
         ends = begins + n / obs.recording.rate_hz
         for axis in np.linalg.svd(up[None])[2]:
-            own = float(np.sqrt(((axis @ twin.gyro_S) ** 2 * noise[i] ** 2).sum() * N_BLOCKS))
+            own = float(np.sqrt(((axis @ state.gyro_S) ** 2 * noise[i] ** 2).sum() * N_BLOCKS))
             y, tilt = rate @ axis / own, 0.0
             if abs(float(axis @ up)) < LEVEL:
                 # Turned force reads along the other level axis; its white noise is that of the quiet floor.
-                across = np.cross(axis, up) @ twin.accel_S
-                tilt = float(np.sqrt((across**2 * obs.pose_force_sigma[i] ** 2).sum() * N_BLOCKS)) / twin.gravity
+                across = np.cross(axis, up) @ state.accel_S
+                tilt = float(np.sqrt((across**2 * obs.pose_force_sigma[i] ** 2).sum() * N_BLOCKS)) / state.gravity
                 y = np.concatenate([y, CONTRASTS @ angle @ axis / tilt])
             out.append(_Direction(axis, y, own, tilt, begins, ends))
     return out

@@ -58,7 +58,7 @@ class Prior:
 
 
 @dataclass(frozen=True, eq=False)
-class Twin:
+class SessionState:
     """State of the model. ``accel_S``, ``accel_b``, ``gyro_S`` act on centred raw readings; the rest is per pose.
 
     Biases are in SI; ``strengths`` are those of the session's noise.
@@ -151,7 +151,7 @@ class Linearisation:
     """The rows of one fit and the means to add columns to them."""
 
     obs: Observations
-    twin: Twin
+    state: SessionState
     distortion: Distortion
     prior: Prior | None
     core: _core.SessionFit = field(repr=False)
@@ -166,7 +166,7 @@ class Linearisation:
             slices.append(slice(first, first + stop - start))
             first += stop - start
         parts = [np.arange(start, stop) for start, stop in self.obs.move_ranges]
-        mid = np.array([(hold.start + hold.stop) // 2 for hold in self.obs.segments.poses], dtype=np.intp)
+        mid = np.array([(pose.start + pose.stop) // 2 for pose in self.obs.segments.poses], dtype=np.intp)
         return Trajectory(force, rate, attitude, tuple(slices), np.concatenate([mid, *parts]))
 
     def columns(self, distortion: Distortion) -> FloatArray:
@@ -176,7 +176,7 @@ class Linearisation:
     @cached_property
     def accel_white(self) -> FloatArray:
         """(poses, 3, 3) from an error in SI to a whitened row of the accelerometer at rest."""
-        inverse = np.linalg.inv(self.twin.accel_S)
+        inverse = np.linalg.inv(self.state.accel_S)
         return core_poses(self.obs).force_white() @ inverse
 
     @cached_property
@@ -184,7 +184,7 @@ class Linearisation:
         """(poses, 3, 3) the same of the gyro; ``None`` without one."""
         if self.obs.pose_rate_sigma is None:
             return None
-        inverse = np.linalg.inv(self.twin.gyro_S)
+        inverse = np.linalg.inv(self.state.gyro_S)
         return inverse / self.obs.pose_rate_sigma[:, :, None]
 
     @cached_property
@@ -238,23 +238,23 @@ def core_model(
     )
 
 
-def core_state(twin: Twin) -> _core.SessionState:
+def core_state(state: SessionState) -> _core.SessionState:
     """A point in the unknowns of the Rust model: biases in raw units."""
     return _core.SessionState(
-        force_scale=np.ascontiguousarray(twin.accel_S),
-        force_bias=np.ascontiguousarray(twin.accel_b),
-        rate_scale=np.ascontiguousarray(twin.gyro_S),
-        up=np.ascontiguousarray(twin.up),
-        pose_rate_bias=np.ascontiguousarray(np.linalg.solve(twin.gyro_S, twin.gyro_bias.T).T),
-        pose_force_bias=np.ascontiguousarray(np.linalg.solve(twin.accel_S, twin.accel_bias.T).T),
-        effect=np.ascontiguousarray(twin.effect, dtype=np.float64),
+        force_scale=np.ascontiguousarray(state.accel_S),
+        force_bias=np.ascontiguousarray(state.accel_b),
+        rate_scale=np.ascontiguousarray(state.gyro_S),
+        up=np.ascontiguousarray(state.up),
+        pose_rate_bias=np.ascontiguousarray(np.linalg.solve(state.gyro_S, state.gyro_bias.T).T),
+        pose_force_bias=np.ascontiguousarray(np.linalg.solve(state.accel_S, state.accel_bias.T).T),
+        effect=np.ascontiguousarray(state.effect, dtype=np.float64),
     )
 
 
-def twin_of(core: _core.SessionFit, gravity_m_s2: float) -> Twin:
+def state_of(core: _core.SessionFit, gravity_m_s2: float) -> SessionState:
     """The point where a fit ended, biases in SI."""
     accel_S, gyro_S = np.asarray(core.force_scale), np.asarray(core.rate_scale)
-    return Twin(
+    return SessionState(
         gravity=gravity_m_s2, accel_S=accel_S, accel_b=np.asarray(core.force_bias), gyro_S=gyro_S,
         up=np.asarray(core.up), gyro_bias=core.pose_rate_bias @ gyro_S.T, accel_bias=core.pose_force_bias @ accel_S.T,
         effect=np.asarray(core.effect), strengths=core.strengths,

@@ -7,12 +7,12 @@ import pytest
 
 import trihedron
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.residuals.creep import settling, with_settling
 from trihedron.diagnose.residuals.goodness_of_fit import judge_rows
+from trihedron.diagnose.residuals.settling import settling, with_settling
 from trihedron.diagnose.session.observations import _turned_at_ends, observe
 from trihedron.diagnose.session.solve import tune_noise
-from trihedron.diagnose.session.starting_point import start_twin
-from trihedron.diagnose.session.twin import NO_DISTORTION
+from trihedron.diagnose.session.starting_point import start_state
+from trihedron.diagnose.session.state import NO_DISTORTION
 from trihedron.records import Recording
 from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import hand_session, simulate
@@ -46,7 +46,7 @@ def session(seed, lean_rad, scatter_rad_s):
     segments = segment_recording(log)
     calibration = trihedron.calibrate(log, segments=segments, gravity_m_s2=truth.gravity_m_s2).calibration
     obs = observe(log, resegment(log, segments))
-    return Context(obs, tune_noise(obs, start_twin(obs, calibration), NO_DISTORTION, None))
+    return Context(obs, tune_noise(obs, start_state(obs, calibration), NO_DISTORTION, None))
 
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.slow) for s in (2, 3))])
@@ -63,7 +63,7 @@ def test_scatter_under_supports_that_give_is_still_found_and_creep_alone_is_none
     gives = settling(session(seed, 0.001, 0.0))
     # The accelerometer hardly sees so little; the shape in time and what it does see say the same.
     assert gives.is_motion
-    assert gives.creep - gives.scatter > 9.0
+    assert gives.settling - gives.scatter > 9.0
     assert not settling(session(seed, 0.0, 1e-3)).is_motion
     assert not settling(session(seed, 0.006, 1e-3)).is_motion
 
@@ -79,7 +79,7 @@ def test_moves_allow_for_poses_that_settle_and_rates_at_rest_still_disagree(seed
         {one.domain: one for one in judge_rows(fitted, 0.01)}
         for fitted in (
             context.fitted,
-            tune_noise(with_settling(context, found), context.fitted.twin, NO_DISTORTION, None),
+            tune_noise(with_settling(context, found), context.fitted.state, NO_DISTORTION, None),
         )
     )
     assert before["moves"].disagrees
