@@ -261,6 +261,7 @@ def test_a_small_disk_that_fills_up_leaves_the_old_output(session):
 
 
 UNTRUSTED = {
+    "allan": ["allan", "log.csv", "--calibration", "untrusted.json"],
     "apply": ["apply", "untrusted.json", "log.csv", "-o", "x.csv"],
     "verify": ["verify", "untrusted.json", "log.csv"],
     "diagnose": ["diagnose", "log.csv", "--calibration", "untrusted.json"],

@@ -117,7 +117,7 @@ def test_a_recording_that_cannot_be_calibrated_is_left_out_with_its_reason(four_
 
 
 def test_dates_that_are_not_in_the_logs_are_asked_for(four_sessions):
-    with pytest.raises(ValueError, match="--labels"):
+    with pytest.raises(ValueError, match="give labels"):
         trihedron.calibrate_sessions(four_sessions, by="date", gravity_m_s2=G)
     result = trihedron.calibrate_sessions(four_sessions, by="date", labels=["mon", "mon", "tue", "tue"], gravity_m_s2=G)
     assert all(one.between is not None for one in result.model.repeated)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.api.applying import AnyCalibration, calibration_of, check_units
+from trihedron.api.applying import AnyCalibration, calibration_of, check_units, doubted
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.errors import RefusedError
 from trihedron.estimate.noise.from_curve import identify_curve
@@ -22,7 +22,7 @@ from trihedron.files.checkpoint import Checkpoint, made_of
 from trihedron.read.allan_table import read_allan_table
 from trihedron.read.chunks import open_chunks
 from trihedron.read.errors import ReadError
-from trihedron.records import Calibration, Noise, Recording, TermName
+from trihedron.records import Calibration, Finding, Noise, Recording, TermName
 from trihedron.units import (
     AccelerationUnit,
     RateUnit,
@@ -80,10 +80,12 @@ def allan(
     >>> found.axis("gyro x").terms  # doctest: +SKIP
     """
     recording = recording_of(recording)
+    doubts: tuple[Finding, ...] = ()
     if calibration is not None:
         if accelerometer_lsb is not None or gyroscope_lsb is not None:
             raise RefusedError("the size of a count is given twice: by a calibration and by itself; give one.")
-        recording = _in_si(recording, calibration_of(calibration))
+        known = calibration_of(calibration)
+        recording, doubts = _in_si(recording, known), doubted(known)
     readings, names, units = readings_of(
         recording,
         None if gyroscope_lsb is None else rate_lsb_to_si(gyroscope_lsb),
@@ -100,7 +102,7 @@ def allan(
         source=recording.source,
     )
     # What the log is said to be comes before what its noise is.
-    return replace(found, findings=(*recording.findings, *found.findings))
+    return replace(found, findings=(*recording.findings, *doubts, *found.findings))
 
 
 def _in_si(recording: Recording, known: Calibration) -> Recording:

@@ -13,7 +13,6 @@ from trihedron.read import ReadError, read_recording
 from trihedron.records import Recording, Segments
 from trihedron.records.checked import WrongTypeError, number_of
 from trihedron.records.progress import Progress
-from trihedron.report.in_python import finding_in_python, in_python
 from trihedron.units import AccelerationUnit, RateUnit
 
 AnyRecording = object
@@ -62,24 +61,20 @@ def read(
     inside = getattr(path, "recording", path)
     if isinstance(inside, Recording):
         return inside
-    try:
-        recording = read_recording(
-            path,
-            accelerometer_path=accelerometer_path,
-            gyroscope_path=gyroscope_path,
-            columns=columns,
-            rate_hz=rate_hz,
-            accelerometer_unit=accelerometer_unit,
-            gyroscope_unit=gyroscope_unit,
-            time_unit=time_unit,
-            device=device,
-            topic=topic,
-            instance=instance,
-            progress=progress,
-        )
-    except ReadError as error:
-        raise ReadError(in_python(str(error))) from None
-    return recording.with_same_readings(findings=tuple(finding_in_python(finding) for finding in recording.findings))
+    return read_recording(
+        path,
+        accelerometer_path=accelerometer_path,
+        gyroscope_path=gyroscope_path,
+        columns=columns,
+        rate_hz=rate_hz,
+        accelerometer_unit=accelerometer_unit,
+        gyroscope_unit=gyroscope_unit,
+        time_unit=time_unit,
+        device=device,
+        topic=topic,
+        instance=instance,
+        progress=progress,
+    )
 
 
 def of_arrays(

@@ -46,7 +46,8 @@ def verify(
 
     Examples
     --------
-    >>> trihedron.verify(result, recording).is_passed
+    >>> another, _ = trihedron.simulate("hand-session", 4)
+    >>> trihedron.verify(result, another).is_passed
     True
     """
     known = calibration_of(calibration)

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts.low_pass import Spectrum, undisturbed
 from trihedron.channel_facts.pooled import Pooled, as_measured, pooled_logarithm, robust_poses, root_of
 from trihedron.errors import RefusedError
+from trihedron.probability import chdtri
 from trihedron.ranges import ranges_of
 from trihedron.records.pose_noise import PoseLine
 from trihedron.transforms import cosine_transform
@@ -200,7 +200,7 @@ def lines_of_poses(frequency: FloatArray, power: FloatArray, count: int, rate_hz
     level = np.array([np.median(power[max(0, i - 16) : i + 17]) for i in range(n)])
     centre = (1.0 - 2.0 / (9.0 * count)) ** 3 if count > 1 else 0.4549
     ratio = power * centre / np.maximum(level, 1e-300)
-    limit = float(chdtri(count, LINE_CHANCE / n)) / count
+    limit = chdtri(count, LINE_CHANCE / n) / count
     # The neighbourhood's median is itself known to 1.25/√33 of a deviation.
     limit *= 1.0 + 3.0 * 1.25 * math.sqrt(2.0 / count / 33.0)
     out: list[PoseLine] = []

@@ -23,11 +23,12 @@ from trihedron.diagnose.residuals.goodness_of_fit import hidden_biases, judge_ro
 from trihedron.diagnose.residuals.settling import settling, with_settling
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
 from trihedron.diagnose.sample_evidence import Observed, look
-from trihedron.diagnose.search import Found, search, with_shapes
+from trihedron.diagnose.search import Found, search
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_state
 from trihedron.diagnose.session.state import NO_DISTORTION, Prior, SessionState
+from trihedron.diagnose.shapes import with_shapes
 from trihedron.diagnose.shared import shared_effects
 from trihedron.errors import RefusedError
 from trihedron.records import Calibration, Recording, Segments

@@ -11,12 +11,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
 from trihedron.diagnose.bias_strengths import bias_strengths, bounds_without, explain_as_much
 from trihedron.diagnose.candidates import NEAR, Tried, all_beside, candidates_beside
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
-from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again, hypothesis, without_each
 from trihedron.diagnose.relations.search import Related, related
 from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
@@ -27,6 +25,7 @@ from trihedron.diagnose.session.state import (
     STATIC_GYRO,
     Distortion,
 )
+from trihedron.diagnose.shapes import as_fits_best
 from trihedron.threads import side_by_side
 
 WORTH_FITTING = 20.0
@@ -38,12 +37,6 @@ MOST_EFFECTS = 4
 """Mechanisms of one session at most; poses that were pushed are none."""
 MOST_STEPS = 8
 """Effects and pushed poses together, at most."""
-SHAPE_STEPS = np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
-"""Logarithms of a shape number about the grid's best, over which a parabola is laid."""
-N_RESHAPED = 2
-"""Rounds of sizes and shapes: the second changes them by a tenth of what the first did."""
-STEP_LOG = 0.02
-"""Half-step of the derivative by the logarithm of a shape."""
 OWN_DOMAINS = {"force": (STATIC_ACCEL, DYNAMICS), "rate": (STATIC_GYRO, MOVES, DYNAMICS)}
 """Where a flaw of one sensor must show: velocity needs both, a tilted force being half of it."""
 
@@ -226,49 +219,11 @@ def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Te
 
 
 def _fitted_beside(model: Hypothesis, tried: Tried) -> tuple[Term, Hypothesis]:
-    term = _fitting(model, tried)
+    term = as_fits_best(model, tried)
     state = model.fitted.state
     start = replace(state, effect=np.concatenate([state.effect, np.zeros(term.distortion.n_parameters)]))
     strengths = tried.asked.strengths
     return term, hypothesis(model.obs, start, model.prior, (*model.terms, term), model.within, strengths)
-
-
-def _fitting(model: Hypothesis, tried: Tried) -> Term:
-    """A candidate with its expected size, its own size and its shape as they fit best."""
-    term, asked = tried.term, tried.asked
-    for _ in range(N_RESHAPED):
-        made = term.effect.rescaled(model.context, term.variant, asked.value)
-        if made is None:
-            break
-        term = replace(term, variant=made)
-        asked = model.asked([term])[0]
-    return _reshaped(model, term)
-
-
-def _reshaped(model: Hypothesis, term: Term) -> Term:
-    """A term at the shape number of the largest evidence, with the standard error that its curvature gives."""
-    if len(term.variant.shape) != 1:
-        return term
-    ((name, (value, unit)),) = term.variant.shape.items()
-    if term.effect.reshaped(model.context, term.variant, value) is None:
-        return term
-    spread, sigma = 1.0, np.inf
-    for _ in range(N_RESHAPED):
-        steps = spread * SHAPE_STEPS
-        made = [term.effect.reshaped(model.context, term.variant, value * float(np.exp(step))) for step in steps]
-        asked = model.asked([replace(term, variant=v) for v in made if v is not None])
-        gain = np.array([one.log_evidence for one in asked])
-        a, b, _ = np.polyfit(steps, gain, 2)
-        if a < 0.0:
-            value *= float(np.exp(np.clip(-b / (2.0 * a), steps[0], steps[-1])))
-            sigma = float(np.sqrt(-0.5 / a))
-            spread = float(np.clip(2.0 * sigma, 0.1, 1.0))
-        else:
-            value *= float(np.exp(steps[gain.argmax()]))
-    final = term.effect.reshaped(model.context, term.variant, value)
-    if final is None:
-        return term
-    return replace(term, variant=replace(final, shape={name: (value, unit)}, shape_sigma=value * min(sigma, 10.0)))
 
 
 def _pruned(model: Hypothesis, limit: float) -> _Judged:
@@ -308,13 +263,15 @@ def _swapped(judged: _Judged, rivals: dict[str, list[Tried]]) -> tuple[Hypothesi
         term = model.terms[k]
         scored = [(2.0 * model.log_evidence - term.paid, model, term)]
         for other in _others(rivals.get(term.effect.id, []), {t.effect.id for t in model.terms}):
-            fitted = _fitting(without, other)
+            fitted = as_fits_best(without, other)
             swapped = again(model, [*model.terms[:k], fitted, *model.terms[k + 1 :]])
             if fitted.effect.is_plausible_variant(fitted.variant, *swapped.value(k)):
                 scored.append((2.0 * swapped.log_evidence - fitted.paid, swapped, fitted))
-        most, model, chosen = max(scored, key=lambda one: one[0])
-        close = [t.effect.id for score, _, t in scored if score > most - NEAR and t.effect is not chosen.effect]
-        named[chosen.effect.id] = close
+        _, model, chosen = max(scored, key=lambda one: one[0])
+        least = model.log_evidence - 0.5 * NEAR
+        named[chosen.effect.id] = [
+            t.effect.id for _, one, t in scored if one.log_evidence > least and t.effect is not chosen.effect
+        ]
     return model, named
 
 
@@ -322,31 +279,3 @@ def _others(rivals: Iterable[Tried], held: set[str]) -> list[Tried]:
     """Rivals that are not in the hypothesis, those that came near."""
     free = [one for one in rivals if one.term.effect.id not in held]
     return [one for one in free if one.score > free[0].score - WORTH_FITTING] if free else []
-
-
-def with_shapes(model: Hypothesis) -> Hypothesis:
-    """The hypothesis whose shape numbers are unknowns too: one more column each, p D'(ln shape).
-
-    With a shape held fixed S, b and p would claim to be known better than they are.
-    """
-    more = [term for k in range(len(model.terms)) if (term := _by_shape(model, k)) is not None]
-    return again(model, [*model.terms, *more]) if more else model
-
-
-def _by_shape(model: Hypothesis, k: int) -> Term | None:
-    term = model.terms[k]
-    if term.variant.shape_sigma <= 0.0 or len(term.variant.shape) != 1:
-        return None
-    ((_, (value, _)),) = term.variant.shape.items()
-    made = [term.effect.reshaped(model.context, term.variant, value * float(np.exp(s))) for s in (-STEP_LOG, STEP_LOG)]
-    if made[0] is None or made[1] is None:
-        return None
-    size, _ = model.value(k)
-    low, high = made[0].distortion, made[1].distortion
-
-    def slope(name: str) -> FloatArray | None:
-        a, b = getattr(low, name), getattr(high, name)
-        return None if a is None else ((b - a) @ size / (2.0 * STEP_LOG))[:, :, None]
-
-    columns = Distortion(slope("force"), slope("rate"))
-    return Term(term.effect, Variant(columns, ("shape",), ("1",), label="shape"), np.ones(1))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -105,11 +104,23 @@ def consistency_findings(axis: int | None, seen: Consistency) -> list[Finding]:
     """What an inconsistent filter tells about the noise it was given; ``axis`` None stands for all three."""
     out: list[Finding] = []
     case, name = ("norm", "") if axis is None else ("axis", AXES[axis])
-    size: dict[str, Any] = {"axis": name, "nis_mean": seen.nis_mean, "nis_low": seen.nis_low, "nis_high": seen.nis_high}
-    if seen.n and seen.nis_mean > seen.nis_high:
-        out.append(Finding.of(FindingCode.INNOVATIONS_TOO_LARGE, case, **size, widening=np.sqrt(seen.nis_mean)))
-    elif seen.n and seen.nis_mean < seen.nis_low:
-        out.append(Finding.of(FindingCode.INNOVATIONS_TOO_SMALL, case, **size))
+    mean, low, high = seen.nis_mean, seen.nis_low, seen.nis_high
+    if seen.n and mean > high:
+        out.append(
+            Finding.of(
+                FindingCode.INNOVATIONS_TOO_LARGE,
+                case,
+                axis=name,
+                nis_mean=mean,
+                nis_low=low,
+                nis_high=high,
+                widening=np.sqrt(mean),
+            )
+        )
+    elif seen.n and mean < low:
+        out.append(
+            Finding.of(FindingCode.INNOVATIONS_TOO_SMALL, case, axis=name, nis_mean=mean, nis_low=low, nis_high=high)
+        )
     if seen.n_lags and seen.whiteness_p < 1.0 - CONFIDENCE:
         out.append(
             Finding.of(
