@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.records import AllanCurve, NoiseAxis, TermName
@@ -17,6 +18,9 @@ LEAST_SHARE = 1e-3
 """Of the variance, anywhere: what is less moves the sum by less than the width of its line."""
 MARGIN = 1.6
 """Factor in time by which a name keeps off the ends of the picture."""
+
+NAME_DECADES = (1.2, 0.3)
+"""Decades of time and of deviation that a name takes up where five and four of them fill the picture."""
 
 Limits = tuple[float, float]
 
@@ -38,18 +42,27 @@ def parts_of(axis: NoiseAxis, tau_s: FloatArray) -> list[Part]:
     total = axis.allan_variance(tau_s)
     out = []
     for symbol, variance in axis.allan_parts(tau_s).items():
-        share = np.where(inside, variance / total, 0.0)
         if np.max(variance / total) < LEAST_SHARE:
             continue
+        deviation = np.sqrt(variance)
+        share = np.where(inside & _is_free(out, tau_s, deviation), variance / total, 0.0)
         # A sinusoid is largest where N is read off: its name stands at its foot.
         at = int(np.argmax(share >= 0.1 * share.max() if symbol == "lines" else share))
         read_at = READ_AT.get(TermName(symbol), 0.0) if symbol in TermName._value2member_map_ else 0.0
         near = int(np.argmin(np.abs(np.log(tau_s / read_at)))) if read_at > 0.0 else at
         if inside[near] and share[near] >= LEAST_SHARE:
             at = near
-        deviation = np.sqrt(variance)
         out.append(Part(*_names(axis, symbol), deviation, float(tau_s[at]), float(deviation[at])))
     return out
+
+
+def _is_free(named: list[Part], tau_s: FloatArray, deviation: FloatArray) -> npt.NDArray[np.bool_]:
+    """Where a name on a line of ``deviation`` (n,) stands on none of those before it."""
+    free = np.ones(len(tau_s), dtype=bool)
+    for part in named:
+        is_beside = np.abs(np.log10(tau_s / part.x)) > NAME_DECADES[0]
+        free &= is_beside | (np.abs(np.log10(deviation / part.y)) > NAME_DECADES[1])
+    return free
 
 
 def room_for(curve: AllanCurve, axes: list[tuple[NoiseAxis, int]], tau_s: FloatArray) -> Limits | None:
