@@ -79,7 +79,7 @@ def look(
         # Half of the rate of false alarms is theirs, half the search's.
         if evidence is not None and evidence.p_value * len(catalogue()) < alpha / 2.0:
             found.append((effect, evidence))
-    for effect, evidence in sorted(found, key=lambda pair: (pair[0].precedence, -pair[1].strength)):
+    for effect, evidence in sorted(found, key=lambda pair: -pair[1].strength):
         observed = _with_one(observed, effect, evidence, start, prior)
     return observed, candidates
 

@@ -60,9 +60,6 @@ class Effect(ABC):
     repeatable: ClassVar[bool] = False
     """Whether it may be accepted more than once (another pose, another line)."""
 
-    precedence: ClassVar[int] = 0
-    """Among effects with evidence of their own the lowest is settled first: what spoils every other look at the samples
-    (a range that ends) before the others."""
     accounts_for: ClassVar[tuple[Domain, ...]] = ()
     """Domains of samples whose disagreement is this effect itself, seen from another side."""
 

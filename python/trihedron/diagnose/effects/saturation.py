@@ -36,7 +36,6 @@ ABOVE_REST = 1.2
 class _Saturation(DirectEffect):
     sensor: ClassVar[str]
     is_proof = True
-    precedence = -1
 
     def find(self, context: Context) -> Evidence | None:
         obs = context.obs
