@@ -208,7 +208,7 @@ fn kalman_poses(c: &mut Criterion) {
                         4.9 * (3.0 * angle).sin(),
                     ],
                     start: 10.0 * f64::from(k),
-                    hold: 5.0,
+                    pose_s: 5.0,
                     extra_variance: 0.0,
                 };
                 k += 1;

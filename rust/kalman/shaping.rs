@@ -53,7 +53,7 @@ const GAUSS_MARKOV_PEAK: f64 = 0.381_138_658;
 
 /// Variance of the slowest and the fastest of several Gauss-Markov processes, over that of the others.
 ///
-/// With one process per decade from 0.3/T to 6/T_p (T_p: length of a pose) the Allan deviation then follows 0.664 B within 2 %
+/// With one process per decade from 0.3/T to 6/P (P: length of a pose) the Allan deviation then follows 0.664 B within 2 %
 /// between one pose and a third of the session T.
 const END_SHARE: f64 = 1.25;
 

@@ -64,7 +64,7 @@ fn pose(start: f64) -> Pose {
         reading: 1.0,
         reference: [0.0, 0.0, 9.8],
         start,
-        hold: 1.0,
+        pose_s: 1.0,
         extra_variance: 0.0,
     }
 }
