@@ -254,6 +254,7 @@ def candidates(answer: Answer, known: dict[str, Candidate], asked: dict[str, Bia
 def _candidate(one: Tried, against: str | None) -> Candidate:
     term, asked = one.term, one.asked
     size = term.effect.parameters(term.variant, asked.value, asked.covariance)
-    sigma = np.sqrt(np.maximum(np.diag(asked.covariance), 0.0)) * abs(term.variant.scale)
-    limit = float(np.max(np.abs(asked.value) * abs(term.variant.scale) + 1.96 * sigma))
+    # What is reported in other numbers (an angle for a direction) has no largest size.
+    linear = [p for p in size if p.name in term.variant.names and p.unit == size[0].unit]
+    limit = max((abs(p.value) + 1.96 * p.std for p in linear), default=None)
     return Candidate(term.effect.id, one.p_value, True, "", one.score, size, limit, against)

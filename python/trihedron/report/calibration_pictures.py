@@ -65,10 +65,13 @@ def before_after_panel(calibration: Calibration, means: FloatArray) -> Panel:
     pose = np.arange(1, len(before) + 1, dtype=np.float64)
     noise = float(np.sqrt(np.mean(mm_s2(quality.sigma) ** 2)))
     marks: list[Mark] = [Level(y=noise, name="noise alone (rms)", is_dashed=True)] if noise > 0.0 else []
-    for values, name, colour in ((before, "before", "soft"), (after, "after", "c1")):
+    # As in the residuals beside it: one colour for fits that saw the pose, one for those that did not.
+    held = _is_held(quality)
+    kinds = ((before, "before", "soft"), (after, "after" + held * ", held out", "accent" if held else "c1"))
+    for values, name, colour in kinds:
         told = [said(f"pose {k}, {name}", "", v, "mm/s²") for k, v in enumerate(values, 1)]
         size = np.where(values == 0.0, np.nan, np.abs(values))
-        marks.append(Points(pose, size, told, None, f"{name} calibration", colour))  # type: ignore[arg-type]
+        marks.append(Points(pose, size, told, None, name, colour, colour == "accent"))  # type: ignore[arg-type]
     rms = [plain_number(float(np.sqrt(np.nanmean(values**2)))) for values in (before, after)]
     return Panel(
         Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True),

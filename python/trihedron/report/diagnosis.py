@@ -13,7 +13,7 @@ from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.report.axes import LETTERS
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pictures
-from trihedron.report.diagnosis_candidates import candidates_table
+from trihedron.report.diagnosis_candidates import candidates_blocks
 from trihedron.report.diagnosis_charts import before_after_chart
 from trihedron.report.diagnosis_models import models_blocks
 from trihedron.report.diagnosis_numbers import (
@@ -36,7 +36,7 @@ from trihedron.report.diagnosis_words import (
     headlines_of,
     next_step_in_words,
     p_in_words,
-    printed_unit,
+    parameter_unit,
     quantity,
     rms_in_words,
     size_in_words,
@@ -50,11 +50,9 @@ from trihedron.report.effect_charts import effect_chart
 from trihedron.report.effect_rest_charts import rest_panels
 from trihedron.report.findings import findings_block
 from trihedron.report.numbers import (
-    engineering_exponent,
     how_many,
     listed,
     plain_number,
-    unit_with_power,
 )
 from trihedron.report.reference import beside_reference
 
@@ -82,7 +80,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "") -> Document:
         Section("Missing effects", (*effects_blocks(diagnosis), *_physics(diagnosis))),
         Section("Unexplained", (Paragraph(_remaining(diagnosis)), *relations_blocks(diagnosis))),
         Section("Cross-validation: before and after", _held_out(diagnosis)),
-        Section("Candidates", (candidates_table(diagnosis),)),
+        Section("Candidates", candidates_blocks(diagnosis)),
         Section("Calibration and noise", models_blocks(diagnosis)),
     ]
     if diagnosis.parameters:
@@ -198,16 +196,11 @@ def _parameters(effect: AcceptedEffect) -> str:
     groups = []
     for unit in units:
         members = [p for p in effect.parameters if p.unit == unit]
-        exponent = engineering_exponent(max(abs(p.value) for p in members))
-        printed = printed_unit(unit)
-        if printed == "°" or -3 < exponent <= 3:
-            exponent = 0
-        scale = 10.0**-exponent
+        scale, shared = parameter_unit(unit, max(abs(p.value) for p in members))
         words = [
             f"{_parameter(p.name)} {value_in_words(scale * p.value, scale * p.std)}" for p in members[:MOST_PARAMETERS]
         ]
         more = len(members) - MOST_PARAMETERS
-        shared = unit_with_power(exponent, printed)
         groups.append(", ".join(words) + (f", {more} more" if more > 0 else "") + (f" [{shared}]" if shared else ""))
     return "; ".join(groups)
 

@@ -3,25 +3,40 @@
 from __future__ import annotations
 
 from trihedron.records.diagnosis import Candidate, Diagnosis
-from trihedron.report.diagnosis_words import p_in_words
-from trihedron.report.document import Table
+from trihedron.report.diagnosis_words import parameter_in_words
+from trihedron.report.document import Block, Facts, Table
+from trihedron.report.numbers import MINUS, listed
+
+
+def candidates_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """Every effect of the catalogue: what was tried, and why the others could not be."""
+    missing: dict[str, list[str]] = {}
+    for candidate in diagnosis.candidates:
+        if not candidate.applicable:
+            missing.setdefault(candidate.reason, []).append(candidate.id)
+    rows = tuple((listed(names), f"not applicable: {reason}") for reason, names in missing.items())
+    return (candidates_table(diagnosis), Facts(rows)) if rows else (candidates_table(diagnosis),)
 
 
 def candidates_table(diagnosis: Diagnosis) -> Table:
-    """Every effect of the catalogue: how far the linear model alone would ask for it, and what became of it."""
+    """Every effect that was tried: its score, its size at most, and what became of it."""
     accepted = {effect.id for effect in diagnosis.effects}
-    tried = [c for c in diagnosis.candidates if c.applicable]
-    tried.sort(key=lambda c: 2.0 if c.p_value is None else c.p_value)
+    tried = sorted((c for c in diagnosis.candidates if c.applicable), key=_order)
     rows = [
         (
             c.id,
-            "–" if c.p_value is None else p_in_words(c.p_value),
+            "–" if c.score is None else f"{round(c.score, 1) + 0.0:.1f}".replace("-", MINUS),
+            "–" if c.limit95 is None or c.id in accepted else parameter_in_words(c.limit95, c.size[0].unit),
             "accepted" if c.id in accepted else _outcome(c),
         )
         for c in tried
     ]
-    rows += [(c.id, "–", f"not applicable: {c.reason}") for c in diagnosis.candidates if not c.applicable]
-    return Table(("effect", "p against the linear model", "outcome"), tuple(rows), "Every effect of the catalogue")
+    caption = "Effects that were tried; score: twice the log-evidence that one gains, less its price"
+    return Table(("effect", "score", "at most (95 %)", "outcome"), tuple(rows), caption)
+
+
+def _order(candidate: Candidate) -> float:
+    return 2.0 if candidate.p_value is None else candidate.p_value
 
 
 def _outcome(candidate: Candidate) -> str:

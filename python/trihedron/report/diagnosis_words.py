@@ -7,7 +7,14 @@ from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.finding import FindingCode
 from trihedron.report.diagnosis_numbers import differing_in_short
 from trihedron.report.document import Headline, Level
-from trihedron.report.numbers import listed, plain_number, unit_in_print, with_sigma
+from trihedron.report.numbers import (
+    engineering_exponent,
+    listed,
+    plain_number,
+    unit_in_print,
+    unit_with_power,
+    with_sigma,
+)
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 LEVELS: dict[str, Level] = {
@@ -89,7 +96,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
 def next_step_in_words(diagnosis: Diagnosis) -> str:
     """What to do with the verdict."""
     if diagnosis.verdict == "consistent":
-        return "Nothing is to be added: use these parameters with their uncertainties."
+        return "Nothing is missing: store S and b with trihedron calibrate LOG -o FILE, and use them."
     if diagnosis.verdict == "not-testable":
         return ""
     if diagnosis.verdict == "unexplained":
@@ -142,6 +149,24 @@ def size_in_words(value: float, unit: str) -> str:
 
 def printed_unit(unit: str) -> str:
     return {"deg": "°", "1": ""}.get(unit, unit_in_print(unit))
+
+
+def parameter_unit(unit: str, largest: float) -> tuple[float, str]:
+    """What parameters of an effect are multiplied by, the largest being ``largest``, and their unit then: rates in °/s,
+    a power of ten where numbers are small or large."""
+    factor, printed = 1.0, printed_unit(unit)
+    if unit.startswith(("rad/s", "(rad/s)")):
+        factor, printed = degrees_from_radians(1.0), printed.replace("rad", "°", 1)
+    exponent = engineering_exponent(factor * largest)
+    if printed == "°" or -3 < exponent <= 3 or (printed == "°/s" and exponent == -3):
+        exponent = 0
+    return factor * 10.0**-exponent, unit_with_power(exponent, printed)
+
+
+def parameter_in_words(value: float, unit: str) -> str:
+    """One parameter of an effect as people read it."""
+    scale, printed = parameter_unit(unit, abs(value))
+    return f"{plain_number(scale * value, 2)} {printed}".rstrip()
 
 
 def p_in_words(p: float) -> str:

@@ -124,6 +124,12 @@ class Document:
         return tuple(finding for one in lists for finding in one.findings)
 
     @property
+    def what_next(self) -> str:
+        """What to do first: what the gravest finding asks for, where it is serious."""
+        first = self.foremost
+        return first.action if first is not None and _is_first(first) else self.next_step
+
+    @property
     def foremost(self) -> Finding | None:
         """The first of the gravest findings, where it is more than a note: what a reader should know first."""
         for severity in (Severity.SERIOUS, Severity.WARNING):
@@ -131,6 +137,10 @@ class Document:
                 if finding.severity is severity:
                     return finding
         return None
+
+
+def _is_first(finding: Finding) -> bool:
+    return finding.severity is Severity.SERIOUS and bool(finding.action)
 
 
 def with_its_making(document: Document) -> Document:

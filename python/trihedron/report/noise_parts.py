@@ -40,7 +40,7 @@ def parts_of(axis: NoiseAxis, tau_s: FloatArray) -> list[Part]:
     """Every part of the sum that can be seen in it, largest where its name stands, N and K where they are read off."""
     inside = (tau_s >= tau_s[0] * MARGIN) & (tau_s <= tau_s[-1] / MARGIN)
     total = axis.allan_variance(tau_s)
-    out = []
+    out: list[Part] = []
     for symbol, variance in axis.allan_parts(tau_s).items():
         if np.max(variance / total) < LEAST_SHARE:
             continue

@@ -15,7 +15,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
-from trihedron.records import Severity
+from trihedron.records import Finding, Severity
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 from trihedron.report.drawing import NoFiguresError
 from trihedron.sanitise import one_line, printable
@@ -63,21 +63,33 @@ def to_html(document: Document) -> str:
 
 
 def _noticed(document: Document) -> tuple[Markup, list[str], str]:
-    """What the first screen says of findings: the foremost, codes of the others that are no notes, where all stand."""
+    """What the first screen says of findings: the foremost, names of the others that are no notes, where all stand."""
     first = document.foremost
     if first is None:
         return Markup(""), [], ""
-    grave = [finding.code.value for finding in document.findings if finding.severity is not Severity.NOTE]
-    grave.remove(first.code.value)
+    others = [
+        f"{severity.value} {', '.join(named)}"
+        for severity in (Severity.SERIOUS, Severity.WARNING)
+        if (
+            named := list(
+                dict.fromkeys(_name(f) for f in document.findings if f.severity is severity and f is not first)
+            )
+        )
+    ]
     listing = (any(isinstance(block, FindingList) for block in section.blocks) for section in document.sections)
     seen = "" if first.seen in document.verdict else first.seen
-    told = f"{seen} → {first.action}" if first.action else seen
-    return unbroken(told.strip()), list(dict.fromkeys(grave)), f"s{list(listing).index(True) + 1}"
+    told = f"{seen} → {first.action}" if first.action and first.action != document.what_next else seen
+    return unbroken(told), others, f"s{list(listing).index(True) + 1}"
+
+
+def _name(finding: Finding) -> str:
+    return finding.code.value.replace("-", " ")
 
 
 def unbroken(text: str) -> Markup:
-    """Options (``--extended``) and directions (``-X/+Y``) kept on one line."""
-    return Markup(_DASHED.sub(r'<span class="whole">\g<0></span>', str(escape(text))))
+    """Options (``--extended``) and directions (``-X/+Y``) kept on one line, numbers on that of their %."""
+    text = str(escape(text)).replace(" %", "\u00a0%")
+    return Markup(_DASHED.sub(r'<span class="whole">\g<0></span>', text))
 
 
 def stacked(text: str) -> Markup:

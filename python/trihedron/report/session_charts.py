@@ -11,6 +11,9 @@ from trihedron.report.chart import AXIS_COLOURS, Band, Bars, Chart, Level, Line,
 from trihedron.report.drawn import envelope, said
 from trihedron.report.numbers import unit_in_print
 
+LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
+"""What the length of two Gaussian errors exceeds as rarely as one exceeds 3σ, over its rms."""
+
 
 def signals_chart(recording: Recording, segments: Segments) -> Chart:
     """Both sensors over time, holds shaded, bumps marked."""
@@ -74,15 +77,14 @@ def verification_chart(verification: Verification) -> Chart:
         return Chart((norm,))
     move = (v.moves + 1).astype(np.float64)
     told = [said(f"move {k + 1}", "", a, "°") for k, a in zip(v.moves, v.angle_deg, strict=True)]
-    expected = [
-        said(f"move {k + 1}, to be expected", "", a, "° rms") for k, a in zip(v.moves, v.angle_sigma_deg, strict=True)
-    ]
+    edge = np.column_stack([move - 0.5, move + 0.5]).ravel()
+    limit = np.repeat(LIMIT_RMS * v.angle_sigma_deg, 2)
     moves = Panel(
         Scale("move", limits=(0.3, move[-1] + 0.7), whole=True),
         Scale("tilt error  [°]", "°", includes=(0.0,)),
         (
+            Band(edge, 0.0 * limit, limit, "as likely as 3σ"),
             Bars(move, v.angle_deg, 0.7, told, "tilt error", "c3"),
-            Points(move, v.angle_sigma_deg, expected, None, "to be expected (rms)", "ink"),
         ),
         height_px=180,
     )

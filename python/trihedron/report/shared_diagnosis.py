@@ -8,10 +8,10 @@ from typing import Any
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.recording import distinct_names
 from trihedron.records.shared_effects import SharedDiagnosis, SharedEffect
-from trihedron.report.diagnosis_words import p_in_words, printed_unit, value_in_words, verdict_in_words
+from trihedron.report.diagnosis_words import p_in_words, parameter_unit, value_in_words, verdict_in_words
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
-from trihedron.report.numbers import engineering_exponent, listed, plain_number, unit_with_power
+from trihedron.report.numbers import listed, plain_number
 from trihedron.report.shared_diagnosis_charts import candidates_chart, shared_chart
 
 
@@ -104,9 +104,8 @@ def _parameters(effect: SharedEffect, names: list[str]) -> Table:
     rows = []
     for i, common in enumerate(effect.parameters):
         largest = max(abs(one[i].value) for one in (effect.parameters, *effect.each))
-        exponent = engineering_exponent(largest) if largest > 0.0 else 0
-        unit = unit_with_power(exponent, printed_unit(common.unit))
-        cells = [_cell(one[i], 10.0**-exponent) for one in (effect.parameters, *effect.each)]
+        scale, unit = parameter_unit(common.unit, largest)
+        cells = [_cell(one[i], scale) for one in (effect.parameters, *effect.each)]
         rows.append((common.name, *cells, unit))
     return Table(("parameter", "together", *names, "unit"), tuple(rows), "Parameters together and alone")
 
