@@ -11,7 +11,7 @@ import trihedron
 from trihedron.comparison.frames import carried_gravity, sign_of_gravity
 from trihedron.diagnose.against.fitted import FittedModel
 from trihedron.diagnose.against.numbers import compare_numbers
-from trihedron.estimate.noise.of_biases import PoseBiases, compare_slow
+from trihedron.estimate.noise.slow import PoseBiases, compare_slow
 from trihedron.records import Pose
 from trihedron.records.sampling import Sampling, TimestampKind
 from trihedron.simulate import hand_session, scenario_by_name, simulate
@@ -113,7 +113,7 @@ def zeros(seed, walk, flicker=0.0):
         means = np.array([x[k * every : k * every + length].mean() for k in range(POSES)])
         t = np.arange(POSES) * (POSE_S + GAP_S)
         sigma = np.full(POSES, N / np.sqrt(POSE_S))
-        out.append(PoseBiases(means - means.mean(), sigma, t, np.full(POSES, POSE_S), scatters=True))
+        out.append(PoseBiases(means - means.mean(), sigma, t, np.full(POSES, POSE_S)))
     return out
 
 

@@ -1,10 +1,11 @@
 """Slow noise of an accelerometer from the lengths of gravity in poses: intervals hold, two sessions are compared."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from trihedron.estimate.noise.of_biases import PoseBiases
-from trihedron.estimate.noise.of_norms import PoseNorms, compare_slow_norms
+from trihedron.estimate.noise.slow import PoseBiases, compare_slow
 
 N, POSE_S, GAP_S, POSES, RATE_HZ = 4e-3, 4.5, 2.0, 26, 20.0
 
@@ -21,14 +22,14 @@ def session(seed, walk, scatter=0.0, poses=POSES):
     sigma = np.full(poses, N / np.sqrt(POSE_S))
     norms = (up * means).sum(axis=1) + np.hypot(sigma, scatter) * rng.standard_normal(poses)
     t = np.arange(poses) * (POSE_S + GAP_S)
-    return PoseNorms(PoseBiases(norms, sigma, t, np.full(poses, POSE_S), scatters=True), up)
+    return [PoseBiases(norms, sigma, t, np.full(poses, POSE_S), up)]
 
 
 def test_sessions_of_one_unit_are_not_told_apart_and_the_walk_is_inside_its_interval():
     inside, p = [], []
     for k, walk in enumerate((0.0, 4e-4, 4e-3, (4e-3, 4e-4, 1e-4))):
         for seed in range(2):
-            found = compare_slow_norms(session([k, seed], walk), session([k, 50 + seed], walk, scatter=1e-3))
+            found = compare_slow(session([k, seed], walk), session([k, 50 + seed], walk, scatter=1e-3))
             p.append(found.p_value)
             inside += [
                 axis["K"].lower <= true <= axis["K"].upper
@@ -43,25 +44,23 @@ def test_sessions_of_one_unit_are_not_told_apart_and_the_walk_is_inside_its_inte
 
 def test_a_walk_ten_times_as_large_is_told_from_the_other_and_scatter_is_no_walk():
     # Seventeen contrasts of one number a pose: most pairs, not all.
-    found = [compare_slow_norms(session(s, 1e-2), session(100 + s, 4e-4)) for s in range(5)]
+    found = [compare_slow(session(s, 1e-2), session(100 + s, 4e-4)) for s in range(5)]
     told = [f for f in found if f.p_value < 0.01]
     assert len(told) >= 3
     assert {f.term for f in told} == {"K"}
     assert all(axis["K"].upper < 4e-3 for f in told for axis in f.second)
-    jumps = [compare_slow_norms(session(s, 0.0, scatter=2e-2), session(100 + s, 0.0)).p_value for s in range(5)]
+    jumps = [compare_slow(session(s, 0.0, scatter=2e-2), session(100 + s, 0.0)).p_value for s in range(5)]
     assert np.sum(np.array(jumps) < 0.01) <= 1
 
 
 def test_figures_do_not_hang_on_how_the_accelerometer_was_calibrated():
-    one, other = session(1, 4e-3), session(2, 4e-4)
+    (one,), other = session(1, 4e-3), session(2, 4e-4)
     x, y, z = one.up.T
-    moved = PoseNorms(
-        PoseBiases(one.norms.values + 0.03 * x - 0.02 * y + 0.01 * z * z + 0.005 * x * y, one.norms.sigma,
-                  one.norms.time_s, one.norms.length_s, scatters=True), one.up)  # fmt: skip
-    first, second = compare_slow_norms(one, other), compare_slow_norms(moved, other)
+    moved = replace(one, values=one.values + 0.03 * x - 0.02 * y + 0.01 * z * z + 0.005 * x * y)
+    first, second = compare_slow([one], other), compare_slow([moved], other)
     assert first.first[2]["K"].value == pytest.approx(second.first[2]["K"].value, rel=1e-6)
     assert first.p_value == pytest.approx(second.p_value, rel=1e-6)
 
 
 def test_few_poses_or_poses_of_one_axis_are_not_compared():
-    assert compare_slow_norms(session(1, 1e-3, poses=18), session(2, 1e-3)) is None
+    assert compare_slow(session(1, 1e-3, poses=18), session(2, 1e-3)) is None

@@ -32,7 +32,7 @@ def chart():
 def document():
     finding = Finding(FindingCode.UNIT_DETECTED, Severity.WARNING, "seen", "cause", "action")
     table = Table(("", "value"), (("a", "1 ± 2"),), "a table")
-    picture = Picture("signals", "A caption.", None, chart)
+    picture = Picture("signals", "A caption.", chart)
     sections = (
         Section("Result", (Paragraph("words"), table, picture)),
         Section("Findings", (findings_block((finding,)),)),

@@ -14,8 +14,7 @@ from trihedron.channel_facts.pooled import ratio_of
 from trihedron.comparison.noise import Sampled, Sensor
 from trihedron.diagnose.against.mechanisms import FREE_CURVES
 from trihedron.estimate.noise.correlation_time import correlation_time
-from trihedron.estimate.noise.of_biases import PoseBiases, SlowDifference, compare_slow
-from trihedron.estimate.noise.of_norms import PoseNorms, compare_slow_norms
+from trihedron.estimate.noise.slow import PoseBiases, SlowDifference, compare_slow
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, NoiseTerm
 from trihedron.records.domains import Domain
@@ -101,9 +100,9 @@ def slow_noise(model: Side, recording: Side, *, alpha: float) -> tuple[NoiseDiff
         out += _rows("gyroscope", compare_slow(*biases), rate_hz, alpha, is_open=is_open)
     has_curve = _has_curve(model[0], "accelerometer")
     norms = accel_norms(*model, with_curve=True), accel_norms(*recording, with_curve=has_curve)
-    if norms[0] is not None and norms[1] is not None:
+    if norms[0] and norms[1]:
         is_open = _drifts(recording[0], "accelerometer", but_curve=has_curve)
-        out += _rows("accelerometer", compare_slow_norms(norms[0], norms[1]), rate_hz, alpha, is_open=is_open)
+        out += _rows("accelerometer", compare_slow(*norms), rate_hz, alpha, is_open=is_open)
     return tuple(out)
 
 
@@ -161,41 +160,42 @@ def gyro_biases(
 
     ``with_curve``: a drift along a free curve stays on them where nothing else was taken off.
     """
-    density = found.noise.get("gyroscope_density")
-    shown = next((r for r in found.residuals if r.domain == "static-gyro" and len(r.after) > 1), None)
-    if density is None or shown is None:
+    shown = _shown(found, "gyroscope", with_curve=with_curve)
+    if shown is None:
         return ()
-    values, time_s = shown.after, shown.time_after_s
-    if with_curve and _has_curve(found):
-        values, time_s = shown.before, shown.time_before_s
+    values, time_s, white = shown
     length = _poses(time_s, recording, segments).length_s
-    white: FloatArray = np.asarray(density, dtype=np.float64)
-    return tuple(PoseBiases(values[:, k], white[k] / np.sqrt(length), time_s, length, scatters=True) for k in range(3))
+    return tuple(PoseBiases(values[:, k], white[k] / np.sqrt(length), time_s, length) for k in range(3))
 
 
 def accel_norms(
     found: Diagnosis, recording: Recording, segments: Segments, *, with_curve: bool = False
-) -> PoseNorms | None:
-    """Lengths of gravity in a session's poses, what effects make of them taken off, and its directions.
-
-    ``with_curve``: a drift along a free curve stays on them where nothing else was taken off.
-    """
-    density = found.noise.get("accelerometer_density")
-    shown = next((r for r in found.residuals if r.domain == "static-accel" and len(r.after) > 1), None)
-    if density is None or shown is None:
-        return None
-    values, time_s = shown.after, shown.time_after_s
-    if with_curve and _has_curve(found, "accelerometer"):
-        values, time_s = shown.before, shown.time_before_s
+) -> tuple[PoseBiases, ...]:
+    """Lengths of gravity in a session's poses, with its directions; otherwise like :func:`gyro_biases`."""
+    shown = _shown(found, "accelerometer", with_curve=with_curve)
+    if shown is None:
+        return ()
+    values, time_s, density = shown
     poses = _poses(time_s, recording, segments)
     if poses.means is None:
-        return None
+        return ()
     S, b = (np.array(found.extended.accelerometer[name]) for name in ("S", "b"))
     force = correct(poses.means, S, b)
     up = force / np.linalg.norm(force, axis=1, keepdims=True)
-    white = np.sqrt((up**2 @ np.asarray(density, dtype=np.float64) ** 2) / poses.length_s)
-    norms = PoseBiases(values[:, 0], white, time_s, poses.length_s, scatters=True)
-    return PoseNorms(norms, up)
+    white = np.sqrt((up**2 @ density**2) / poses.length_s)
+    return (PoseBiases(values[:, 0], white, time_s, poses.length_s, up),)
+
+
+def _shown(found: Diagnosis, sensor: Sensor, *, with_curve: bool) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Residuals of a sensor's poses (n, c), their times (n,) and the density of its white noise (3,)."""
+    density = found.noise.get(f"{sensor}_density")
+    shown = next((r for r in found.residuals if r.domain == DOMAINS[sensor] and len(r.after) > 1), None)
+    if density is None or shown is None:
+        return None
+    white: FloatArray = np.asarray(density, dtype=np.float64)
+    if with_curve and _has_curve(found, sensor):
+        return shown.before, shown.time_before_s, white
+    return shown.after, shown.time_after_s, white
 
 
 @dataclass(frozen=True, eq=False)

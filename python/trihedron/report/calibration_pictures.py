@@ -19,7 +19,6 @@ from trihedron.report.calibration_charts import (
 from trihedron.report.calibration_residuals import direction
 from trihedron.report.chart import AXIS_COLOURS, Chart, Level, Line, Mark, Matrix, Panel, Points, Scale, Sphere
 from trihedron.report.document import Block, Picture
-from trihedron.report.drawing import later
 from trihedron.report.drawn import said
 from trihedron.report.numbers import plain_number
 from trihedron.report.segments import signals_picture
@@ -43,7 +42,6 @@ def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture
     return Picture(
         "residuals",
         caption,
-        later("figures", "draw_residuals", quality),
         chart,
     )
 
@@ -119,7 +117,7 @@ def figure_blocks(calibration: Calibration, segments: Segments | None, recording
         chart = time_chart(calibration, segments, recording)
         if chart is not None:
             caption = "Residuals of the fit over time, against 3 σ of noise alone: drift would show as a slope."
-            blocks.append(Picture("time", caption, later("chart_figures", "draw_chart", lambda: chart), lambda: chart))
+            blocks.append(Picture("time", caption, lambda: chart))
     if means is not None:
         if quality is not None and len(means) == len(quality.residual):
             caption = (
@@ -127,9 +125,7 @@ def figure_blocks(calibration: Calibration, segments: Segments | None, recording
                 "blue too short, pale behind. One colour on one side: an effect of orientation that the model lacks. "
                 "Drag to turn."
             )
-            blocks.append(
-                Picture("orientation", caption, None, partial(orientation_chart, calibration.accelerometer, means))
-            )
+            blocks.append(Picture("orientation", caption, partial(orientation_chart, calibration.accelerometer, means)))
         blocks.append(_poses_picture(calibration.accelerometer, means))
     gyroscope = calibration.gyroscope
     if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:
@@ -137,7 +133,6 @@ def figure_blocks(calibration: Calibration, segments: Segments | None, recording
             Picture(
                 "moves",
                 "Tilt error after every rotation, in sample and cross-validated (held out).",
-                later("figures", "draw_moves", gyroscope.quality),
                 partial(move_chart, gyroscope.quality, segments),
             )
         )
@@ -151,7 +146,6 @@ def _poses_picture(sensor: SensorCalibration, means: FloatArray) -> Picture:
         "poses",
         "Directions of 'up' in the body frame, upper and lower hemisphere. Empty regions are poses that were "
         "not recorded; triangles are the most useful next poses, in that order.",
-        later("figures", "draw_poses", sensor, means),
         partial(sphere_chart, sensor, means),
     )
 
@@ -217,7 +211,7 @@ def correlation_picture(calibration: Calibration) -> Picture | None:
     if len(names) < FEWEST_NAMES:
         return None
     caption = "Correlations of the free parameters (a: accelerometer, w: gyroscope), orange positive, blue negative."
-    return Picture("correlations", caption, None, partial(matrix_chart, calibration))
+    return Picture("correlations", caption, partial(matrix_chart, calibration))
 
 
 def matrix_chart(calibration: Calibration) -> Chart:

@@ -45,7 +45,6 @@ from trihedron.report.diagnosis_words import (
     where_in_words,
 )
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
-from trihedron.report.drawing import later
 from trihedron.report.effect_charts import effect_chart
 from trihedron.report.effect_rest_charts import rest_panels
 from trihedron.report.findings import findings_block
@@ -283,7 +282,7 @@ def _physics(diagnosis: Diagnosis) -> list[Picture]:
         if chart is not None:
             caption = f"{effect.id}: {_drawn_in_words(effect)}. "
             caption += _without_strongest(effect.statement)
-            out.append(Picture(f"effect-{effect.id}", caption, None, lambda drawn=chart: drawn))  # type: ignore[misc]
+            out.append(Picture(f"effect-{effect.id}", caption, lambda drawn=chart: drawn))  # type: ignore[misc]
     return out
 
 
@@ -300,13 +299,12 @@ def _drawn_in_words(effect: AcceptedEffect) -> str:
 def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
     has_effects = bool(diagnosis.effects)
 
-    draw = later("diagnosis_figures", "draw_before_after", residuals, has_effects=has_effects)
     caption = f"{_CAPTIONS[residuals.domain]} {_counted(residuals)}; "
     caption += "error bars: ± 2 σ of the predicted noise."
     if residuals.domain == "dynamics":
         caption += " Velocity and angle of one move share most of their noise: χ² compares what is left of it."
     chart = partial(before_after_chart, residuals, has_effects=has_effects)
-    return Picture(f"{residuals.domain}", caption, draw, chart)
+    return Picture(f"{residuals.domain}", caption, chart)
 
 
 def _counted(residuals: DomainResiduals) -> str:

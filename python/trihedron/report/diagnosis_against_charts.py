@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -12,7 +12,6 @@ from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.report.axes import axis_in_print
 from trihedron.report.chart import Chart, Colour, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Picture
-from trihedron.report.drawing import later
 from trihedron.report.numbers import plain_number
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
@@ -48,7 +47,7 @@ def stages_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
         "Cross-validated residual, stage by stage: as given, with its own parameters, noise, effects; each domain "
     )
     caption += "against its own first stage."
-    return (_picture("stages", caption, partial(stages_chart, diagnosis)),)
+    return (Picture("stages", caption, partial(stages_chart, diagnosis)),)
 
 
 def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -58,14 +57,10 @@ def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
         return ()
     first = "Noise inside poses, model (dashed) and recording, in octaves that both logs show."
     second = "Allan deviation of that noise, model (dashed) and recording: what the octaves above make of it."
-    spectra = _picture("spectra-both", first, partial(spectra_chart, diagnosis))
+    spectra = Picture("spectra-both", first, partial(spectra_chart, diagnosis))
     if not any(len(_without_gaps(*one)[0]) >= FEWEST_OCTAVES for one in seen.values()):
         return (spectra,)
-    return spectra, _picture("allan-both", second, partial(allan_chart, diagnosis))
-
-
-def _picture(name: str, caption: str, chart: Callable[[], Chart]) -> Picture:
-    return Picture(name, caption, later("chart_figures", "draw_chart", chart), chart)
+    return spectra, Picture("allan-both", second, partial(allan_chart, diagnosis))
 
 
 def stages_chart(diagnosis: Diagnosis) -> Chart:

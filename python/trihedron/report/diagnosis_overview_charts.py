@@ -16,7 +16,6 @@ from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel
 from trihedron.report.diagnosis_numbers import GROUPS, in_print, named
 from trihedron.report.diagnosis_words import MEANING
 from trihedron.report.document import Block, Picture
-from trihedron.report.drawing import later
 from trihedron.report.drawn import envelope
 from trihedron.report.numbers import plain_number, unit_in_print, with_sigma
 from trihedron.sensor_model import correct
@@ -43,7 +42,7 @@ def strengths_picture(diagnosis: Diagnosis) -> Picture | None:
         return None
     caption = "How far the recording and the model disagree, domain by domain: χ² per degree of freedom; 1 is what "
     caption += "noise alone explains."
-    return _picture("strengths", caption, partial(strengths_chart, diagnosis))
+    return Picture("strengths", caption, partial(strengths_chart, diagnosis))
 
 
 def strengths_chart(diagnosis: Diagnosis) -> Chart:
@@ -83,7 +82,7 @@ def forest_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if diagnosis.parameters:
         caption = "Parameters of the recording (dots, 95 % interval) about those of the model (the line at 0); orange: "
         caption += "the group differs."
-        out.append(_picture("forest", caption, partial(forest_chart, diagnosis.parameters)))
+        out.append(Picture("forest", caption, partial(forest_chart, diagnosis.parameters)))
     return tuple(out)
 
 
@@ -94,7 +93,7 @@ def ratio_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
         return ()
     caption = "Noise and sampling of the model over the recording's, with the interval where there is one; orange: "
     caption += "differs; 1: the same."
-    return (_picture("ratios", caption, partial(ratios_chart, rows)),)
+    return (Picture("ratios", caption, partial(ratios_chart, rows)),)
 
 
 def forest_chart(parameters: Sequence[ParameterDifference]) -> Chart:
@@ -171,7 +170,7 @@ def traces_picture(
     caption = "Readings of the recording and of the simulation moved as it was, where the two lie farthest apart."
     if any(isinstance(one, Panel) and one.y.label.startswith(CORRECTED) for one in chart.panels):
         caption += " One is in counts: both were corrected, each by its own parameters."
-    return _picture("traces", caption, lambda: chart)
+    return Picture("traces", caption, lambda: chart)
 
 
 def traces_chart(
@@ -236,7 +235,3 @@ def _both_sides(recording: Recording, simulated: Recording, segments: Segments, 
         said = "gyro" if name == "gyroscope" else name
         out.append((said, (mine, printed), at, (mine - at) / noise))
     return out
-
-
-def _picture(name: str, caption: str, chart: partial[Chart] | object) -> Picture:
-    return Picture(name, caption, later("chart_figures", "draw_chart", chart), chart)  # type: ignore[arg-type]

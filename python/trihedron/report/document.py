@@ -10,7 +10,6 @@ from trihedron.records import Finding, Severity
 
 if TYPE_CHECKING:
     from trihedron.report.chart import Chart
-    from trihedron.report.figures import ShownFigure
 
 Level = Literal["good", "usable", "bad"]
 """The colour of a verdict: nothing speaks against it, something does, not to be trusted."""
@@ -55,15 +54,11 @@ class FindingList:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure that is drawn when a writer can show it, ``chart`` by a page.
-
-    ``draw`` is for a notebook or a file, and raises ``NoFiguresError`` without matplotlib; None where only pages draw.
-    """
+    """A figure as data, made when a writer wants it: a page draws it itself, a notebook by matplotlib."""
 
     name: str
     caption: str
-    draw: Callable[[], ShownFigure] | None
-    chart: Callable[[], Chart] | None = None
+    chart: Callable[[], Chart]
 
 
 Block = Paragraph | Facts | Table | Code | FindingList | Picture

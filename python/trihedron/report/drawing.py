@@ -2,36 +2,35 @@
 
 from __future__ import annotations
 
-from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, cast
+from types import ModuleType
 
 from trihedron.errors import RefusedError
-
-if TYPE_CHECKING:
-    from trihedron.report.figures import ShownFigure
+from trihedron.report.document import Picture
 
 
 class NoFiguresError(RefusedError):
     """Figures were asked for where matplotlib is not installed."""
 
 
-def later(room: str, name: str, *what: object, **how: object) -> partial[ShownFigure]:
-    """A figure to be drawn by ``name`` of ``trihedron.report.<room>`` when it is called.
+def figures() -> ModuleType:
+    """:mod:`trihedron.report.figures`, which alone draws by matplotlib.
 
     Raises
     ------
     NoFiguresError
-        (a ``ValueError``) when it is called and matplotlib is not installed.
+        (a ``ValueError``) when matplotlib is not installed.
     """
-    return partial(_draw, room, name, *what, **how)
-
-
-def _draw(room: str, name: str, *what: object, **how: object) -> ShownFigure:
     try:
-        drawing = import_module(f"trihedron.report.{room}")
+        return import_module("trihedron.report.figures")
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] not in {"matplotlib", "mpl_toolkits"}:
             raise
         raise NoFiguresError("figures need matplotlib, which is not installed: pip install matplotlib.") from None
-    return cast("ShownFigure", getattr(drawing, name)(*what, **how))
+
+
+def png_of(picture: Picture) -> bytes:
+    """A figure drawn, as a PNG file; raises as :func:`figures` does."""
+    room = figures()
+    made: bytes = room.png(room.draw_chart(picture.chart))
+    return made

@@ -1,138 +1,56 @@
-"""Figures: the only place that draws. Every function returns a figure; :func:`png` makes a file of it."""
+"""A chart's data as a matplotlib figure: what a page draws as SVG, for notebooks and ``.plot()``."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Sequence
+from typing import cast
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from trihedron.arrays import XYZ, FloatArray
-from trihedron.records import FitQuality, Recording, Segments, SensorCalibration, Verification
-from trihedron.report.numbers import unit_in_print
-from trihedron.units import mm_s2_from_m_s2
+from trihedron.errors import RefusedError
+from trihedron.report.chart import (
+    Band,
+    Bars,
+    Chart,
+    Colour,
+    Disc,
+    Level,
+    Line,
+    Mark,
+    Matrix,
+    Note,
+    Panel,
+    Points,
+    Scale,
+    Span,
+    Sphere,
+)
+from trihedron.report.disc import equal_area
 
-# Distinct for colour-blind readers and in grey (Okabe and Ito).
-AXIS_COLOURS = ("#0072B2", "#E69F00", "#009E73")
-ACCENT = "#D55E00"
-INK = "#222222"
-SHADE = "#DDE5EC"
+# The axes: distinct for colour-blind readers and in grey (Okabe and Ito).
+COLOURS: dict[Colour, str] = {
+    "c1": "#0072B2", "c2": "#E69F00", "c3": "#009E73", "accent": "#D55E00", "ink": "#222222", "shade": "#DDE5EC",
+    "soft": "#8A949C", "grey": "#B4BCC2", "warn": "#D55E00",
+}  # fmt: skip
+MOST_NAMES = 24
+"""Places along an axis that are named below it; more are counted."""
+_UNIT = re.compile(r" +\[")
+WIDTH_IN = 9.5
 DPI = 110
-MOST_POINTS = 4000
-
-
-def draw_signals(recording: Recording, segments: Segments | None = None) -> Figure:
-    """Both sensors over time, holds shaded where segments are given."""
-    sensors = [
-        (recording.accelerometer, f"accelerometer\n[{unit_in_print(recording.accelerometer_unit.value)}]"),
-        (recording.gyroscope, f"gyroscope\n[{unit_in_print(recording.gyroscope_unit.value)}]"),
-    ]
-    present = [(readings, label) for readings, label in sensors if readings is not None]
-    figure, axes = panels(len(present), 1, (9.5, 1.0 + 1.9 * len(present)), share_x=True)
-    for axis, (readings, label) in zip(axes, present, strict=True):
-        if segments is not None:
-            _shade_poses(axis, recording, segments)
-        for k in range(3):
-            time, values = _envelope(recording.time_s, readings[:, k])
-            axis.plot(time, values, color=AXIS_COLOURS[k], linewidth=0.7, label=XYZ[k])
-        axis.set_ylabel(label)
-        axis.margins(x=0.0)
-    axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
-    if segments is not None:
-        _mark_disturbances(axes, recording, segments)
-    axes[-1].set_xlabel("time [s]")
-    return figure
-
-
-def draw_pose_means(segments: Segments) -> Figure:
-    """Mean readings of every pose over time, in the unit of the log."""
-    pairs = [("accelerometer", segments.accelerometer_mean), ("gyroscope", segments.gyroscope_mean)]
-    present = [(name, means) for name, means in pairs if means is not None]
-    figure, axes = panels(len(present), 1, (9.5, 1.0 + 1.9 * len(present)), share_x=True)
-    for axis, (name, means) in zip(axes, present, strict=True):
-        for k in range(3):
-            axis.plot(segments.time_mid_s, means[:, k], "o", color=AXIS_COLOURS[k], markersize=4, label=XYZ[k])
-        axis.set_ylabel(name)
-    axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
-    axes[-1].set_xlabel("time [s]")
-    return figure
-
-
-def draw_residuals(quality: FitQuality) -> Figure:
-    """Residual of every pose with its standard error, and the held-out prediction."""
-    figure, (axis,) = panels(1, 1, (9.5, 3.2))
-    pose = np.arange(1, len(quality.residual) + 1)
-    axis.axhline(0.0, color=INK, linewidth=0.8)
-    if quality.held_out is not None:
-        axis.errorbar(
-            pose + 0.18,
-            mm_s2(quality.held_out),
-            None if quality.held_out_sigma is None else mm_s2(quality.held_out_sigma),
-            fmt="o",
-            markersize=5,
-            markerfacecolor="white",
-            color=ACCENT,
-            elinewidth=1.0,
-            label="held out",
-        )
-    axis.errorbar(
-        pose - 0.18,
-        mm_s2(quality.residual),
-        mm_s2(quality.sigma),
-        fmt="o",
-        markersize=4.5,
-        color=AXIS_COLOURS[0],
-        elinewidth=1.0,
-        label="in sample",
-    )
-    axis.set_xlabel("pose")
-    axis.set_ylabel("|f| − |g|  [mm/s²]")
-    axis.set_xlim(0.2, len(pose) + 0.8)
-    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
-    return figure
-
-
-def mm_s2(values: FloatArray) -> FloatArray:
-    """Accelerations in mm/s²."""
-    return values * mm_s2_from_m_s2(1.0)
-
-
-def draw_poses(sensor: SensorCalibration, means: FloatArray) -> Figure:
-    """Directions of "up" on two hemispheres, by Lambert's equal-area projection."""
-    force = means @ sensor.S.T + sensor.b
-    up = force / np.linalg.norm(force, axis=1)[:, None]
-    figure, axes = panels(1, 2, (7.6, 4.1))
-    for axis, sign, title in ((axes[0], 1.0, "+Z above the horizon"), (axes[1], -1.0, "+Z below the horizon")):
-        _hemisphere(axis, title)
-        for k, direction in enumerate(up):
-            # A pose with level Z lies on the rim of both.
-            if sign * direction[2] < -1e-2:
-                continue
-            x, y = _equal_area(direction * np.array([1.0, 1.0, sign]))
-            axis.plot(x, y, "o", markersize=8, color=AXIS_COLOURS[0], alpha=0.85)
-            axis.annotate(str(k + 1), (x, y), ha="center", va="center", fontsize=5.5, color="white")
-    return figure
-
-
-def draw_moves(quality: FitQuality) -> Figure:
-    """Angle between predicted and measured gravity after every move."""
-    assert quality.angle_deg is not None
-    figure, (axis,) = panels(1, 1, (9.5, 3.0))
-    move = np.arange(1, len(quality.angle_deg) + 1)
-    axis.bar(move - 0.2, quality.angle_deg, 0.38, color=AXIS_COLOURS[0], label="in sample")
-    if quality.held_out_angle_deg is not None:
-        axis.bar(move + 0.2, quality.held_out_angle_deg, 0.38, color=ACCENT, label="held out")
-    axis.set_xlabel("move")
-    axis.set_ylabel("tilt error [°]")
-    axis.set_xlim(0.2, len(move) + 0.8)
-    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
-    return figure
+PX_AN_INCH = 140.0
+"""Of a page's figures, which are lower: it has room for more of them on a screen."""
+HIGH_PX = 420
+"""Of what is as high as wide."""
+FEW_DECADES = 100.0
+"""Axes that span less are labelled thrice a decade."""
 
 
 class ShownFigure(Figure):
@@ -140,18 +58,6 @@ class ShownFigure(Figure):
 
     def _repr_png_(self) -> bytes:
         return png(self)
-
-
-def panels(rows: int, columns: int, size: tuple[float, float], *, share_x: bool = False) -> tuple[Figure, list[Axes]]:
-    """A figure of the house and its panels, row by row."""
-    figure = ShownFigure(figsize=size, dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    grid = figure.subplots(rows, columns, sharex=share_x, squeeze=False)
-    axes: list[Axes] = list(grid.ravel())
-    for axis in axes:
-        axis.spines[["top", "right"]].set_visible(False)
-        axis.tick_params(labelsize=8.5, color=INK)
-    return figure, axes
 
 
 def png(figure: Figure) -> bytes:
@@ -162,75 +68,180 @@ def png(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def _shade_poses(axis: Axes, recording: Recording, segments: Segments) -> None:
-    for pose in segments.poses:
-        axis.axvspan(recording.time_s[pose.start], recording.time_s[pose.stop - 1], color=SHADE, linewidth=0, zorder=0)
+def draw_onto(chart: Callable[[], Chart], axes: Sequence[Axes]) -> Figure:
+    """The panels of a chart on axes of the caller's own, one for each; on a single one the first.
+
+    Raises
+    ------
+    ValueError
+        When there are several axes, but not as many as panels.
+    """
+    laid_out = chart().panels
+    if len(axes) == 1:
+        laid_out = laid_out[:1]
+    if len(axes) != len(laid_out):
+        raise RefusedError(f"this figure needs {len(laid_out)} axes, one a panel; ax has {len(axes)}.")
+    for axis, panel in zip(axes, laid_out, strict=True):
+        _draw_any(axis, panel)
+        if isinstance(panel, Panel):
+            _name_below(axis, panel.x)
+    return cast(Figure, axes[0].figure)
 
 
-def _mark_disturbances(axes: Sequence[Axes], recording: Recording, segments: Segments) -> None:
-    for pose in segments.poses:
-        for first, last in pose.disturbed:
-            for axis in axes:
-                start, stop = recording.time_s[first], recording.time_s[min(last, recording.n_samples) - 1]
-                axis.axvspan(start, stop, color=ACCENT, alpha=0.35, linewidth=0, zorder=0)
+def draw_chart(chart: Callable[[], Chart]) -> Figure:
+    """Every panel of a chart: lines, points with uncertainties, bands and levels; discs, spheres, correlations."""
+    laid_out = chart()
+    columns, panels = laid_out.columns, laid_out.panels
+    rows = -(-len(panels) // columns)
+    is_titled = any(panel.title for panel in panels)
+    high_px = max((panel.height_px if isinstance(panel, Panel) else HIGH_PX for panel in panels), default=HIGH_PX)
+    figure = ShownFigure(
+        figsize=(WIDTH_IN + columns - 1, 0.9 + (high_px / PX_AN_INCH + 0.5 * is_titled) * rows),
+        dpi=DPI,
+        layout="constrained",
+    )
+    FigureCanvasAgg(figure)
+    along = {panel.x.label if isinstance(panel, Panel) else None for panel in panels}
+    axes: list[Axes] = list(figure.subplots(rows, columns, sharex=len(along) == 1, squeeze=False).ravel())
+    for axis, panel in zip(axes, panels, strict=False):
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.tick_params(labelsize=8.5, color=COLOURS["ink"])
+        _draw_any(axis, panel)
+        if laid_out.legend and columns == 1 and (named := _named([axis])):
+            beside = (1.0, 1.0)
+            axis.legend(
+                named.values(), named.keys(), loc="upper left", bbox_to_anchor=beside, frameon=False, fontsize=7
+            )
+    for k, (axis, panel) in enumerate(zip(axes, panels, strict=False)):
+        if isinstance(panel, Panel) and (len(along) > 1 or k + columns >= len(panels)):
+            # Nothing below it: what a shared axis hides in the rows above is written here.
+            axis.tick_params(labelbottom=True)
+            _name_below(axis, panel.x)
+    for axis in axes[len(panels) :]:
+        axis.set_axis_off()
+    if laid_out.legend and columns > 1 and (named := _named(axes)):
+        figure.legend(named.values(), named.keys(), loc="outside upper right", ncols=4, frameon=False, fontsize=8)
+    return figure
 
 
-def _envelope(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Smallest and largest value of each block: a long log drawn whole, with no peak lost."""
-    n = len(values)
-    if n <= MOST_POINTS:
-        return time_s, values
-    block = -(-n // (MOST_POINTS // 2))
-    whole = n // block * block
-    parts = values[:whole].reshape(-1, block)
-    low_high = np.column_stack([np.nanmin(parts, axis=1), np.nanmax(parts, axis=1)]).ravel()
-    return np.repeat(time_s[:whole:block], 2), low_high
+def _named(axes: Sequence[Axes]) -> dict[str, Artist]:
+    """A name once: a colour that differs from panel to panel is that panel's axis."""
+    return {name: mark for axis in axes for mark, name in zip(*axis.get_legend_handles_labels(), strict=True)}
 
 
-def _equal_area(direction: FloatArray) -> tuple[float, float]:
-    """Lambert's azimuthal projection of a unit vector about +Z, scaled so that the equator has radius one."""
-    factor = 1.0 / np.sqrt(1.0 + max(float(direction[2]), 0.0))
-    return float(direction[0] * factor), float(direction[1] * factor)
+def _draw_any(axis: Axes, panel: Panel | Disc | Sphere | Matrix) -> None:
+    if isinstance(panel, Panel):
+        _draw_panel(axis, panel)
+        return
+    axis.set_title(panel.title, fontsize=8.5, loc="left")
+    if isinstance(panel, Matrix):
+        _draw_matrix(axis, panel)
+        return
+    _rim(axis)
+    if isinstance(panel, Disc):
+        for x, y, label, _, kind in panel.points:
+            shape, colour = ("o", COLOURS["c1"]) if kind == "taken" else ("^", COLOURS["accent"])
+            axis.plot(x, y, shape, markersize=9, color=colour, alpha=0.85)
+            axis.annotate(label, (x, y), ha="center", va="center", fontsize=5.5, color="white")
+        return
+    share = np.abs(panel.values) / (panel.limit or 1.0)
+    for up, value, size in zip(panel.directions, panel.values, share, strict=True):
+        # What lies below the horizon is hollow.
+        fill = "full" if up[2] >= 0.0 else "none"
+        colour = COLOURS["accent" if value > 0.0 else "c1"]
+        axis.plot(*equal_area(tuple(up)), "o", markersize=3.0 + 9.0 * size, color=colour, fillstyle=fill)
 
 
-def _hemisphere(axis: Axes, title: str) -> None:
+def _rim(axis: Axes) -> None:
+    """A hemisphere seen along Z: its rim, circles of 30° and 60° above it, and two axes."""
     angle = np.linspace(0.0, 2.0 * np.pi, 181)
     for elevation_deg in (0.0, 30.0, 60.0):
-        z = np.sin(np.radians(elevation_deg))
-        radius = np.sqrt(1.0 - z)
-        axis.plot(radius * np.cos(angle), radius * np.sin(angle), color="#AAB4BD", linewidth=0.6, zorder=0)
+        radius = np.sqrt(1.0 - np.sin(np.radians(elevation_deg)))
+        axis.plot(radius * np.cos(angle), radius * np.sin(angle), color=COLOURS["grey"], linewidth=0.6, zorder=0)
     for label, x, y in (("+X", 1.15, 0.0), ("−X", -1.15, 0.0), ("+Y", 0.0, 1.15), ("−Y", 0.0, -1.15)):
-        axis.annotate(label, (x, y), ha="center", va="center", fontsize=9, color=INK)
-        axis.plot([0.0, np.clip(x, -1.0, 1.0)], [0.0, np.clip(y, -1.0, 1.0)], color="#D5DBE0", linewidth=0.6, zorder=0)
+        axis.annotate(label, (x, y), ha="center", va="center", fontsize=9, color=COLOURS["ink"])
+        axis.plot([0.0, x / 1.15], [0.0, y / 1.15], color=COLOURS["grey"], linewidth=0.6, zorder=0)
     axis.set_aspect("equal")
     axis.set_axis_off()
-    axis.set_xlim(-1.22, 1.22)
-    axis.set_ylim(-1.22, 1.22)
-    axis.set_title(title, fontsize=10)
 
 
-def draw_verification(verification: Verification) -> Figure:
-    """Norm error per pose with its standard error, and angle per move with the expected one."""
-    has_moves = len(verification.angle_deg) > 0
-    figure, axes = panels(2 if has_moves else 1, 1, (9.5, 5.2 if has_moves else 3.0))
-    pose = np.arange(1, len(verification.norm_error) + 1)
-    axes[0].axhline(0.0, color=INK, linewidth=0.8)
-    axes[0].errorbar(
-        pose,
-        mm_s2(verification.norm_error),
-        mm_s2(verification.norm_sigma),
-        fmt="o",
-        markersize=4.5,
-        color=AXIS_COLOURS[0],
-        elinewidth=1.0,
-    )
-    axes[0].set_xlabel("pose")
-    axes[0].set_ylabel("|f| − |g|  [mm/s²]")
-    if has_moves:
-        move = verification.moves + 1
-        axes[1].bar(move, verification.angle_deg, 0.7, color=AXIS_COLOURS[0], label="tilt error")
-        axes[1].plot(move, verification.angle_sigma_deg, "_", markersize=14, color=ACCENT, label="to be expected (rms)")
-        axes[1].set_xlabel("move")
-        axes[1].set_ylabel("tilt error [°]")
-        axes[1].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
-    return figure
+def _draw_matrix(axis: Axes, matrix: Matrix) -> None:
+    """Orange positive, blue negative, the lower triangle."""
+    names, n = matrix.names, len(matrix.names)
+    lower = np.where(np.tri(n, k=-1, dtype=bool), matrix.values, np.nan)
+    axis.imshow(lower, cmap="PuOr_r", vmin=-1.0, vmax=1.0)
+    axis.set_xticks(range(n), names, rotation=90, fontsize=6)
+    axis.set_yticks(range(n), names, fontsize=6)
+
+
+def _draw_panel(axis: Axes, panel: Panel) -> None:
+    if panel.x.is_log:
+        axis.set_xscale("log")
+        _decades(axis.xaxis, panel.x.limits)
+    if panel.y.is_log:
+        axis.set_yscale("log")
+        _decades(axis.yaxis, panel.y.limits)
+    for mark in panel.marks:
+        _draw(axis, mark)
+    if panel.title:
+        axis.set_title(panel.title, fontsize=8.5, loc="left")
+    axis.set_ylabel(_UNIT.sub("\n[", panel.y.label), fontsize=8)
+    if panel.y.names:
+        places = [-k for k in range(1, len(panel.y.names) + 1)]
+        axis.set_yticks(places, [_short(n) for n in panel.y.names], fontsize=7)
+        axis.set_ylim(places[-1] - 0.6, -0.4)
+    if panel.x.limits is not None:
+        axis.set_xlim(*panel.x.limits)
+    if panel.y.limits is not None:
+        axis.set_ylim(*panel.y.limits)
+
+
+def _decades(axis: Axis, limits: tuple[float, float] | None) -> None:
+    """Figures as one reads them, at 1, 2 and 5 of every decade; of many decades at the first only."""
+    is_short = limits is not None and limits[1] < FEW_DECADES * limits[0]
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if is_short else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _name_below(axis: Axes, scale: Scale) -> None:
+    if scale.names and len(scale.names) <= MOST_NAMES:
+        places = range(1, len(scale.names) + 1)
+        axis.set_xticks(places, [_short(n) for n in scale.names], rotation=20, ha="right", fontsize=7)
+    else:
+        axis.set_xlabel(scale.label, fontsize=8)
+
+
+def _draw(axis: Axes, mark: Mark) -> None:
+    colour = COLOURS[mark.colour]
+    if isinstance(mark, Level):
+        style = "--" if mark.is_dashed else "-"
+        if mark.y is not None:
+            axis.axhline(mark.y, color=colour, linewidth=0.7, linestyle=style)
+        if mark.x is not None:
+            axis.axvline(mark.x, color=colour, linewidth=0.7, linestyle=style)
+    elif isinstance(mark, Line):
+        style, width = "--" if mark.is_dashed else "-", 0.9 if mark.is_thin else 1.4
+        axis.plot(mark.x, mark.y, color=colour, linewidth=width, linestyle=style, label=mark.name or None)
+    elif isinstance(mark, Band):
+        axis.fill_between(mark.x, mark.lower, mark.upper, color=colour, alpha=0.5, linewidth=0, label=mark.name or None)
+    elif isinstance(mark, Points):
+        along = (mark.sigma, None) if mark.is_across else (None, mark.sigma)
+        axis.errorbar(
+            mark.x, mark.y, along[1], along[0], fmt="o", markersize=3.0, elinewidth=0.7, color=colour,
+            fillstyle="none" if mark.is_hollow else "full", label=mark.name or None,
+        )  # fmt: skip
+    elif isinstance(mark, Bars):
+        base = 0.0 if mark.base is None else mark.base
+        if mark.is_across:
+            axis.barh(mark.y, mark.x - base, mark.width, left=base, color=colour, label=mark.name or None)
+        else:
+            axis.bar(mark.x, mark.y - base, mark.width, bottom=base, color=colour, label=mark.name or None)
+    elif isinstance(mark, Span):
+        axis.axvspan(mark.first, mark.last, color=colour, linewidth=0, zorder=0, label=mark.name or None)
+    elif isinstance(mark, Note):
+        axis.annotate(mark.text, (mark.x, mark.y), xytext=(3, 3), textcoords="offset points", fontsize=7, color=colour)
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= 24 else f"…{name[-23:]}"

@@ -9,7 +9,6 @@ from trihedron.arrays import XYZ
 from trihedron.records.filter_noise import Bounded, FilterNoise, RestCheck, SensorFilterNoise, StaticNoise
 from trihedron.records.plain import as_plain
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
-from trihedron.report.drawing import later
 from trihedron.report.filter_noise_charts import OF_SENSOR, horizon_chart
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.frames import Columns, of_rows
@@ -46,7 +45,6 @@ def filter_noise_report(found: FilterNoise) -> Document:
     picture = Picture(
         "horizon",
         "Error of a filter that carries on alone for a horizon: predicted by its N and K, and actual.",
-        later("chart_figures", "draw_chart", chart),
         chart,
     )
     is_trustworthy = not any(f.severity.value == "serious" for f in found.findings)

@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 import statistics
 from collections import Counter
-from collections.abc import Callable
 from functools import partial
 
 from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.records.sessions import Change, Repeated
 from trihedron.report.axes import axis_in_print
-from trihedron.report.chart import Chart
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
-from trihedron.report.drawing import later
 from trihedron.report.many_charts import fleet_chart, shown
 from trihedron.report.numbers import how_many, plain_number, with_sigma
 
@@ -51,7 +48,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         sections.append(Section("Drift between sessions of one device", tuple(_drift(summary))))
     if n_done:
         caption = "Every number by device, one point a log with its own error; the line is the median of devices."
-        sections.append(Section("Distributions", (_picture("numbers", caption, partial(fleet_chart, summary)),)))
+        sections.append(Section("Distributions", (Picture("numbers", caption, partial(fleet_chart, summary)),)))
     sections.append(Section("Every log", (_logs(summary),)))
     verdict = f"{n_done} of {how_many(n, 'log')} of {how_many(len(devices), 'device')} were calibrated."
     if not bad:
@@ -118,11 +115,7 @@ def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
 def _lead(summary: FleetSummary) -> Picture:
     caption = "The parameters in which devices differ most beside their uncertainties: a point a log, its uncertainty, "
     caption += "about the median of devices."
-    return _picture("differ", caption, partial(fleet_chart, summary, MOST_LEADING))
-
-
-def _picture(name: str, caption: str, chart: Callable[[], Chart]) -> Picture:
-    return Picture(name, caption, later("chart_figures", "draw_chart", chart), chart)
+    return Picture("differ", caption, partial(fleet_chart, summary, MOST_LEADING))
 
 
 def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:

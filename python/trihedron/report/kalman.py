@@ -19,7 +19,6 @@ from trihedron.records import (
 )
 from trihedron.report.calibration import FRAMES, parameter_table
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
-from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.kalman_charts import (
     convergence_chart,
@@ -89,6 +88,10 @@ def _limits(seen: Consistency) -> str:
     return f"{plain_number(seen.nis_low)} to {plain_number(seen.nis_high)}"
 
 
+_INNOVATIONS = """Normalised innovations squared: every pose that is judged, their running mean, and where 99 % of \
+such means lie when the noise model is right."""
+
+
 def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> list[Section]:
     facts = (
         ("poses", f"{outcome.n_poses} in known attitudes"),
@@ -101,29 +104,20 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
             f"convergence-{AXES[axis.axis]}",
             f"Constants of {AXES[axis.axis].upper()} after every pose by every method, with the filter's 3σ band "
             "around its last value.",
-            later("kalman_figures", "draw_convergence", axis),
             partial(convergence_chart, axis, outcome.accelerometer.raw_unit),
         )
         for axis in outcome.axes
     ]
     pictures += [
-        Picture(
-            "innovations",
-            "Normalised innovations squared: every pose that is judged, their running mean, and where 99 % of such "
-            "means lie when the noise model is right.",
-            later("kalman_figures", "draw_innovations", outcome.axes),
-            partial(innovations_chart, outcome.axes),
-        ),
+        Picture("innovations", _INNOVATIONS, partial(innovations_chart, outcome.axes)),
         Picture(
             "drift",
             "Slow noise that the filter saw: while it ran, and smoothed with all readings, with 1σ bands.",
-            later("kalman_figures", "draw_drift", outcome.axes),
             partial(drift_chart, outcome.axes, outcome.accelerometer.raw_unit),
         ),
         Picture(
             "residual",
             "Corrected minus reference specific force of every pose.",
-            later("kalman_figures", "draw_residual", outcome.residual_m_s2),
             partial(residual_chart, outcome.residual_m_s2),
         ),
     ]
@@ -149,20 +143,12 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
         Picture(
             "convergence",
             "S and b after every pose, with the 3σ band around their last values.",
-            later("kalman_figures", "draw_norm_convergence", outcome),
             partial(norm_convergence_chart, outcome),
         ),
-        Picture(
-            "innovations",
-            "Normalised innovations squared: every pose that is judged, their running mean, and where 99 % of such "
-            "means lie when the noise model is right.",
-            later("kalman_figures", "draw_innovations", (outcome,)),
-            partial(innovations_chart, (outcome,)),
-        ),
+        Picture("innovations", _INNOVATIONS, partial(innovations_chart, (outcome,))),
         Picture(
             "residual",
             "Gravity error in every static pose: length of the corrected reading minus |g|.",
-            later("kalman_figures", "draw_residual", outcome.residual_m_s2[:, None]),
             partial(residual_chart, outcome.residual_m_s2[:, None]),
         ),
     )

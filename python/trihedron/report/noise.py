@@ -10,9 +10,8 @@ import numpy as np
 
 from trihedron.records import Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
 from trihedron.report.document import Block, Code, Document, Facts, Headline, Paragraph, Picture, Section, Table
-from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.noise_charts import allan_chart, sensors_chart
+from trihedron.report.noise_charts import allan_chart, every_axis_chart, sensors_chart
 from trihedron.report.noise_units import TERM_WORDS, customary, unit_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma_and_power
 from trihedron.units import degrees_from_radians, micro_g_from_m_s2
@@ -305,7 +304,6 @@ def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
     return Picture(
         f"allan-{axes[0].name.split()[0]}",
         caption,
-        later("noise_figures", "draw_allan", noise.curve, [(unit, axes)]),
         partial(allan_chart, noise.curve, unit, axes),
     )
 
@@ -314,10 +312,10 @@ def _lead(noise: Noise, groups: list[tuple[str, list[NoiseAxis]]]) -> Picture:
     caption = "Allan deviation of both sensors with its 95 % interval; orange: the averaging time at which a "
     caption += "mean is best. The terms, each with its part of the curve, stand below."
     chart = partial(sensors_chart, noise.curve, groups)
-    return Picture("sensors", caption, later("chart_figures", "draw_chart", chart), chart)
+    return Picture("sensors", caption, chart)
 
 
 def noise_picture(noise: Noise) -> Picture:
     """All curves of a log in one figure, a row for each sensor."""
-    draw = later("noise_figures", "draw_allan", noise.curve, _groups(noise))
-    return Picture("allan", "Allan deviation of every axis.", draw)
+    chart = partial(every_axis_chart, noise.curve, _groups(noise))
+    return Picture("allan", "Allan deviation of every axis.", chart)

@@ -34,6 +34,26 @@ def allan_chart(curve: AllanCurve, unit: str, axes: Sequence[NoiseAxis]) -> Char
     return Chart(panels, columns=3)
 
 
+def curve_chart(curve: AllanCurve) -> Chart:
+    """Every channel of a curve with its interval, on one pair of axes."""
+    k = len(curve.clusters)
+    deviation, lower, upper = (values.reshape(k, -1) for values in (curve.deviation, curve.lower, curve.upper))
+    marks: list[Mark] = []
+    for c, name in enumerate(curve.names):
+        marks.append(Band(curve.tau_s, lower[:, c], upper[:, c], f"{100 * curve.confidence:g} % interval"))
+        marks.append(Line(curve.tau_s, deviation[:, c], name, AXIS_COLOURS[c % 3]))
+    units = {unit_in_print(unit) for unit in curve.units if unit}
+    unit = units.pop() if len(units) == 1 else ""
+    y = Scale(f"Allan deviation [{unit}]" if unit else "Allan deviation", unit, is_log=True)
+    return Chart((Panel(Scale("averaging time τ [s]", "s", is_log=True), y, tuple(marks), height_px=270),))
+
+
+def every_axis_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseAxis]]]) -> Chart:
+    """Curves of both sensors, a row for each."""
+    rows = [allan_chart(curve, unit, axes).panels for unit, axes in groups]
+    return Chart(tuple(panel for row in rows for panel in row), columns=max(len(row) for row in rows))
+
+
 def sensors_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseAxis]]]) -> Chart:
     """Both sensors side by side, three axes each, with where a mean is best."""
     panels = []

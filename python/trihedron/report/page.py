@@ -15,9 +15,9 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
-from trihedron.records import Finding, Severity
+from trihedron.records import Severity
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
-from trihedron.report.drawing import NoFiguresError
+from trihedron.report.drawn import drawn
 from trihedron.sanitise import one_line, printable
 
 KINDS: dict[type, str] = {
@@ -82,10 +82,6 @@ def _noticed(document: Document) -> tuple[Markup, list[str], str]:
     return unbroken(told), others, f"s{list(listing).index(True) + 1}"
 
 
-def _name(finding: Finding) -> str:
-    return finding.code.value.replace("-", " ")
-
-
 def unbroken(text: str) -> Markup:
     """Options (``--extended``) and directions (``-X/+Y``) kept on one line, numbers on that of their %."""
     text = str(escape(text)).replace(" %", "\u00a0%")
@@ -121,22 +117,6 @@ def template(name: str) -> Template:
     return made.get_template(name)
 
 
-def png_of(picture: Picture) -> bytes:
-    """A figure drawn, as a PNG file.
-
-    Raises
-    ------
-    NoFiguresError
-        When matplotlib is not installed.
-    """
-    if picture.draw is None:
-        raise NoFiguresError(f"the figure {picture.name} is drawn in reports alone: write a report to an .html file.")
-    figure = picture.draw()
-    from trihedron.report.figures import png
-
-    return png(figure)
-
-
 @cache
 def _file(name: str) -> str:
     """A part of every page, without the indents and comments that only its authors need."""
@@ -154,22 +134,10 @@ def _version() -> str:
 def _shown(block: Block) -> dict[str, Any]:
     shown: dict[str, Any] = {"kind": KINDS[type(block)], "it": block}
     if isinstance(block, Picture):
-        shown |= {"name": block.name, "caption": block.caption, "drawn": Markup(_drawn(block))}
+        shown |= {"name": block.name, "caption": block.caption}
+        shown["drawn"] = Markup(drawn(block.chart(), block.caption))
     if isinstance(block, Table):
         shown["is_long"] = len(block.rows) > LONG
         shown["is_wordy"] = any(len(row[0]) > SHORT for row in block.rows)
         shown["words"] = [k > 0 and any(len(row[k]) > WORDY for row in block.rows) for k in range(len(block.head))]
     return shown
-
-
-def _drawn(picture: Picture) -> str:
-    if picture.chart is not None:
-        from trihedron.report.drawn import drawn
-
-        return drawn(picture.chart(), picture.caption)
-    try:
-        png = base64.b64encode(png_of(picture)).decode()
-    except NoFiguresError as error:
-        # A page without its figures is still the whole answer; it says what is missing and how to have it.
-        return str(Markup("<p>[Not drawn: {}]</p>").format(error))
-    return str(Markup('<img alt="{}" src="data:image/png;base64,{}">').format(picture.caption, png))

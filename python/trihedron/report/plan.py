@@ -12,7 +12,6 @@ import numpy as np
 from trihedron.records.plan import ExperimentPlan, PosePlan
 from trihedron.report.chart import Chart, Line, Panel, Points, Scale
 from trihedron.report.document import Document, Facts, Headline, Paragraph, Picture, Section, Table
-from trihedron.report.drawing import later
 from trihedron.report.numbers import MINUS, plain_number
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
 
@@ -83,7 +82,7 @@ def _picture(poses: tuple[PosePlan, ...]) -> Picture | None:
     chart = partial(poses_chart, poses)
     caption = "Largest standard uncertainty (1 σ) of the accelerometer against the number of poses; sets that leave a "
     caption += "parameter undetermined are not drawn. → Where the curve is flat, more poses are not worth their time."
-    return Picture("poses", caption, later("chart_figures", "draw_chart", chart), chart)
+    return Picture("poses", caption, chart)
 
 
 def poses_chart(poses: tuple[PosePlan, ...]) -> Chart:

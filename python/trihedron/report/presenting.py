@@ -28,6 +28,7 @@ from trihedron.report import document, frames, machine, summaries
 from trihedron.report.calibration import calibration_report
 from trihedron.report.check import check_report
 from trihedron.report.diagnosis import diagnosis_report, first_screen
+from trihedron.report.drawing import figures
 from trihedron.report.filter_noise import filter_noise_columns, filter_noise_record, filter_noise_report
 from trihedron.report.fragment import to_fragment
 from trihedron.report.kalman import kalman_record, kalman_report
@@ -140,7 +141,7 @@ def pictures(result: object) -> dict[str, document.Picture]:
     found = {"allan": noise_picture(result)} if isinstance(result, Noise) else {}
     laid_out = _kind(result).document(result)
     every = [laid_out.lead, *(block for section in laid_out.sections for block in section.blocks)]
-    return found | {b.name: b for b in every if isinstance(b, document.Picture) and b.draw is not None}
+    return found | {b.name: b for b in every if isinstance(b, document.Picture)}
 
 
 def plot(result: object, name: str | None = None, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
@@ -175,18 +176,15 @@ def plot(result: object, name: str | None = None, *, ax: Axes | Sequence[Axes] |
     if chosen is None or chosen not in there:
         listed = ", ".join(repr(key) for key in there) or "none"
         raise RefusedError(f"there is no figure {chosen!r} of this {type(result).__name__}; there are: {listed}.")
-    picture = there[chosen]
-    if ax is not None:
-        if picture.chart is None:
-            raise RefusedError(f"the figure {chosen!r} has a layout of its own: leave ax out.")
-        from trihedron.report.chart_figures import draw_onto
-
-        axes = list(ax) if isinstance(ax, Iterable) else [ax]
-        if not all(hasattr(one, "fill_between") for one in axes):
-            raise RefusedError(f"ax is matplotlib Axes, or a list of them, not {type(ax).__name__}.")
-        return draw_onto(picture.chart, axes)
-    assert picture.draw is not None
-    return picture.draw()
+    chart = there[chosen].chart
+    if ax is None:
+        made: Figure = figures().draw_chart(chart)
+        return made
+    axes = list(ax) if isinstance(ax, Iterable) else [ax]
+    if not all(hasattr(one, "fill_between") for one in axes):
+        raise RefusedError(f"ax is matplotlib Axes, or a list of them, not {type(ax).__name__}.")
+    drawn_on: Figure = figures().draw_onto(chart, axes)
+    return drawn_on
 
 
 def report(result: object, path: str | os.PathLike[str] | None = None, *, overwrite: bool = False) -> str:

@@ -7,7 +7,6 @@ from functools import partial
 
 from trihedron.records.ranking import Ranked, Ranking, Suspicion
 from trihedron.report.document import Document, Facts, Picture, Section, Table
-from trihedron.report.drawing import later
 from trihedron.report.numbers import how_many, listed, plain_number, with_sigma
 from trihedron.report.ranking_charts import ranking_chart
 from trihedron.report.verification import AGAIN, headlines_of, parameters_table
@@ -51,7 +50,7 @@ def ranking_report(ranking: Ranking) -> Document:
         is_trustworthy=not best.is_rejected,
         sections=tuple(sections),
         headlines=headlines_of(best.verification),
-        lead=Picture("order", caption, later("chart_figures", "draw_chart", chart), chart),
+        lead=Picture("order", caption, chart),
         next_step=AGAIN if best.is_rejected else f"Use {best.name}: trihedron apply, trihedron export.",
     )
 

@@ -10,7 +10,6 @@ from trihedron.arrays import XYZ
 from trihedron.records.reference import AgainstReference
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Scale, Span
 from trihedron.report.document import Picture
-from trihedron.report.drawing import later
 from trihedron.report.drawn import envelope
 from trihedron.report.numbers import plain_number
 from trihedron.units import degrees_from_radians
@@ -30,7 +29,7 @@ def error_picture(found: AgainstReference, name: str = "reference-error") -> Pic
     caption += "slow error."
     caption += " Orange: where it stands apart from the rest." if found.error.apart_s else ""
     caption += " Grey: gaps." if found.error.gaps_s else ""
-    return _picture(name, caption, partial(error_chart, found))
+    return Picture(name, caption, partial(error_chart, found))
 
 
 def error_chart(found: AgainstReference) -> Chart:
@@ -50,7 +49,7 @@ def error_chart(found: AgainstReference) -> Chart:
 
 def residual_picture(found: AgainstReference) -> Picture:
     """What is left of the rate over time."""
-    return _picture("reference", "What is left of the rate, window by window.", partial(residual_chart, found))
+    return Picture("reference", "What is left of the rate, window by window.", partial(residual_chart, found))
 
 
 def residual_chart(found: AgainstReference) -> Chart:
@@ -64,7 +63,3 @@ def residual_chart(found: AgainstReference) -> Chart:
         y = Scale(f"{XYZ[k]}  [°/s]", "°/s", limits=(-reach, reach))
         panels.append(Panel(x, y, marks, height_px=110))
     return Chart(tuple(panels), is_linked=True, legend=False)
-
-
-def _picture(name: str, caption: str, chart: partial[Chart]) -> Picture:
-    return Picture(name, caption, later("chart_figures", "draw_chart", chart), chart)

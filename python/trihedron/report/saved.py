@@ -63,8 +63,7 @@ def report_of(saved: Any) -> Document:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, Picture):
-        drawn = None if value.chart is None else _plain(value.chart())
-        return {"is": "Picture", "name": value.name, "caption": value.caption, "chart": drawn}
+        return {"is": "Picture", "name": value.name, "caption": value.caption, "chart": _plain(value.chart())}
     if isinstance(value, Finding):
         return {name: _plain(getattr(value, name)) for name in ("code", "severity", "seen", "cause", "action")}
     if is_dataclass(value) and not isinstance(value, type):
@@ -119,9 +118,8 @@ def _record(value: Any, wanted: Any) -> Any:
     if kind is not wanted or kind is None:
         raise TypeError(f"a {getattr(wanted, '__name__', wanted)} was expected")
     if kind is Picture:
-        drawn = None if value["chart"] is None else _made(value["chart"], chart.Chart)
-        make = None if drawn is None else (lambda: drawn)
-        return Picture(_made(value["name"], str), _made(value["caption"], str), None, make)
+        drawn = _made(value["chart"], chart.Chart)
+        return Picture(_made(value["name"], str), _made(value["caption"], str), lambda: drawn)
     hints = _hints(kind)
     return kind(**{f.name: _made(value[f.name], hints[f.name]) for f in fields(kind)})
 

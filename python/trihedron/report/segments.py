@@ -9,7 +9,6 @@ import numpy as np
 from trihedron.arrays import AXES
 from trihedron.records import Recording, Segments
 from trihedron.report.document import Document, Facts, Headline, Picture, Section, Table
-from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
 from trihedron.report.session_charts import signals_chart
@@ -100,12 +99,10 @@ def pose_table(recording: Recording, segments: Segments) -> Table:
 
 def signals_picture(recording: Recording, segments: Segments) -> Picture:
     """The signals with the poses shaded."""
-    draw = later("figures", "draw_signals", recording, segments)
     caption = "The recording; shaded where the sensor stood still"
     caption += ", orange where a pose was disturbed." if any(pose.disturbed for pose in segments.poses) else "."
     return Picture(
         "signals",
         caption,
-        draw,
         partial(signals_chart, recording, segments),
     )

@@ -15,14 +15,15 @@ LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
 """What the length of two Gaussian errors exceeds as rarely as one exceeds 3σ, over its rms."""
 
 
-def signals_chart(recording: Recording, segments: Segments) -> Chart:
-    """Both sensors over time, holds shaded, bumps marked."""
+def signals_chart(recording: Recording, segments: Segments | None = None) -> Chart:
+    """Both sensors over time, holds shaded and bumps marked where segments are given."""
+    poses = () if segments is None else segments.poses
     time_s = recording.time_s
-    spans = [Span(float(time_s[h.start]), float(time_s[h.stop - 1]), "pose") for h in segments.poses]
+    spans = [Span(float(time_s[h.start]), float(time_s[h.stop - 1]), "pose") for h in poses]
     last = recording.n_samples - 1
     bumps = [
         Span(float(time_s[a]), float(time_s[min(b, last)]), "disturbed, excluded", "warn")
-        for pose in segments.poses
+        for pose in poses
         for a, b in pose.disturbed
     ]
     return _signals(recording, (*spans, *bumps))
@@ -50,6 +51,24 @@ def _signals(recording: Recording, spans: tuple[Span, ...]) -> Chart:
         printed = unit_in_print(unit)
         y = Scale(f"{name}  [{printed}]", printed)
         panels.append(Panel(Scale("time [s]", "s", limits=limits), y, (*spans, *lines), height_px=190))
+    return Chart(tuple(panels), is_linked=True)
+
+
+def means_chart(segments: Segments) -> Chart:
+    """Mean readings of every pose over time, in the unit of the log."""
+    panels = []
+    for name, means in (("accelerometer", segments.accelerometer_mean), ("gyroscope", segments.gyroscope_mean)):
+        if means is None:
+            continue
+        marks = tuple(
+            Points(
+                segments.time_mid_s, means[:, k],
+                [said(f"pose {n}, {axis}", "", v, "") for n, v in enumerate(means[:, k], 1)],
+                None, axis, AXIS_COLOURS[k],
+            )
+            for k, axis in enumerate(XYZ)
+        )  # fmt: skip
+        panels.append(Panel(Scale("time [s]", "s"), Scale(name), marks, height_px=190))
     return Chart(tuple(panels), is_linked=True)
 
 

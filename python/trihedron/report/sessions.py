@@ -9,7 +9,6 @@ from typing import Any
 from trihedron.records.sessions import Change, Repeated, Session, SessionsModel, Spread, ThermalModel
 from trihedron.report.axes import BIAS, axis_in_print
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
-from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.frames import Columns
 from trihedron.report.many_charts import sessions_chart, shown
@@ -86,7 +85,7 @@ def _lead(model: SessionsModel) -> Picture:
     has_band = model.thermal is None and any(one.within is not None for one in model.repeated)
     caption = "Scale and bias of both sensors in every recording, about the common value"
     caption += "; the band: how far they repeat." if has_band else "."
-    return Picture("drift", caption, later("chart_figures", "draw_chart", chart), chart)
+    return Picture("drift", caption, chart)
 
 
 def _named(names: list[str]) -> str:
@@ -246,8 +245,7 @@ def _further(model: SessionsModel) -> list[Picture]:
     others = tuple(name for name in dict.fromkeys(one.parameter.id for one in model.repeated) if name not in DRIFTING)
     chart = partial(sessions_chart, model, others)
     caption = "The other parameters in every recording with their uncertainty (error bars), about the common value."
-    draw = later("chart_figures", "draw_chart", chart)
-    return [Picture("sessions", caption, draw, chart)] if others else []
+    return [Picture("sessions", caption, chart)] if others else []
 
 
 def sessions_columns(model: SessionsModel) -> Columns:

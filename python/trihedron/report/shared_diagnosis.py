@@ -10,7 +10,6 @@ from trihedron.records.recording import distinct_names
 from trihedron.records.shared_effects import SharedDiagnosis, SharedEffect
 from trihedron.report.diagnosis_words import p_in_words, parameter_unit, value_in_words, verdict_in_words
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
-from trihedron.report.drawing import later
 from trihedron.report.numbers import listed, plain_number
 from trihedron.report.shared_diagnosis_charts import candidates_chart, shared_chart
 
@@ -64,7 +63,7 @@ def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
         caption += "pays for being one of many): left of 0 nothing."
     else:
         return None
-    return Picture("shared", caption, later("chart_figures", "draw_chart", chart), chart)
+    return Picture("shared", caption, chart)
 
 
 def _next_step(found: SharedDiagnosis, own: list[str]) -> str:

@@ -47,7 +47,6 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
         lead=Picture(
             "signals",
             "The simulated log; shaded where the body truly stood still.",
-            None,
             partial(truth_chart, recording, truth),
         ),
     )

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from trihedron.arrays import AXES
 from trihedron.records import AllanCurve, Recording, Segments, Severity
 from trihedron.report.document import Document, Facts, Picture, Section, Table
-from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.noise_charts import curve_chart
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
+from trihedron.report.session_charts import means_chart, signals_chart
 
 MOST_ROWS = 12
 """Of a curve's table: one averaging time in so many, so that it is read at a glance."""
@@ -35,7 +38,7 @@ def recording_summary(recording: Recording) -> Document:
         sections=(
             Section("Recording", (Facts(tuple(facts)),)),
             Section("Findings", (findings_block(recording.findings),)),
-            Section("Figures", (Picture("signals", "The recording.", later("figures", "draw_signals", recording)),)),
+            Section("Figures", (Picture("signals", "The recording.", partial(signals_chart, recording)),)),
         ),
     )
 
@@ -52,7 +55,7 @@ def segments_summary(segments: Segments) -> Document:
         sections=(
             Section("Poses", (_poses(segments),)),
             Section("Findings", (findings_block(segments.findings),)),
-            Section("Figures", (Picture("poses", "Mean readings.", later("figures", "draw_pose_means", segments)),)),
+            Section("Figures", (Picture("poses", "Mean readings.", partial(means_chart, segments)),)),
         ),
     )
 
@@ -106,6 +109,6 @@ def curve_summary(curve: AllanCurve) -> Document:
         is_trustworthy=True,
         sections=(
             Section("Deviation", (Table(("τ [s]", *names), rows, "Allan deviation"),)),
-            Section("Figures", (Picture("allan", "Allan deviation.", later("noise_figures", "draw_curve", curve)),)),
+            Section("Figures", (Picture("allan", "Allan deviation.", partial(curve_chart, curve)),)),
         ),
     )

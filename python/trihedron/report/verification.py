@@ -9,7 +9,6 @@ import numpy as np
 
 from trihedron.records import Recording, Segments, Verification
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
-from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import how_many, plain_number, with_sigma
 from trihedron.report.segments import signals_picture
@@ -165,10 +164,8 @@ def _tables(verification: Verification, segments: Segments | None) -> list[Block
 
 
 def _errors_picture(verification: Verification) -> Picture:
-    draw = later("figures", "draw_verification", verification)
     return Picture(
         "errors",
         "Gravity error in every pose and tilt error after every rotation, beside what noise and uncertainty allow.",
-        draw,
         partial(verification_chart, verification),
     )
