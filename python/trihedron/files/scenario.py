@@ -17,7 +17,7 @@ from trihedron.errors import RefusedError
 from trihedron.files.output import write_whole
 
 TEMPLATE = """# A simulation to begin with: an ordinary sensor that reads m/s² and rad/s, turned by hand.
-# Every key: docs/simulation.md. What a file does not say is the profile's.
+# What a file does not say is the profile's; every key is in the documentation, "Simulation".
 name = "my-sensor"
 profile = "mpu"
 
