@@ -23,6 +23,8 @@ INK = "#222222"
 SHADE = "#DDE5EC"
 DPI = 110
 MOST_POINTS = 4000
+MARK = 0.11
+"""Diameter of a pose's mark, where the horizon has radius 1."""
 
 
 def draw_signals(recording: Recording, segments: Segments | None = None) -> Figure:
@@ -109,14 +111,38 @@ def draw_poses(sensor: SensorCalibration, means: FloatArray) -> Figure:
     figure, axes = panels(1, 2, (7.6, 4.1))
     for axis, sign, title in ((axes[0], 1.0, "+Z above the horizon"), (axes[1], -1.0, "+Z below the horizon")):
         _hemisphere(axis, title)
-        for k, direction in enumerate(up):
-            # A pose with level Z lies on the rim of both.
-            if sign * direction[2] < -1e-2:
-                continue
-            x, y = _equal_area(direction * np.array([1.0, 1.0, sign]))
-            axis.plot(x, y, "o", markersize=8, color=AXIS_COLOURS[0], alpha=0.85)
-            axis.annotate(str(k + 1), (x, y), ha="center", va="center", fontsize=5.5, color="white")
+        # A pose with level Z lies on the rim of both.
+        seen = [k for k in range(len(up)) if sign * up[k, 2] >= -1e-2]
+        places = np.array([_equal_area(up[k] * np.array([1.0, 1.0, sign])) for k in seen]).reshape(-1, 2)
+        axis.plot(*places.T, "o", markersize=8, color=AXIS_COLOURS[0], alpha=0.85)
+        for group in alike(places):
+            label = ", ".join(str(seen[k] + 1) for k in group)
+            if len(group) == 1:
+                axis.annotate(label, places[group[0]], ha="center", va="center", fontsize=5.5, color="white")
+            else:
+                # Poses alike share one label, beneath them.
+                x, y = places[group].mean(axis=0)[0], places[group][:, 1].min()
+                beneath: dict[str, Any] = {
+                    "xytext": (0, -8),
+                    "textcoords": "offset points",
+                    "ha": "center",
+                    "va": "center",
+                }
+                axis.annotate(label, (x, y), fontsize=6.5, color=INK, **beneath)
     return figure
+
+
+def alike(places: FloatArray) -> list[list[int]]:
+    """Indices of places (n, 2) whose marks would cover one another's labels, each group by its first."""
+    groups: list[list[int]] = []
+    for k, place in enumerate(places):
+        near = (group for group in groups if np.linalg.norm(places[group[0]] - place) < MARK)
+        group = next(near, None)
+        if group is None:
+            groups.append([k])
+        else:
+            group.append(k)
+    return groups
 
 
 def draw_moves(quality: FitQuality) -> Figure:
