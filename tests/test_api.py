@@ -226,3 +226,19 @@ def test_every_public_record_says_what_each_of_its_fields_is():
     # Results hold what their first class says already.
     unsaid["DiagnosisResult"] -= {field.name for field in dataclasses.fields(trihedron.Diagnosis)}
     assert {name: fields for name, fields in unsaid.items() if fields} == {}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "meant"), [("gravity", "gravity_m_s2"), ("latitude", "latitude_deg"), ("gravity_ms2", "gravity_m_s2")]
+)
+def test_a_keyword_that_is_nearly_right_is_offered_its_name(wrong, meant):
+    with pytest.raises(TypeError, match=f"is {meant} meant"):
+        trihedron.calibrate("log.csv", **{wrong: 9.8})
+
+
+def test_a_sensor_shows_its_numbers_and_its_bias_is_what_the_reading_is_too_much():
+    S, bias = np.array([[0.99, 0.0, 0.0], [0.01, 1.02, 0.0], [-0.02, 0.005, 1.01]]), np.array([0.1, -0.2, 0.3])
+    sensitivity = np.linalg.norm(np.linalg.inv(S), axis=1)
+    one = trihedron.SensorCalibration(S, -S @ (bias * sensitivity), np.zeros((12, 12)), "m/s^2", "m/s^2", "test")
+    np.testing.assert_allclose(one.bias, bias, atol=1e-14)
+    assert "0.99, 1.02, 1.01" in repr(one)

@@ -167,7 +167,7 @@ def test_the_second_act_finds_what_was_sealed_and_mends_the_simulation(seed, tmp
     first = done.found.effects[0]
     assert done.sealed["effect"] in (first.id, *first.confounded_with)
     assert done.improved.verdict == "consistent"
-    assert (tmp_path / "improved.toml").read_text().startswith("# The simulation of an ordinary sensor")
+    assert (tmp_path / "improved.toml").read_text().startswith("# simulation.toml, with the values of a recording")
 
 
 def noisy(profile, accel, gyro, seed, **changes):

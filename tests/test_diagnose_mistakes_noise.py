@@ -28,7 +28,9 @@ def numbers(accel_bias=(0.0, 0.0, 0.0), gyro_bias=(0.0, 0.0, 0.0)):
     )  # fmt: skip
 
 
-def log(seed, *, axes=(1.0, 1.1, 1.25), uniform=False, size=1.0, step=STEP, tau_s=None, jitter_s=0.0, one=False):
+def log(
+    seed, *, axes=(1.0, 1.1, 1.25), uniform=False, size=1.0, step=STEP, tau_s=None, jitter_s=0.0, one=False, timed=True
+):
     """Readings at rest; ``tau_s``: a Gauss-Markov process of twice the noise's size beside it, per sensor."""
     rng = np.random.default_rng(seed)
     n = EVERY * N_POSES
@@ -43,7 +45,8 @@ def log(seed, *, axes=(1.0, 1.1, 1.25), uniform=False, size=1.0, step=STEP, tau_
         lsb = step * noise / SENSORS["gyroscope"]
         readings[sensor] = lsb * np.round(x / lsb) if lsb else x
     time = np.arange(n) / RATE_HZ + (jitter_s * rng.standard_normal(n) if jitter_s else 0.0)
-    made = Recording.from_arrays(time, **readings, accelerometer_unit="m/s^2", gyroscope_unit="rad/s")
+    clock = {"time_s": time} if timed else {"time_s": None, "rate_hz": RATE_HZ}
+    made = Recording.from_arrays(**clock, **readings, accelerometer_unit="m/s^2", gyroscope_unit="rad/s")
     return sampled(made, POSES, numbers())
 
 
@@ -121,6 +124,8 @@ def test_readings_without_steps_are_named_where_the_recordings_steps_matter():
 def test_a_perfect_clock_is_named_where_the_recordings_scatters():
     found = said(log(9), log(10, jitter_s=1.5e-3))
     assert "The clock of the model is perfect" in found["both", "jitter"]
+    # A log without a time column says nothing of timestamps: neither is judged.
+    assert not any(n.term == "jitter" for n in compare_noise(log(10, jitter_s=1.5e-3), log(9, timed=False), alpha=0.01))
 
 
 def test_one_time_constant_for_both_sensors_is_named_with_all_four_times():

@@ -368,3 +368,19 @@ def test_noise_of_a_rest_log_goes_from_allan_into_the_export(tmp_path, capsys):
     assert document["update_rate"] == pytest.approx(100.0, rel=1e-3)
     assert main(["export", str(file), "--to", "kalibr", "--noise", str(file)]) == 1
     assert "trihedron allan --json" in capsys.readouterr().err
+
+
+def test_the_list_of_targets_says_what_each_cannot_be_written_without(capsys):
+    assert main(["export", "--to", "list"]) == 0
+    listed = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()[1:])
+    assert listed["kalibr*"] == "--noise --rate"
+    assert listed["px4*"] == "--current-parameters"
+    assert listed["c"] == "–"
+    assert main(["export", "--to", "c"]) == 1
+    assert "name a calibration file" in capsys.readouterr().err
+
+
+def test_a_log_in_place_of_a_calibration_is_told_the_order(tmp_path, capsys):
+    (tmp_path / "log.csv").write_text("t,ax,ay,az\n0,0,0,9.8\n")
+    assert main(["apply", str(tmp_path / "log.csv"), "cal.json"]) == 1
+    assert "it comes before the log" in capsys.readouterr().err

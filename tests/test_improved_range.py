@@ -20,7 +20,16 @@ from trihedron.simulate.twin import unclipped
 
 G = 9.80665
 LIMIT_DEG_S = 150.0
-IDEAL = 'name = "ideal"\nprofile = "ideal"\n\n[session]\nkind = "hand"\n'
+IDEAL = """# A perfect sensor.
+name = "ideal"  # and a name
+profile = "ideal"
+
+[session]
+kind = "hand"
+
+[accelerometer]
+b = [0, 0, 0]  # none
+"""
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +68,17 @@ def test_the_ends_of_a_recordings_range_are_those_of_the_improved_scenario(clipp
 
 
 @pytest.mark.slow
+def test_what_a_scenario_said_of_its_old_values_is_not_kept_and_a_stated_bias_of_none_is_not_asked_about(improved):
+    found, better = improved
+    text = better.read_text()
+    assert text.startswith("# ideal.toml, with the values of a recording")
+    assert "perfect" not in text
+    assert "# none" not in text
+    assert "# and a name" in text
+    assert {p.id for p in found.parameters if p.significant} >= {"accel-bias", "gyro-bias"}
+    assert not any(p.remark for p in found.parameters if p.id.endswith("bias"))
+
+
 def test_a_scenario_with_the_recordings_range_lacks_no_saturation(clipped, improved):
     _, recording = clipped
     again = trihedron.diagnose(recording, against=improved[1], gravity_m_s2=G)

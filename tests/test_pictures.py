@@ -21,6 +21,7 @@ from trihedron.report.diagnosis_overview_charts import traces_chart
 from trihedron.report.disc import drawn_disc
 from trihedron.report.document import Picture, Table
 from trihedron.report.effect_rest_charts import rest_panels
+from trihedron.report.figures import alike
 from trihedron.report.findings.told import told_once
 from trihedron.report.findings.wording import filled
 from trihedron.report.many_charts import sessions_chart
@@ -253,3 +254,8 @@ def test_the_bar_of_a_pose_that_determines_a_parameter_alone_does_not_hide_the_o
     low, high = residual_chart(quality).panels[0].y.limits
     # All points, mm/s²; of the bar a thousand times as long no more than three usual ones.
     assert 4.0 < high == -low < 10.0
+
+
+def test_poses_alike_share_a_label_in_the_picture_of_orientations():
+    places = np.array([[0.0, 0.0], [0.5, 0.0], [0.02, 0.01], [0.53, 0.03], [-0.5, 0.0]])
+    assert alike(places) == [[0, 2], [1, 3], [4]]

@@ -135,6 +135,8 @@ def test_a_log_of_a_gyro_alone_is_diagnosed_and_its_calibration_refused_in_one_s
     result = trihedron.diagnose(trial.log, reference=trial.motion, gravity_m_s2=G)
     assert result.verdict == "consistent"
     assert "Against the reference" in str(result)
+    # What is judged is a rate: no velocity in °/s.
+    assert [(d.domain, d.unit) for d in result.domains] == [("rate", "rad/s")]
     assert diagnosis_document(result)["reference"]["accelerometer"] is None
     with pytest.raises(ValueError, match="has none"):
         trihedron.calibrate(trial.log, reference=trial.motion, gravity_m_s2=G)

@@ -10,6 +10,9 @@ import trihedron
 from trihedron.diagnose.session.observations import observe
 from trihedron.records.domains import DOMAINS
 from trihedron.report import to_text
+from trihedron.report.axes import axes_of
+from trihedron.report.calibration import axes_table, calibration_report
+from trihedron.report.calibration_fit import fit_in_words
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.verification import verification_report
 from trihedron.segment import resegment
@@ -67,6 +70,30 @@ def test_a_bias_has_one_sign_and_one_value_in_every_report(made):
     assert given.model == pytest.approx(expected[0], abs=1e-9)
     for one in (result, several, again):
         assert "the reading at zero input, −S⁻¹ b" in re.sub(r"\s+", " ", trihedron.report(one))
+
+
+def test_the_uncertainty_of_a_scale_is_one_figure_wherever_it_is_stated(made):
+    _, result, _ = made
+    document = calibration_report(result.calibration)
+    axes = next(s for s in document.sections if s.heading == "Axes").blocks
+    for sensor, table in zip(("accelerometer", "gyroscope"), axes, strict=True):
+        worst = max((row[2] for row in table.rows), key=lambda said: float(said.split()[0]))
+        headline = next(h for h in document.headlines if h.what == f"{sensor} scale uncertainty")
+        assert f"{headline.value} {headline.unit}" == worst
+        # A bias stands once, in SI, over the sensitivity; the raw reading at zero input has another name.
+        assert table.head[-1].startswith("reading at zero input, −S⁻¹ b [count")
+    one = replace(result.accelerometer, S=np.eye(3), raw_unit="m/s^2")
+    assert "zero input" not in " ".join(axes_table("accelerometer", one, axes_of(one)).head)
+
+
+def test_excluded_moves_are_counted_among_all_moves_of_the_log(made):
+    _, result, _ = made
+    quality = result.gyroscope.quality
+    angle, weights = quality.angle_deg.copy(), quality.weights.copy()
+    angle[:2], weights[:] = np.nan, 1.0
+    part = replace(result.gyroscope, quality=replace(quality, angle_deg=angle, weights=weights))
+    said = dict(fit_in_words("gyroscope", part))["tilt error after a rotation"]
+    assert f"({len(angle) - 2} of {len(result.segments.moves)} moves, the others excluded)" in said
 
 
 def test_a_disturbed_pose_is_named_by_its_number_in_the_recording(made):

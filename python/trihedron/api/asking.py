@@ -6,7 +6,8 @@ import functools
 import inspect
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from difflib import get_close_matches
 from importlib import import_module
 from numbers import Integral, Real
 from typing import Any, TypeVar
@@ -235,7 +236,8 @@ def asked_in_python(verb: Verb) -> Verb:
         try:
             given = signature.bind(*args, **kwargs)
         except TypeError as error:
-            raise WrongTypeError(f"{verb.__name__}: {error}; see help(trihedron.{verb.__name__}).") from None
+            meant = _meant(kwargs, signature.parameters)
+            raise WrongTypeError(f"{verb.__name__}: {error}; {meant}see help(trihedron.{verb.__name__}).") from None
         for name, value in given.arguments.items():
             if signature.parameters[name].kind is inspect.Parameter.VAR_KEYWORD:
                 given.arguments[name] = _options(verb.__name__, value)
@@ -259,10 +261,19 @@ def asked_in_python(verb: Verb) -> Verb:
     return ask  # type: ignore[return-value]
 
 
+def _meant(given: Iterable[str], known: Iterable[str]) -> str:
+    """The name that a wrong one begins, or is nearest to."""
+    known = list(known)
+    wrong = next((name for name in given if name not in known), "")
+    near = [name for name in known if name.startswith(wrong)] or get_close_matches(wrong, known, 1)
+    return f"is {near[0]} meant? " if wrong and near else ""
+
+
 def _options(verb: str, options: dict[str, Any]) -> dict[str, Any]:
     """What is handed on to :func:`trihedron.read`."""
     known = inspect.signature(import_module("trihedron.api.reading").read).parameters
     for name in options:
         if name not in known or name == "path":
-            raise WrongTypeError(f"{verb}: trihedron.read has no option {name}; see help(trihedron.read).")
+            meant = _meant([name], known)
+            raise WrongTypeError(f"{verb}: trihedron.read has no option {name}; {meant}see help(trihedron.read).")
     return {name: settled(verb, name, value, str(known[name].annotation)) for name, value in options.items()}

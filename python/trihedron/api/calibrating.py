@@ -214,7 +214,7 @@ def _require_poses(recording: Recording, segments: Segments) -> None:
             why = f"{found}. {why}"
         raise RefusedError(
             f"{recording.source}: {why} Hold the sensor still for 3 to 5 seconds in each of 18 or more "
-            "different poses (docs/procedure.md); `trihedron segment LOG` shows what was seen."
+            "different poses; `trihedron segment LOG` shows what was seen."
         )
 
 

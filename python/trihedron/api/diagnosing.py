@@ -36,6 +36,7 @@ from trihedron.simulate import Scenario
 
 GivenModel = Recording | Scenario | str | os.PathLike[str]
 """A simulated recording or its file, or a scenario or its .toml."""
+BIASES = ("accel-bias", "gyro-bias")
 
 
 def diagnose(
@@ -170,9 +171,8 @@ def _of_poses(
         if simulated is not None:
             stages = with_noise_stage(found.stages, simulated.sampled, recording_used, segments_used, fit, noise)
             found = replace(found, stages=stages)
-            if simulated.scenario is not None and recording_used.gyroscope is not None and used.gyroscope is not None:
-                beside = MovedAlike(recording_used, segments_used, used)
-                found = judged_by_motion(found, simulated.scenario, beside, alpha)
+            if simulated.scenario is not None:
+                found = _beside_scenario(found, simulated.scenario, (recording_used, segments_used, used), alpha)
         updated, used = used, given
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
     return DiagnosisResult(
@@ -187,6 +187,17 @@ def _of_poses(
         segments=segments,
         recording=recording,
     )
+
+
+def _beside_scenario(
+    found: Diagnosis, scenario: Scenario, fitted: tuple[Recording, Segments, Calibration], alpha: float
+) -> Diagnosis:
+    """What only a scenario shows: its biases were applied as it states them, and it can be moved as often as needed."""
+    asked = tuple(replace(p, remark="") if p.id in BIASES else p for p in found.parameters)
+    found = replace(found, parameters=asked)
+    if fitted[0].gyroscope is None or fitted[2].gyroscope is None:
+        return found
+    return judged_by_motion(found, scenario, MovedAlike(*fitted), alpha)
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,7 +57,7 @@ def improve(
 ) -> Improvement:
     """The user's scenario file with numbers, noise, sampling and physics of the recording.
 
-    Only what differs is replaced; comments, order and all else stay. Effects that only the scenario has are taken out.
+    Only what differs is replaced, with its comment; all else stays. Effects that only the scenario has are taken out.
     ``stage`` stops after the numbers, or after noise and sampling.
 
     Raises

@@ -34,11 +34,34 @@ def read(
     instance: int | str | None = None,
     progress: Progress | None = None,
 ) -> Recording:
-    """Read and audit a log; the parameters are those of :func:`trihedron.read.read_recording`.
+    """Read and audit a log: one file, one file per sensor, or readings in memory.
 
-    ``path`` is a file name, or readings in memory: an array (n, columns), also structured or masked; a dictionary of
-    arrays (n,) or (n, 3); a list of dictionaries, one per sample; a data frame of pandas, polars or Arrow. Names of
-    columns are understood as in a file; masked cells are missing readings. A recording comes back as it is.
+    Without time column and rate, 100 Hz is assumed and reported: serious with a gyro, whose scale is inversely
+    proportional to the rate.
+
+    Parameters
+    ----------
+    path : file, or readings in memory
+        Text, ROS bags, PX4, ArduPilot, HDF5, MAT, Parquet, npz and others, recognised by content; or an array
+        (n, columns), also structured or masked; a dictionary of arrays (n,) or (n, 3); a list of dictionaries, one per
+        sample; a data frame of pandas, polars or Arrow. Masked cells are missing readings. A recording comes back.
+    accelerometer_path, gyroscope_path : file
+        One file per sensor, each with its own clock; they are merged on a common base. One alone is read alone.
+    columns : str
+        ``"time=t,ax=3,ay=4,az=5"`` (names, or numbers from 1), or roles in file order ``"t,ax,ay,az,-,gx,gy,gz"``;
+        ``time=none`` ignores a time column.
+    rate_hz : float
+        Sampling rate [Hz] of a log without a time column. A time column wins; a rate that contradicts it is a finding.
+    accelerometer_unit, gyroscope_unit, time_unit : str
+        Units, where what is detected from names and readings is wrong.
+    device : int
+        Which device (from 1) of an archive of several.
+    topic : str
+        Which topic, dataset or member of a file that holds several.
+    instance : int or str
+        Which of several IMUs whose readings one file holds.
+    progress : callable
+        Called with (done fraction, text).
 
     Returns
     -------

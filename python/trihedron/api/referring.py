@@ -222,7 +222,7 @@ def diagnosis_by(
     """A diagnosis of a log that holds no poses to speak of: what its reference alone says, as fields."""
     effects = effects_of(found)
     parameters = () if given is None or given.gyroscope is None else parameters_of(found, given, alpha)
-    test = _dynamics(found)
+    test = _rate(found)
     left = replace(test, disagrees=False) if effects else test
     verdict: Verdict = "consistent"
     if any(p.significant for p in parameters):
@@ -251,11 +251,11 @@ def diagnosis_by(
     return dict(vars(base))
 
 
-def _dynamics(found: AgainstReference) -> DomainTest:
+def _rate(found: AgainstReference) -> DomainTest:
     """Rate inside the motion: p is that of the effects tried on it, the search paid for."""
     score = max([0.0, *(one.score or 0.0 for one in found.effects.values())])
     return DomainTest(
-        "dynamics", 1.0, float(3 * found.gyroscope.n_rows), float(np.exp(-0.5 * score)), score > ACCEPTED,
+        "rate", 1.0, float(3 * found.gyroscope.n_rows), float(np.exp(-0.5 * score)), score > ACCEPTED,
         rms=found.gyroscope.rms, unit="rad/s",
     )  # fmt: skip
 

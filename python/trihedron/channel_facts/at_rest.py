@@ -24,6 +24,8 @@ TESTABLE = 8
 """Gaps within reach, of many, that are evidence (``rust/adc_grid.rs``, where the grid's own limits stand)."""
 REPEATS = 2
 """Readings must repeat where they are few, so many times a value."""
+SINGLE = 2.0**-23
+"""The last bit of single precision, relative."""
 PARTS = 8
 """Where the whole log has no grid its parts may: a range was changed, or another sensor took over."""
 
@@ -43,7 +45,8 @@ def adc_step(readings: FloatArray) -> float:
 
     Readings in counts, in units converted from counts, and decimals as written are told alike. Without a code between
     them visited values are several steps apart; then the step is what all gaps are multiples of. Of a log that changes
-    its step, the one of most of its parts is returned; of two that are multiples of a third, the third.
+    its step, the one of most of its parts is returned; of two that are multiples of a third, the third. The last bit of
+    readings in single precision is no step of an ADC.
 
     Examples
     --------
@@ -55,12 +58,19 @@ def adc_step(readings: FloatArray) -> float:
     seen = np.ascontiguousarray(probe(readings))
     levels, n = _core.levels_of(seen)
     step = _grid(levels, n)
+    if 0.0 < step < 1.0 and step <= SINGLE * np.abs(levels).max() and _is_power_of_two(step):
+        return 0.0
     # Where most values occur once, no step matters beside the noise.
     if step or len(levels) < TESTABLE or REPEATS * len(levels) > n:
         return step
     parts = [_core.levels_of(part) for part in np.array_split(seen, PARTS)]
     steps = [_grid(*part) for part in parts if len(part[0]) > TESTABLE]
     return float(np.median(steps)) if steps and all(steps) else 0.0
+
+
+def _is_power_of_two(step: float) -> bool:
+    exponent = math.log2(step)
+    return abs(exponent - round(exponent)) < 1e-6
 
 
 def adc_steps(readings: FloatArray) -> FloatArray:

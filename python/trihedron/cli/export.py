@@ -15,14 +15,14 @@ LOSSES = ("lost", "Not in this file", "upper limit", "NOT TO BE TRUSTED")
 
 
 def export(
-    calibration: Annotated[
-        list[Path],
-        typer.Argument(metavar="CALIBRATION", help="Calibration file, of ours or another maker's; or several."),
-    ],
     to: Annotated[
         str,
-        typer.Option("--to", metavar="TARGET", help="px4, ardupilot, kalibr, gazebo, c ...; 'list' names them all."),
+        typer.Option("--to", metavar="TARGET", help="px4, ardupilot, kalibr, c ...; 'list': all, and what each needs."),
     ],
+    calibration: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="CALIBRATION", help="Calibration file, of ours or another maker's; or several."),
+    ] = None,
     output: Annotated[
         Path,
         typer.Option("-o", "--output", metavar="FILE", help="Where to write; '-' is stdout. A folder for several."),
@@ -55,6 +55,8 @@ def export(
     if to == "list":
         _list()
         return
+    if not calibration:
+        raise typer.BadParameter("name a calibration file")
     if rate is not None and not rate > 0.0:
         raise typer.BadParameter(f"--rate is the number of samples per second, not {rate:g}")
     folder = output if str(output) != "-" and len(calibration) > 1 else None
@@ -107,9 +109,9 @@ def _put(made: dict[str, str], place: Path | None, to: str, force: bool, inputs:
 
 
 def _list() -> None:
-    from trihedron.files.formats import formats
+    from trihedron.files.formats import formats, needs
 
+    typer.echo("TARGET          needs beside CALIBRATION (*: one of counts also needs --accel-lsb and --gyro-lsb)")
     for name, kind in formats().items():
         if kind.write is not None:
-            takes = "readings in SI; counts with --accel-lsb, --gyro-lsb" if kind.in_si else "any readings"
-            typer.echo(f"{name:14}{takes}")
+            typer.echo(f"{name + ('*' if kind.in_si else ''):16}{' '.join(needs(kind)) or '–'}")

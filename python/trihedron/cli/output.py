@@ -7,6 +7,7 @@ import errno
 import os
 import shutil
 import sys
+import textwrap
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -192,8 +193,11 @@ def silence_stdout() -> None:
 
 def say(sentence: str) -> None:
     """To stderr: what was done, not what was found."""
+    text = printable(sentence)
+    if sys.stderr.isatty():
+        text = textwrap.fill(text, shutil.get_terminal_size().columns, break_long_words=False, break_on_hyphens=False)
     try:
-        typer.echo(printable(sentence), err=True)
+        typer.echo(text, err=True)
     except OSError as error:
         if error.errno not in (errno.EPIPE, errno.EBADF):
             raise
@@ -211,6 +215,8 @@ def leave(findings: Iterable[Finding]) -> None:
     """End with status 2, and the reason on stderr, when a serious finding says that the answer is not to be trusted."""
     reasons = [finding.seen for finding in findings if finding.severity.value == "serious"]
     if reasons:
+        from trihedron.report.findings.told import first_clause
+
         more = f" ({len(reasons) - 1} more)" if len(reasons) > 1 else ""
-        say(f"trihedron: not to be trusted: {reasons[0]}{more}")
+        say(f"trihedron: not to be trusted: {first_clause(reasons[0])}{more}")
         raise typer.Exit(NOT_TO_BE_TRUSTED)

@@ -38,7 +38,7 @@ def verify(
 ) -> None:
     """Test calibrations on a recording that they were not made from: CALIBRATION LOG, or LOG A B C ...
 
-    Calibrations may be files of any maker that is read here (docs/export.md); several are ranked. Exit status 2 when a
+    Calibrations may be files of other programs (Kalibr, PX4, ArduPilot, ...); several are ranked. Exit status 2 when a
     limit is exceeded, or, without one, when the miss is more than ten times what was expected; of several, when the
     best does not fit.
     """

@@ -73,6 +73,7 @@ class Sampled:
     likeness: dict[Sensor, float]
     rate_hz: float
     jitter_steps: float
+    has_timestamps: bool = True
 
 
 def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> Sampled:
@@ -107,10 +108,11 @@ def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> 
     away = steps[np.abs(steps - nominal) < 0.9 * nominal] / nominal - 1.0
     jitter = float(np.std(away)) / math.sqrt(2.0) if len(away) else 0.0
     clock = recording.sampling
+    has_timestamps = clock.kind is not TimestampKind.NONE or jitter > PERFECT_CLOCK
     if clock.is_even and clock.kind in _SCATTERED:
         # Reading put the samples on the even clock behind their timestamps: what these scattered by is in its report.
         jitter = max(jitter, clock.timestamp_error_s * recording.rate_hz)
-    return Sampled(noise, excess, count, likeness, recording.rate_hz, jitter)
+    return Sampled(noise, excess, count, likeness, recording.rate_hz, jitter, has_timestamps)
 
 
 def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
@@ -328,6 +330,8 @@ def _sampling(model: Sampled, recording: Sampled) -> Iterator[NoiseDifference]:
         f"The model samples at {model.rate_hz:.5g} Hz, the recording at {recording.rate_hz:.5g} Hz." if is_far else ""
     )
     yield NoiseDifference("both", "", "rate", model.rate_hz, recording.rate_hz, ratio, None, "Hz", None, is_far, remark)
+    if not recording.has_timestamps:
+        return
     # Timestamps on an even grid scatter by their rounding only.
     m, r = (0.0 if one.jitter_steps < PERFECT_CLOCK else one.jitter_steps / one.rate_hz for one in (model, recording))
     larger, smaller = max(model.jitter_steps, recording.jitter_steps), min(model.jitter_steps, recording.jitter_steps)

@@ -224,8 +224,7 @@ def _norm_findings(error: FloatArray, sigma: FloatArray) -> list[Finding]:
             "verify-rest",
             severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
             norm_rms_m_s2=rms,
-            chi2_per_pose=times**2,
-            times_expected=times,
+            chi2_per_dof=times**2,
         )
     ]
 
@@ -249,6 +248,6 @@ def _angle_findings(moves: Carriage) -> list[Finding]:
             angle_rms_deg=rms,
             worst_move=int(moves.which[worst]) + 1,
             worst_deg=angle_deg[worst],
-            times_expected=times,
+            chi2_per_dof=times**2,
         )
     ]

@@ -90,7 +90,7 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
         document = parse_json(text)
     except DocumentError as error:
         raise CalibrationFileError(
-            f"{path}: {error}; name a calibration file written by `trihedron calibrate -o`."
+            f"{path}: {error}; name a calibration file written by `trihedron calibrate -o` (it comes before the log)."
         ) from None
     return calibration_from_document(document, str(path))
 

@@ -41,7 +41,7 @@ def read_frame_declaration(path: str | Path) -> FrameDeclaration:
     except OverflowError:
         raise RefusedError(f"{path}: a length or a place is not a finite number of bytes.") from None
     except (KeyError, TypeError) as error:
-        raise RefusedError(f"{path}: {_said(error)}; docs/capture.md shows a whole declaration.") from None
+        raise RefusedError(f"{path}: {_said(error)}; keys and an example: capture.md of the documentation.") from None
     except ValueError as error:
         raise RefusedError(f"{path}: {error}") from None
 

@@ -1,9 +1,10 @@
-"""A user's scenario file, changed where a diagnosis says so: comments, order and everything else stay as they were."""
+"""A user's scenario file, changed where a diagnosis says so; the rest stays, but for comments on what changed."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping, Sequence
+from itertools import dropwhile
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from trihedron.errors import RefusedError
 from trihedron.files.output import write_whole
 
 TEMPLATE = """# A simulation to begin with: an ordinary sensor that reads m/s² and rad/s, turned by hand.
-# Every key: docs/simulation.md. What a file does not say is the profile's.
+# What a file does not say is the profile's; every key is in the documentation, "Simulation".
 name = "my-sensor"
 profile = "mpu"
 
@@ -72,7 +73,7 @@ def improved_scenario(
         When the file is not TOML.
     """
     try:
-        document = tomlkit.parse(read_text(path, "scenario file"))
+        document = tomlkit.parse(_under_own_head(read_text(path, "scenario file"), os.path.basename(path)))
     except DocumentError as error:
         raise RefusedError(of_path(path, error)) from None
     except (TOMLKitError, RecursionError) as error:
@@ -109,6 +110,12 @@ def write_scenario(text: str, path: str | os.PathLike[str], *, overwrite: bool =
     write_whole(path, text, overwrite=overwrite)
 
 
+def _under_own_head(text: str, name: str) -> str:
+    """The text with a line of ours for the comments above its first key, which spoke of the values as they were."""
+    rest = list(dropwhile(lambda line: not line.strip() or line.startswith("#"), text.splitlines(keepends=True)))
+    return f"# {name}, with the values of a recording in place of its own (diagnose --improved).\n{''.join(rest)}"
+
+
 def _merge(parent: Any, name: str, values: Mapping[str, Any]) -> None:
     if name not in parent:
         parent.add(name, tomlkit.table())
@@ -117,7 +124,11 @@ def _merge(parent: Any, name: str, values: Mapping[str, Any]) -> None:
         if isinstance(value, Mapping):
             _merge(table, key, value)
         else:
-            table[key] = _item(value)
+            item = _item(value)
+            is_same = key in table and table[key] == item
+            table[key] = item
+            if not is_same:
+                item.trivia.comment = item.trivia.comment_ws = ""
 
 
 def _item(value: Any) -> Item:

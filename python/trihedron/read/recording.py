@@ -58,40 +58,12 @@ def read_recording(
     instance: int | str | None = None,
     progress: Progress | None = None,
 ) -> Recording:
-    """Read and audit a log: one file, or one file per sensor.
-
-    Parameters
-    ----------
-    path : file, or readings in memory
-        Text (CSV, TSV, blanks; gzip, bzip2, xz), ``.npz``, ``.npy``, Parquet and others
-        (``docs/reading.md``), told by content; or arrays, a dictionary or a data frame; or
-    accelerometer_path, gyroscope_path : file
-        one file per sensor, each with its own clock; they are merged on a common base. One alone is read alone.
-    columns : str
-        ``"time=t,ax=3,ay=4,az=5"`` (names, or numbers from 1), or roles in file order ``"t,ax,ay,az,-,gx,gy,gz"``;
-        ``time=none`` ignores a time column.
-    rate_hz : float
-        Sampling rate [Hz] of a log without a time column. A time column wins; a rate that contradicts it is a finding.
-    accelerometer_unit, gyroscope_unit, time_unit : str
-        Units, where what is detected from names and readings is wrong.
-    device : int
-        Which device (from 1) of an archive ``counts`` (n, devices, 6).
-    topic : str
-        Which topic, dataset or member of a file that holds several.
-    instance : int or str
-        Which of several IMUs whose readings one file holds.
-    progress : callable
-        Called with (done fraction, text).
+    """Read and audit a log: one file, or one file per sensor; the parameters are those of ``trihedron.read``.
 
     Raises
     ------
     ReadError
         (a ``ValueError``) one sentence naming file, line and remedy.
-
-    Notes
-    -----
-    See ``docs/reading.md``. Without time column and rate, 100 Hz is assumed and reported: serious with a gyro, whose
-    scale is inversely proportional to the rate.
     """
     if rate_hz is not None and not (np.isfinite(rate_hz) and 0 < rate_hz < 1e7):
         raise ReadError(f"the rate must be a positive number of samples per second, got {rate_hz}.")

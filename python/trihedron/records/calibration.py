@@ -86,6 +86,8 @@ class SensorCalibration(Frozen):
     covariance : (12, 12)
         In the order of :data:`PARAMETER_NAMES`; rows of parameters fixed by the choice of frame are zero. ``sigma_S``
         (3, 3) and ``sigma_b`` (3,) are its diagonal's roots.
+    bias : (3,)
+        What the axes read too much, in SI: opposite in sign to b.
     raw_unit, si_unit, method : str
         Units before and after, and how S and b were found.
     quality, observability : FitQuality, Observability or None
@@ -124,8 +126,15 @@ class SensorCalibration(Frozen):
         """(3,) standard errors of b."""
         return np.sqrt(np.maximum(np.diag(self.covariance)[9:], 0.0))
 
+    @property
+    def bias(self) -> FloatArray:
+        """(3,) bias of each axis in SI: the reading at zero input, ``-S⁻¹ b``, over the axis' sensitivity."""
+        inverse = np.linalg.inv(self.S)
+        return np.asarray(-(inverse @ self.b) / np.linalg.norm(inverse, axis=1), dtype=np.float64)
+
     def __repr__(self) -> str:
-        return f"<SensorCalibration {self.raw_unit} to {self.si_unit}, by {self.method}>"
+        scale, b = (", ".join(f"{v:.6g}" for v in values) for values in (np.diag(self.S), self.b))
+        return f"<SensorCalibration {self.raw_unit} to {self.si_unit}: diagonal of S [{scale}], b [{b}] {self.si_unit}>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

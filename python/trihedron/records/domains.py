@@ -9,7 +9,9 @@ from trihedron.arrays import FloatArray
 from trihedron.records.frozen import Frozen
 from trihedron.records.plain import Plain
 
-Domain = Literal["static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing", "numbers", "noise"]
+Domain = Literal[
+    "static-accel", "static-gyro", "moves", "dynamics", "rate", "within-static", "timing", "numbers", "noise"
+]
 DOMAINS: tuple[Domain, ...] = ("static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing")
 
 

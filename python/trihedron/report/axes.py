@@ -16,7 +16,7 @@ from trihedron.sensor_model import other_form, other_form_jacobian
 
 LETTERS = 2
 """Of a name that is made of axes alone."""
-BIAS = "the reading at zero input, −S⁻¹ b: its sign is opposite to that of b"
+BIAS = "the reading at zero input, −S⁻¹ b, over the axis' sensitivity: its sign is opposite to that of b"
 """What a bias is in every report; b is what a corrected reading adds."""
 
 
@@ -34,24 +34,29 @@ def channel_in_print(channel: str) -> str:
 class Axes:
     """What the numbers of one sensor say about its axes.
 
-    ``sensitivity`` (3,) in raw unit per SI unit, ``bias`` (3,) reading at zero input, raw, and ``bias_si`` (3,) the
-    same over the sensitivity, ``skew_rad`` (3,) by which the angles X-Y, X-Z, Y-Z exceed a right angle; each with its
-    standard error.
+    ``sensitivity`` (3,) in raw unit per SI unit, ``at_zero`` (3,) the reading at zero input, raw, and ``bias`` (3,) the
+    same over the sensitivity, SI; ``skew_rad`` (3,) by which the angles X-Y, X-Z, Y-Z exceed a right angle; each with
+    its standard error.
     """
 
     sensitivity: FloatArray
     sigma_sensitivity: FloatArray
+    at_zero: FloatArray
+    sigma_at_zero: FloatArray
     bias: FloatArray
     sigma_bias: FloatArray
-    bias_si: FloatArray
-    sigma_bias_si: FloatArray
     skew_rad: FloatArray
     sigma_skew_rad: FloatArray
 
+    @property
+    def scale_sigma(self) -> FloatArray:
+        """(3,) relative standard error of the scale of each axis: the one that every report states."""
+        return self.sigma_sensitivity / self.sensitivity
+
 
 def axes_of(sensor: SensorCalibration) -> Axes:
-    """From the rows r of ``S⁻¹``: sensitivity ``|r_i|``, bias ``-S⁻¹ b``, skew ``-asin(r_i·r_j / |r_i||r_j|)``."""
-    inverse, bias = other_form(sensor.S, sensor.b)
+    """From the rows r of ``S⁻¹``: sensitivity ``|r_i|``, reading ``-S⁻¹ b``, skew ``-asin(r_i·r_j / |r_i||r_j|)``."""
+    inverse, at_zero = other_form(sensor.S, sensor.b)
     jacobian = other_form_jacobian(sensor.S, sensor.b)
     covariance = jacobian @ sensor.covariance @ jacobian.T
     sensitivity = np.linalg.norm(inverse, axis=1)
@@ -60,7 +65,7 @@ def axes_of(sensor: SensorCalibration) -> Axes:
     for i in range(3):
         own = slice(3 * i, 3 * i + 3)
         wrt[i, own] = unit[i]
-        wrt[6 + i, own] = -bias[i] / sensitivity[i] ** 2 * unit[i]
+        wrt[6 + i, own] = -at_zero[i] / sensitivity[i] ** 2 * unit[i]
         wrt[6 + i, 9 + i] = 1.0 / sensitivity[i]
     skew = np.zeros(3)
     for k, (i, j) in enumerate(combinations(range(3), 2)):
@@ -70,5 +75,5 @@ def axes_of(sensor: SensorCalibration) -> Axes:
         wrt[3 + k, 3 * i : 3 * i + 3] = slope * (unit[j] - cosine * unit[i]) / sensitivity[i]
         wrt[3 + k, 3 * j : 3 * j + 3] = slope * (unit[i] - cosine * unit[j]) / sensitivity[j]
     sigma = np.sqrt(np.maximum(np.diag(wrt @ covariance @ wrt.T), 0.0))
-    sigma_bias = np.sqrt(np.maximum(np.diag(covariance)[9:], 0.0))
-    return Axes(sensitivity, sigma[:3], bias, sigma_bias, bias / sensitivity, sigma[6:], skew, sigma[3:6])
+    sigma_at_zero = np.sqrt(np.maximum(np.diag(covariance)[9:], 0.0))
+    return Axes(sensitivity, sigma[:3], at_zero, sigma_at_zero, at_zero / sensitivity, sigma[6:], skew, sigma[3:6])

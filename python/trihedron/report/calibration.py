@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from trihedron.arrays import AXES, XYZ
@@ -84,9 +86,9 @@ def _headlines(calibration: Calibration) -> list[Headline]:
             beside = f"rms, {seen[-1][0]}, {AFTER_MOVES}; noise alone {plain_number(move_floor(gyroscope.quality))}°"
             out.append(Headline("tilt error after a rotation", plain_number(seen[-1][1]), "°", beside))
     for name, sensor in _sensors(calibration):
-        relative = sensor.sigma_S.diagonal() / np.abs(sensor.S.diagonal())
-        words, unit = _relative(float(relative.max()))
-        out.append(Headline(f"{name} scale uncertainty", words, unit, "1 σ, worst axis"))
+        with suppress(ValueError):
+            words, unit = _relative(float(axes_of(sensor).scale_sigma.max()))
+            out.append(Headline(f"{name} scale uncertainty", words, unit, "1 σ, worst axis"))
     return out
 
 
@@ -169,30 +171,30 @@ def _meaning(calibration: Calibration) -> tuple[Block, ...]:
 
 def _axes_block(name: str, sensor: SensorCalibration) -> Block:
     try:
-        return _axes_table(name, sensor, axes_of(sensor))
+        return axes_table(name, sensor, axes_of(sensor))
     except ValueError:
         return Paragraph(f"The {name}'s S is singular: its axes have no meaning of their own.")
 
 
-def _axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
+def axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
     raw, si = unit_in_print(sensor.raw_unit), unit_in_print(sensor.si_unit)
-    unit = "" if raw == si else f" [{raw} per {si}]"
+    head = ["", "scale (sensitivity)" if raw == si else f"scale (sensitivity) [{raw} per {si}]", "relative σ"]
     rows = [
-        (
-            XYZ[i],
-            with_sigma(axes.sensitivity[i], axes.sigma_sensitivity[i]),
-            " ".join(_relative(float(axes.sigma_sensitivity[i] / axes.sensitivity[i]))),
-            with_sigma(axes.bias[i], axes.sigma_bias[i]),
-        )
+        [XYZ[i], with_sigma(axes.sensitivity[i], axes.sigma_sensitivity[i]), " ".join(_relative(axes.scale_sigma[i]))]
         for i in range(3)
     ]
+    if raw != si:
+        # In SI it is the bias above but for the scale: a second figure of one thing.
+        head.append(f"reading at zero input, −S⁻¹ b [{raw}]")
+        for i, row in enumerate(rows):
+            row.append(with_sigma(axes.at_zero[i], axes.sigma_at_zero[i]))
     skew = [
         f"{pair} {with_sigma(mrad_from_radians(axes.skew_rad[k]), mrad_from_radians(axes.sigma_skew_rad[k]))} mrad"
         for k, pair in enumerate(("X-Y", "X-Z", "Y-Z"))
     ]
     return Table(
-        ("", f"sensitivity{unit}", "relative σ", f"bias: raw reading at zero input [{raw}]"),
-        tuple(rows),
+        tuple(head),
+        tuple(tuple(row) for row in rows),
         f"{name.capitalize()} axes; angles between axes exceed 90° by {', '.join(skew)}",
     )
 

@@ -44,7 +44,7 @@ def _bias(sensor: SensorCalibration) -> list[tuple[str, str]]:
     except ValueError:
         return []
     factor, unit = shown(sensor.si_unit)
-    values = zip(XYZ, factor * axes.bias_si, factor * axes.sigma_bias_si, strict=True)
+    values = zip(XYZ, factor * axes.bias, factor * axes.sigma_bias, strict=True)
     return [("bias", ", ".join(f"{axis} {with_sigma(v, s)}" for axis, v, s in values) + f" {unit}; {BIAS}")]
 
 
@@ -84,9 +84,9 @@ def _angle_words(quality: FitQuality) -> str:
     if angles:
         parts = [f"{plain_number(rms)}° rms, {plain_number(worst)}° worst {label}" for label, rms, worst in angles]
         assert quality.angle_deg is not None
-        n_seen, n_counted = int(np.isfinite(quality.angle_deg).sum()), int(counted_moves(quality).sum())
-        if n_counted < n_seen:
-            parts[0] += f" ({n_counted} of {n_seen} moves, the others excluded)"
+        n_moves, n_counted = len(quality.angle_deg), int(counted_moves(quality).sum())
+        if n_counted < n_moves:
+            parts[0] += f" ({n_counted} of {n_moves} moves, the others excluded)"
         parts.append(f"noise alone {plain_number(move_floor(quality))}° rms")
         return "; ".join(parts)
     if quality.dof <= 0:

@@ -9,7 +9,8 @@ from trihedron.report.axes import axes_of
 from trihedron.report.channels import channels_table
 from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.numbers import how_many, plain_number, unit_in_print
+from trihedron.report.many_charts import shown
+from trihedron.report.numbers import how_many, plain_number
 from trihedron.report.segments import recording_facts, signals_picture
 from trihedron.units import mrad_from_radians
 
@@ -67,11 +68,12 @@ def _expected_cells(sensor: SensorCalibration) -> tuple[str, str, str]:
         axes = axes_of(sensor)
     except ValueError:
         return ("not determined", "not determined", "not determined")
-    scale = 100.0 * float(np.max(axes.sigma_sensitivity / axes.sensitivity))
+    scale = 100.0 * float(np.max(axes.scale_sigma))
+    factor, unit = shown(sensor.si_unit)
     skew = mrad_from_radians(float(np.max(axes.sigma_skew_rad)))
     return (
         f"{plain_number(scale, 2)} %",
-        f"{plain_number(float(np.max(sensor.sigma_b)), 2)} {unit_in_print(sensor.si_unit)}",
+        f"{plain_number(factor * float(np.max(axes.sigma_bias)), 2)} {unit}",
         f"{plain_number(skew, 2)} mrad",
     )
 

@@ -31,8 +31,9 @@ MEANING = {
     "static-gyro": "gyro rate in static poses",
     "moves": "tilt error after a rotation",
     "dynamics": "velocity error over a rotation",
+    "rate": "angular rate beside the reference",
     "within-static": "noise within static poses",
-    "timing": "sampling times",
+    "timing": "even sampling (seen in motion)",
     "numbers": "parameters of the model",
     "noise": "noise and sampling",
 }

@@ -121,14 +121,19 @@ def as_frame(result: object, library: str) -> Any:
     return frames.made_by(library, _kind(result).columns(result))
 
 
+def _width() -> int:
+    """Columns of the terminal, as many as a file has at most."""
+    return min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
+
+
 def as_text(result: object) -> str:
     """The report of a result as plain text."""
-    return to_text(_kind(result).document(result))
+    return to_text(_kind(result).document(result), width=_width())
 
 
 def as_screen(result: DiagnosisResult) -> str:
     """The first screen of a diagnosis as plain text, as ``print`` gives it."""
-    return to_text(diagnosis_report(result), sections=first_screen(result))
+    return to_text(diagnosis_report(result), sections=first_screen(result), width=_width())
 
 
 def as_html(result: object) -> str:

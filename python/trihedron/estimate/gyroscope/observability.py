@@ -22,18 +22,13 @@ def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray, n_gyrosco
     A move shows ``δS_ω ∫w' dt`` across the vertical only, so the element ``S_ij`` needs a turn about body axis ``j``
     during which axis ``i`` is not vertical, and, for ``i ≠ j``, by an angle that is not a whole turn.
     """
-    values, vectors = np.linalg.eigh(covariance)
-    worst = vectors[:, -1].reshape(3, 3)
-    size = float(np.linalg.norm(S, 2))
-    relative = float(np.sqrt(max(values[-1], 0.0))) / size if size > 0 else float("inf")
-    rate, axis = (int(k) for k in np.unravel_index(np.argmax(np.abs(worst)), (3, 3)))
-    if rate == axis:
-        weakest = words("gyro-scale", axis=axis + 1, share=relative)
-    else:
-        weakest = words("gyro-share", axis=axis + 1, rate=rate + 1, share=relative)
+    scale = np.maximum(np.linalg.norm(S, axis=0), np.finfo(float).tiny)
+    share = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3) / scale
+    rate, axis = (int(k) for k in np.unravel_index(np.argmax(share), (3, 3)))
+    weakest = words("gyro-scale" if rate == axis else "gyro-share", axis=axis + 1, rate=rate + 1)
     advice: tuple[Words, ...] = ()
-    if fit.rank < len(fit.singular_values) or relative > WEAK:
-        advice = tuple(_advice(fit, covariance, size))
+    if fit.rank < len(fit.singular_values) or _worst(covariance, S) > WEAK:
+        advice = tuple(_advice(fit, covariance, float(np.linalg.norm(S, 2))))
     sigma = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     correlation = covariance / np.outer(sigma, sigma)
     pairs = tuple(
@@ -49,6 +44,12 @@ def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray, n_gyrosco
     unseen = np.asarray(fit.directions)[k:, fit.rank :]
     n_unseen = int(np.count_nonzero(np.linalg.norm(unseen, axis=0) > 0.5))
     return Observability(n_gyroscope - n_unseen, n_gyroscope, condition, singular, weakest, advice, pairs)
+
+
+def _worst(covariance: FloatArray, S: FloatArray) -> float:
+    """Standard error of the worst direction in ``S_ω`` over its size."""
+    size = float(np.linalg.norm(S, 2))
+    return float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0))) / size if size > 0 else float("inf")
 
 
 def _advice(fit: AlignmentFit, covariance: FloatArray, size: float) -> list[Words]:
@@ -89,12 +90,9 @@ def observability_findings(observability: Observability, covariance: FloatArray,
                 advice=advice,
             )
         ]
-    size = float(np.linalg.norm(S, 2))
-    relative = float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0))) / size if size > 0 else float("inf")
-    if relative > WEAK:
-        return [
-            Finding.of(FindingCode.NOT_OBSERVABLE, "moves-weak", weakest=observability.weakest, advice=advice)
-            if relative > HARDLY_SEEN
-            else Finding.of(FindingCode.WEAKLY_OBSERVABLE, "moves", weakest=observability.weakest, advice=advice)
-        ]
+    worst = _worst(covariance, S)
+    if worst > HARDLY_SEEN:
+        return [Finding.of(FindingCode.NOT_OBSERVABLE, "moves-weak", weakest=observability.weakest, advice=advice)]
+    if worst > WEAK:
+        return [Finding.of(FindingCode.WEAKLY_OBSERVABLE, "moves", weakest=observability.weakest, advice=advice)]
     return []

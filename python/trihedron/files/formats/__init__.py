@@ -8,17 +8,20 @@ Writers are tested by evaluating the target's equation, readers as the inverse o
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
 
+import numpy as np
+
 from trihedron.documents import DocumentError, of_path, read_text
 from trihedron.errors import RefusedError
 from trihedron.files.calibration import FORMAT as OWN
 from trihedron.files.calibration import CalibrationFileError, read_calibration
-from trihedron.files.formats.contract import ExportOptions, Format, NoiseFigure, SensorNoise
+from trihedron.files.formats.contract import ExportOptions, Format, NoiseFigure, SensorNoise, given
 from trihedron.files.formats.matrices import lower_orthogonal, upper_frame
 from trihedron.files.plausible import require_plausible
 from trihedron.records import Calibration
@@ -35,6 +38,7 @@ __all__ = [
     "formats",
     "is_calibration",
     "lower_orthogonal",
+    "needs",
     "targets",
     "upper_frame",
 ]
@@ -51,6 +55,16 @@ def formats() -> dict[str, Format]:
 def targets() -> list[str]:
     """What a calibration can be written for."""
     return [name for name, one in formats().items() if one.write is not None]
+
+
+def needs(one: Format) -> list[str]:
+    """The options without which a format cannot be written, as its own refusal names them."""
+    identity = (np.eye(3), np.zeros(3))
+    try:
+        one.write(given("trihedron", {"accelerometer": identity, "gyroscope": identity}), ExportOptions())  # type: ignore[misc]
+    except RefusedError as error:
+        return list(dict.fromkeys(re.findall(r"--(?:noise|rate|current-parameters)", str(error))))
+    return []
 
 
 def export_files(calibration: Calibration, target: str, options: ExportOptions | None = None) -> dict[str, str]:

@@ -155,11 +155,10 @@ ENTRIES = (
         Code.RESIDUAL_ABOVE_NOISE,
         "verify-rest",
         WARNING,
-        "The gravity error in static poses is {norm_rms_m_s2:.3g} m/s² rms ({norm_rms_m_s2:.2g mg}), on "
-        "average {times_expected:.1f} times the noise and uncertainty of a pose.",
+        "The gravity error in static poses, {norm_rms_m_s2:.3g mm/s²} rms ({norm_rms_m_s2:.2g mg}), exceeds noise and "
+        "uncertainty: χ²/dof {chi2_per_dof:.2g}, each pose weighed by its own.",
         "The sensor has changed since (temperature, shock, supply), gravity is another here, or poses were not still.",
         "Calibrate again near the conditions of use; compare the two calibrations.",
-        numbers=("chi2_per_pose",),
         or_severity=SERIOUS,
     ),
 )

@@ -48,7 +48,7 @@ _CALIBRATE = (
         WARNING,
         "The gyro was not calibrated: {why}.",
         "The recording does not hold what the gyro needs.",
-        "Turn the sensor about all three axes between poses; docs/procedure.md shows how.",
+        "Turn the sensor about all three axes between poses, by 60 to 180° in 2 to 4 s.",
     ),
     Entry(
         Code.NOT_FIT,
@@ -56,7 +56,7 @@ _CALIBRATE = (
         SERIOUS,
         "No calibration can be made from this log: {why}",
         "The log does not hold what a calibration needs.",
-        "docs/procedure.md shows how to move the sensor.",
+        "Hold the sensor still for 3 to 5 s in each of 18 or more different poses; turn it by hand between them.",
     ),
     Entry(
         Code.NOT_FIT,
@@ -64,7 +64,7 @@ _CALIBRATE = (
         NOTE,
         "One or two orientations in {duration_s:.0f} s: scales, angles between axes and moves are not tested.",
         "A static log, a chamber log or a table that stands still.",
-        "To test those too, hold 18 or more poses of 3 to 5 s in different directions (docs/procedure.md).",
+        "To test those too, hold 18 or more poses of 3 to 5 s in different directions.",
         numbers=("n_poses",),
     ),
 )

@@ -167,8 +167,8 @@ _RATES = (
 
 _EVEN = "of {rate_hz:.5g} Hz"
 _HOW = (
-    "{is_rounded:?rounded to {grid_s:.3g ms}|{is_late:?late by {timestamp_error_s:.2g ms} rms, as they are when "
-    "samples are timestamped on arrival|with {timestamp_error_s:.2g ms} rms of jitter}}"
+    "{is_rounded:?rounded to {grid_s:.3g ms}|each {is_late:?late by {timestamp_error_s:.2g ms} rms, as they are when "
+    "samples are timestamped on arrival|off it by {timestamp_error_s:.2g ms} rms}}"
 )
 _BY_MOTION = (
     "{motion_tells:?in motion the readings follow {followed:.2g %} ± {sigma_followed:.2g %} of that (0 %: samples were "

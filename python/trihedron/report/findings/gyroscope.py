@@ -128,7 +128,7 @@ _MOVES = (
         Code.NOT_OBSERVABLE,
         "moves-weak",
         SERIOUS,
-        "the moves hardly determine the {weakest}.",
+        "the moves hardly determine the {weakest}: its σ stands beside it in S.",
         _SAME_GRAVITY,
         "{advice:sentences}",
     ),
@@ -136,7 +136,7 @@ _MOVES = (
         Code.WEAKLY_OBSERVABLE,
         "moves",
         WARNING,
-        "the moves hardly determine the {weakest}.",
+        "the moves hardly determine the {weakest}: its σ stands beside it in S.",
         _SAME_GRAVITY,
         "{advice:sentences}",
     ),
@@ -186,8 +186,8 @@ _MOVES = (
         Code.HELD_OUT_WORSE,
         "verify-moves",
         WARNING,
-        "The tilt error after rotations is {angle_rms_deg:.3g}° rms (worst move {worst_move}: {worst_deg:.3g}°), "
-        "single moves {times_expected:.1f} times (rms) their own noise and uncertainty.",
+        "The tilt error after rotations, {angle_rms_deg:.3g}° rms (worst move {worst_move}: {worst_deg:.3g}°), exceeds "
+        "noise and uncertainty: χ²/dof {chi2_per_dof:.2g}, each move weighed by its own.",
         "The gyro's scale has changed since, it clipped, samples were lost, or a pose was not still.",
         "Look at the worst moves; calibrate again near the conditions of use.",
         or_severity=SERIOUS,

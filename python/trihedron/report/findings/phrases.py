@@ -32,9 +32,8 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "faces-all": "all faces present",
         "faces-missing": "scale and bias cannot be separated without {faces:&, }",
         # moves and turns of a gyro
-        "gyro-scale": "scale of gyro {axis:axis} (S_{axis:letter}{axis:letter}), uncertainty {share:.2g %} (1 σ)",
-        "gyro-share": "gyro cross-axis {axis:axis} into {rate:axis} (S_{rate:letter}{axis:letter}), uncertainty "
-        "{share:.2g %} of the scale (1 σ)",
+        "gyro-scale": "scale of gyro {axis:axis} (S_{axis:letter}{axis:letter})",
+        "gyro-share": "gyro cross-axis {axis:axis} into {rate:axis} (S_{rate:letter}{axis:letter})",
         "gyro-answer": "response of gyro {axis:axis} to turns about {about:axis} of the case, uncertainty "
         "{share:.2g %} (1 σ)",
         "turn-about": "lay the body's {axis:axis} axis level and turn the sensor about it by 90 to 120°, "

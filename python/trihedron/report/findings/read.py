@@ -14,8 +14,8 @@ _SAY_GYRO_UNIT = "Say it with --gyro-unit rad/s, deg/s, ..., or counts, if this 
 _ALIKE = "Both look alike. The calibration differs only in its name of the raw unit."
 _SOURCE = "{is_given:?as you said|by its column names}"
 _TURNING = (
-    "gravity rotates {factor:.3g} (± {percent:.1g} %) times as fast as a gyro in {unit} would read "
-    "(correlation {correlation:.2f})"
+    "turns of gravity are {factor:.3g} (± {percent:.1g} %) times those of a gyro in {unit} "
+    "(1 where the unit is right; correlation {correlation:.2f})"
 )
 _INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
 _CUT_OFF = "A log that was cut off, or a memory card with errors."

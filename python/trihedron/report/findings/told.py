@@ -24,14 +24,19 @@ def findings_block(findings: Iterable[Finding]) -> FindingList | Paragraph:
 
 
 def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) -> str:
-    """``bad`` with the first serious finding; ``usable`` with the number of warnings; or ``good``."""
+    """``bad`` with what the first serious finding says first; ``usable`` with the number of warnings; or ``good``."""
     found = told_once(findings)
     serious = [finding for finding in found if finding.severity is Severity.SERIOUS]
     n_warnings = sum(finding.severity is Severity.WARNING for finding in found)
     if serious:
         more = f" ({how_many(len(serious) - 1, 'more serious finding')})" if len(serious) > 1 else ""
-        return f"{bad}: {_capital(serious[0].seen)}{more}"
+        return f"{bad}: {_capital(first_clause(serious[0].seen))}{more}"
     return f"{usable}, with {how_many(n_warnings, 'warning')}." if n_warnings else good
+
+
+def first_clause(seen: str) -> str:
+    """What a finding says first: the whole of it stands once, among the findings."""
+    return re.split(r"(?<=\D)\. (?=[A-Z])|; ", seen, maxsplit=1)[0].rstrip(".") + "."
 
 
 def told_once(findings: Iterable[Finding]) -> tuple[Finding, ...]:
