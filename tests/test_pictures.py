@@ -12,7 +12,7 @@ from diagnosed_session import simulated
 from trihedron.cli import main
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.records.diagnosis import Candidate
-from trihedron.report.calibration_charts import residual_chart
+from trihedron.report.calibration_charts import MARK, residual_chart, sphere_chart
 from trihedron.report.chart import Note, Panel, Scale
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.diagnosis_candidates import candidates_table
@@ -21,7 +21,6 @@ from trihedron.report.diagnosis_overview_charts import traces_chart
 from trihedron.report.disc import drawn_disc
 from trihedron.report.document import Picture, Table
 from trihedron.report.effect_rest_charts import rest_panels
-from trihedron.report.figures import alike
 from trihedron.report.findings.told import told_once
 from trihedron.report.findings.wording import filled
 from trihedron.report.many_charts import sessions_chart
@@ -256,6 +255,11 @@ def test_the_bar_of_a_pose_that_determines_a_parameter_alone_does_not_hide_the_o
     assert 4.0 < high == -low < 10.0
 
 
-def test_poses_alike_share_a_label_in_the_picture_of_orientations():
-    places = np.array([[0.0, 0.0], [0.5, 0.0], [0.02, 0.01], [0.53, 0.03], [-0.5, 0.0]])
-    assert alike(places) == [[0, 2], [1, 3], [4]]
+def test_numbers_of_poses_alike_do_not_cover_one_another():
+    result = trihedron.calibrate(trihedron.simulate("hand-session", 3)[0], gravity_m_s2=9.81)
+    means = np.repeat(result.segments.accelerometer_mean, 2, axis=0)
+    for disc in sphere_chart(result.accelerometer, means).panels:
+        named = np.array([[x, y] for x, y, label, *_ in disc.points if label])
+        apart = np.linalg.norm(named[:, None] - named, axis=2) + 10.0 * np.eye(len(named))
+        assert len(named) >= 8
+        assert apart.min() >= MARK

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 
@@ -18,6 +19,8 @@ STRONG = 0.5
 """Correlation above which two parameters are named together."""
 LIMIT_SIGMAS = 3.0
 """A pose or move beyond it happens by chance once in 370."""
+MARK = 0.12
+"""Diameter of a pose\'s mark, the horizon having radius 1."""
 MOST_NUMBERED = 60
 """Poses on a disc that carry their number; of more, one would cover the next."""
 
@@ -127,8 +130,11 @@ def sphere_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
             # A pose with level Z lies on the rim of both.
             if sign * u[2] >= -1e-2:
                 words = " ".join(f"{c:+.2f}" for c in u).replace("-", "−")
-                label = str(k + 1) if len(up) <= MOST_NUMBERED else ""
-                points.append((*equal_area((u[0], u[1], u[2])), label, f"pose {k + 1}: up is {words}", "taken"))
+                x, y = equal_area((u[0], u[1], u[2]))
+                # On a mark that covers another's number none can be read: the first of poses alike has one.
+                is_covered = any(name and math.hypot(x - a, y - b) < MARK for a, b, name, *_ in points)
+                label = "" if is_covered or len(up) > MOST_NUMBERED else str(k + 1)
+                points.append((x, y, label, f"pose {k + 1}: up is {words}", "taken"))
         for n, (words, d) in enumerate(wanted):
             if sign * d[2] >= -1e-2:
                 points.append((*equal_area((d[0], d[1], d[2])), str(n + 1), f"to add, {n + 1}: {words}", "wanted"))

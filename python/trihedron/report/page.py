@@ -67,15 +67,10 @@ def _noticed(document: Document) -> tuple[Markup, list[str], str]:
     first = document.foremost
     if first is None:
         return Markup(""), [], ""
-    others = [
-        f"{severity.value} {', '.join(named)}"
-        for severity in (Severity.SERIOUS, Severity.WARNING)
-        if (
-            named := list(
-                dict.fromkeys(_name(f) for f in document.findings if f.severity is severity and f is not first)
-            )
-        )
-    ]
+    others = []
+    for severity in (Severity.SERIOUS, Severity.WARNING):
+        named = [f.code.value.replace("-", " ") for f in document.findings if f.severity is severity and f is not first]
+        others += [f"{severity.value} {', '.join(dict.fromkeys(named))}"] if named else []
     listing = (any(isinstance(block, FindingList) for block in section.blocks) for section in document.sections)
     seen = "" if first.seen in document.verdict else first.seen
     told = f"{seen} → {first.action}" if first.action and first.action != document.what_next else seen
