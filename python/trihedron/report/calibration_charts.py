@@ -125,7 +125,7 @@ def sphere_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
     wanted = [(words, direction) for words in advice if (direction := direction_in_words(words)) is not None]
     discs = []
     for sign, title in ((1.0, "+Z above the horizon"), (-1.0, "+Z below the horizon")):
-        points = []
+        points: list[tuple[float, float, str, str, str]] = []
         for k, u in enumerate(up):
             # A pose with level Z lies on the rim of both.
             if sign * u[2] >= -1e-2:
