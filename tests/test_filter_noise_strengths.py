@@ -25,7 +25,7 @@ def test_an_accelerometers_reference_is_as_wrong_as_the_gyro_found_it():
     told = with_slow_error_of(VELOCITY, draws)
     assert whole(told, told.mean)[4:] == pytest.approx([0.6 * SLOW, 0.8 * SLOW, TAU], rel=1e-6)
     slow, others = COORDINATES.index("slow"), [COORDINATES.index(name) for name in ("noise", "bias_walk", "white")]
-    assert told.sigma[slow] == pytest.approx(np.std(np.log(draws[:, 4])))
+    assert told.sigma[slow] == pytest.approx(2.0 * np.std(np.log(draws[:, 4])))
     assert not told.may_be_nothing[slow]
     assert np.all(told.mean[others] == VELOCITY.mean[others])
     # The prior's height is the normal's there, and the search's slope its derivative.

@@ -39,8 +39,9 @@ TIMES_S = (10.0, 30.0, 100.0)
 """Time constants of a Gauss-Markov bias that are tried beside the walk."""
 PREFERRED = 6.0
 """2 ln of the evidence by which the bias has to be Gauss-Markov: three time constants are tried (2 ln 3) and 4 more."""
-LEAST_SIGMA = 0.1
-"""Of a coordinate that another sensor's draws tell: their number tells no closer."""
+WIDER_BY, LEAST_SIGMA = 2.0, 0.2
+"""Prior σ of what another sensor's draws tell, in theirs: both see the same course of the reference's error, and what
+that course tells of its strength counts once. No less than the number of draws tells."""
 ABSENT = 30.0
 """An interval that reaches over more than this factor says how large the strength can be, and no more."""
 
@@ -164,7 +165,7 @@ def with_slow_error_of(prior: Prior, draws: FloatArray) -> Prior:
     mean, sigma, may_be_nothing = prior.mean.copy(), prior.sigma.copy(), prior.may_be_nothing.copy()
     for name, values in told.items():
         at = COORDINATES.index(name)
-        mean[at], sigma[at], may_be_nothing[at] = values.mean(), max(float(values.std()), LEAST_SIGMA), False
+        mean[at], sigma[at], may_be_nothing[at] = values.mean(), max(WIDER_BY * float(values.std()), LEAST_SIGMA), False
     return replace(prior, mean=mean, sigma=sigma, may_be_nothing=may_be_nothing)
 
 
