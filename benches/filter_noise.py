@@ -5,7 +5,8 @@
 Each run draws for both sensors N, K, vibration that follows a throttle and a scale matrix that is off, for the gyro
 g-sensitivity and a bias that follows the temperature, and a truth with white and slow (Matérn-3/2) error
 (filter_noise_trial/); the noise at rest is told with 5 % of error. NEES is that of the held-out half: 3 is right.
-`--euroc FOLDER` takes the recorded flights instead, with the data sheet's values as static ones.
+`--euroc FOLDER` takes the recorded flights instead, with the data sheet's values as static ones; `--backwards` predicts
+the angles of the first half of each from the second as well.
 """
 
 import argparse
@@ -17,7 +18,18 @@ import numpy as np
 from filter_noise_trial.generator import KINDS, G, drawn
 from trihedron import read
 from trihedron.api.referring import motion_of
-from trihedron.estimate.filter_noise.beside_reference import Asked, beside_reference
+from trihedron.estimate.filter_noise.angle import angle_stretches
+from trihedron.estimate.filter_noise.beside_reference import (
+    ANGLE,
+    Asked,
+    beside_reference,
+    consistency,
+    halves,
+    independent_or_not,
+    informed,
+)
+from trihedron.estimate.reference.fit import laid_beside
+from trihedron.estimate.reference.motion import fit_motion
 from trihedron.records import Recording
 from trihedron.records.filter_noise import CAUSES, Bounded, StaticNoise
 from trihedron.records.reference import ReferenceMotion
@@ -88,10 +100,13 @@ def told(sensor, runs):
     print(f"  all shares {100 * np.mean(every):.1f} %", flush=True)
 
 
-def flights(folder):
+def flights(folder, is_backwards):
     for path in sorted(Path(folder).glob("*.log.csv.gz")):
         motion = motion_of(str(path).replace(".log.", ".truth."))
         asked = Asked((1.0, 10.0, 30.0), 25.0, 9.807, ADIS16448, ADIS16448_FORCE)
+        if is_backwards:
+            backwards(path, motion, asked)
+            continue
         for s in beside_reference(read(path), motion, asked):
             N, K = (f"{x.value:.2e} [{x.lower:.1e}, {x.upper:.1e}]" for x in (s.N, s.K))
             nees = ", ".join(f"{c.horizon_s:.0f} s {c.nees:.1f} (static {c.static_nees:.0f})" for c in s.consistency)
@@ -101,15 +116,31 @@ def flights(folder):
             print(f"   slow error of the reference {s.reference.slow}, {s.reference.slow_s:.0f} s", flush=True)
 
 
+def backwards(path, motion, asked):
+    """Angles of each half predicted from the other."""
+    found = fit_motion([laid_beside(read(path), motion, asked.gravity_m_s2)])
+    stretches = angle_stretches(found, asked.band_hz, ADIS16448.N.value)
+    half, held = halves(stretches)
+    later = [one.part(first, len(one.time_s)) for one, first in held]
+    for named, taught_by, test in (("second from first", half, held), ("first from second", later, half)):
+        fitted, _ = independent_or_not(taught_by, informed(ANGLE, stretches, ADIS16448), ANGLE)
+        # Parts of their own: a filter that begins there knows nothing of the other half.
+        parts = test if test is held else [(one, 0) for one in test]
+        every = [consistency(parts, fitted, ADIS16448, h) for h in asked.horizons_s]
+        told = ", ".join(f"{c.horizon_s:.0f} s {c.nees:.1f}" for c in every if c is not None)
+        print(f"{path.name.split('.')[0]} {named}: NEES {told}", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--seconds", type=float, default=160.0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--euroc")
+    parser.add_argument("--backwards", action="store_true")
     given = parser.parse_args()
     if given.euroc:
-        flights(given.euroc)
+        flights(given.euroc, given.backwards)
     else:
         simulated(given)
 

@@ -1,30 +1,46 @@
-"""Uncertainties of `--reference` on simulated rigs: how many truths lie within one and two of them.
+"""Uncertainties of `--reference` on simulated rigs: how many truths lie within their 95 % intervals.
 
     python benches/reference_coverage.py --each 40 --seed 1000 --kinds tracked,path,table,commands
+    python benches/reference_coverage.py --speed
 
 The rig is tests/reference_rig.py: attitudes as products of turns, rates as their finite differences, an instrument of
 its own. commands: rates of a table that lags and wobbles; table: rates that it measured; tracked: attitude with 0.05°
 of white error on a clock up to 100 ppm off; path: the same with position (0.3 mm) and a lever arm.
 walk, drone, robot: motions of tests/reference_truths.py, two minutes, truths off by 0.1 to 2° over 4 to 40 s in the
 world or the body, clocks up to 50 ms and 300 ppm apart, walks of the bias; odd seeds have a g-sensitivity of data
-sheets' size, seeds 2 and 3 of every four a position.
+sheets' size, seeds 2 and 3 of every four a position. shaken: 5 Hz all along, so that two offsets of the clock fit, and
+a refusal is the right answer.
+`--speed`: CPU of the fit beside 2.5 to 10 minutes of walk at 200 Hz, and of `calibrate` on a session as long.
 """
 
 import argparse
 import sys
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+import trihedron
 from reference_rig import G, commanded_table, measured_table, tracked
 from reference_truths import truth
+from trihedron.errors import RefusedError
 from trihedron.estimate.reference.fit import fit_reference
 from trihedron.estimate.reference.motion import ACCEPTED
 
+
+def shaken(seed):
+    """Shaken at 5 Hz under a tracker that lacks both ends: a fifth of a second more or less fits as well."""
+    trial = truth(seed, "shaken", seconds=40)
+    inside = (trial.motion.time_s > 4.0) & (trial.motion.time_s < 36.0)
+    t = trial.motion.time_s[inside]
+    return replace(trial, motion=replace(trial.motion, time_s=t - t[0], attitude=trial.motion.attitude[inside]))
+
+
 KINDS = {
+    "shaken": shaken,
     "tracked": tracked,
     "path": lambda seed: tracked(seed, has_path=True),
     "table": measured_table,
@@ -38,6 +54,13 @@ KINDS = {
 }
 
 
+def one_or_refused(trial):
+    try:
+        return one(trial)
+    except RefusedError:
+        return None
+
+
 def one(trial):
     """z of every number of one trial, by group."""
     found = fit_reference(trial.log, trial.motion, G)
@@ -45,12 +68,12 @@ def one(trial):
     sigma = np.sqrt(np.diag(found.gyroscope.covariance))
     z = {
         "gyro S": (found.gyroscope.S - A).ravel() / sigma[:9],
+        **turned_or_not(found, trial.unit.M),
         "gyro b": (found.gyroscope.b + A @ trial.unit.c) / sigma[9:],
     }
-    if trial.unit.g_sensitivity is None:
-        # That over time has the g-sensitivity at the mean force in it.
-        z["bias over time"] = (found.bias.value.mean(axis=0) + A @ trial.unit.c) / found.bias.sigma.mean(axis=0)
-    else:
+    if trial.walked is not None or trial.unit.g_sensitivity is None:
+        z["bias over time"] = bias_over_time(trial, found, A)
+    if trial.unit.g_sensitivity is not None:
         one = found.effects["gyro-g-sensitivity"]
         z["g-sensitivity"] = (one.value - trial.unit.g_sensitivity.ravel()) / one.std
     if found.clock_rate_ppm is not None:
@@ -68,27 +91,76 @@ def one(trial):
     return z, {name: e.score for name, e in found.effects.items()}, has
 
 
+def turned_or_not(found, M):
+    """z of S by what its error is: a turn of all axes, which the mean error of a body's truth is too, and the rest."""
+    wrong = (found.gyroscope.S @ M).ravel() - np.eye(3).ravel()
+    J = np.kron(np.eye(3), M.T)
+    cov = J @ found.gyroscope.covariance[:9, :9] @ J.T
+    pairs = [(i, j) for i in range(3) for j in range(i, 3)]
+    unit = np.eye(9).reshape(9, 3, 3)
+    rest = np.stack([0.5 * (unit[:, i, j] + unit[:, j, i]) for i, j in pairs])
+    turn = np.stack([0.5 * (unit[:, i, j] - unit[:, j, i]) for i, j in pairs if i != j])
+    parts = {"  its turn": turn, "  the rest": rest}
+    return {name: by @ wrong / np.sqrt(np.diag(by @ cov @ by.T)) for name, by in parts.items()}
+
+
+def bias_over_time(trial, found, A):
+    """z of the bias at nine times, the g-sensitivity at the mean force in it."""
+    at = np.linspace(0, len(found.bias.time_s) - 1, 9).astype(int)
+    true = np.tile(-A @ trial.unit.c, (len(at), 1))
+    if trial.walked is not None:
+        time_s = trial.log.time_s
+        true -= np.stack([np.interp(found.bias.time_s[at], time_s, axis) for axis in trial.walked.T], axis=1)
+    if trial.unit.g_sensitivity is not None:
+        force = (trial.log.accelerometer - trial.unit.d) @ np.linalg.inv(trial.unit.N).T
+        true -= trial.unit.g_sensitivity @ force.mean(axis=0)
+    return ((found.bias.value[at] - true) / found.bias.sigma[at]).ravel()
+
+
+def told(kind, runs, n_refused, cpu_s):
+    print(f"{kind}: {len(runs)} runs, {n_refused} refused, {cpu_s:.0f} s CPU")
+    for name in dict.fromkeys(name for r in runs for name in r[0]):
+        z = np.concatenate([r[0][name] for r in runs if name in r[0]])
+        one, most = (100 * np.mean(np.abs(z) < k) for k in (1, 1.96))
+        rms = np.sqrt(np.mean(z**2))
+        print(f"  {name:16} within 1 sigma {one:5.1f} %, 1.96 sigma {most:5.1f} %, rms z {rms:.2f}, n {len(z)}")
+    for name in runs[0][1] if runs else ():
+        for has in (False, True):
+            score = np.array([r[1].get(name, -np.inf) for r in runs if (name in r[2]) == has])
+            if len(score):
+                named, beside = int(np.sum(score > ACCEPTED)), "with" if has else "without"
+                print(f"  {name:26} named in {named} of {len(score)} {beside} it")
+    sys.stdout.flush()
+
+
+def speed():
+    session = trihedron.simulate("hand-session", seed=1)[0]
+    worked = time.process_time()
+    trihedron.calibrate(session, gravity_m_s2=G)
+    beside = time.process_time() - worked
+    print(f"calibrate of a session of {session.duration_s:.0f} s: {beside:.2f} s CPU")
+    for seconds in (150, 300, 600):
+        trial = truth(1, "walk", seconds=seconds, step=5, has_path=True)
+        worked = time.process_time()
+        fit_reference(trial.log, trial.motion, G)
+        taken = time.process_time() - worked
+        print(f"walk of {seconds} s at 200 Hz: {taken:.1f} s CPU, {taken / beside:.0f} times", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--each", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1000)
     parser.add_argument("--kinds", default="tracked,path,table,commands")
+    parser.add_argument("--speed", action="store_true")
     given = parser.parse_args()
+    if given.speed:
+        speed()
+        return
     for kind in given.kinds.split(","):
         start = time.process_time()
-        runs = [one(KINDS[kind](given.seed + k)) for k in range(given.each)]
-        print(f"{kind}: {given.each} runs, {time.process_time() - start:.0f} s CPU")
-        for name in dict.fromkeys(name for r in runs for name in r[0]):
-            z = np.concatenate([r[0][name] for r in runs if name in r[0]])
-            inside, wide = (100 * np.mean(np.abs(z) < k) for k in (1, 2))
-            rms = np.sqrt(np.mean(z**2))
-            print(f"  {name:16} within 1 sigma {inside:5.1f} %, 2 sigma {wide:5.1f} %, rms z {rms:.2f}, n {len(z)}")
-        for name in runs[0][1]:
-            for has in (False, True):
-                score = np.array([r[1].get(name, -np.inf) for r in runs if (name in r[2]) == has])
-                if len(score):
-                    named, beside = int(np.sum(score > ACCEPTED)), "with" if has else "without"
-                    print(f"  {name:26} named in {named} of {len(score)} {beside} it")
+        runs = [one_or_refused(KINDS[kind](given.seed + k)) for k in range(given.each)]
+        told(kind, [r for r in runs if r is not None], runs.count(None), time.process_time() - start)
 
 
 if __name__ == "__main__":

@@ -129,7 +129,8 @@ def jittered(C, rng, sigma_rad):
 
 @dataclass
 class Trial:
-    """A log, its reference, and the truth: unit, lead of the clock at the log's zero [s], its rate [ppm], arm [m]."""
+    """A log, its reference, and the truth: unit, lead of the clock at the log's zero [s], its rate [ppm], arm [m], and
+    the walk (n, 3) of the gyro's bias about its mean [rad/s] where it is known."""
 
     log: Recording
     motion: ReferenceMotion
@@ -137,6 +138,7 @@ class Trial:
     lead_s: float
     ppm: float
     arm: np.ndarray
+    walked: np.ndarray | None = None
 
 
 def tracked(seed, seconds=50, sigma_deg=0.05, has_path=False, track_hz=100, earth=None, rest_s=2.0, **more):

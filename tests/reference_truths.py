@@ -12,7 +12,7 @@ from trihedron.records import Recording
 from trihedron.records.reference import ReferenceMotion
 
 STEP = 10
-"""Samples of the rig in one of the log and in one row of the truth: 100 Hz each."""
+"""Samples of the rig in one of the log, unless asked for otherwise, and in one row of the truth: 100 Hz each."""
 G_SENSITIVITY = np.radians(0.1) / 9.81
 """The size in data sheets, (rad/s)/(m/s²)."""
 
@@ -89,20 +89,20 @@ def small_turn(v):
     return turn(0, v[:, 0]) @ turn(1, v[:, 1]) @ turn(2, v[:, 2])
 
 
-def readings(rng, u, C, path):
-    """Gyro [rad/s] and accelerometer [m/s²], and the bias's mean [rad/s]: white noise and a walk of the bias."""
+def readings(rng, u, C, path, step):
+    """Gyro [rad/s] and accelerometer [m/s²], and the walk (n, 3) of the gyro's bias [rad/s]; white noise besides."""
     f, w = forces(C, path), rates_of(C)
-    n = len(C) // STEP
-    f, w = (x[: n * STEP].reshape(n, STEP, 3).mean(axis=1) for x in (f, w))
-    dt = STEP / FINE_HZ
+    n = len(C) // step
+    f, w = (x[: n * step].reshape(n, step, 3).mean(axis=1) for x in (f, w))
+    dt = step / FINE_HZ
     noise, drift = np.exp(rng.uniform(np.log([5e-5, 2e-6]), np.log([5e-4, 5e-5])))
     bias = np.cumsum(drift * np.sqrt(dt) * rng.normal(size=(n, 3)), axis=0)
     felt = w if u.g_sensitivity is None else w + f @ u.g_sensitivity.T
     gyro = (felt + bias) @ u.M.T + u.c + noise / np.sqrt(dt) * rng.normal(size=(n, 3))
-    return gyro, f @ u.N.T + u.d + 0.02 * rng.normal(size=(n, 3)), bias.mean(axis=0)
+    return gyro, f @ u.N.T + u.d + 0.02 * rng.normal(size=(n, 3)), bias
 
 
-def truth(seed, kind, seconds=120, has_g_sensitivity=False, has_path=False, size_deg=None, lasting_s=None):
+def truth(seed, kind, seconds=120, has_g_sensitivity=False, has_path=False, size_deg=None, lasting_s=None, step=STEP):
     """One trial: ``kind`` of motion, its truth off by 0.1 to 2° over 4 to 40 s in world or body, clocks apart."""
     rng = np.random.default_rng(seed)
     u = unit(rng)
@@ -112,8 +112,8 @@ def truth(seed, kind, seconds=120, has_g_sensitivity=False, has_path=False, size
     t = np.arange(0, seconds, 1 / FINE_HZ)
     C, path = MOTIONS[kind](rng, t)
     arm = rng.uniform(-0.1, 0.1, 3) if has_path else np.zeros(3)
-    gyro, accelerometer, mean_bias = readings(rng, u, C, path + C @ arm)
-    u.c = u.c + u.M @ mean_bias
+    gyro, accelerometer, walked = readings(rng, u, C, path + C @ arm, step)
+    u.c = u.c + u.M @ walked.mean(axis=0)
     lead, ppm = rng.uniform(-0.05, 0.05), rng.uniform(-300, 300)
     k = np.arange(0, len(t), STEP)
     size = np.radians(size_deg or np.exp(rng.uniform(np.log(0.1), np.log(2))))
@@ -121,7 +121,7 @@ def truth(seed, kind, seconds=120, has_g_sensitivity=False, has_path=False, size
     seen = error @ C[k] if rng.uniform() < 0.5 else C[k] @ error
     seen = jittered(seen, rng, np.radians(0.05))
     position = path[k] + 3e-4 * rng.normal(size=(len(k), 3)) if has_path else None
-    log = Recording.from_arrays(times(len(gyro), STEP), accelerometer, gyro)
+    log = Recording.from_arrays(times(len(gyro), step), accelerometer, gyro)
     timestamps = t[k] * (1 + 1e-6 * ppm) + lead
     motion = ReferenceMotion(timestamps - timestamps[0], attitude=seen, position=position, source=f"{kind}.csv")
-    return Trial(log, motion, u, lead - timestamps[0], ppm, arm)
+    return Trial(log, motion, u, lead - timestamps[0], ppm, arm, walked - walked.mean(axis=0))

@@ -14,7 +14,15 @@ from trihedron.estimate.filter_noise.angle import angle_stretches
 from trihedron.estimate.filter_noise.axes import unlike_axes_beside
 from trihedron.estimate.filter_noise.held_out import Errors, errors_over
 from trihedron.estimate.filter_noise.left_over import Left, left_over
-from trihedron.estimate.filter_noise.strengths import PREFERRED, Fitted, Prior, bounded, fit, forgetting
+from trihedron.estimate.filter_noise.strengths import (
+    PREFERRED,
+    Fitted,
+    Prior,
+    bounded,
+    fit,
+    forgetting,
+    with_slow_error_of,
+)
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, matern
 from trihedron.estimate.filter_noise.temperature import PER_KELVIN, beside_temperature, of_temperature
 from trihedron.estimate.filter_noise.velocity import velocity_stretches
@@ -45,7 +53,8 @@ VELOCITY = Prior(
     ANGLE.sigma,
     np.ones(7),
 )
-"""The same of accelerometers beside a path: a millimetre of white error; the slow one is that of the attitude."""
+"""The same of accelerometers beside a path: a millimetre of white error; the slow one is that of the attitude, whose
+fit knows more of it (`Learnt.told`)."""
 LEAST_S = 40.0
 """Shared motion below which two halves say nothing of ten seconds."""
 UNTURNED = np.ones(2)
@@ -82,15 +91,53 @@ def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Asked
     stretches = beside_temperature(angle_stretches(found, asked.band_hz, known), recording, PER_KELVIN["gyroscope"])
     _refuse_short(stretches, motion)
     left = left_over(found, asked.horizons_s)
-    out = [_sensor(stretches, ANGLE, asked, asked.gyroscope, left)]
+    of_gyro = learnt(stretches, (ANGLE, ANGLE), asked.gyroscope)
+    out = [_sensor(of_gyro, asked, asked.gyroscope, left)]
     if motion.position is not None and side.force is not None:
         known = 0.0 if asked.accelerometer is None else asked.accelerometer.N.value
         assert out[0].reference is not None
         white = out[0].reference.white.value
         more = velocity_stretches(side, found.points[0], asked.band_hz, known, asked.gravity_m_s2, white)
         more = beside_temperature(more, recording, PER_KELVIN["accelerometer"])
-        out.append(_sensor(more, VELOCITY, asked, asked.accelerometer, {}, white))
+        of_force = learnt(more, of_gyro.told(VELOCITY), asked.accelerometer)
+        out.append(_sensor(of_force, asked, asked.accelerometer, {}, white))
     return tuple(out)
+
+
+@dataclass(frozen=True, eq=False)
+class Learnt:
+    """Fits of a sensor's stretches: ``taught`` on the half before ``held``, ``found`` on all, each with whether the
+    reference follows the sensor; the prior of all."""
+
+    stretches: Sequence[Stretch]
+    held: list[tuple[Stretch, int]]
+    taught: tuple[Fitted, bool]
+    found: tuple[Fitted, bool]
+    prior: Prior
+
+    def told(self, usual: Prior) -> tuple[Prior, Prior]:
+        """Priors of the half and of all for another sensor beside this reference, with what this one tells of it.
+
+        A reference computed from this sensor shares errors with it that the difference does not show.
+        """
+        half, whole = (
+            usual if follows else with_slow_error_of(usual, fitted.draws)
+            for fitted, follows in (self.taught, self.found)
+        )
+        return half, whole
+
+
+def learnt(stretches: Sequence[Stretch], usual: tuple[Prior, Prior], static: StaticNoise | None) -> Learnt:
+    """Both fits, under the usual priors of the half and of all."""
+    half, held = halves(stretches)
+    of_half, of_all = (informed(one, stretches, static) for one in usual)
+    return Learnt(
+        stretches,
+        held,
+        independent_or_not(half, of_half, usual[0]),
+        independent_or_not(stretches, of_all, usual[1]),
+        of_all,
+    )
 
 
 def _refuse_short(stretches: Sequence[Stretch], motion: ReferenceMotion) -> None:
@@ -102,14 +149,10 @@ def _refuse_short(stretches: Sequence[Stretch], motion: ReferenceMotion) -> None
 
 
 def _sensor(
-    stretches: Sequence[Stretch], usual: Prior, asked: Asked, static: StaticNoise | None, left: Left,
-    white_rad: float = 0.0,
-) -> SensorFilterNoise:  # fmt: skip
-    is_gyro = usual is ANGLE
-    prior = informed(usual, stretches, static)
-    half, held = halves(stretches)
-    taught, _ = independent_or_not(half, prior, usual)
-    found, follows = independent_or_not(stretches, prior, usual)
+    learnt: Learnt, asked: Asked, static: StaticNoise | None, left: Left, white_rad: float = 0.0
+) -> SensorFilterNoise:
+    stretches, taught, (found, follows) = learnt.stretches, learnt.taught[0], learnt.found
+    is_gyro = stretches[0].tilts is None
     gain, sigma, tau = forgetting(stretches, found)
     is_gm = gain > PREFERRED
     draws = found.draws
@@ -135,11 +178,11 @@ def _sensor(
         static=static,
         bias=BiasModel("gauss-markov", gain, sigma, tau) if is_gm else BiasModel("walk", gain),
         axes_N=() if follows else unlike_axes_beside(stretches, found, N),
-        vibration=bounded(draws[:, 1]) if prior.is_there[1] and not follows else None,
+        vibration=bounded(draws[:, 1]) if learnt.prior.is_there[1] and not follows else None,
         reference=_worth(draws, follows),
         shares=shares,
         consistency=tuple(
-            one for h in asked.horizons_s if (one := consistency(held, taught, static, h)) is not None
+            one for h in asked.horizons_s if (one := consistency(learnt.held, taught, static, h)) is not None
         ),
         is_settled=found.is_settled and taught.is_settled,
     )  # fmt: skip
@@ -157,7 +200,7 @@ def informed(usual: Prior, stretches: Sequence[Stretch], static: StaticNoise | N
     # Without a datum of the noise at rest only changes of the power tell vibration from it.
     shows = np.any(power > 0.0) and (static is not None or np.std(power) > 0.2 * np.mean(power))
     is_there[1] = float(shows)
-    return Prior(mean, sigma, is_there)
+    return replace(usual, mean=mean, sigma=sigma, is_there=is_there)
 
 
 def independent_or_not(stretches: Sequence[Stretch], prior: Prior, usual: Prior) -> tuple[Fitted, bool]:
@@ -170,7 +213,7 @@ def independent_or_not(stretches: Sequence[Stretch], prior: Prior, usual: Prior)
         return apart, False
     wide = prior.sigma.copy()
     wide[0] = usual.sigma[0]
-    other = fit(stretches, Prior(prior.mean, wide, prior.is_there))
+    other = fit(stretches, replace(prior, sigma=wide))
     follows = 2.0 * (other.evidence - apart.evidence) > PREFERRED
     return (other, True) if follows else (apart, False)
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.special import gammaln, logsumexp, ndtr
+from scipy.special import gammaln, logsumexp, ndtr, ndtri
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
 from trihedron.records.filter_noise import Bounded
+
+Mask = npt.NDArray[np.bool_]
 
 COORDINATES = ("noise", "vibration", "bias_walk", "white", "slow", "slow_s", "body")
 """Logarithms of strengths, ``slow`` that of the reference's whole slow error, and last a standard normal number whose
@@ -36,6 +39,9 @@ TIMES_S = (10.0, 30.0, 100.0)
 """Time constants of a Gauss-Markov bias that are tried beside the walk."""
 PREFERRED = 6.0
 """2 ln of the evidence by which the bias has to be Gauss-Markov: three time constants are tried (2 ln 3) and 4 more."""
+WIDER_BY, LEAST_SIGMA = 2.0, 0.2
+"""Prior σ of what another sensor's draws tell, in theirs: both see the same course of the reference's error, and what
+that course tells of its strength counts once. No less than the number of draws tells."""
 ABSENT = 30.0
 """An interval that reaches over more than this factor says how large the strength can be, and no more."""
 
@@ -44,13 +50,15 @@ ABSENT = 30.0
 class Prior:
     """Of the coordinates: ``mean`` (7,), ``sigma`` (7,); ``is_there`` (7,) those that there are.
 
-    A strength that may be nothing has a half-Cauchy prior about ``mean`` (Gelman 2006): flat towards nothing, so that
-    what a log does not show has an upper limit of the log and not of the prior. ``sigma`` then bounds the search.
+    A strength that ``may_be_nothing`` (7,) has a half-Cauchy prior about ``mean`` (Gelman 2006): flat towards nothing,
+    so that what a log does not show has an upper limit of the log and not of the prior. ``sigma`` then bounds the
+    search. The others are normal.
     """
 
     mean: FloatArray
     sigma: FloatArray
     is_there: FloatArray
+    may_be_nothing: Mask = field(default_factory=MAY_BE_NOTHING.copy)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,8 +111,8 @@ def _slope(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> tuple[F
     free = prior.is_there > 0.0
     far, sigma = x - prior.mean[free], prior.sigma[free]
     # A hyperbolic secant of the logarithm, of information 1/2 on average.
-    slope = np.where(MAY_BE_NOTHING[free], -np.tanh(far), -far / sigma**2)
-    information = np.diag(np.where(MAY_BE_NOTHING[free], 0.5, 1.0 / sigma**2))
+    slope = np.where(prior.may_be_nothing[free], -np.tanh(far), -far / sigma**2)
+    information = np.diag(np.where(prior.may_be_nothing[free], 0.5, 1.0 / sigma**2))
     at = whole(prior, x)
     others = [whole(prior, x + STEP * e) for e in np.eye(len(x))]
     for one in stretches:
@@ -130,7 +138,7 @@ def height(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> float:
     strengths = whole(prior, x)
     normal = -0.5 * (far / sigma) ** 2 - np.log(np.sqrt(2.0 * np.pi) * sigma)
     half_cauchy = -np.log(np.pi * np.cosh(far))
-    known = np.sum(np.where(MAY_BE_NOTHING[free], half_cauchy, normal))
+    known = np.sum(np.where(prior.may_be_nothing[free], half_cauchy, normal))
     return float(sum(one.evidence(strengths) for one in stretches) + known)
 
 
@@ -141,6 +149,24 @@ def whole(prior: Prior, x: FloatArray) -> FloatArray:
     angle = 0.5 * np.pi * float(ndtr(every[-1]))
     slow = np.exp(every[4])
     return np.array([*np.exp(every[:4]), slow * np.cos(angle), slow * np.sin(angle), np.exp(every[5])])
+
+
+def with_slow_error_of(prior: Prior, draws: FloatArray) -> Prior:
+    """The prior of another sensor beside the same reference, whose slow error is as ``draws`` (k, 7) of this one have
+    it: one error turns the angles of the one and tilts gravity for the other."""
+    s = dict(zip(NAMES, draws.T, strict=True))
+    right_angles = np.arctan2(s["body"], s["world"]) / (0.5 * np.pi)
+    told = {
+        "slow": np.log(np.hypot(s["world"], s["body"])),
+        "slow_s": np.log(s["slow_s"]),
+        # Within five sigma: rounding makes a part of the one or of the other exactly nothing.
+        "body": np.clip(ndtri(right_angles), -5.0, 5.0),
+    }
+    mean, sigma, may_be_nothing = prior.mean.copy(), prior.sigma.copy(), prior.may_be_nothing.copy()
+    for name, values in told.items():
+        at = COORDINATES.index(name)
+        mean[at], sigma[at], may_be_nothing[at] = values.mean(), max(WIDER_BY * float(values.std()), LEAST_SIGMA), False
+    return replace(prior, mean=mean, sigma=sigma, may_be_nothing=may_be_nothing)
 
 
 def fit(stretches: Sequence[Stretch], prior: Prior) -> Fitted:

@@ -1,0 +1,50 @@
+"""Strengths of noise for a filter: their priors and their greatest posterior."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from test_filter_noise import SLOW, STRENGTHS, TAU, K, N, drawn
+from trihedron.estimate.filter_noise.beside_reference import VELOCITY
+from trihedron.estimate.filter_noise.strengths import (
+    COORDINATES,
+    Prior,
+    _slope,
+    height,
+    most_likely,
+    whole,
+    with_slow_error_of,
+)
+
+
+def test_an_accelerometers_reference_is_as_wrong_as_the_gyro_found_it():
+    draws = np.tile(STRENGTHS, (50, 1))
+    draws[:, 4] = 0.6 * SLOW * np.geomspace(0.5, 2.0, 50)
+    draws[:, 5] = 0.8 * SLOW * np.geomspace(0.5, 2.0, 50)
+    told = with_slow_error_of(VELOCITY, draws)
+    assert whole(told, told.mean)[4:] == pytest.approx([0.6 * SLOW, 0.8 * SLOW, TAU], rel=1e-6)
+    slow, others = COORDINATES.index("slow"), [COORDINATES.index(name) for name in ("noise", "bias_walk", "white")]
+    assert told.sigma[slow] == pytest.approx(2.0 * np.std(np.log(draws[:, 4])))
+    assert not told.may_be_nothing[slow]
+    assert np.all(told.mean[others] == VELOCITY.mean[others])
+    # The prior's height is the normal's there, and the search's slope its derivative.
+    x = told.mean + 0.3 * told.sigma
+    both = [height([drawn(3)], told, x + sign * 1e-3 * np.eye(7)[slow]) for sign in (1.0, -1.0)]
+    assert _slope([drawn(3)], told, x)[0][slow] == pytest.approx((both[0] - both[1]) / 2e-3, abs=0.1)
+
+
+@pytest.mark.parametrize("far", [0.1, 10.0])
+def test_the_greatest_posterior_is_found_from_strengths_that_are_far_off(far):
+    # From a prior a factor of ten off on either side: searching along slopes alone ended on a ridge in a real flight.
+    sigma = np.log([1.1, 2.0, 30.0, 30.0, 30.0, 4.0, 2.0])
+    near = Prior(np.log([N, 1.0, K, 3e-5, SLOW, TAU, 1.0]), sigma, np.array([1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0]))
+    off = replace(near, mean=near.mean + np.log(far) * np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0]))
+    x, _ = most_likely([drawn(3)], off)
+    other, _ = most_likely([drawn(3)], near)
+    # Under that prior nothing is likelier, the other prior's greatest posterior among it; 0.01 ends the search.
+    assert height([drawn(3)], off, x) > height([drawn(3)], off, other) - 0.1
+    slope, _ = _slope([drawn(3)], off, other)
+    for k, e in enumerate(np.eye(len(other))):
+        both = [height([drawn(3)], off, other + sign * 1e-3 * e) for sign in (1.0, -1.0)]
+        assert slope[k] == pytest.approx((both[0] - both[1]) / 2e-3, abs=0.1)
