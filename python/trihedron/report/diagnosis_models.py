@@ -1,19 +1,22 @@
-"""The models of a diagnosis: S and b without and with the effects, gravity and noise."""
+"""A diagnosis in tables: S and b without and with the effects, every effect that was tried, empirical relations."""
 
 from __future__ import annotations
 
 from trihedron.arrays import AXES
-from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.diagnosis import Candidate, Diagnosis, Relation
 from trihedron.report.diagnosis_words import (
+    p_in_words,
     size_in_words,
     value_in_words,
 )
 from trihedron.report.document import Block, Facts, Table
 from trihedron.report.numbers import (
     engineering_exponent,
+    listed,
     plain_number,
     power_of_ten,
     unit_in_print,
+    with_sigma,
 )
 
 
@@ -72,3 +75,54 @@ def _number_with_sigma(value: float, sigma: float) -> str:
         return value_in_words(value, sigma)
     scale = 10.0**-exponent
     return f"({value_in_words(scale * value, scale * sigma)}) {power_of_ten(exponent)}"
+
+
+def candidates_table(diagnosis: Diagnosis) -> Table:
+    """Every effect of the catalogue: how far the linear model alone would ask for it, and what became of it."""
+    accepted = {effect.id for effect in diagnosis.effects}
+    tried = [c for c in diagnosis.candidates if c.applicable]
+    tried.sort(key=lambda c: 2.0 if c.p_value is None else c.p_value)
+    rows = [
+        (
+            c.id,
+            "–" if c.p_value is None else p_in_words(c.p_value),
+            "accepted" if c.id in accepted else _outcome(c),
+        )
+        for c in tried
+    ]
+    rows += [(c.id, "–", f"not applicable: {c.reason}") for c in diagnosis.candidates if not c.applicable]
+    return Table(("effect", "p against the linear model", "outcome"), tuple(rows), "Every effect of the catalogue")
+
+
+def _outcome(candidate: Candidate) -> str:
+    """Why an effect that was tried is not in the model: small p alone is no reason beside what was accepted."""
+    if candidate.stands_against is not None:
+        return f"needless beside {candidate.stands_against}"
+    return candidate.reason or "not needed"
+
+
+MOST_COEFFICIENTS = 6
+
+
+def relations_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """One block per empirical relation; none where nothing predicts."""
+    return tuple(Facts(_rows(one)) for one in diagnosis.relations)
+
+
+def _rows(relation: Relation) -> tuple[tuple[str, str], ...]:
+    shown = relation.coefficients[:MOST_COEFFICIENTS]
+    words = [f"{c.name} {_value(c.value, c.std)} {unit_in_print(c.unit)}" for c in shown]
+    more = len(relation.coefficients) - len(shown)
+    rows = [
+        ("empirical relation", relation.statement),
+        ("", f"{relation.form}: " + ", ".join(words) + (f", {more} more" if more > 0 else "")),
+    ]
+    if relation.resembles:
+        rows.append(("", f"Similar to {listed(list(relation.resembles))}; similarity is no proof."))
+    if relation.experiment:
+        rows.append(("", f"To confirm it: {relation.experiment}."))
+    return tuple(rows)
+
+
+def _value(value: float, sigma: float) -> str:
+    return with_sigma(value, sigma) if sigma > 0.0 else plain_number(value, 3)

@@ -91,7 +91,7 @@ def _converter() -> Converter:
     made.register_structure_hook(float, lambda value, _: math.nan if value is None else float(_checked(value, float)))
     for kind in (str, bool, int):
         made.register_structure_hook(kind, lambda value, wanted: _checked(value, wanted))
-    made.register_structure_hook_func(lambda kind: get_origin(kind) is Literal, _literal)
+    made.register_structure_hook_func(_is_literal, _literal)
     made.register_unstructure_hook_func(is_array, _line)
     made.register_structure_hook_func(is_array, lambda line, _: _array(_checked(line, str)))
     made.register_unstructure_hook(Finding, lambda found: {name: getattr(found, name) for name in _SAID})
@@ -132,6 +132,10 @@ def _line(values: FloatArray) -> str:
 def _array(line: str) -> FloatArray:
     rows = np.array([[float(word) for word in row.split()] for row in line.split(";")])
     return rows if len(rows) > 1 else rows[0]
+
+
+def _is_literal(kind: Any) -> bool:
+    return get_origin(kind) is Literal
 
 
 def _literal(value: Any, wanted: Any) -> Any:
