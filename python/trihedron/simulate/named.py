@@ -38,9 +38,9 @@ SESSIONS: dict[str, Callable[..., Motion]] = {
 """What a scenario file may call a session."""
 
 
-def _of(profile: Profile, motion: Motion) -> Scenario:
-    accelerometer, gyroscope = profile.unit(1)
-    return Scenario(motion, accelerometer=accelerometer, gyroscope=gyroscope, clock=profile.clock)
+def _of(profile: Profile, motion: Motion, name: str = "", unit: int = 1) -> Scenario:
+    accelerometer, gyroscope = profile.unit(unit)
+    return Scenario(motion, name, accelerometer, gyroscope, profile.clock)
 
 
 def _linear() -> Scenario:
