@@ -9,12 +9,15 @@ import numpy as np
 import trihedron
 from trihedron.diagnose.effects.table_tilt import _error_of_mean
 from trihedron.diagnose.residuals import goodness_of_fit
-from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
+from trihedron.diagnose.residuals.jumps import jumps_in_poses
 from trihedron.diagnose.session.state import STATIC_ACCEL, STATIC_GYRO
 from trihedron.records import Pose
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
 
 RATE_HZ = 100.0
+
+JUMPS = 1e-3
+"""p-value from which zeros are said to change inside poses."""
 
 
 class Poses:

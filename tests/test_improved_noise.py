@@ -22,7 +22,7 @@ from trihedron.simulate import (
     noise_of_octaves,
     simulate,
 )
-from trihedron.simulate.bias_repeatability import bias_in_moves as straying
+from trihedron.simulate.noise import bias_in_moves as straying
 from trihedron.simulate.profiles import profile_by_name
 
 RATE = 100.0

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 import trihedron
-from trihedron.report.noise_parts import NAME_DECADES, parts_of
+from trihedron.report.noise_charts import NAME_DECADES, parts_of
 
 
 def test_no_name_of_a_part_stands_on_another():

@@ -15,7 +15,7 @@ from trihedron.records.diagnosis import Candidate
 from trihedron.report.calibration_charts import MARK, residual_chart, sphere_chart
 from trihedron.report.chart import Note, Panel, Scale
 from trihedron.report.diagnosis import diagnosis_report
-from trihedron.report.diagnosis_candidates import candidates_table
+from trihedron.report.diagnosis_models import candidates_table
 from trihedron.report.diagnosis_numbers import differing_noise
 from trihedron.report.diagnosis_overview_charts import traces_chart
 from trihedron.report.disc import drawn_disc

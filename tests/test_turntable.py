@@ -10,7 +10,7 @@ from confidence.sensor import Truth as ConfidenceTruth
 from confidence.sensor import lower
 from trihedron import calibrate, diagnose, segment, verify
 from trihedron.estimate.gyroscope.alignment import usual_deg
-from trihedron.estimate.gyroscope.own_residuals import with_own_residuals
+from trihedron.estimate.gyroscope.turntable import with_own_residuals
 from trihedron.records import Recording
 
 G, RATE_HZ, DEG = 9.81, 100.0, np.pi / 180.0

@@ -17,7 +17,7 @@ import typer
 
 from trihedron.cli.provenance import with_provenance
 from trihedron.cli.speech import speaks_unicode
-from trihedron.files.output import OutputError, check_free, write_whole
+from trihedron.files.output import check_free, check_report, write_whole
 from trihedron.sanitise import printable
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from trihedron.report.text import Style
 
 NOT_TO_BE_TRUSTED = 2
-REPORT_KINDS = (".html", ".txt", ".json")
 
 
 def check_outputs(
@@ -39,8 +38,8 @@ def check_outputs(
     OutputError
         As :func:`trihedron.files.output.check_free`, or when a report has an ending that names no format.
     """
-    if report is not None and report.suffix.lower() not in REPORT_KINDS:
-        raise OutputError(f"{report}: the ending tells the format of a report; give .html, .txt or .json.")
+    if report is not None:
+        check_report(report)
     check_free([*paths, report], overwrite=force, inputs=inputs)
 
 
@@ -48,19 +47,9 @@ def write_report(document: Document, machine: dict[str, Any], report: Path | Non
     """The report in the format that its name asks for."""
     if report is None:
         return
-    document = _with_provenance(document)
-    kind = report.suffix.lower()
-    if kind == ".html":
-        from trihedron.report.page import to_html
+    from trihedron.report.saved import written
 
-        content = to_html(document)
-    elif kind == ".txt":
-        from trihedron.report import to_text
-        from trihedron.report.document import with_its_making
-
-        content = to_text(with_its_making(document))
-    else:
-        content = _saved(machine, document)
+    content = written(_with_provenance(document), lambda: machine, report)
     write_whole(report, content, overwrite=force)
     say(f"report: {report}")
 
@@ -68,13 +57,6 @@ def write_report(document: Document, machine: dict[str, Any], report: Path | Non
 def _with_provenance(document: Document) -> Document:
     """How a report was made; one that is laid out again keeps how it was."""
     return document if document.provenance else with_provenance(document)
-
-
-def _saved(machine: dict[str, Any], document: Document) -> str:
-    from trihedron.report.machine import json_text
-    from trihedron.report.saved import with_report
-
-    return json_text(with_report(machine, document))
 
 
 def write_json(machine: dict[str, Any], target: Path | None, *, force: bool, document: Document | None = None) -> None:
@@ -89,8 +71,11 @@ def write_json(machine: dict[str, Any], target: Path | None, *, force: bool, doc
     if str(target) == "-":
         typer.echo(json_text(machine), nl=False)
         return
-    content = json_text(machine) if document is None else _saved(machine, _with_provenance(document))
-    write_whole(target, content, overwrite=force)
+    if document is not None:
+        from trihedron.report.saved import with_report
+
+        machine = with_report(machine, _with_provenance(document))
+    write_whole(target, json_text(machine), overwrite=force)
     say(f"JSON: {target}")
 
 

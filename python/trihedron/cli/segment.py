@@ -29,6 +29,6 @@ def segment(
 
     with progress("segmenting") as tell:
         segments = reading.segment(recording, progress=tell)
-    document, machine = segments_report(recording, segments), segments_record(recording, segments)
+    document, machine = segments_report(segments, recording), segments_record(segments, recording)
     tell_all(document, machine, json, report, force=force)
     leave((*recording.findings, *segments.findings))

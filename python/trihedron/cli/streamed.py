@@ -81,7 +81,7 @@ def segment_stream(
         segments = segment_file(log, checkpoint=checkpoint, progress=tell)
     # Figures and times come from the rows of moves and of the ends of poses.
     recording, shown = condensed(log, segments)
-    document, machine = segments_report(recording, shown), segments_record(recording, shown)
+    document, machine = segments_report(shown, recording), segments_record(shown, recording)
     tell_all(document, machine, json, report, force=force)
     leave(segments.findings)
 

@@ -138,6 +138,18 @@ class OutputError(RefusedError):
     """A file that cannot be written. One sentence: which file, why, what to do."""
 
 
+def check_report(path: Path) -> None:
+    """Refuse a report whose ending names no format.
+
+    Raises
+    ------
+    OutputError
+        Naming the endings that there are.
+    """
+    if path.suffix.lower() not in (".html", ".txt", ".json"):
+        raise OutputError(f"{path}: the ending tells the format of a report; give .html, .txt or .json.")
+
+
 def check_free(
     paths: Iterable[Path | None], *, overwrite: bool, inputs: Iterable[str | os.PathLike[str] | None] = ()
 ) -> None:

@@ -209,15 +209,12 @@ class Consistency:
 class KalmanCalibration(Frozen):
     """Calibration of a triad by Kalman filter.
 
-    ``inverse_S`` (3, 3), ``inverse_b`` (3,): ``raw = inverse_S f + inverse_b``; ``accelerometer`` the direct form
-    ``f = S raw + b`` with its covariance, in the frame of the references. ``residual_m_s2`` (n, 3) is corrected minus
-    reference specific force.
+    ``axes`` hold ``raw = U f + U0`` of every axis; ``accelerometer`` is the direct form ``f = S raw + b`` with its
+    covariance, in the frame of the references. ``residual_m_s2`` (n, 3) is corrected minus reference specific force.
     """
 
     axes: tuple[AxisKalmanResult, ...]
     accelerometer: SensorCalibration
-    inverse_S: FloatArray
-    inverse_b: FloatArray
     references: FloatArray
     readings: FloatArray
     start_s: FloatArray

@@ -73,8 +73,8 @@ def _converter() -> Converter:
     from cattrs.gen import make_dict_unstructure_fn, override
 
     plain = Converter(unstruct_collection_overrides={tuple: list}, detailed_validation=False, forbid_extra_keys=True)
-    plain.register_unstructure_hook_func(_is_array, lambda array: array.tolist())
-    plain.register_structure_hook_func(_is_array, lambda numbers, _: np.array(numbers, dtype=np.float64))
+    plain.register_unstructure_hook_func(is_array, lambda array: array.tolist())
+    plain.register_structure_hook_func(is_array, lambda numbers, _: np.array(numbers, dtype=np.float64))
     plain.register_structure_hook(float, lambda number, _: math.nan if number is None else float(number))
     plain.register_structure_hook_func(_is_mapping, _mapping)
 
@@ -100,7 +100,8 @@ def _converter() -> Converter:
     return plain
 
 
-def _is_array(kind: Any) -> bool:
+def is_array(kind: Any) -> bool:
+    """Whether a type is an array of NumPy, of any element."""
     return kind is np.ndarray or get_origin(kind) is np.ndarray
 
 

@@ -61,6 +61,13 @@ class Presented(Frozen):
         return str(ask("as_html", self))
 
 
+class Printed(Presented):
+    """One of which ``print`` gives the report."""
+
+    def __str__(self) -> str:
+        return self.as_text()
+
+
 def _read_only(mapping: Mapping[Any, Any]) -> MappingProxyType[Any, Any]:
     return MappingProxyType(dict(mapping))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.records.presented import Presented
+from trihedron.records.presented import Printed
 from trihedron.records.verification import Verification
 
 Interval = tuple[float, float]
@@ -57,7 +57,7 @@ class Ranked:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ranking(Presented):
+class Ranking(Printed):
     """Calibrations in order, the best first. ``print`` gives the table."""
 
     source: str
@@ -72,6 +72,3 @@ class Ranking(Presented):
 
     def __repr__(self) -> str:
         return f"<Ranking of {len(self.candidates)} calibrations on {self.source}: {self.best.name} first>"
-
-    def __str__(self) -> str:
-        return self.as_text()

@@ -9,7 +9,7 @@ from trihedron.answers import ask
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity, Verification
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.kalman import KalmanCalibration, NormKalmanCalibration
-from trihedron.records.presented import Presented
+from trihedron.records.presented import Presented, Printed
 from trihedron.records.published import published_figures
 from trihedron.records.reference import AgainstReference
 from trihedron.records.sessions import SessionsModel
@@ -17,7 +17,7 @@ from trihedron.sanitise import one_line
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CalibrationResult(Presented):
+class CalibrationResult(Printed):
     """A calibration with the segments and the recording that it was made from. ``print`` gives the report.
 
     Attributes
@@ -68,12 +68,9 @@ class CalibrationResult(Presented):
         sensors = "accelerometer" if self.gyroscope is None else "accelerometer and gyroscope"
         return f"<CalibrationResult of {one_line(self.recording.source)}: {sensors}, {self.segments.n_poses} poses>"
 
-    def __str__(self) -> str:
-        return self.as_text()
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class VerificationResult(Presented):
+class VerificationResult(Printed):
     """A calibration judged on another recording. ``print`` gives the report.
 
     Attributes
@@ -112,12 +109,9 @@ class VerificationResult(Presented):
     def __repr__(self) -> str:
         return f"<VerificationResult on {one_line(self.recording.source)}: {self.verification.norm_rms:.3g} m/s² rms>"
 
-    def __str__(self) -> str:
-        return self.as_text()
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CheckResult(Presented):
+class CheckResult(Printed):
     """Whether a log is fit for calibration. ``print`` gives the report.
 
     Attributes
@@ -149,9 +143,6 @@ class CheckResult(Presented):
         return (
             f"<CheckResult of {one_line(self.recording.source)}: {'fit' if self.is_fit else 'not fit'} for calibration>"
         )
-
-    def __str__(self) -> str:
-        return self.as_text()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -219,7 +210,7 @@ class DiagnosisResult(Diagnosis, Presented):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class KalmanResult(Presented):
+class KalmanResult(Printed):
     """What the filter found, with the segments and the recording that it was made from. ``print`` gives the report.
 
     Attributes
@@ -256,12 +247,9 @@ class KalmanResult(Presented):
     def __repr__(self) -> str:
         return f"<KalmanResult of {one_line(self.recording.source)}: {self.calibration.accelerometer.method}>"
 
-    def __str__(self) -> str:
-        return self.as_text()
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SessionsResult(Presented):
+class SessionsResult(Printed):
     """Many recordings as one model, with each recording's own calibration. ``print`` gives the report.
 
     Attributes
@@ -293,6 +281,3 @@ class SessionsResult(Presented):
 
     def __repr__(self) -> str:
         return f"<SessionsResult of {len(self.model.sessions)} recordings by {self.model.by}>"
-
-    def __str__(self) -> str:
-        return self.as_text()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from trihedron.records.diagnosis import Diagnosis, EffectParameter
 from trihedron.records.frozen import Frozen
 from trihedron.records.plain import Plain
-from trihedron.records.presented import Presented
+from trihedron.records.presented import Printed
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class SharedCandidate(Frozen, Plain):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SharedDiagnosis(Presented):
+class SharedDiagnosis(Printed):
     """Several recordings of one unit: each diagnosed by itself, and what they share. ``print`` gives the report."""
 
     diagnoses: tuple[Diagnosis, ...]
@@ -49,9 +49,6 @@ class SharedDiagnosis(Presented):
         """Of every recording the effects (ids) that it names by itself and not all share."""
         shared = {one.id for one in self.effects if one.is_of_instrument}
         return tuple(tuple(one.id for one in d.effects if one.id not in shared) for d in self.diagnoses)
-
-    def __str__(self) -> str:
-        return self.as_text()
 
     def __repr__(self) -> str:
         return f"<SharedDiagnosis of {len(self.diagnoses)} recordings, {len(self.effects)} shared effects>"

@@ -13,8 +13,8 @@ from trihedron.report.axes import BIAS, axes_of
 from trihedron.report.calibration_charts import move_noise_deg
 from trihedron.report.document import Table
 from trihedron.report.many_charts import shown
-from trihedron.report.numbers import how_many, plain_number, with_sigma
-from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2
+from trihedron.report.numbers import how_many, in_mm_s2, plain_number, with_sigma
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 METHODS = {
     "joint": "both sensors in one fit of poses and moves",
@@ -49,16 +49,13 @@ def _bias(sensor: SensorCalibration) -> list[tuple[str, str]]:
 
 
 def _norm_words(quality: FitQuality) -> str:
-    def words(value: float) -> str:
-        return f"{plain_number(mm_s2_from_m_s2(value))} mm/s² ({plain_number(mg_from_m_s2(value), 2)} mg)"
-
     n = how_many(len(quality.residual), "pose")
-    parts = [f"{words(quality.rms)} rms in sample ({n})"]
+    parts = [f"{in_mm_s2(quality.rms)} rms in sample ({n})"]
     if quality.dof <= 0:
         parts = ["none in sample: as many parameters as poses, so the fit cannot be judged"]
     if quality.held_out_rms is not None:
-        parts.append(f"{words(quality.held_out_rms)} cross-validated (held out)")
-    parts.append(f"noise alone {words(quality.floor)}")
+        parts.append(f"{in_mm_s2(quality.held_out_rms)} cross-validated (held out)")
+    parts.append(f"noise alone {in_mm_s2(quality.floor)}")
     return "; ".join(parts)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -177,7 +177,6 @@ class Chart:
     columns: int = 1
     is_linked: bool = False
     legend: bool = True
-    extra: tuple[str, ...] = field(default=())
 
 
 def limits_of(panel: Panel) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -10,8 +10,8 @@ from trihedron.records import Calibration, Comparison, Finding, Recording, Segme
 from trihedron.report.calibration import parameter_table
 from trihedron.report.document import Block, Document, Facts, Paragraph, Section, Table
 from trihedron.report.findings import findings_block
-from trihedron.report.numbers import duration, engineering_exponent, plain_number, power_of_ten, with_sigma
-from trihedron.units import mg_from_m_s2, mm_s2_from_m_s2
+from trihedron.report.numbers import duration, engineering_exponent, in_mm_s2, plain_number, power_of_ten, with_sigma
+from trihedron.report.verification import facts_of
 
 
 def demonstration_report(
@@ -41,15 +41,11 @@ def demonstration_report(
     )
 
 
-def _acceleration(value: float) -> str:
-    return f"{plain_number(mm_s2_from_m_s2(value))} mm/s² ({plain_number(mg_from_m_s2(value), 2)} mg)"
-
-
 def _verdict(comparison: Comparison, verification: Verification, before: float) -> str:
     within = int(np.sum(np.abs(comparison.z) < 2.0))
     return (
-        f"Gravity error in static poses of a session that the calibration has not seen: {_acceleration(before)} rms "
-        f"before, {_acceleration(verification.norm_rms)} after. {within} of {len(comparison.names)} parameters lie "
+        f"Gravity error in static poses of a session that the calibration has not seen: {in_mm_s2(before)} rms "
+        f"before, {in_mm_s2(verification.norm_rms)} after. {within} of {len(comparison.names)} parameters lie "
         "within 2σ of the truth."
     )
 
@@ -78,24 +74,8 @@ def _calibrated(calibration: Calibration, latitude_deg: float) -> tuple[Block, .
 
 
 def _verified(verification: Verification, before: float) -> tuple[Block, ...]:
-    expected = float(np.sqrt(np.mean(verification.norm_sigma**2)))
-    rows = [
-        ("gravity error before", f"{_acceleration(before)} rms with the data sheet's scale"),
-        (
-            "gravity error after",
-            f"{_acceleration(verification.norm_rms)} rms over {len(verification.norm_error)} poses",
-        ),
-        ("  expected", f"{_acceleration(expected)} rms from noise and the calibration's uncertainty"),
-    ]
-    if len(verification.angle_deg):
-        rows += [
-            (
-                "tilt error after a rotation",
-                f"{plain_number(verification.angle_rms_deg)}° rms over {len(verification.angle_deg)} moves",
-            ),
-            ("  expected", f"{plain_number(verification.angle_expected_deg)}° rms"),
-        ]
-    return (Facts(tuple(rows)), *_warnings(verification.findings))
+    uncalibrated = ("gravity error before", f"{in_mm_s2(before)} rms with the data sheet's scale")
+    return (Facts((uncalibrated, *facts_of(verification))), *_warnings(verification.findings))
 
 
 def _warnings(findings: tuple[Finding, ...]) -> tuple[Block, ...]:

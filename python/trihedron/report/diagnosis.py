@@ -13,9 +13,8 @@ from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.report.axes import LETTERS
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pictures
-from trihedron.report.diagnosis_candidates import candidates_blocks
 from trihedron.report.diagnosis_charts import before_after_chart
-from trihedron.report.diagnosis_models import models_blocks
+from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relations_blocks
 from trihedron.report.diagnosis_numbers import (
     differing_blocks,
     noise_blocks,
@@ -28,7 +27,6 @@ from trihedron.report.diagnosis_overview_charts import (
     strengths_picture,
     traces_picture,
 )
-from trihedron.report.diagnosis_relations import relations_blocks
 from trihedron.report.diagnosis_words import (
     LEVELS,
     MEANING,

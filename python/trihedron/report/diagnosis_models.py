@@ -1,19 +1,22 @@
-"""The models of a diagnosis: S and b without and with the effects, gravity and noise."""
+"""A diagnosis in tables: S and b without and with the effects, every effect that was tried, empirical relations."""
 
 from __future__ import annotations
 
 from trihedron.arrays import AXES
-from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.diagnosis import Candidate, Diagnosis, Relation
 from trihedron.report.diagnosis_words import (
     size_in_words,
     value_in_words,
 )
 from trihedron.report.document import Block, Facts, Table
 from trihedron.report.numbers import (
+    MINUS,
     engineering_exponent,
+    listed,
     plain_number,
     power_of_ten,
     unit_in_print,
+    with_sigma,
 )
 
 
@@ -72,3 +75,68 @@ def _number_with_sigma(value: float, sigma: float) -> str:
         return value_in_words(value, sigma)
     scale = 10.0**-exponent
     return f"({value_in_words(scale * value, scale * sigma)}) {power_of_ten(exponent)}"
+
+
+def candidates_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """Every effect of the catalogue: what was tried, and why the others could not be."""
+    missing: dict[str, list[str]] = {}
+    for candidate in diagnosis.candidates:
+        if not candidate.applicable:
+            missing.setdefault(candidate.reason, []).append(candidate.id)
+    rows = tuple((listed(names), f"not applicable: {reason}") for reason, names in missing.items())
+    return (candidates_table(diagnosis), Facts(rows)) if rows else (candidates_table(diagnosis),)
+
+
+def candidates_table(diagnosis: Diagnosis) -> Table:
+    """Every effect that was tried: its score, its size at most, and what became of it."""
+    accepted = {effect.id for effect in diagnosis.effects}
+    tried = sorted((c for c in diagnosis.candidates if c.applicable), key=_order)
+    rows = [
+        (
+            c.id,
+            "–" if c.score is None else f"{round(c.score, 1) + 0.0:.1f}".replace("-", MINUS),
+            "–" if c.limit95 is None or c.id in accepted else parameter_in_words(c.limit95, c.size[0].unit),
+            "accepted" if c.id in accepted else _outcome(c),
+        )
+        for c in tried
+    ]
+    caption = "Effects that were tried; score: twice the log-evidence that one gains, less its price"
+    return Table(("effect", "score", "at most (95 %)", "outcome"), tuple(rows), caption)
+
+
+def _order(candidate: Candidate) -> float:
+    return 2.0 if candidate.p_value is None else candidate.p_value
+
+
+def _outcome(candidate: Candidate) -> str:
+    """Why an effect that was tried is not in the model: small p alone is no reason beside what was accepted."""
+    if candidate.stands_against is not None:
+        return f"needless beside {candidate.stands_against}"
+    return candidate.reason or "not needed"
+
+
+MOST_COEFFICIENTS = 6
+
+
+def relations_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """One block per empirical relation; none where nothing predicts."""
+    return tuple(Facts(_rows(one)) for one in diagnosis.relations)
+
+
+def _rows(relation: Relation) -> tuple[tuple[str, str], ...]:
+    shown = relation.coefficients[:MOST_COEFFICIENTS]
+    words = [f"{c.name} {_value(c.value, c.std)} {unit_in_print(c.unit)}" for c in shown]
+    more = len(relation.coefficients) - len(shown)
+    rows = [
+        ("empirical relation", relation.statement),
+        ("", f"{relation.form}: " + ", ".join(words) + (f", {more} more" if more > 0 else "")),
+    ]
+    if relation.resembles:
+        rows.append(("", f"Similar to {listed(list(relation.resembles))}; similarity is no proof."))
+    if relation.experiment:
+        rows.append(("", f"To confirm it: {relation.experiment}."))
+    return tuple(rows)
+
+
+def _value(value: float, sigma: float) -> str:
+    return with_sigma(value, sigma) if sigma > 0.0 else plain_number(value, 3)

@@ -238,7 +238,9 @@ def _draw(axis: Axes, mark: Mark) -> None:
         else:
             axis.bar(mark.x, mark.y - base, mark.width, bottom=base, color=colour, label=mark.name or None)
     elif isinstance(mark, Span):
-        axis.axvspan(mark.first, mark.last, color=colour, linewidth=0, zorder=0, label=mark.name or None)
+        # A shade is pale already; any other colour would hide the curves.
+        alpha = 1.0 if mark.colour == "shade" else 0.35
+        axis.axvspan(mark.first, mark.last, color=colour, alpha=alpha, linewidth=0, zorder=0, label=mark.name or None)
     elif isinstance(mark, Note):
         axis.annotate(mark.text, (mark.x, mark.y), xytext=(3, 3), textcoords="offset points", fontsize=7, color=colour)
 

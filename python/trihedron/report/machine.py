@@ -38,9 +38,9 @@ def curve_record(curve: AllanCurve) -> dict[str, Any]:
     return {name: getattr(curve, name) for name in (*names, *arrays)}
 
 
-def poses_record(segments: Segments) -> dict[str, Any]:
-    """Poses, moves and noise without the recording that they were found in."""
-    poses = [
+def segments_record(segments: Segments, recording: Recording | None = None) -> dict[str, Any]:
+    """Poses with their means, moves, noise; times of begin and end where the recording is given."""
+    poses: list[dict[str, Any]] = [
         {
             "start": pose.start,
             "stop": pose.stop,
@@ -56,51 +56,25 @@ def poses_record(segments: Segments) -> dict[str, Any]:
         }
         for k, pose in enumerate(segments.poses)
     ]
-    return {
-        "accelerometer_sigma": _row(segments.accelerometer_sigma),
-        "gyroscope_sigma": _row(segments.gyroscope_sigma),
+    found = {
+        "accelerometer_sigma": segments.accelerometer_sigma,
+        "gyroscope_sigma": segments.gyroscope_sigma,
         "poses": poses,
         "moves": [dict(vars(move)) for move in segments.moves],
         "findings": [finding.to_dict() for finding in segments.findings],
     }
-
-
-def segments_record(recording: Recording, segments: Segments) -> dict[str, Any]:
-    """Poses with their means, moves, noise."""
-    poses = [
-        {
-            "start": pose.start,
-            "stop": pose.stop,
-            "start_s": float(recording.time_s[pose.start]),
-            "stop_s": float(recording.time_s[pose.stop - 1]),
-            "disturbed": [list(part) for part in pose.disturbed],
-            "n_averaged": int(segments.n_averaged[k]),
-            "accelerometer_mean": _row(segments.accelerometer_mean, k),
-            "accelerometer_sigma_mean": _row(segments.accelerometer_sigma_mean, k),
-            "gyroscope_mean": _row(segments.gyroscope_mean, k),
-            "gyroscope_sigma_mean": _row(segments.gyroscope_sigma_mean, k),
-        }
-        for k, pose in enumerate(segments.poses)
-    ]
-    moves = [
-        {"start": move.start, "stop": move.stop, "pose_before": move.pose_before, "pose_after": move.pose_after}
-        for move in segments.moves
-    ]
-    return {
-        "recording": recording_record(recording),
-        "accelerometer_sigma": _row(segments.accelerometer_sigma),
-        "gyroscope_sigma": _row(segments.gyroscope_sigma),
-        "poses": poses,
-        "moves": moves,
-        "findings": [finding.to_dict() for finding in segments.findings],
-    }
+    if recording is None:
+        return found
+    for row, pose in zip(poses, segments.poses, strict=True):
+        row["start_s"], row["stop_s"] = (float(recording.time_s[at]) for at in (pose.start, pose.stop - 1))
+    return {"recording": recording_record(recording), **found}
 
 
 def calibration_record(calibration: Calibration, segments: Segments, recording: Recording) -> dict[str, Any]:
     """The calibration file's content, the figures that every report prints, the segments that it was made from."""
     document = calibration_document(calibration)
     figures = published_figures(calibration)
-    return {**document, "figures": figures, "segments": segments_record(recording, segments)}
+    return {**document, "figures": figures, "segments": segments_record(segments, recording)}
 
 
 def verification_record(verification: Verification) -> dict[str, Any]:
@@ -137,7 +111,7 @@ def check_record(
             if sensor is not None:
                 expected[name] = {"sigma_S": sensor.sigma_S, "sigma_b": sensor.sigma_b, "si_unit": sensor.si_unit}
     return {
-        **segments_record(recording, segments),
+        **segments_record(segments, recording),
         "is_fit": not any(finding.severity.value == "serious" for finding in findings),
         "expected": expected,
         "channels": channels_record(recording),
@@ -145,7 +119,5 @@ def check_record(
     }
 
 
-def _row(array: Any, k: int | None = None) -> Any:
-    if array is None:
-        return None
-    return array if k is None else array[k]
+def _row(array: Any, k: int) -> Any:
+    return None if array is None else array[k]

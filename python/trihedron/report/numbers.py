@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import re
 
+from trihedron.units import mg_from_m_s2, mm_s2_from_m_s2
+
 MINUS = "−"
 
 
@@ -107,3 +109,9 @@ def duration(seconds: float) -> str:
 def one_of(unit: str) -> str:
     """A unit after 'per': one count, not several."""
     return "count" if unit == "counts" else unit_in_print(unit)
+
+
+def in_mm_s2(acceleration_m_s2: float) -> str:
+    """An acceleration in mm/s², and in mg."""
+    mm_s2, mg = mm_s2_from_m_s2(acceleration_m_s2), mg_from_m_s2(acceleration_m_s2)
+    return f"{plain_number(mm_s2)} mm/s² ({plain_number(mg, 2)} mg)"

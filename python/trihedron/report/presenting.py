@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from trihedron.errors import RefusedError
 from trihedron.files.calibration import calibration_document, plain
-from trihedron.files.output import OutputError, write_whole
+from trihedron.files.output import write_whole
 from trihedron.records import AllanCurve, Calibration, Noise, Recording, Segments, Verification
 from trihedron.records.filter_noise import FilterNoise
 from trihedron.records.plan import ExperimentPlan
@@ -35,11 +35,11 @@ from trihedron.report.fragment import to_fragment
 from trihedron.report.kalman import kalman_record, kalman_report
 from trihedron.report.noise import noise_picture, noise_report
 from trihedron.report.noise_files import noise_record
-from trihedron.report.page import to_html
 from trihedron.report.plan import plan_record, plan_report
 from trihedron.report.ranking import ranking_record, ranking_report
 from trihedron.report.reference import calibration_result_report
-from trihedron.report.saved import with_report
+from trihedron.report.saved import written
+from trihedron.report.segments import segments_report
 from trihedron.report.sessions import sessions_columns, sessions_record, sessions_report
 from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
 from trihedron.report.text import WIDTH, to_text
@@ -48,8 +48,6 @@ from trihedron.report.verification import verification_report
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-REPORT_ENDINGS = (".html", ".txt", ".json")
 
 
 @dataclass(frozen=True)
@@ -98,7 +96,7 @@ _KINDS: dict[type, _Shown] = {
     FilterNoise: _Shown(filter_noise_report, filter_noise_record, filter_noise_columns),
     AllanCurve: _Shown(summaries.curve_summary, machine.curve_record, frames.curve_columns),
     Recording: _Shown(summaries.recording_summary, machine.recording_record, frames.recording_columns),
-    Segments: _Shown(summaries.segments_summary, machine.poses_record, frames.segments_columns),
+    Segments: _Shown(segments_report, machine.segments_record, frames.segments_columns),
     ExperimentPlan: _Shown(plan_report, plan_record),
 }
 
@@ -213,18 +211,9 @@ def report(result: object, path: str | os.PathLike[str] | None = None, *, overwr
     >>> trihedron.report(result).splitlines()[0]
     'Calibration'
     """
-    laid_out = _kind(result).document(result)
-    text = to_text(laid_out)
-    if path is None:
-        return text
-    ending = Path(path).suffix.lower()
-    if ending == ".html":
-        content = to_html(laid_out)
-    elif ending == ".txt":
-        content = text
-    elif ending == ".json":
-        content = machine.json_text(with_report(_kind(result).record(result), laid_out))
-    else:
-        raise OutputError(f"{path}: the ending tells the format of a report; give {', '.join(REPORT_ENDINGS)}.")
-    write_whole(path, content, overwrite=overwrite)
-    return text
+    shown = _kind(result)
+    laid_out = shown.document(result)
+    if path is not None:
+        content = written(laid_out, lambda: plain(shown.record(result)), Path(path))
+        write_whole(path, content, overwrite=overwrite)
+    return to_text(laid_out)

@@ -3,34 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
-from enum import Enum
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from types import UnionType
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
+from trihedron.files.output import check_report
 from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records.plain import is_array
 from trihedron.report import chart, document
 from trihedron.report.document import Document, Picture
+from trihedron.report.machine import json_text
+from trihedron.report.text import to_text
+
+if TYPE_CHECKING:
+    from cattrs import Converter
 
 KEY = "report"
 """Where a saved result holds its report."""
 VERSION = 1
 DIGITS = 6
 """Significant digits of a drawn value: a page of 4 k shows four."""
-_KINDS: dict[str, type] = {
-    kind.__name__: kind
-    for kind in (
-        document.Document, document.Section, document.Headline, document.Paragraph, document.Facts, document.Table,
-        document.Code, document.FindingList, document.Picture, chart.Chart, chart.Panel, chart.Disc, chart.Sphere,
-        chart.Matrix, chart.Scale, chart.Line, chart.Points, chart.Bars, chart.Band, chart.Span, chart.Level,
-        chart.Note,
-    )
-}  # fmt: skip
 
 
 class NotAReportError(RefusedError):
@@ -39,7 +36,27 @@ class NotAReportError(RefusedError):
 
 def with_report(machine: Mapping[str, Any], laid_out: Document) -> dict[str, Any]:
     """The result for machines with the report beside it, from which ``trihedron report`` lays it out again."""
-    return {**machine, KEY: {"version": VERSION, "document": _plain(laid_out)}}
+    return {**machine, KEY: {"version": VERSION, "document": _converter().unstructure(laid_out)}}
+
+
+def written(laid_out: Document, machine: Callable[[], Mapping[str, Any]], path: Path) -> str:
+    """A report as the content of a file, in the format that its ending names; ``machine`` makes the result for JSON.
+
+    Raises
+    ------
+    OutputError
+        (a ``ValueError``) when the ending names none.
+    """
+    check_report(path)
+    ending = path.suffix.lower()
+    if ending == ".html":
+        # Its templates are slow to load.
+        from trihedron.report.page import to_html
+
+        return to_html(laid_out)
+    if ending == ".txt":
+        return to_text(document.with_its_making(laid_out))
+    return json_text(with_report(machine(), laid_out))
 
 
 def report_of(saved: Any) -> Document:
@@ -54,98 +71,80 @@ def report_of(saved: Any) -> Document:
     if not isinstance(held, Mapping) or held.get("version") != VERSION:
         raise NotAReportError("no report is saved in it: write it again with --json FILE or --report FILE.json.")
     try:
-        found = _made(held.get("document"), Document)
+        return _converter().structure(held.get("document"), Document)
     except (TypeError, ValueError, KeyError, RecursionError) as error:
         raise NotAReportError(f"the report saved in it is malformed: {error}") from None
-    assert isinstance(found, Document)
-    return found
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Picture):
-        return {"is": "Picture", "name": value.name, "caption": value.caption, "chart": _plain(value.chart())}
-    if isinstance(value, Finding):
-        return {name: _plain(getattr(value, name)) for name in ("code", "severity", "seen", "cause", "action")}
-    if is_dataclass(value) and not isinstance(value, type):
-        return {"is": type(value).__name__, **{f.name: _plain(getattr(value, f.name)) for f in fields(value)}}
-    if isinstance(value, np.ndarray):
-        rows = np.atleast_2d(np.asarray(value, dtype=np.float64))
-        return ";".join(" ".join(f"{number:.{DIGITS}g}" for number in row) for row in rows)
-    if isinstance(value, Enum):
-        return value.value
-    if isinstance(value, float | np.floating):
-        return float(f"{float(value):.{DIGITS}g}") if math.isfinite(value) else None
-    if isinstance(value, str | bool | int) or value is None:
-        return value
-    return [_plain(one) for one in value]
 
 
 @cache
-def _hints(kind: type) -> dict[str, Any]:
-    return get_type_hints(kind)
+def _converter() -> Converter:
+    """Reads fields off the dataclasses; what is of another type than its field is refused, since it comes from a file.
+
+    Which of several kinds an entry is stands in it as ``is``.
+    """
+    # Imported here: a command that writes no document does without it.
+    from cattrs import Converter
+    from cattrs.strategies import configure_tagged_union
+
+    made = Converter(unstruct_collection_overrides={tuple: list, Sequence: list}, detailed_validation=False)
+    made.register_unstructure_hook(float, _rounded)
+    made.register_structure_hook(float, lambda value, _: math.nan if value is None else float(_checked(value, float)))
+    for kind in (str, bool, int):
+        made.register_structure_hook(kind, lambda value, wanted: _checked(value, wanted))
+    made.register_structure_hook_func(_is_literal, _literal)
+    made.register_unstructure_hook_func(is_array, _line)
+    made.register_structure_hook_func(is_array, lambda line, _: _array(_checked(line, str)))
+    made.register_unstructure_hook(Finding, lambda found: {name: getattr(found, name) for name in _SAID})
+    made.register_structure_hook(Finding, lambda value, _: _finding(value))
+
+    def picture(value: dict[str, Any], _: Any) -> Picture:
+        drawn = made.structure(value["chart"], chart.Chart)
+        return Picture(_checked(value["name"], str), _checked(value["caption"], str), lambda: drawn)
+
+    made.register_structure_hook(Picture, picture)
+    made.register_unstructure_hook(
+        Picture, lambda one: {"name": one.name, "caption": one.caption, "chart": made.unstructure(one.chart())}
+    )
+    panels, _ = get_args(get_type_hints(chart.Chart)["panels"])
+    for kinds in (chart.Mark, panels, document.Block):
+        configure_tagged_union(kinds, made, tag_name="is")
+    return made
 
 
-def _made(value: Any, wanted: Any) -> Any:
-    """A value of the type wanted; what is of another one is refused, since it comes from a file."""
-    origin, inner = get_origin(wanted), get_args(wanted)
-    if origin is np.ndarray:
-        # One line of numbers, rows apart by semicolons: a signal on a line of its own a number would be a megabyte.
-        rows = np.array(
-            [[float(word) for word in row.split()] for row in _checked(value, isinstance(value, str)).split(";")]
-        )
-        return rows if len(rows) > 1 else rows[0]
-    if origin in (Union, UnionType):
-        return _one_of(value, inner)
-    if origin is Literal:
-        return _checked(value, value in inner)
-    if origin is tuple:
-        return _tuple(value, inner)
-    if origin is Sequence:
-        return tuple(_made(one, inner[0]) for one in _list(value))
-    if wanted is Finding:
-        code, severity = FindingCode(value["code"]), Severity(value["severity"])
-        return Finding(code, severity, *(_made(value[name], str) for name in ("seen", "cause", "action")))
-    if is_dataclass(wanted):
-        return _record(value, wanted)
-    if wanted is float:
-        return math.nan if value is None else float(_checked(value, isinstance(value, int | float)))
-    return _checked(value, isinstance(value, wanted))
+_SAID = ("code", "severity", "seen", "cause", "action")
 
 
-def _record(value: Any, wanted: Any) -> Any:
-    named = value.get("is") if isinstance(value, dict) else None
-    kind = _KINDS.get(named) if isinstance(named, str) else None
-    if kind is not wanted or kind is None:
-        raise TypeError(f"a {getattr(wanted, '__name__', wanted)} was expected")
-    if kind is Picture:
-        drawn = _made(value["chart"], chart.Chart)
-        return Picture(_made(value["name"], str), _made(value["caption"], str), lambda: drawn)
-    hints = _hints(kind)
-    return kind(**{f.name: _made(value[f.name], hints[f.name]) for f in fields(kind)})
+def _finding(value: dict[str, Any]) -> Finding:
+    code, severity, *said = (_checked(value[name], str) for name in _SAID)
+    return Finding(FindingCode(code), Severity(severity), *said)
 
 
-def _one_of(value: Any, kinds: tuple[Any, ...]) -> Any:
-    if value is None and type(None) in kinds:
-        return None
-    named = value.get("is") if isinstance(value, dict) else None
-    for kind in kinds:
-        if kind is not type(None) and (named is None or getattr(kind, "__name__", "") == named):
-            return _made(value, kind)
-    raise TypeError(f"{str(named)[:40]} has no place here")
+def _rounded(value: float) -> float | None:
+    return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
 
 
-def _tuple(value: Any, inner: tuple[Any, ...]) -> Any:
-    if len(inner) == 2 and inner[1] is Ellipsis:
-        return tuple(_made(one, inner[0]) for one in _list(value))
-    return tuple(_made(one, kind) for one, kind in zip(_list(value), inner, strict=True))
+def _line(values: FloatArray) -> str:
+    """One line of numbers, rows apart by semicolons: a signal on a line of its own a number would be a megabyte."""
+    rows = np.atleast_2d(np.asarray(values, dtype=np.float64))
+    return ";".join(" ".join(f"{number:.{DIGITS}g}" for number in row) for row in rows)
 
 
-def _list(value: Any) -> list[Any]:
-    out: list[Any] = _checked(value, isinstance(value, list))
-    return out
+def _array(line: str) -> FloatArray:
+    rows = np.array([[float(word) for word in row.split()] for row in line.split(";")])
+    return rows if len(rows) > 1 else rows[0]
 
 
-def _checked(value: Any, is_right: bool) -> Any:
-    if not is_right:
+def _is_literal(kind: Any) -> bool:
+    return get_origin(kind) is Literal
+
+
+def _literal(value: Any, wanted: Any) -> Any:
+    if value not in get_args(wanted):
+        raise TypeError(f"{str(value)[:40]!r} has no place here")
+    return value
+
+
+def _checked(value: Any, wanted: type) -> Any:
+    if not isinstance(value, int | float if wanted is float else wanted):
         raise TypeError(f"{str(value)[:40]!r} has no place here")
     return value

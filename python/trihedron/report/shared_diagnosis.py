@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.recording import distinct_names
-from trihedron.records.shared_effects import SharedDiagnosis, SharedEffect
+from trihedron.records.shared_effects import SharedCandidate, SharedDiagnosis, SharedEffect
+from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale
 from trihedron.report.diagnosis_words import p_in_words, parameter_unit, value_in_words, verdict_in_words
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
-from trihedron.report.numbers import listed, plain_number
-from trihedron.report.shared_diagnosis_charts import candidates_chart, shared_chart
+from trihedron.report.numbers import listed, plain_number, with_sigma
 
 
 def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
@@ -133,3 +136,46 @@ def shared_diagnosis_record(found: SharedDiagnosis) -> dict[str, Any]:
         "candidates": [one.to_dict() for one in found.candidates],
         "diagnoses": [one.to_dict() for one in found.diagnoses],
     }
+
+
+TWO_SIGMA = 2.0
+ROW_PX = 26
+COLUMNS = 3
+BAR = 0.7
+"""Of a row."""
+LONGEST = 16
+"""Letters of a name that stands beside its row; recordings of longer ones are counted, as the title names them."""
+
+
+def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
+    """A panel a parameter: its value in all recordings together, then in each, with 95 % intervals."""
+    panels = []
+    rows = ("together", *names)
+    is_counted = max(map(len, names)) > LONGEST
+    beside = ("together", *(f"recording {k}" for k in range(1, len(names) + 1))) if is_counted else rows
+    place = -np.arange(1.0, len(rows) + 1.0)
+    for i, common in enumerate(effect.parameters):
+        found = [one[i] for one in (effect.parameters, *effect.each)]
+        scale, unit = parameter_unit(common.unit, max(abs(one.value) for one in found))
+        value, sigma = scale * np.array([(one.value, one.std) for one in found]).T
+        told = [f"{row}: {with_sigma(v, s)} {unit}" for row, v, s in zip(rows, value, sigma, strict=True)]
+        marks = (
+            Level(x=0.0, name="no effect"),
+            Points(value[1:], place[1:], told[1:], TWO_SIGMA * sigma[1:], "one recording", "c1", is_across=True),
+            Points(value[:1], place[:1], told[:1], TWO_SIGMA * sigma[:1], "together", "accent", is_across=True),
+        )
+        x = Scale(f"{common.name} [{unit}]", unit, includes=(0.0,))
+        panels.append(Panel(x, Scale("", names=beside), marks, title=common.name, height_px=ROW_PX * (len(rows) + 1)))
+    return Chart(tuple(panels), columns=min(COLUMNS, len(panels)))
+
+
+def candidates_chart(candidates: Sequence[SharedCandidate]) -> Chart:
+    """A bar an effect: its score in all recordings together."""
+    place = -np.arange(1.0, len(candidates) + 1.0)
+    score = np.array([one.score for one in candidates])
+    told = [f"{one.id}: score {plain_number(one.score)}" for one in candidates]
+    bars = Bars(score, place, BAR, told, "tried in all recordings together", "soft", is_across=True)
+    x = Scale("score", includes=(0.0,))
+    names = tuple(one.id for one in candidates)
+    panel = Panel(x, Scale("", names=names), (bars, Level(x=0.0)), height_px=ROW_PX * (len(names) + 1))
+    return Chart((panel,))

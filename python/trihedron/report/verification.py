@@ -10,10 +10,10 @@ import numpy as np
 from trihedron.records import Recording, Segments, Verification
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.numbers import how_many, plain_number, with_sigma
+from trihedron.report.numbers import how_many, in_mm_s2, plain_number, with_sigma
 from trihedron.report.segments import signals_picture
 from trihedron.report.session_charts import verification_chart
-from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 
 def verification_report(
@@ -21,7 +21,7 @@ def verification_report(
 ) -> Document:
     """Lay out a verification."""
     sections = [
-        Section("Result", (Facts(_facts(verification)),)),
+        Section("Result", (Facts(facts_of(verification)),)),
         Section("Findings", (findings_block(verification.findings),)),
         Section("Parameters", (parameters_table(verification),)),
         Section("Poses and moves", tuple(_tables(verification, segments))),
@@ -58,18 +58,18 @@ def headlines_of(v: Verification) -> tuple[Headline, ...]:
     return tuple(out)
 
 
-def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:
-    v = verification
+def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
+    """Errors in poses and after rotations beside what was to be expected, and how far the gyro's bias changed."""
     worst = int(np.argmax(np.abs(v.norm_error)))
     expected = float(np.sqrt(np.mean(v.norm_sigma**2)))
     facts = [
         ("gravity", f"{v.gravity_m_s2:.5f} m/s², {v.gravity_source}"),
         (
             "gravity error in static poses",
-            f"{_acceleration(v.norm_rms)} rms over {len(v.norm_error)} poses, worst "
-            f"{_acceleration(float(v.norm_error[worst]))} in pose {worst + 1}",
+            f"{in_mm_s2(v.norm_rms)} rms over {len(v.norm_error)} poses, worst "
+            f"{in_mm_s2(float(v.norm_error[worst]))} in pose {worst + 1}",
         ),
-        ("  expected", f"{_acceleration(expected)} rms from noise and the calibration's uncertainty"),
+        ("  expected", f"{in_mm_s2(expected)} rms from noise and the calibration's uncertainty"),
     ]
     if len(v.angle_deg):
         worst = int(np.argmax(v.angle_deg))
@@ -120,10 +120,6 @@ _SHOWN = {
     "rad": (1000.0, "mrad"),
     "1": (100.0, "%"),
 }
-
-
-def _acceleration(value: float) -> str:
-    return f"{plain_number(mm_s2_from_m_s2(value))} mm/s² ({plain_number(mg_from_m_s2(value), 2)} mg)"
 
 
 def _tables(verification: Verification, segments: Segments | None) -> list[Block]:

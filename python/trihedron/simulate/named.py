@@ -38,88 +38,54 @@ SESSIONS: dict[str, Callable[..., Motion]] = {
 """What a scenario file may call a session."""
 
 
-def _of(profile: Profile, motion: Motion, name: str, unit: int = 1) -> Scenario:
+def _of(profile: Profile, motion: Motion, name: str = "", unit: int = 1) -> Scenario:
     accelerometer, gyroscope = profile.unit(unit)
     return Scenario(motion, name, accelerometer, gyroscope, profile.clock)
 
 
-def _hand_session() -> Scenario:
-    """24 poses by hand, consumer 16-bit part."""
-    return _of(MPU, hand_session(), "hand-session")
-
-
 def _linear() -> Scenario:
-    """The hand session without noise and ADC: what a perfect estimator inverts exactly."""
-    accelerometer, gyroscope = MPU.unit(1)
-    accel = Accelerometer(accelerometer.S, accelerometer.b, accelerometer.unit)
-    gyro = Gyroscope(gyroscope.S, gyroscope.b, gyroscope.unit)
-    return Scenario(hand_session(), "linear-noiseless", accel, gyro, MPU.clock)
+    scenario = _of(MPU, hand_session())
+    accel, gyro = scenario.accelerometer, scenario.gyroscope
+    return replace(
+        scenario,
+        accelerometer=Accelerometer(accel.S, accel.b, accel.unit),
+        gyroscope=Gyroscope(gyro.S, gyro.b, gyro.unit),
+    )
 
 
 def _tactical() -> Scenario:
-    """36 poses by hand with a lever arm to the wrist, tactical unit, Earth turning."""
-    scenario = _of(TACTICAL, hand_session(36, pose_s=10.0, first_pose_s=60.0, arm_m=0.15), "hand-session-tactical")
+    scenario = _of(TACTICAL, hand_session(36, pose_s=10.0, first_pose_s=60.0, arm_m=0.15))
     return replace(scenario, environment=Environment(gravity_m_s2=0.0, latitude_deg=55.7, earth_rate=True))
 
 
-def _six_faces() -> Scenario:
-    """Six faces, twice round, consumer 16-bit part."""
-    return _of(MPU, six_faces(2), "six-faces")
-
-
-def _table_turns() -> Scenario:
-    """Turns of 90, 180 and 360 deg against a wall on three faces, consumer 16-bit part."""
-    return _of(MPU, table_turns(), "table-turns")
-
-
 def _manual() -> Scenario:
-    """The laboratory manual's example: 18 poses, then turns by ±8π on three faces, 10-bit ADC, 50 Hz."""
     poses = poses_in_order([*FACES, *EDGES], pose_s=6.0, move_s=3.0, wobble_deg=4.0)
     steps = list(poses.steps)
     for face in FACES[::2]:
         steps += poses_in_order([face], pose_s=4.0, move_s=3.0, arrive=True).steps
         for angle in (1440.0, -1440.0):
             steps += [Turn(face, angle, 16.0, ramp=0.25, wobble_deg=0.4), Pose(4.0, "rest")]
-    profile = ANALOG_6DOF
-    motion = Motion(tuple(steps), start=poses.start)
-    return Scenario(motion, "manual-example", profile.accelerometer, profile.gyroscope, profile.clock)
-
-
-def _rest() -> Scenario:
-    """One hour at rest, consumer 16-bit part."""
-    return _of(MPU, long_rest(3600.0), "rest-hour")
+    accel, gyro = ANALOG_6DOF.accelerometer, ANALOG_6DOF.gyroscope
+    return Scenario(Motion(tuple(steps), start=poses.start), "", accel, gyro, ANALOG_6DOF.clock)
 
 
 def _rest_manual() -> Scenario:
-    """Two hours at rest, the manual's unit with a finer ADC, for Allan curves."""
     accel, gyro = ANALOG_6DOF.accelerometer, ANALOG_6DOF.gyroscope
     accel = replace(accel, adc=replace(accel.adc, lsb=0.0))
     gyro = replace(gyro, adc=replace(gyro.adc, lsb=0.0))
-    return Scenario(long_rest(7200.0), "rest-manual", accel, gyro, ANALOG_6DOF.clock)
-
-
-def _rest_industrial() -> Scenario:
-    """Three hours at rest, industrial 14-bit part."""
-    return _of(ADIS, long_rest(10000.0), "rest-industrial")
+    return Scenario(long_rest(7200.0), "", accel, gyro, ANALOG_6DOF.clock)
 
 
 def _dividing_head() -> Scenario:
-    """324 poses of an optical dividing head, industrial part on a 12-bit ADC."""
-    scenario = _of(ADIS, dividing_head(), "dividing-head")
+    scenario = _of(ADIS, dividing_head())
     step = 0.11 * math.sqrt(12.0)  # the published ADC's own noise of 0.11 m/s² as the rms of its rounding
     accel = scenario.accelerometer
     lsb = step / float(np.abs(np.diag(np.asarray(accel.S))).mean())
     return replace(scenario, accelerometer=replace(accel, adc=replace(accel.adc, lsb=lsb)))
 
 
-def _rate_table() -> Scenario:
-    """Rate-table profile, ±30 to ±240 deg/s about each axis, industrial part."""
-    return _of(ADIS, rate_table(), "rate-table")
-
-
 def _imperfect() -> Scenario:
-    """24 poses by hand with several effects at once: what a linear model cannot reproduce."""
-    scenario = _of(MPU, hand_session(arm_m=0.1), "imperfect")
+    scenario = _of(MPU, hand_session(arm_m=0.1))
     scenario = with_effect(scenario, "accel-quadratic", k2=(2e-4, -3e-4, 1e-4))
     scenario = with_effect(scenario, "gyro-g-sensitivity", matrix=((2e-4, 0, 0), (0, -3e-4, 1e-4), (0, 0, 2e-4)))
     scenario = with_effect(scenario, "accel-size-effect", places_m=((0.004, 0, 0), (0, 0.004, 0), (0, 0, 0)))
@@ -127,31 +93,47 @@ def _imperfect() -> Scenario:
 
 
 def _lossy() -> Scenario:
-    """The hand session with lost samples whose timestamps were made anew, and jitter."""
-    scenario = with_effect(_of(MPU, hand_session(), "lossy-log"), "dropped-samples", losses=[(30.0, 7), (60.0, 25)])
+    scenario = with_effect(_of(MPU, hand_session()), "dropped-samples", losses=[(30.0, 7), (60.0, 25)])
     return with_effect(scenario, "timing-jitter", jitter_s=3e-4)
 
 
-_SCENARIOS: dict[str, Callable[[], Scenario]] = {
-    "hand-session": _hand_session,
-    "hand-session-tactical": _tactical,
-    "linear-noiseless": _linear,
-    "six-faces": _six_faces,
-    "table-turns": _table_turns,
-    "manual-example": _manual,
-    "dividing-head": _dividing_head,
-    "rate-table": _rate_table,
-    "imperfect": _imperfect,
-    "lossy-log": _lossy,
-    "rest-hour": _rest,
-    "rest-manual": _rest_manual,
-    "rest-industrial": _rest_industrial,
-}
+_SCENARIOS: dict[str, tuple[str, Callable[[], Scenario]]] = {
+    "hand-session": ("24 poses by hand, consumer 16-bit part.", lambda: _of(MPU, hand_session())),
+    "hand-session-tactical": (
+        "36 poses by hand with a lever arm to the wrist, tactical unit, Earth turning.", _tactical,
+    ),
+    "linear-noiseless": (
+        "The hand session without noise and ADC: what a perfect estimator inverts exactly.", _linear,
+    ),
+    "six-faces": ("Six faces, twice round, consumer 16-bit part.", lambda: _of(MPU, six_faces(2))),
+    "table-turns": (
+        "Turns of 90, 180 and 360 deg against a wall on three faces, consumer 16-bit part.",
+        lambda: _of(MPU, table_turns()),
+    ),
+    "manual-example": (
+        "The laboratory manual's example: 18 poses, then turns by ±8π on three faces, 10-bit ADC, 50 Hz.", _manual,
+    ),
+    "dividing-head": (
+        "324 poses of an optical dividing head, industrial part on a 12-bit ADC.", _dividing_head,
+    ),
+    "rate-table": (
+        "Rate-table profile, ±30 to ±240 deg/s about each axis, industrial part.", lambda: _of(ADIS, rate_table()),
+    ),
+    "imperfect": (
+        "24 poses by hand with several effects at once: what a linear model cannot reproduce.", _imperfect,
+    ),
+    "lossy-log": ("The hand session with lost samples whose timestamps were made anew, and jitter.", _lossy),
+    "rest-hour": ("One hour at rest, consumer 16-bit part.", lambda: _of(MPU, long_rest(3600.0))),
+    "rest-manual": (
+        "Two hours at rest, the manual's unit with a finer ADC, for Allan curves.", _rest_manual,
+    ),
+    "rest-industrial": ("Three hours at rest, industrial 14-bit part.", lambda: _of(ADIS, long_rest(10000.0))),
+}  # fmt: skip
 
 
 def list_scenarios() -> dict[str, str]:
     """Name and one sentence for each ready-made scenario."""
-    return {name: (make.__doc__ or "").strip() for name, make in _SCENARIOS.items()}
+    return {name: about for name, (about, _) in _SCENARIOS.items()}
 
 
 def scenario_by_name(name: str) -> Scenario:
@@ -164,4 +146,4 @@ def scenario_by_name(name: str) -> Scenario:
     """
     if name not in _SCENARIOS:
         raise RefusedError(f"no scenario is called {name!r}; there are {', '.join(_SCENARIOS)}")
-    return _SCENARIOS[name]()
+    return replace(_SCENARIOS[name][1](), name=name)

@@ -14,11 +14,10 @@ from trihedron.errors import RefusedError
 from trihedron.records.recording import Recording
 from trihedron.records.truth import TrueSegment, Truth
 from trihedron.simulate.accelerometer import Accelerometer
-from trihedron.simulate.bias_repeatability import bias_in_moves, bias_of_poses
 from trihedron.simulate.effects import effects_of
 from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.motion.plan import Plan, plan_motion
-from trihedron.simulate.noise import NoiseTerms, make_noise, stream
+from trihedron.simulate.noise import NoiseTerms, bias_in_moves, bias_of_poses, make_noise, stream
 from trihedron.simulate.readout import Triple, sense_axes
 from trihedron.simulate.scenario import Clock, Environment, Scenario
 

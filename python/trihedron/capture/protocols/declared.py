@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 
 from trihedron.capture.protocols.contract import Frame
-from trihedron.capture.protocols.framing import CHECKSUM_OF, MORE, FramedDecoder
+from trihedron.capture.protocols.framing import CHECKSUM_OF, FramedDecoder
 from trihedron.errors import RefusedError
 from trihedron.records.frame_declaration import CHECKSUM_SIZES, SIZES, FrameDeclaration
 
@@ -21,7 +21,7 @@ class DeclaredDecoder(FramedDecoder):
         self.name = declaration.name
         self._declaration = declaration
         order = "<" if declaration.little_endian else ">"
-        self._length = declaration.length
+        self.length = declaration.length
         values = declaration.values
         self.columns = tuple(f"{field.name} [{field.unit}]" if field.unit else field.name for field in values)
         self._scales = tuple(field.scale for field in values)
@@ -48,10 +48,6 @@ class DeclaredDecoder(FramedDecoder):
         self.tick_s = 0.0 if clock is None else clock.tick_s
         self._checksum = None if declaration.checksum == "none" else CHECKSUM_OF[declaration.checksum]
         self._checksum_end = declaration.checksum_at + CHECKSUM_SIZES[declaration.checksum]
-
-    def length_at(self, data: bytearray, at: int) -> int:
-        """Always the same."""
-        return self._length if len(data) - at >= self._length else MORE
 
     def is_sound(self, data: bytearray, at: int, length: int) -> bool:  # noqa: ARG002 -- one length
         """By the checksum; without one every sync begins a frame."""

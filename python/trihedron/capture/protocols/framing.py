@@ -82,6 +82,8 @@ class FramedDecoder(ABC):
     counter_modulus = 0
     clock_modulus = 0
     tick_s = 0.0
+    length = 0
+    """Of every frame, where all have one."""
 
     def __init__(self, sync: bytes) -> None:
         self._sync = sync
@@ -89,9 +91,9 @@ class FramedDecoder(ABC):
         self.corrupt = 0
         self.skipped_bytes = 0
 
-    @abstractmethod
     def length_at(self, data: bytearray, at: int) -> int:
         """Length of the frame whose sync is ``at``; ``MORE``; or 0 where its head cannot be one."""
+        return self.length if len(data) - at >= self.length else MORE
 
     @abstractmethod
     def is_sound(self, data: bytearray, at: int, length: int) -> bool:

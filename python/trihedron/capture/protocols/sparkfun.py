@@ -9,9 +9,8 @@ from __future__ import annotations
 import struct
 
 from trihedron.capture.protocols.contract import Frame, printed_numbers
-from trihedron.capture.protocols.framing import MORE, FramedDecoder, LineFedDecoder
+from trihedron.capture.protocols.framing import FramedDecoder, LineFedDecoder
 
-_LENGTH = 16
 _FRAME = struct.Struct(">x7Hx")
 _HIGHEST = 1023
 """Of a ten-bit ADC: what exceeds it is no frame."""
@@ -29,15 +28,12 @@ class SixDofDecoder(FramedDecoder):
     """Binary frames ``A … Z`` of 16 bytes."""
 
     name = "sparkfun-6dof"
+    length = 16
     columns: tuple[str, ...] = SIX_DOF_COLUMNS
     counter_modulus = _COUNT_MODULUS
 
     def __init__(self) -> None:
         super().__init__(b"A")
-
-    def length_at(self, data: bytearray, at: int) -> int:
-        """Always the same."""
-        return _LENGTH if len(data) - at >= _LENGTH else MORE
 
     def is_sound(self, data: bytearray, at: int, length: int) -> bool:
         """Z at its place and nothing above the ADC's range."""

@@ -10,9 +10,8 @@ from __future__ import annotations
 import struct
 
 from trihedron.capture.protocols.contract import Frame
-from trihedron.capture.protocols.framing import MORE, FramedDecoder
+from trihedron.capture.protocols.framing import FramedDecoder
 
-_LENGTH = 11
 _CLOCK, _ACCELERATION, _RATE = 0x50, 0x51, 0x52
 _LAST_KIND = 0x5F
 _G, _DEGREES = 16.0 / 32768, 2000.0 / 32768
@@ -29,6 +28,7 @@ class WitMotionDecoder(FramedDecoder):
     """Samples of acceleration and rate; angles, magnetometer and the rest pass by."""
 
     name = "witmotion"
+    length = 11
     columns: tuple[str, ...] = _COLUMNS
 
     def __init__(self) -> None:
@@ -40,10 +40,6 @@ class WitMotionDecoder(FramedDecoder):
     def adopt(self, other: WitMotionDecoder) -> None:
         """Go on with the clock of the connection before."""
         self._has_clock, self.tick_s, self.clock_modulus = other._has_clock, other.tick_s, other.clock_modulus
-
-    def length_at(self, data: bytearray, at: int) -> int:
-        """Always the same."""
-        return _LENGTH if len(data) - at >= _LENGTH else MORE
 
     def is_sound(self, data: bytearray, at: int, length: int) -> bool:
         """A kind that there is, and the sum of bytes."""

@@ -6,18 +6,15 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only
 from trihedron.diagnose.effects.late_readings import TIMES_S, by_delay, is_confirmed
-from trihedron.records.words import why_not
 
 
 class AccelGyroTimeOffset(Effect):
     """Accelerometer readings belong to an earlier instant: f(t) reads f(t − δ); where δ < 0 the gyro is late."""
 
     id = "accel-gyro-time-offset"
+    needs_moves = True
     size = 0.015
     """s: a sample or two of a slow log, the delay of a filter."""
-
-    def unavailable(self, context: Context) -> str | None:
-        return why_not("no-moves") if not context.moves else None
 
     def variants(self, context: Context) -> list[Variant]:
         return [_offset(context, sign * t, f"{1e3 * sign * t:+.0f} ms") for t in TIMES_S for sign in (1.0, -1.0)]

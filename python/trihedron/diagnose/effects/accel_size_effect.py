@@ -7,19 +7,16 @@ import numpy as np
 from trihedron.arrays import AXES
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only
-from trihedron.records.words import why_not
 
 
 class AccelSizeEffect(Effect):
     """Accelerometers 2 and 3 displaced from accelerometer 1: each reads its own α×r + ω×(ω×r)."""
 
     id = "accel-size-effect"
+    needs_moves = True
     applies_elsewhere = True
     size = 5e-3
     """m: dies of one package."""
-
-    def unavailable(self, context: Context) -> str | None:
-        return why_not("no-moves") if not context.moves else None
 
     def variants(self, context: Context) -> list[Variant]:
         w, a = context.rate, context.angular_acceleration

@@ -16,7 +16,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.state import Distortion
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain
-from trihedron.records.words import Words, effect_words, experiment_for
+from trihedron.records.words import Words, effect_words, experiment_for, why_not
 
 TYPICAL_M_S2, TYPICAL_RAD_S = 0.03, 2e-3
 """3 mg and 0.1 °/s: what consumer parts stray by."""
@@ -57,6 +57,8 @@ class Effect(ABC):
     """What to record so that a user's own effect cannot be mistaken for another."""
     applies_elsewhere: ClassVar[bool] = False
     """Whether the fitted effect can be taken off another recording of the same sensor, from logged signals alone."""
+    needs_moves: ClassVar[bool] = False
+    """Whether it shows in nothing but moves between poses, which need a gyro."""
     repeatable: ClassVar[bool] = False
     """Whether it may be accepted more than once (another pose, another line)."""
 
@@ -97,9 +99,9 @@ class Effect(ABC):
                 out = np.minimum(out, typical / np.maximum(rms, LEAST_RMS))
         return out
 
-    def unavailable(self, context: Context) -> str | None:  # noqa: ARG002
+    def unavailable(self, context: Context) -> str | None:
         """Why this recording cannot show the effect; ``None`` when it can."""
-        return None
+        return why_not("no-moves") if self.needs_moves and not context.moves else None
 
     @abstractmethod
     def variants(self, context: Context) -> list[Variant]:

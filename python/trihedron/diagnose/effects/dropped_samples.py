@@ -17,7 +17,6 @@ from trihedron.diagnose.session.state import NO_DISTORTION, SessionState
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
-from trihedron.records.words import why_not
 
 CLEAR_COUNT = 3.0
 """Standard errors by which a count must differ from none."""
@@ -103,11 +102,9 @@ class DroppedSamples(DirectEffect):
     """Both sensors jump at once by the same whole number of samples; put back, the motion is smooth again."""
 
     id = "dropped-samples"
+    needs_moves = True
     is_sought_again = True
     is_of_session = True
-
-    def unavailable(self, context: Context) -> str | None:
-        return why_not("no-moves") if not context.moves else None
 
     def find(self, context: Context) -> Evidence | None:
         losses, sigmas = counted_losses(context)

@@ -11,7 +11,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, rate_only
 from trihedron.gravity import EARTH_RATE_RAD_S, normal_gravity
 from trihedron.records.diagnosis import EffectParameter
-from trihedron.records.words import Words, why_not
+from trihedron.records.words import Words
 from trihedron.units import degrees_from_radians, radians_from_degrees
 
 STEPS = 91, 180
@@ -106,13 +106,9 @@ class EarthRate(Effect):
     """Earth rate in the level frame of the first pose: two horizontal components and the vertical one."""
 
     id = "earth-rate"
+    needs_moves = True
     size = EARTH_RATE_RAD_S
     """It has one size."""
-
-    def unavailable(self, context: Context) -> str | None:
-        if context.obs.raw_rate is None or not context.moves:
-            return why_not("no-moves")
-        return None
 
     def variants(self, context: Context) -> list[Variant]:
         attitude = context.pose_attitude

@@ -7,7 +7,6 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, per_axis, rate_only
-from trihedron.records.words import why_not
 
 LEAST_RATE = 1e-3
 """rad/s, where nothing turns."""
@@ -17,10 +16,8 @@ class GyroScaleNonlinearity(Effect):
     """Cubic (odd), quadratic (even), or both, along each gyro's own axis."""
 
     id = "gyro-scale-nonlinearity"
+    needs_moves = True
     applies_elsewhere = True
-
-    def unavailable(self, context: Context) -> str | None:
-        return why_not("no-moves") if not context.moves else None
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:
         # A hundredth of the fastest turn.

@@ -8,7 +8,6 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
 from trihedron.diagnose.effects.late_readings import NEAR_ONE, by_low_pass, times_for
-from trihedron.records.words import why_not
 
 SIGMAS = 3.0
 """How far below zero a lag may come out by chance; a filter that answers before it is asked does not exist."""
@@ -18,11 +17,9 @@ class SensorLag(Effect):
     """Lag of one sensor, first order (per axis too) or second: its reading trails the motion by τ."""
 
     id = "sensor-lag"
+    needs_moves = True
     size = 0.015
     """s: the delay of a filter."""
-
-    def unavailable(self, context: Context) -> str | None:
-        return why_not("no-moves") if not context.moves else None
 
     def variants(self, context: Context) -> list[Variant]:
         unit = FIRST_ORDER_S

@@ -7,11 +7,10 @@ from scipy.special import chdtrc, ndtr, stdtrit
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.effects.table_turns import meant_as_multiples, table_turns
+from trihedron.diagnose.effects.direct import Evidence
+from trihedron.diagnose.effects.table_turns import TableEffect, table_turns
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
-from trihedron.records.words import why_not
 
 FEWEST_TO_SCATTER = 3
 """Turns from which their own scatter says anything."""
@@ -39,16 +38,10 @@ def _error_of_mean(values: FloatArray, weights: FloatArray, noise: FloatArray) -
     return max(by_noise, wider * float(np.sqrt(variance * (share**2).sum())))
 
 
-class TableTilt(DirectEffect):
+class TableTilt(TableEffect):
     """Turning on a tilted table swings the vertical about the table's normal: it comes back only after a full turn."""
 
     id = "table-tilt"
-    is_of_session = True
-
-    def unavailable(self, context: Context) -> str | None:
-        if not context.moves or not meant_as_multiples(table_turns(context)):
-            return why_not("no-table-turns")
-        return None
 
     def find(self, context: Context) -> Evidence | None:
         state, obs = context.fitted.state, context.obs

@@ -8,6 +8,8 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.direct import DirectEffect
+from trihedron.records.words import why_not
 
 NEAR_DEG = 12.0
 """A turn meant to be a multiple of 90° lands within this; hand moves land anywhere."""
@@ -54,3 +56,13 @@ def meant_as_multiples(turns: list[TableTurn]) -> bool:
     """Whether these are turns against a wall: at least four, nearly all close to a multiple of 90°."""
     near = [abs(np.degrees(turn.error_rad)) < NEAR_DEG for turn in turns]
     return len(turns) >= FEWEST_TURNS and float(np.mean(near)) > NEARLY_ALL
+
+
+class TableEffect(DirectEffect):
+    """An effect of an experiment on a table."""
+
+    is_of_session = True
+
+    def unavailable(self, context: Context) -> str | None:
+        is_there = context.moves and meant_as_multiples(table_turns(context))
+        return None if is_there else why_not("no-table-turns")

@@ -14,7 +14,6 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.sample_steps import StepErrors, step_errors
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.records.diagnosis import EffectParameter
-from trihedron.records.words import why_not
 
 WINDOW_S = 4.0
 """An even clock may drift over longer times than this."""
@@ -123,10 +122,8 @@ class TimingJitter(DirectEffect):
     """Steps of both sensors scatter together, in proportion to the slope of the signal."""
 
     id = "timing-jitter"
+    needs_moves = True
     is_sought_again = True
-
-    def unavailable(self, context: Context) -> str | None:
-        return why_not("no-moves") if not context.moves else None
 
     def find(self, context: Context) -> Evidence | None:
         return self._wrong_timestamps(context) or self._uneven_samples(context)

@@ -7,11 +7,10 @@ from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.effects.table_turns import NEAR_DEG, TableTurn, meant_as_multiples, table_turns
+from trihedron.diagnose.effects.direct import Evidence
+from trihedron.diagnose.effects.table_turns import NEAR_DEG, TableEffect, TableTurn, table_turns
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
-from trihedron.records.words import why_not
 
 OFF_SIGMA = 4.0
 """A turn is named that is off by so much: one right turn of 16 000 is."""
@@ -19,16 +18,10 @@ P_LIMIT = 1e-4
 """False alarms of the χ² test on all turns together: in 24 healthy sessions the worst turn was 1.6 σ off."""
 
 
-class TurnAngleError(DirectEffect):
+class TurnAngleError(TableEffect):
     """Table turns against a wall miss their multiple of 90° by more than the gyro's own error."""
 
     id = "turn-angle-error"
-    is_of_session = True
-
-    def unavailable(self, context: Context) -> str | None:
-        if not context.moves or not meant_as_multiples(table_turns(context)):
-            return why_not("no-table-turns")
-        return None
 
     def find(self, context: Context) -> Evidence | None:
         turns = table_turns(context)

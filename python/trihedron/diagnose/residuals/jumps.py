@@ -30,8 +30,6 @@ LAG, LIKE_A_WALK = 4, 3.0
 in a third of the poses up to 3; a walk 3.4 to 8 (25 poses)."""
 N_POOL, N_DRAWS, SEED, N_NOISES = 40_000, 20_000, 1, 3
 FEWEST_POSES = 12
-JUMPS = 1e-3
-"""p-value from which zeros are said to change inside poses."""
 N_LOOKS = 3
 """Axes."""
 

@@ -17,12 +17,11 @@ FALSE_ALARM = 1e-4
 class AttitudeDependence:
     """``z(f) = z₀ + A f``: the raw bias (n, 3) of the poses against their specific force.
 
-    ``A`` (3, 3) in raw unit per m/s²; ``zero`` (3,) is ``z₀`` with ``cov_bias`` variances (3,); ``p_value`` of ``A =
-    0``; ``scatter_before``, ``scatter_after`` (3,) the standard deviation of the pose biases without and with it, raw.
+    ``A`` (3, 3) in raw unit per m/s²; ``var_bias`` (3,) variances of ``z₀``; ``p_value`` of ``A = 0``;
+    ``scatter_left`` the standard deviation of the pose biases with it, raw.
     """
 
     A: FloatArray
-    zero: FloatArray
     var_bias: FloatArray
     p_value: float
     scatter_left: float
@@ -42,7 +41,7 @@ def attitude_dependence(zero: FloatArray, var_bias: FloatArray, force: FloatArra
     design = np.column_stack([np.ones(n), force])
     if n < 9 or np.linalg.matrix_rank(design, tol=1e-2 * float(np.linalg.norm(force, 2))) < 4:
         return None
-    A, z0, var_z0 = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
+    A, var_z0 = np.zeros((3, 3)), np.zeros(3)
     chi2_mean = chi2_line = 0.0
     for axis in range(3):
         weight = 1.0 / np.maximum(var_bias[:, axis], 1e-30 + 1e-24 * zero[:, axis] ** 2)
@@ -52,14 +51,14 @@ def attitude_dependence(zero: FloatArray, var_bias: FloatArray, force: FloatArra
         rest = zero[:, axis] - design @ solution
         mean_square = float(np.sum(weight * rest**2)) / (n - 4)
         covariance = np.linalg.inv((design * weight[:, None]).T @ design) * max(mean_square, 1.0)
-        z0[axis], A[axis], var_z0[axis] = solution[0], solution[1:], covariance[0, 0]
+        A[axis], var_z0[axis] = solution[1:], covariance[0, 0]
         chi2_mean += float(np.sum(weight * (zero[:, axis] - mean) ** 2))
         chi2_line += float(np.sum(weight * rest**2))
     ratio = ((chi2_mean - chi2_line) / 9.0) / max(chi2_line / (3.0 * (n - 4)), 1e-300)
     # Where noise alone explains the poses, a significant ratio of two tiny numbers means nothing.
     p_value = float(fdtrc(9, 3 * (n - 4), ratio)) if chi2_mean > 3.0 * (n - 1) else 1.0
     left = float(np.sqrt(chi2_line / (n - 4) / max(chi2_mean / (n - 1), 1e-300)))
-    return AttitudeDependence(A, z0, var_z0, p_value, left)
+    return AttitudeDependence(A, var_z0, p_value, left)
 
 
 def pool_biases(bias: FloatArray, var_bias: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -33,11 +33,6 @@ class ShapingOptions:
     ramp_damping: float = 1.0 / np.sqrt(2.0)
     averages: bool = True
 
-    @classmethod
-    def of_the_article(cls, session_s: float, pose_s: float) -> ShapingOptions:
-        """Eight states: one Gauss-Markov process in the middle of the session's time scales, instantaneous readings."""
-        return cls(flicker_rates_per_s=(1.0 / float(np.sqrt(session_s * pose_s)),), averages=False)
-
 
 def shaping_model(
     noise: AxisNoise, options: ShapingOptions, *, session_s: float, pose_s: float

@@ -129,15 +129,11 @@ def calibrate_with_references(
         )  # fmt: skip
         axes.append(result)
         findings += consistency_findings(axis, result.consistency)
-    inverse_S = np.array([a.constants[:3] for a in axes])
-    inverse_b = np.array([a.constants[3] for a in axes])
     observability, seen = _observability(f)
     findings += seen
     accelerometer = direct_form(axes, raw_unit, observability)
     residual = (z @ accelerometer.S.T + accelerometer.b) - f
-    return KalmanCalibration(
-        tuple(axes), accelerometer, inverse_S, inverse_b, f, z, start, pose, residual, tuple(findings)
-    )
+    return KalmanCalibration(tuple(axes), accelerometer, f, z, start, pose, residual, tuple(findings))
 
 
 def pose_arrays(

@@ -65,11 +65,6 @@ class PoseBiases:
     up: FloatArray | None = None
 
     @property
-    def n_axes(self) -> int:
-        """Axes that ``values`` are made of."""
-        return 1 if self.up is None else 3
-
-    @property
     def basis(self) -> FloatArray:
         """(n, m) contrasts that no calibration changes: no constant of a gyro; no zero, scale or angle of the other."""
         if self.up is None:

@@ -8,17 +8,14 @@ from __future__ import annotations
 
 from trihedron.files.formats.contract import ExportOptions, Format, number
 from trihedron.files.formats.matrices import noise_alone
+from trihedron.files.formats.noise_keys import limits
 from trihedron.records import Calibration
 
 
 def to_fast_lio(calibration: Calibration, options: ExportOptions) -> str:
     """Keys of the IMU for its configuration's ``mapping``."""
     _, figures, lines = noise_alone(calibration, options, "FAST-LIO", ": variances of one sample")
-    lines += [
-        f"# {name} is an upper limit: it was not seen in the static log."
-        for name, one in figures.named()
-        if one.is_limit
-    ]
+    lines += [f"# {limit}" for limit in limits(options)]
     lines += ["common:", f'  imu_topic: "{options.topic}"', "mapping:"]
     for key, one in (
         ("acc_cov", figures.accel_N),

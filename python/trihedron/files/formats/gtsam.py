@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.files.formats.contract import ExportOptions, Format, heading, number, of_si_readings, row
-from trihedron.files.formats.noise_keys import required
+from trihedron.files.formats.noise_keys import limits, required
 from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration
 
@@ -15,11 +15,7 @@ def to_gtsam(calibration: Calibration, options: ExportOptions) -> str:
     known = of_si_readings(calibration, "GTSAM", options)
     figures = required(known, options, "GTSAM")
     lines = [f"# {line}" for line in heading(known, "true = S @ raw + b; preintegrate what is true.")]
-    lines += [
-        f"# {name} is an upper limit: it was not seen in the static log."
-        for name, one in figures.named()
-        if one.is_limit
-    ]
+    lines += [f"# {limit}" for limit in limits(options)]
     lines += ["import numpy as np", ""]
     for name, sensor in named_sensors(known):
         lines += [f"S_{name.upper()} = np.array([{', '.join(f'[{row(r)}]' for r in sensor.S)}])"]

@@ -19,15 +19,6 @@ class Figures:
     gyro_K: NoiseFigure
     rate_hz: float
 
-    def named(self) -> tuple[tuple[str, NoiseFigure], ...]:
-        """The four with their names in words."""
-        return (
-            ("accelerometer N", self.accel_N),
-            ("accelerometer K", self.accel_K),
-            ("gyroscope N", self.gyro_N),
-            ("gyroscope K", self.gyro_K),
-        )
-
 
 def required(calibration: Calibration, options: ExportOptions, target: str) -> Figures:
     """All that the target's reader demands.
