@@ -48,17 +48,19 @@ def _bias(sensor: SensorCalibration) -> list[tuple[str, str]]:
     return [("bias", ", ".join(f"{axis} {with_sigma(v, s)}" for axis, v, s in values) + f" {unit}; {BIAS}")]
 
 
-def _norm_words(quality: FitQuality) -> str:
-    def words(value: float) -> str:
-        return f"{plain_number(mm_s2_from_m_s2(value))} mm/s² ({plain_number(mg_from_m_s2(value), 2)} mg)"
+def acceleration_words(value: float) -> str:
+    """A gravity error [m/s²] in mm/s² and mg."""
+    return f"{plain_number(mm_s2_from_m_s2(value))} mm/s² ({plain_number(mg_from_m_s2(value), 2)} mg)"
 
+
+def _norm_words(quality: FitQuality) -> str:
     n = how_many(len(quality.residual), "pose")
-    parts = [f"{words(quality.rms)} rms in sample ({n})"]
+    parts = [f"{acceleration_words(quality.rms)} rms in sample ({n})"]
     if quality.dof <= 0:
         parts = ["none in sample: as many parameters as poses, so the fit cannot be judged"]
     if quality.held_out_rms is not None:
-        parts.append(f"{words(quality.held_out_rms)} cross-validated (held out)")
-    parts.append(f"noise alone {words(quality.floor)}")
+        parts.append(f"{acceleration_words(quality.held_out_rms)} cross-validated (held out)")
+    parts.append(f"noise alone {acceleration_words(quality.floor)}")
     return "; ".join(parts)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,7 +41,7 @@ from trihedron.report.reference import calibration_result_report
 from trihedron.report.saved import with_report
 from trihedron.report.sessions import sessions_columns, sessions_record, sessions_report
 from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
-from trihedron.report.text import to_text
+from trihedron.report.text import WIDTH, to_text
 from trihedron.report.verification import verification_report
 
 if TYPE_CHECKING:

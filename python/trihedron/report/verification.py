@@ -8,13 +8,14 @@ from functools import partial
 import numpy as np
 
 from trihedron.records import Recording, Segments, Verification
+from trihedron.report.calibration_fit import acceleration_words
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import how_many, plain_number, with_sigma
 from trihedron.report.segments import signals_picture
 from trihedron.report.session_charts import verification_chart
-from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 
 def verification_report(
@@ -67,10 +68,10 @@ def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:
         ("gravity", f"{v.gravity_m_s2:.5f} m/s², {v.gravity_source}"),
         (
             "gravity error in static poses",
-            f"{_acceleration(v.norm_rms)} rms over {len(v.norm_error)} poses, worst "
-            f"{_acceleration(float(v.norm_error[worst]))} in pose {worst + 1}",
+            f"{acceleration_words(v.norm_rms)} rms over {len(v.norm_error)} poses, worst "
+            f"{acceleration_words(float(v.norm_error[worst]))} in pose {worst + 1}",
         ),
-        ("  expected", f"{_acceleration(expected)} rms from noise and the calibration's uncertainty"),
+        ("  expected", f"{acceleration_words(expected)} rms from noise and the calibration's uncertainty"),
     ]
     if len(v.angle_deg):
         worst = int(np.argmax(v.angle_deg))
@@ -121,10 +122,6 @@ _SHOWN = {
     "rad": (1000.0, "mrad"),
     "1": (100.0, "%"),
 }
-
-
-def _acceleration(value: float) -> str:
-    return f"{plain_number(mm_s2_from_m_s2(value))} mm/s² ({plain_number(mg_from_m_s2(value), 2)} mg)"
 
 
 def _tables(verification: Verification, segments: Segments | None) -> list[Block]:
