@@ -10,7 +10,7 @@ from trihedron.report.document import Document, Facts, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.numbers import how_many, listed, plain_number, with_sigma
 from trihedron.report.ranking_charts import ranking_chart
-from trihedron.report.verification import AGAIN, headlines_of, parameters_table
+from trihedron.report.verification import headlines_of, parameters_table
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_from_m_s2
 
 MISTAKES = {
@@ -23,6 +23,9 @@ MISTAKES = {
     "axes": "axes are exchanged or mirrored (another frame)",
     "gravity": "it was made with another gravity",
 }
+
+
+AGAIN = "Calibrate again: none of these fits this log."
 
 
 def ranking_report(ranking: Ranking) -> Document:

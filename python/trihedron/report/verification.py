@@ -11,7 +11,7 @@ from trihedron.records import Recording, Segments, Verification
 from trihedron.report.calibration_fit import acceleration_words
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawing import later
-from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.findings import findings_block, remedy_of, verdict_of
 from trihedron.report.numbers import how_many, plain_number, with_sigma
 from trihedron.report.segments import signals_picture
 from trihedron.report.session_charts import verification_chart
@@ -43,7 +43,7 @@ def verification_report(
         sections=tuple(sections),
         headlines=headlines_of(verification),
         lead=_errors_picture(verification),
-        next_step="Use the calibration: trihedron apply, trihedron export." if verification.is_passed else AGAIN,
+        next_step=USE if verification.is_passed else remedy_of(verification.findings),
     )
 
 
@@ -115,7 +115,7 @@ def parameters_table(v: Verification) -> Table:
     return Table(head, tuple(rows), "Parameters that do not depend on the frame, against this log's own calibration")
 
 
-AGAIN = "Calibrate again, or see which poses and moves carry the error: they stand below."
+USE = "Use the calibration: trihedron apply, trihedron export."
 _SHOWN = {
     "m/s^2": (1000.0, "mm/s²"),
     "rad/s": (degrees_from_radians(1.0), "°/s"),

@@ -34,6 +34,11 @@ def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) ->
     return f"{usable}, with {how_many(n_warnings, 'warning')}." if n_warnings else good
 
 
+def remedy_of(findings: Iterable[Finding]) -> str:
+    """What to do about the first serious finding."""
+    return next((_capital(finding.action) for finding in findings if finding.severity is Severity.SERIOUS), "")
+
+
 def first_clause(seen: str) -> str:
     """What a finding says first: the whole of it stands once, among the findings."""
     return re.split(r"(?<=\D)\. (?=[A-Z])|; ", seen, maxsplit=1)[0].rstrip(".") + "."
