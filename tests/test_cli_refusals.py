@@ -87,3 +87,15 @@ def test_too_few_poses_and_a_log_that_never_rests_are_refused_with_the_remedy(tm
     assert "still" in refused(capsys, "calibrate", shaken)
     assert main(["check", str(shaken)]) == 2
     assert "NOT FIT" in capsys.readouterr().out
+
+
+def test_what_comes_next_is_the_remedy_of_what_is_wrong_and_keeps_the_rate_that_was_said(tmp_path, capsys):
+    rng = np.random.default_rng(2)
+    poses = np.vstack([np.eye(3), -np.eye(3)]) * 16384.0
+    rows = np.repeat(np.hstack([poses, np.zeros((6, 3))]), 400, axis=0) + rng.normal(scale=20.0, size=(2400, 6))
+    np.savetxt(tmp_path / "board.csv", rows, fmt="%d", delimiter=",")
+    main(["check", str(tmp_path / "board.csv")])
+    assert "Calibrate:" not in capsys.readouterr().out
+    main(["check", str(tmp_path / "board.csv"), "--rate", "50", "--columns", "ax,ay,az,-,-,-"])
+    said = capsys.readouterr().out
+    assert "NOT FIT" in said or "trihedron calibrate LOG --rate 50 --latitude DEG" in said

@@ -13,6 +13,7 @@ from trihedron.report import to_text
 from trihedron.report.axes import axes_of
 from trihedron.report.calibration import axes_table, calibration_report
 from trihedron.report.calibration_fit import fit_in_words
+from trihedron.report.calibration_pictures import uncalibrated_error
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.verification import verification_report
 from trihedron.segment import resegment
@@ -84,6 +85,13 @@ def test_the_uncertainty_of_a_scale_is_one_figure_wherever_it_is_stated(made):
         assert table.head[-1].startswith("reading at zero input, −S⁻¹ b [count")
     one = replace(result.accelerometer, S=np.eye(3), raw_unit="m/s^2")
     assert "zero input" not in " ".join(axes_table("accelerometer", one, axes_of(one)).head)
+
+
+def test_the_error_before_calibration_stands_beside_the_one_after_it_as_the_figure_has_it(made):
+    _, result, _ = made
+    error = uncalibrated_error(result.calibration, result.segments.accelerometer_mean)
+    line = re.search(r"^ *before calibration +(\S+) mm/s²", trihedron.report(result), re.MULTILINE)
+    assert float(line[1]) == pytest.approx(1e3 * np.sqrt(np.mean(error**2)), rel=5e-3)
 
 
 def test_excluded_moves_are_counted_among_all_moves_of_the_log(made):

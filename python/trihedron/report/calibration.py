@@ -15,7 +15,13 @@ from trihedron.report.calibration_charts import (
     strong_correlations,
 )
 from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor
-from trihedron.report.calibration_pictures import correlation_picture, figure_blocks, lead_picture
+from trihedron.report.calibration_pictures import (
+    before_words,
+    correlation_picture,
+    figure_blocks,
+    lead_picture,
+    uncalibrated_error,
+)
 from trihedron.report.calibration_residuals import residual_tables
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
@@ -23,6 +29,7 @@ from trihedron.report.numbers import (
     duration,
     engineering_exponent,
     how_many,
+    in_mm_s2,
     one_of,
     plain_number,
     power_of_ten,
@@ -117,11 +124,23 @@ def _result(calibration: Calibration, segments: Segments | None, recording: Reco
     facts.append(("frame", FRAMES[calibration.frame]))
     blocks: list[Block] = [Facts(tuple(facts))]
     for name, sensor in _sensors(calibration):
-        blocks += [parameter_table(name, sensor), Facts(tuple(fit_in_words(name, sensor)))]
+        rows = fit_in_words(name, sensor)
+        if name == "accelerometer" and segments is not None:
+            rows += before_in_words(calibration, segments)
+        blocks += [parameter_table(name, sensor), Facts(tuple(rows))]
     strong = strong_correlations(calibration)
     if strong:
         blocks.append(Facts((("correlations above 0.5", _pairs(strong)),)))
     return tuple(blocks)
+
+
+def before_in_words(calibration: Calibration, segments: Segments) -> list[tuple[str, str]]:
+    """The gravity error of the same poses without this calibration."""
+    means = segments.accelerometer_mean
+    if means is None:
+        return []
+    rms = float(np.sqrt(np.nanmean(uncalibrated_error(calibration, means) ** 2)))
+    return [("  before calibration", f"{in_mm_s2(rms)} rms, {before_words(calibration)}")]
 
 
 def _sensors(calibration: Calibration) -> list[tuple[str, SensorCalibration]]:

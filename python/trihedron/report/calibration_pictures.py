@@ -38,7 +38,7 @@ def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture
     chart = partial(residual_chart, quality)
     if means is not None and len(means) == len(quality.residual):
         chart = partial(lead_chart, calibration, means)
-        caption += f" Beside it the error's size before calibration ({_before_words(calibration)}) and after."
+        caption += f" Beside it the error's size before calibration ({before_words(calibration)}) and after."
     return Picture(
         "residuals",
         caption,
@@ -88,7 +88,8 @@ def uncalibrated_error(calibration: Calibration, means: FloatArray) -> FloatArra
     return np.asarray(scale * norm - calibration.gravity_m_s2)
 
 
-def _before_words(calibration: Calibration) -> str:
+def before_words(calibration: Calibration) -> str:
+    """What readings without this calibration are."""
     return "one scale for all axes, no bias" if _as_read(calibration) is None else "the readings as they are"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
+from trihedron.records.sampling import TimestampKind
 from trihedron.report.axes import axes_of
 from trihedron.report.channels import channels_table
 from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
@@ -34,8 +35,13 @@ def check_report(
         ),
         headlines=tuple(_headlines(segments, calibration)),
         lead=signals_picture(recording, segments),
-        next_step="Calibrate: trihedron calibrate LOG -o FILE.",
+        next_step=f"Calibrate: trihedron calibrate LOG{_rate(recording)} --latitude DEG -o FILE.",
     )
+
+
+def _rate(recording: Recording) -> str:
+    """The option without which a log that has no timestamps is read at another rate."""
+    return "" if recording.sampling.kind is not TimestampKind.NONE else f" --rate {recording.rate_hz:.6g}"
 
 
 def _headlines(segments: Segments, calibration: Calibration | None) -> list[Headline]:

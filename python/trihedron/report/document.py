@@ -122,7 +122,9 @@ class Document:
     def what_next(self) -> str:
         """What to do first: what the gravest finding asks for, where it is serious."""
         first = self.foremost
-        return first.action if first is not None and _is_first(first) else self.next_step
+        if first is None or first.severity is not Severity.SERIOUS or not first.action:
+            return self.next_step
+        return first.action[:1].upper() + first.action[1:]
 
     @property
     def foremost(self) -> Finding | None:
@@ -132,10 +134,6 @@ class Document:
                 if finding.severity is severity:
                     return finding
         return None
-
-
-def _is_first(finding: Finding) -> bool:
-    return finding.severity is Severity.SERIOUS and bool(finding.action)
 
 
 def with_its_making(document: Document) -> Document:

@@ -73,7 +73,7 @@ def _noticed(document: Document) -> tuple[Markup, list[str], str]:
         others += [f"{severity.value} {', '.join(dict.fromkeys(named))}"] if named else []
     listing = (any(isinstance(block, FindingList) for block in section.blocks) for section in document.sections)
     seen = "" if first.seen in document.verdict else first.seen
-    told = f"{seen} → {first.action}" if first.action and first.action != document.what_next else seen
+    told = f"{seen} → {first.action}" if first.action and first.severity is not Severity.SERIOUS else seen
     return unbroken(told), others, f"s{list(listing).index(True) + 1}"
 
 

@@ -12,7 +12,7 @@ from trihedron.records.ranking import Ranked, Ranking, Suspicion
 from trihedron.report.chart import Chart, Colour, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Document, Facts, Picture, Section, Table
 from trihedron.report.numbers import how_many, listed, plain_number, with_sigma
-from trihedron.report.verification import AGAIN, headlines_of, parameters_table
+from trihedron.report.verification import headlines_of, parameters_table
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_from_m_s2
 
 MISTAKES = {
@@ -25,6 +25,9 @@ MISTAKES = {
     "axes": "axes are exchanged or mirrored (another frame)",
     "gravity": "it was made with another gravity",
 }
+
+
+AGAIN = "Calibrate again: none of these fits this log."
 
 
 def ranking_report(ranking: Ranking) -> Document:

@@ -54,8 +54,8 @@ def to_text(document: Document, *, sections: int | None = None, width: int = WID
     verdict = _wrap(style.plain(document.verdict), style.width)
     lines = [*title, *_wrap(style.plain(one_line(document.subtitle)), style.width), ""]
     lines += [style.paint(line, _COLOURS[document.level]) for line in verdict]
-    if document.next_step == document.what_next != "":  # what a finding asks for stands with it
-        lines += _wrap(style.plain(document.next_step), style.width, style.plain("→ "), "  ")
+    if document.what_next:
+        lines += _wrap(style.plain(document.what_next), style.width, style.plain("→ "), "  ")
     for section in document.sections[:sections]:
         shown = [_block(block, style) for block in section.blocks if not isinstance(block, Picture)]
         if not shown:

@@ -41,7 +41,7 @@ def verification_report(
         sections=tuple(sections),
         headlines=headlines_of(verification),
         lead=_errors_picture(verification),
-        next_step="Use the calibration: trihedron apply, trihedron export." if verification.is_passed else AGAIN,
+        next_step=USE if verification.is_passed else "",
     )
 
 
@@ -113,7 +113,7 @@ def parameters_table(v: Verification) -> Table:
     return Table(head, tuple(rows), "Parameters that do not depend on the frame, against this log's own calibration")
 
 
-AGAIN = "Calibrate again, or see which poses and moves carry the error: they stand below."
+USE = "Use the calibration: trihedron apply, trihedron export."
 _SHOWN = {
     "m/s^2": (1000.0, "mm/s²"),
     "rad/s": (degrees_from_radians(1.0), "°/s"),

@@ -167,13 +167,12 @@ _RATES = (
 
 _EVEN = "of {rate_hz:.5g} Hz"
 _HOW = (
-    "{is_rounded:?rounded to {grid_s:.3g ms}|each {is_late:?late by {timestamp_error_s:.2g ms} rms, as they are when "
-    "samples are timestamped on arrival|off it by {timestamp_error_s:.2g ms} rms}}"
+    "{is_rounded:?rounded to {grid_s:.3g ms}|{is_late:?late by {timestamp_error_s:.2g ms} rms, as they are when "
+    "samples are timestamped on arrival|off by {timestamp_error_s:.2g ms} rms}}"
 )
 _BY_MOTION = (
-    "{motion_tells:?in motion the readings follow {followed:.2g %} ± {sigma_followed:.2g %} of that (0 %: samples were "
-    "taken evenly, 100 %: when timestamped)|no motion shows when the "
-    "samples were taken}"
+    "{motion_tells:?readings in motion follow {followed:.2g %} ± {sigma_followed:.2g %} of that (0 %: sampled evenly, "
+    "100 %: as timestamped)|no motion shows when samples were taken}"
 )
 _WITH_THEM = (
     "period_s", "sigma_period_s", "timestamp_error_s", "shared_fraction", "followed", "sigma_followed", "grid_s",
@@ -186,7 +185,7 @@ _CLOCKS = (
         Code.EVEN_CLOCK,
         "",
         NOTE,
-        f"The timestamps are those of an even clock {_EVEN}, {_HOW} ({_BY_MOTION}); the even clock was used.",
+        f"The timestamps are those of an even clock {_EVEN}, {_HOW}; the even clock was used: {_BY_MOTION}.",
         numbers=_WITH_THEM,
     ),
     Entry(
