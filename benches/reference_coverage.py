@@ -10,7 +10,7 @@ walk, drone, robot: motions of tests/reference_truths.py, two minutes, truths of
 world or the body, clocks up to 50 ms and 300 ppm apart, walks of the bias; odd seeds have a g-sensitivity of data
 sheets' size, seeds 2 and 3 of every four a position. shaken: 5 Hz all along, so that two offsets of the clock fit, and
 a refusal is the right answer.
-`--speed`: CPU of the fit beside 2.5 to 10 minutes of walk at 200 Hz, and of `calibrate` on a session as long.
+`--speed`: CPU of the fit beside 2.5 to 10 minutes of walk at 200 Hz, and of `calibrate` on a simulated session.
 """
 
 import argparse

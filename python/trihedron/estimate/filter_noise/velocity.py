@@ -53,8 +53,9 @@ def _stretch(
 
     def between(samples: FloatArray) -> FloatArray:
         """Mean velocities between neighbouring blocks of an acceleration (k, ...)."""
-        twice = np.cumsum(np.cumsum(samples, axis=0) - 0.5 * samples, axis=0) * step**2
-        return _differences(twice, n) / h
+        # Trapezoids both times: a sum that includes its last sample whole is a path half a sample ahead.
+        once = np.cumsum(samples, axis=0) - 0.5 * samples
+        return _differences(np.cumsum(once, axis=0) - 0.5 * once, n) * step**2 / h
 
     world = np.einsum("kij,kj->ki", C, force)
     up = world.mean(axis=0) / np.linalg.norm(world.mean(axis=0))
