@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -10,10 +11,11 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence, without_moves
-from trihedron.diagnose.effects.sample_steps import MAX_LOST, Loss, find_losses
+from trihedron.diagnose.effects.hidden_losses import bridge, hidden_losses, residual_after
+from trihedron.diagnose.effects.sample_steps import Loss, find_losses, most_lost
 from trihedron.diagnose.session.observations import Observations, observe
-from trihedron.diagnose.session.solve import fit, move_misfit
-from trihedron.diagnose.session.state import NO_DISTORTION, SessionState
+from trihedron.diagnose.session.solve import fit, move_residuals
+from trihedron.diagnose.session.state import NO_DISTORTION, Prior, SessionState
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
@@ -22,6 +24,13 @@ CLEAR_COUNT = 3.0
 """Standard errors by which a count must differ from none."""
 UNSETTLED = 0.15
 """Relative error of a count that only the joint of the two sides tells."""
+MEDIAN_OF_FIVE = 4.35
+"""Median of a chi-square of the five rows that a move has."""
+CONTRADICTS, FEWEST_MOVES = 10.0, 3
+"""Times the median of all moves' misfits: of five rows that agree one in a hundred million is so far off."""
+DENIED = 15.0
+"""Chi-square of gravity that a loss must win where gravity can count it: one of two numbers, place and count, that were
+searched for."""
 MOST_OF_INTERVALS = 0.02
 """Losses in more than one of fifty intervals are no losses here and there: the clock or the motion is another."""
 NAMED = 4
@@ -32,70 +41,100 @@ _KNOWN: WeakKeyDictionary[Observations, tuple[list[Loss], dict[int, float]]] = W
 def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
     """Losses with their counts, and the standard error of each count by its sample.
 
-    The joint of the two sides tells where and roughly how many; gravity and rest after the move tell how many exactly:
-    a turn whose middle is missing ends elsewhere. The twin is fitted without the moves concerned, so that a loss cannot
-    bend what it is judged by. Searched once per set of observations.
+    The joint of the two sides tells where and roughly how many; gravity and rest after the move tell how many exactly,
+    or none: a turn whose middle is missing ends elsewhere. The session is fitted without the moves concerned, so that a
+    loss cannot bend what it is judged by. Searched once per set of observations.
     """
     if context.obs not in _KNOWN:
         losses = find_losses(context)
-        counts, sigmas = _by_gravity(context, losses)
-        _KNOWN[context.obs] = ([replace(one, count=counts[one.sample]) for one in losses], sigmas)
+        ranges, _ = without_moves(context.obs.move_ranges, context.obs.move_poses, {one.move for one in losses})
+        if len(ranges) < FEWEST_MOVES or len(context.fitted.state.effect):
+            _KNOWN[context.obs] = losses, {one.sample: 0.5 + UNSETTLED * one.count for one in losses}
+        else:
+            _KNOWN[context.obs] = _by_gravity(context, losses)
     return _KNOWN[context.obs]
 
 
-def _by_gravity(context: Context, losses: list[Loss]) -> tuple[dict[int, int], dict[int, float]]:
-    counts = {loss.sample: loss.count for loss in losses}
-    sigmas = {loss.sample: 0.5 + UNSETTLED * loss.count for loss in losses}
-    obs, state = context.obs, context.fitted.state
-    ranges, poses = without_moves(obs.move_ranges, obs.move_poses, {loss.move for loss in losses})
-    if not losses or len(ranges) < 3 or len(state.effect):
-        return counts, sigmas
-    clean = fit(
-        replace(obs, move_ranges=ranges, move_poses=poses), state, NO_DISTORTION, context.fitted.line.prior
-    ).state
-    for m in sorted({loss.move for loss in losses}):
-        own = sorted((loss for loss in losses if loss.move == m), key=lambda one: -one.gain)
-        trial = {loss.sample: loss.count for loss in own}
-        best = _misfit(obs, clean, m, trial)
-        for _ in range(2 if len(own) > 1 else 1):  # losses in one move are counted in turn
-            for loss in own:
-                for direction in (-1, 1):
-                    while 1 <= trial[loss.sample] + direction <= MAX_LOST:
-                        moved = trial | {loss.sample: trial[loss.sample] + direction}
-                        value = _misfit(obs, clean, m, moved)
-                        if value >= best:
-                            break
-                        best, trial = value, moved
-        for loss in own:
-            n = trial[loss.sample]
-            beside = [_misfit(obs, clean, m, trial | {loss.sample: k}) - best for k in (n - 1, n + 1) if k >= 1]
-            # Misfit grows by one at one sigma; noise that a move shows beyond its own widens it.
-            counts[loss.sample] = n
-            sigmas[loss.sample] = float(max(0.3, np.sqrt(max(best / 5.0, 1.0) / max(float(np.mean(beside)), 1e-3))))
-    return counts, sigmas
-
-
-def _misfit(obs: Observations, state: SessionState, m: int, losses: dict[int, int]) -> float:
-    """Chi-square of gravity and velocity after one move with samples put back behind those named."""
-    a, b = obs.move_ranges[m]
-    assert obs.raw_rate is not None
-    force, rate, time = obs.raw_force[a:b], obs.raw_rate[a:b], obs.time_s[a:b]
-    step = 1.0 / obs.recording.rate_hz
-    for k, n in sorted(losses.items(), reverse=True):
-        i = k - a
-        force = np.concatenate([force[: i + 1], bridge(force, i, n), force[i + 1 :]])
-        rate = np.concatenate([rate[: i + 1], bridge(rate, i, n), rate[i + 1 :]])
-        put = time[i] + step * np.arange(1, n + 1)
-        time = np.concatenate([time[: i + 1], put, time[i + 1 :] + n * step])
-    one = replace(
-        obs,
-        time_s=time,
-        raw_force=force,
-        raw_rate=rate,
-        move_ranges=((0, len(time)),),
-        move_poses=obs.move_poses[m : m + 1],
+def _by_gravity(context: Context, losses: list[Loss]) -> tuple[list[Loss], dict[int, float]]:
+    obs, touched = context.obs, {loss.move for loss in losses}
+    ranges, poses = without_moves(obs.move_ranges, obs.move_poses, touched)
+    clean = _of_moves_that_agree(
+        replace(obs, move_ranges=ranges, move_poses=poses), context.fitted.state, context.fitted.line.prior
     )
-    return float(move_misfit(one, state)[0])
+    misfit = (move_residuals(obs, clean) ** 2).sum(axis=1)
+    usual = max(float(np.median([v for m, v in enumerate(misfit) if m not in touched])) / MEDIAN_OF_FIVE, 1.0)
+    limit = CONTRADICTS * MEDIAN_OF_FIVE * usual
+    counted: list[Loss] = []
+    sigmas: dict[int, float] = {}
+    for m in range(obs.n_moves):
+        move = _Move(obs, clean, m, usual)
+        own = move.counted([loss for loss in losses if loss.move == m])
+        if move.misfit(own) > limit:
+            hidden = move.counted(hidden_losses(obs, clean, m, usual, limit))
+            own = min(own, hidden, key=move.misfit)
+        counted += own
+        sigmas |= {one.sample: move.sigma(own, one) for one in own}
+    return counted, sigmas
+
+
+@dataclass(frozen=True, eq=False)
+class _Move:
+    """One move held against a session that agrees; ``usual`` is what moves miss gravity by, over their noise."""
+
+    obs: Observations
+    state: SessionState
+    m: int
+    usual: float
+
+    def misfit(self, losses: Sequence[Loss]) -> float:
+        """Chi-square of gravity and velocity after the move with what was lost put back."""
+        residual = residual_after(self.obs, self.state, self.m, {one.sample: one.count for one in losses})
+        return float(residual @ residual)
+
+    def counted(self, losses: Sequence[Loss]) -> list[Loss]:
+        """Losses with the counts that gravity tells, without those that it denies."""
+        own = sorted(losses, key=lambda one: -one.gain)
+        for _ in range(2 if len(own) > 1 else 1):  # several in one move are counted in turn
+            for k in range(len(own)):
+                own[k] = self._best(own, k)
+        for one in sorted(own, key=lambda one: one.gain):
+            others = [other for other in own if other is not one]
+            best = self.misfit(own)
+            if self.misfit(others) - best < DENIED * max(best / 5.0, self.usual) and self.sigma(own, one) < one.count:
+                own = others
+        return own
+
+    def _best(self, own: list[Loss], k: int) -> Loss:
+        best, least = own[k], self.misfit(own)
+        for direction in (-1, 1):
+            while 1 <= best.count + direction <= most_lost(self.obs):
+                moved = replace(best, count=best.count + direction)
+                value = self.misfit([*own[:k], moved, *own[k + 1 :]])
+                if value >= least:
+                    break
+                best, least = moved, value
+        return best
+
+    def sigma(self, own: list[Loss], one: Loss) -> float:
+        """Standard error of a count: misfit grows by one at one sigma; what a move shows beyond noise widens it."""
+        others, best = [other for other in own if other is not one], self.misfit(own)
+        beside = [
+            self.misfit([*others, replace(one, count=n)]) - best for n in (one.count - 1, one.count + 1) if n >= 1
+        ]
+        return float(max(0.3, np.sqrt(max(best / 5.0, 1.0) / max(float(np.mean(beside)), 1e-3))))
+
+
+def _of_moves_that_agree(obs: Observations, state: SessionState, prior: Prior | None) -> SessionState:
+    """The session without moves that contradict it: a loss that was not found must not bend what others are held to."""
+    for _ in range(obs.n_moves):
+        state = fit(obs, state, NO_DISTORTION, prior).state
+        misfit = (move_residuals(obs, state) ** 2).sum(axis=1)
+        bad = {int(m) for m in np.flatnonzero(misfit > CONTRADICTS * np.median(misfit))}
+        ranges, poses = without_moves(obs.move_ranges, obs.move_poses, bad)
+        if not bad or len(ranges) < FEWEST_MOVES:
+            return state
+        obs = replace(obs, move_ranges=ranges, move_poses=poses)
+    return state
 
 
 class DroppedSamples(DirectEffect):
@@ -153,20 +192,6 @@ class DroppedSamples(DirectEffect):
 
 
 # Lost samples put back: a cubic bridge across every gap, timestamps and poses behind it moved.
-
-
-def bridge(values: FloatArray, k: int, n: int) -> FloatArray:
-    """(n, ...) samples between ``k`` and ``k + 1`` on a cubic Hermite through the two samples on either side."""
-    if k < 1 or k + 2 >= len(values):
-        return np.repeat(values[k : k + 1], n, axis=0)
-    a, b = values[k], values[k + 1]
-    da, db = values[k] - values[k - 1], values[k + 2] - values[k + 1]
-    x = (np.arange(1, n + 1) / (n + 1)).reshape(-1, *([1] * (values.ndim - 1)))
-    width = n + 1
-    h00, h10 = 2 * x**3 - 3 * x**2 + 1, x**3 - 2 * x**2 + x
-    h01, h11 = -2 * x**3 + 3 * x**2, x**3 - x**2
-    out: FloatArray = h00 * a + h10 * width * da + h01 * b + h11 * width * db
-    return out
 
 
 def insert_samples(recording: Recording, segments: Segments, losses: dict[int, int]) -> tuple[Recording, Segments]:

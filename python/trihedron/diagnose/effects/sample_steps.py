@@ -16,7 +16,8 @@ from trihedron.diagnose.session.observations import Observations
 
 HALF_WINDOW = 6
 """Samples on either side from which the local motion is learnt."""
-MAX_LOST = 60
+MOST_LOST, LONGEST_LOSS_S = 60, 0.15
+"""Samples and seconds, whichever is more, over which a motion may be joined: a fifth of a quick move of the hand."""
 AGREEMENT = 30.0
 """Chi-square that one sensor may lose by the count both share."""
 AGREEMENT_SHARE = 0.01
@@ -121,11 +122,16 @@ class Loss:
     per_sensor: tuple[float, ...]
 
 
+def most_lost(obs: Observations) -> int:
+    """Samples that may be missing at one place, at most."""
+    return max(MOST_LOST, round(LONGEST_LOSS_S * obs.recording.rate_hz))
+
+
 @lru_cache(maxsize=4)
-def _joints(w: int, order: int) -> FloatArray:
+def _joints(w: int, order: int, most: int) -> FloatArray:
     """(counts, 2w, 2w) projectors onto what no polynomial of so many coefficients joins across n missing samples."""
     projectors = []
-    for n in range(MAX_LOST + 1):
+    for n in range(most + 1):
         t = np.r_[np.arange(-w, 0) + 0.5, np.arange(w) + 0.5 + n] / (w + n / 2)
         q, _ = np.linalg.qr(np.vander(t - t.mean(), order))
         projectors.append(np.eye(2 * w) - q @ q.T)
@@ -145,6 +151,13 @@ def _trials(projectors: FloatArray, windows: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("nikc,nikc->kn", left, left))
 
 
+def joint_costs(obs: Observations, samples: npt.NDArray[np.intp], w: int, most: int) -> FloatArray:
+    """(k, counts, sensors) what a cubic through ``w`` samples before and after leaves, none to ``most`` put between."""
+    sensors = _whitened(obs)
+    windows = [np.stack([x[samples + o] for o in range(1 - w, w + 1)]) for x in sensors]
+    return np.stack([_trials(_joints(w, 4, most), v) for v in windows], axis=2)
+
+
 def find_losses(context: Context) -> list[Loss]:
     """The losses of the recording as it is now observed, found once."""
     return list(_losses(context.obs))
@@ -160,7 +173,8 @@ def _losses(obs: Observations) -> list[Loss]:
     sensors = _whitened(obs)
     clipped = clipped_samples(obs)
     w = HALF_WINDOW
-    stack, stiffer = _joints(w, 4), _joints(w, 6)
+    most = most_lost(obs)
+    stack, stiffer = _joints(w, 4, most), _joints(w, 6, most)
     losses: list[Loss] = []
     for m, (a, b) in enumerate(obs.move_ranges):
         if b - a < 2 * w + 2:
@@ -191,7 +205,7 @@ def _losses(obs: Observations) -> list[Loss]:
         best = (total <= total.min(axis=1, keepdims=True) + AGREEMENT).argmax(axis=1)
         for row, s in enumerate(suspect):
             n = int(best[row])
-            if n == 0 or n == MAX_LOST:
+            if n == 0 or n == most:
                 continue
             left = trial[row, n]
             gains = zero[s] - left

@@ -119,10 +119,9 @@ def tune_noise(obs: Observations, start: SessionState, distortion: Distortion, p
     return fit(obs, start, distortion, prior, PART_NOISE)
 
 
-def move_misfit(obs: Observations, state: SessionState) -> FloatArray:
-    """(moves,) chi-square of gravity and velocity after every move at a point, nothing fitted."""
-    residual = core_model(obs, state.gravity, None).move_residuals(core_state(state))
-    out: FloatArray = (residual**2).sum(axis=1)
+def move_residuals(obs: Observations, state: SessionState) -> FloatArray:
+    """(moves, 5) what gravity and velocity miss after every move at a point, nothing fitted, over its noise."""
+    out: FloatArray = core_model(obs, state.gravity, None).move_residuals(core_state(state))
     return out
 
 
