@@ -11,6 +11,7 @@ from trihedron.report.chart import AXIS_COLOURS, Band, Bars, Chart, Level, Line,
 from trihedron.report.drawn import envelope, said
 from trihedron.report.numbers import unit_in_print
 
+ALLOWED = "3σ of noise and of the calibration's own error"
 LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
 """What the length of two Gaussian errors exceeds as rarely as one exceeds 3σ, over its rms."""
 
@@ -87,7 +88,7 @@ def verification_chart(verification: Verification) -> Chart:
         Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True),
         Scale("|f| − |g|  [mm/s²]", "mm/s²"),
         (
-            Band(edge, -limit, limit, "3σ of noise and of the calibration's own error"),
+            Band(edge, -limit, limit, ALLOWED),
             Level(y=0.0),
             Points(pose, error, told, None, "error in the pose", "c1"),
         ),
@@ -102,7 +103,7 @@ def verification_chart(verification: Verification) -> Chart:
         Scale("move", limits=(0.3, move[-1] + 0.7), whole=True),
         Scale("tilt error  [°]", "°", includes=(0.0,)),
         (
-            Band(edge, 0.0 * limit, limit, "as likely as 3σ"),
+            Band(edge, 0.0 * limit, limit, ALLOWED),
             Bars(move, v.angle_deg, 0.7, told, "tilt error", "c3"),
         ),
         height_px=180,
