@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy.typing as npt
 
+from trihedron.api.asking import asked_in_python
 from trihedron.arrays import AXES
 from trihedron.errors import RefusedError
 from trihedron.read import ReadError, read_recording
@@ -141,13 +142,15 @@ def of_arrays(
         if values is not None:
             columns[name] = values
             mapping.append(f"{role}={name}")
-    return read(
+    # A class method stands behind no verb of the package's front, which would say this in Python's words.
+    recording: Recording = asked_in_python(read)(
         columns,
         columns=",".join(mapping),
         rate_hz=rate_hz,
         accelerometer_unit=None if accelerometer is None else accelerometer_unit,
         gyroscope_unit=None if gyroscope is None else gyroscope_unit,
     )
+    return recording
 
 
 def _check_even(name: str, given: Any) -> None:

@@ -67,7 +67,7 @@ def before_after_panel(calibration: Calibration, means: FloatArray) -> Panel:
     held = _is_held(quality)
     kinds = ((before, "before", "soft"), (after, "after" + held * ", held out", "accent" if held else "c1"))
     for values, name, colour in kinds:
-        told = [said(f"pose {k}, {name}", "", v, "mm/s²") for k, v in enumerate(values, 1)]
+        told = [said(f"pose {k}", "", v, "mm/s²") for k, v in enumerate(values, 1)]
         size = np.where(values == 0.0, np.nan, np.abs(values))
         marks.append(Points(pose, size, told, None, name, colour, colour == "accent"))  # type: ignore[arg-type]
     rms = [plain_number(float(np.sqrt(np.nanmean(values**2)))) for values in (before, after)]

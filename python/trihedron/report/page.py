@@ -18,6 +18,7 @@ from markupsafe import Markup, escape
 from trihedron.records import Severity
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 from trihedron.report.drawn import drawn
+from trihedron.report.findings.told import first_clause
 from trihedron.sanitise import one_line, printable
 
 KINDS: dict[type, str] = {
@@ -72,7 +73,9 @@ def _noticed(document: Document) -> tuple[Markup, list[str], str]:
         named = [f.code.value.replace("-", " ") for f in document.findings if f.severity is severity and f is not first]
         others += [f"{severity.value} {', '.join(dict.fromkeys(named))}"] if named else []
     listing = (any(isinstance(block, FindingList) for block in section.blocks) for section in document.sections)
-    seen = "" if first.seen in document.verdict else first.seen
+    clause = first_clause(first.seen).rstrip(".")
+    rest = first.seen[len(clause) :].lstrip(" .;")
+    seen = rest[:1].upper() + rest[1:] if clause.lower() in document.verdict.lower() else first.seen
     told = f"{seen} → {first.action}" if first.action and first.severity is not Severity.SERIOUS else seen
     return unbroken(told), others, f"s{list(listing).index(True) + 1}"
 
