@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.effects.direct import MIN_FALL, MUST_HALVE, DirectEffect, Evidence
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, tune_noise
@@ -18,10 +18,6 @@ from trihedron.records.diagnosis import Candidate
 
 VISIBLE = 0.98
 """Readings that were changed must lower the held-out misfit of some domain by at least this factor."""
-MIN_FALL = 15.0
-"""Chi-square that moves must gain by samples put back: as one of two numbers (place and count) paid for by a search."""
-MUST_HALVE = 0.5
-"""Share of the misfit of such moves that may stay: a loss explains its move, a jolt does not."""
 
 
 @dataclass(frozen=True, eq=False)

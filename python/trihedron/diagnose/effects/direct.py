@@ -17,6 +17,10 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain, HeldOut, Where
 
 NOWHERE = Where()
+MIN_FALL = 15.0
+"""Chi-square that moves must gain by samples put back: as one of two numbers (place and count) paid for by a search."""
+MUST_HALVE = 0.5
+"""Share of the misfit of such moves that may stay: a loss explains its move, a jolt does not."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence, without_moves
+from trihedron.diagnose.effects.direct import MIN_FALL, DirectEffect, Evidence, without_moves
 from trihedron.diagnose.effects.hidden_losses import bridge, hidden_losses, residual_after
 from trihedron.diagnose.effects.sample_steps import Loss, find_losses, most_lost
 from trihedron.diagnose.session.observations import Observations, observe
@@ -27,10 +27,7 @@ UNSETTLED = 0.15
 MEDIAN_OF_FIVE = 4.35
 """Median of a chi-square of the five rows that a move has."""
 CONTRADICTS, FEWEST_MOVES = 10.0, 3
-"""Times the median of all moves' misfits: of five rows that agree one in a hundred million is so far off."""
-DENIED = 15.0
-"""Chi-square of gravity that a loss must win where gravity can count it: one of two numbers, place and count, that were
-searched for."""
+"""Times the median of all moves' misfits: of five rows that agree one in thirty million is so far off."""
 MOST_OF_INTERVALS = 0.02
 """Losses in more than one of fifty intervals are no losses here and there: the clock or the motion is another."""
 NAMED = 4
@@ -100,7 +97,7 @@ class _Move:
         for one in sorted(own, key=lambda one: one.gain):
             others = [other for other in own if other is not one]
             best = self.misfit(own)
-            if self.misfit(others) - best < DENIED * max(best / 5.0, self.usual) and self.sigma(own, one) < one.count:
+            if self.misfit(others) - best < MIN_FALL * max(best / 5.0, self.usual) and self.sigma(own, one) < one.count:
                 own = others
         return own
 
@@ -195,7 +192,7 @@ class DroppedSamples(DirectEffect):
 
 
 def insert_samples(recording: Recording, segments: Segments, losses: dict[int, int]) -> tuple[Recording, Segments]:
-    """Put ``n`` samples behind sample ``k`` for every ``k: n``, on a cubic through the two samples on either side.
+    """Put ``n`` samples behind sample ``k`` for every ``k: n``, on a cubic by the values and slopes on either side.
 
     A cubic Hermite bridge keeps value and slope at both edges of the gap, so that the rotation integrated across it is
     right to the fifth power of its length. Time timestamps behind a gap move by what was lost.

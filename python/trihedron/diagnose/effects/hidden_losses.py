@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.diagnose.effects.direct import MUST_HALVE
 from trihedron.diagnose.effects.sample_steps import LEAST_GAIN, Loss, clipped_samples, joint_costs, most_lost
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import move_residuals
@@ -19,8 +20,7 @@ PLACE_S, TRIAL_S = 0.01, 0.03
 """How far places that are tried stand apart; and how much is put there to see what a loss does."""
 MOST_IN_A_MOVE = 3
 FEWEST_OF_PARABOLA = 6
-MUST_HALVE = 0.5
-"""Share of the misfit that a loss may leave."""
+"""Samples from which a parabola tells a slope better than their first step does: twice what it takes up."""
 
 
 def hidden_losses(obs: Observations, state: SessionState, m: int, usual: float, limit: float) -> list[Loss]:
