@@ -21,7 +21,7 @@ def bias_over_time(found: MotionFit, k: int) -> BiasOverTime:
     side, own, problem = found.sides[k], found.places[k], found.problems[k]
     all_of = posterior(found, found.fitted.strengths)
     mean, cov = all_of.mean[problem.index], all_of.covariance[np.ix_(problem.index, problem.index)]
-    columns, beside, _, _ = problem.blocks.smoothed(problem.table(), np.exp(found.fitted.strengths[k]).tolist())
+    columns, beside, _, _ = problem.blocks.smoothed(problem.table, np.exp(found.fitted.strengths[k]).tolist())
     m = len(beside)
     columns = columns.reshape(m, 3, -1)
     change = -columns[:, :, :-1]
@@ -48,7 +48,7 @@ def error_over_time(found: MotionFit, k: int) -> ErrorOverTime:
     problem = found.problems[k]
     mean = posterior(found, found.fitted.strengths).mean[problem.index]
     strengths = np.exp(found.fitted.strengths[k])
-    columns, beside, _, _ = problem.blocks.smoothed(problem.table(), strengths.tolist())
+    columns, beside, _, _ = problem.blocks.smoothed(problem.table, strengths.tolist())
     m = len(beside)
     columns = columns.reshape(m, 3, -1)
     walked = columns[:, :, -1] - columns[:, :, :-1] @ mean
