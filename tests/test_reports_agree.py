@@ -78,9 +78,9 @@ def test_the_uncertainty_of_a_scale_is_one_figure_wherever_it_is_stated(made):
     document = calibration_report(result.calibration)
     axes = next(s for s in document.sections if s.heading == "Axes").blocks
     for sensor, table in zip(("accelerometer", "gyroscope"), axes, strict=True):
-        worst = max((row[2] for row in table.rows), key=lambda said: float(said.split()[0]))
+        worst = max((row[2] for row in table.rows), key=float)
         headline = next(h for h in document.headlines if h.what == f"{sensor} scale uncertainty")
-        assert f"{headline.value} {headline.unit}" == worst
+        assert (table.head[2], headline.unit, headline.value) == ("relative σ [%]", "%", worst)
         # A bias stands once, in SI, over the sensitivity; the raw reading at zero input has another name.
         assert table.head[-1].startswith("reading at zero input, −S⁻¹ b [count")
     one = replace(result.accelerometer, S=np.eye(3), raw_unit="m/s^2")

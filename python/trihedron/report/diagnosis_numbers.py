@@ -9,7 +9,7 @@ from trihedron.report.axes import BIAS
 from trihedron.report.document import Block, Facts, Paragraph, Table
 from trihedron.report.findings import ranged
 from trihedron.report.numbers import MINUS, decimals_of, plain_number, unit_in_print, with_sigma
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_radians
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 NAMED_SIGMAS = 3.0
 """Components of a group that differs are named from here on; the largest always is."""
@@ -276,7 +276,7 @@ def _unit(p: ParameterDifference, *, is_difference: bool) -> tuple[float, str]:
         return degrees_from_radians(1.0), "°/s"
     if p.unit == "m/s^2":
         return mm_s2_from_m_s2(1.0), "mm/s²"
-    return (mrad_from_radians(1.0), "mrad") if is_difference else (degrees_from_radians(1.0), "°")
+    return degrees_from_radians(1.0), "°"
 
 
 def _sensor(n: NoiseDifference) -> str:

@@ -225,5 +225,8 @@ def headlines_of(diagnosis: Diagnosis) -> tuple[Headline, ...]:
     if not tests:
         return ()
     worst = min((d for d in tests if d.disagrees), key=lambda d: d.p_value, default=tests[0])
-    beside = f"χ² per degree of freedom, 1 by noise alone; p {p_in_words(worst.p_value)}"
-    return (Headline(MEANING[worst.domain], plain_number(worst.chi2_per_dof), "", beside),)
+    chi2, judged = plain_number(worst.chi2_per_dof), f"1 by noise alone; p {p_in_words(worst.p_value)}"
+    if not worst.unit:
+        return (Headline(f"{MEANING[worst.domain]}, χ²/dof", chi2, "", judged),)
+    size, _, unit = rms_in_words(worst).partition(" ")
+    return (Headline(MEANING[worst.domain], size, unit, f"rms by this diagnosis; χ²/dof {chi2}, {judged}"),)

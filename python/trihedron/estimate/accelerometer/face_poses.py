@@ -157,6 +157,11 @@ def identify(means: FloatArray, raw_unit: AccelerationUnit) -> IntArray:
     return np.where(is_face & (norm > 0), faces, 0)
 
 
+def are_six_faces(means: FloatArray, raw_unit: AccelerationUnit) -> bool:
+    """Whether poses of mean readings (n, 3) are the faces of a case, each at least once, and nothing else."""
+    return len(means) >= len(FACES) and set(identify(means, raw_unit).tolist()) == set(FACES)
+
+
 def faces_up(means: FloatArray, raw_unit: AccelerationUnit, up: Sequence[int] | None) -> IntArray:
     """Face (n,) of each mean reading (n, 3): as stated, or as they show it.
 

@@ -168,7 +168,8 @@ _USE = (
         Code.LIMIT_EXCEEDED,
         "rest",
         SERIOUS,
-        "The gravity error in static poses is {rms_mg:.3g} mg rms; the limit is {limit_mg:g} mg.",
+        "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms ({rms_m_s2:.3g mg}); the limit is "
+        "{limit_mg:g} mg.",
         "The calibration is less accurate here than required.",
         "Calibrate again, or accept a wider limit.",
     ),
