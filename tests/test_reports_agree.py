@@ -51,6 +51,13 @@ def test_a_pose_cut_where_it_was_bumped_keeps_its_number(made):
     assert obs.move_names(range(3, 6)) == ("move 4", "a disturbance in pose 5", "move 5")
 
 
+def test_a_domain_agrees_exactly_up_to_the_limit_that_its_figure_shows(made):
+    _, _, found = made
+    judged = [one for one in found.domains if one.limit is not None]
+    assert {one.domain for one in judged} >= {"static-accel", "moves", "dynamics"}
+    assert all(one.disagrees == (one.chi2_per_dof > one.limit) for one in judged)
+
+
 def test_a_bias_has_one_sign_and_one_value_in_every_report(made):
     recording, result, _ = made
     text = trihedron.report(result)

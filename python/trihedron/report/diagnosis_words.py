@@ -14,6 +14,7 @@ from trihedron.report.numbers import (
     unit_in_print,
     unit_with_power,
     with_sigma,
+    with_unit,
 )
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
@@ -145,7 +146,7 @@ def size_in_words(value: float, unit: str) -> str:
         return f"{plain_number(degrees_from_radians(value))} °/s"
     if unit == "s":
         return f"{plain_number(ms_from_s(value))} ms"
-    return plain_number(value) + ("" if unit in ("", "1", "raw") else f" {printed_unit(unit)}")
+    return with_unit(plain_number(value), "" if unit == "raw" else printed_unit(unit))
 
 
 def printed_unit(unit: str) -> str:

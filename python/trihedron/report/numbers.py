@@ -87,6 +87,11 @@ def unit_in_print(unit: str) -> str:
     return unit.replace("^2", "²").replace("^3", "³").replace("sqrt(Hz)", "√Hz").replace("sqrt(s)", "√s")
 
 
+def with_unit(number: str, unit: str) -> str:
+    """``2.04 mm/s²``, ``0.03°``."""
+    return f"{number}{unit}" if unit == "°" else f"{number} {unit}".rstrip()
+
+
 def how_many(n: int, noun: str) -> str:
     """``1 pose``, ``24 poses``."""
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"

@@ -37,7 +37,7 @@ _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 SHORT = 12
 """Names of rows that are no longer are never broken."""
 _ASIDE = re.compile(r" \([^)]*\)")
-MOST_OTHERS = 3
+MOST_OTHERS = 2
 """Findings that the first screen names behind the foremost; the others are counted."""
 _DASHED = re.compile(r"(?<![\w-])-{1,2}[A-Za-z][\w/+-]*")
 

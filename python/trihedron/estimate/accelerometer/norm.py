@@ -224,7 +224,7 @@ def _assemble(
             observability.advice,
             is_anchored=fit.is_anchored,
             anchor=_core.ANCHOR,
-            are_faces=are_six_faces(values, unit),
+            are_faces=are_six_faces(values),
         ),
         *verdict.convergence_findings(fit.is_converged, words(fit.stopped_because)),
         *verdict.model_findings(S, unit, signs_are_known=signs_are_known),
