@@ -1,9 +1,9 @@
-"""``python benches/confidence [NAME ...] [--sessions N] [--first SEED ...] [--asked | --design]``: do intervals hold?
+"""``python benches/confidence [NAME ...] [--sessions N] [--first SEED ...] [--design]``: do intervals hold?
 
 One line per setting: sessions answered and trusted (no serious finding), marked, refused; over the trusted ones the
 share within 1.96 σ and rms z of S and b of both sensors, and the largest of all in σ. A share is outside where it
 misses 93 to 97 % by more than two of its standard errors, from session to session, for a session's elements share its
-readings. ``scattered biases`` takes ``--gyro`` [°/s] and ``--accel`` [mm/s²], drawn anew for every pose.
+readings.
 """
 
 import argparse
@@ -16,61 +16,32 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from confidence import design
-from confidence.machine import robot
 from confidence.motion import G
 from confidence.sensor import lower
-from confidence.sessions import hand, manual, table
+from confidence.sessions import hand
 from trihedron import calibrate
 from trihedron.records import Recording
 
 STRONG = {"gyro_flicker": np.radians(20.0 / 3600.0), "accel_flicker": 0.3e-3 * G}
 WEAK = {"gyro_flicker": np.radians(0.2 / 3600.0), "accel_flicker": 2e-5}
-THERE_AND_BACK = {90.0: (90.0, -90.0), 180.0: (180.0, -180.0), 360.0: (360.0, -360.0)}
 NORMAL_95 = 1.96
 QUANTITIES = ("S_f", "b_f", "S_w", "b_w")
 
-SETTINGS = {
-    **{f"moves of {s:g} s": (hand, {"move_s": s}) for s in (0.25, 2.0, 30.0, 60.0)},
-    **{f"gyro of {b} bit": (hand, {"gyro_bits": b}) for b in (8, 10, 12)},
-    **{f"both of {b} bit": (hand, {"gyro_bits": b, "accel_bits": b}) for b in (8, 10, 12)},
-    **{f"{hz:g} Hz": (hand, {"rate_hz": hz}) for hz in (10.0, 1000.0)},
-    **{f"{n} poses": (hand, {"n_poses": n}) for n in (9, 12, 40)},
-    "1/f strong": (hand, STRONG),
-    "1/f weak": (hand, WEAK),
-    **{f"lost {100 * p:g} %, timestamps true": (hand, {"lost": p}) for p in (0.001, 0.03)},
-    **{f"lost {100 * p:g} %, timestamps remade": (hand, {"lost": p, "is_remade": True}) for p in (0.001, 0.03)},
-    **{
-        f"{hz:g} Hz, moves of {s:g} s, lost {100 * p:g} %, remade": (
-            hand,
-            {"rate_hz": hz, "move_s": s, "lost": p, "is_remade": True},
-        )
-        for hz, s, p in ((1000.0, 2.0, 0.001), (100.0, 10.0, 0.001), (100.0, 0.25, 0.001), (10.0, 2.0, 0.001))
-    },
-    **{
-        f"table turns, {r:g} deg/s": (table, {"rate_deg_s": r, "turns": (180.0, -180.0)})
-        for r in (0.5, 1.0, 3.0, 10.0, 50.0, 500.0)
-    },
-    **{f"faces, turns of {a:g}": (table, {"turns": t, "method": "faces"}) for a, t in THERE_AND_BACK.items()},
-    **{
-        f"faces, stated {a:g}": (table, {"turns": t, "method": "faces", "is_stated": True})
-        for a, t in THERE_AND_BACK.items()
-    },
-    "robot": (robot, {}),
-    "robot, 12 bit": (robot, {"gyro_bits": 12}),
-    "robot, 12 bit, lost 0.3 %, remade": (robot, {"gyro_bits": 12, "lost": 0.003, "is_remade": True}),
-    "manual's session, moves": (manual, {}),
-    "manual's session, stated turns": (manual, {"is_stated": True}),
-    "scattered biases": (hand, {"n_poses": 24, "scatter": (0.05, 3.0)}),
-}
-
 # One factor of a session at a time: length of moves, bits, rate, poses, slow noise, losses. 16 bits, 100 Hz, 18 poses
 # are those of the moves of 2 s.
-ASKED = (
-    *(f"moves of {s:g} s" for s in (0.25, 2.0, 30.0)),
-    *(f"{which} of {b} bit" for which in ("gyro", "both") for b in (8, 10, 12)),
-    *("10 Hz", "1000 Hz", "9 poses", "12 poses", "40 poses", "1/f strong", "1/f weak"),
-    *(f"lost {100 * p:g} %, timestamps {timestamps}" for p in (0.001, 0.03) for timestamps in ("true", "remade")),
-)
+SETTINGS = {
+    **{f"moves of {s:g} s": {"move_s": s} for s in (0.25, 2.0, 30.0)},
+    **{f"gyro of {b} bit": {"gyro_bits": b} for b in (8, 10, 12)},
+    **{f"both of {b} bit": {"gyro_bits": b, "accel_bits": b} for b in (8, 10, 12)},
+    **{f"{hz:g} Hz": {"rate_hz": hz} for hz in (10.0, 1000.0)},
+    **{f"{n} poses": {"n_poses": n} for n in (9, 12, 40)},
+    "1/f strong": STRONG,
+    "1/f weak": WEAK,
+    **{f"lost {100 * p:g} %, timestamps true": {"lost": p} for p in (0.001, 0.03)},
+    **{f"lost {100 * p:g} %, timestamps remade": {"lost": p, "is_remade": True} for p in (0.001, 0.03)},
+    # °/s and mm/s² that biases differ by from pose to pose.
+    "scattered biases": {"n_poses": 24, "scatter": (0.05, 3.0)},
+}
 
 
 def scattered(values, S, time_s, rests, sigma, rng):
@@ -81,9 +52,8 @@ def scattered(values, S, time_s, rests, sigma, rng):
 
 
 def answer(make, options, seed):
-    """Calibration of one session through the public front, its truth in the same frame, the motion."""
+    """Calibration of one session through the public front, and its truth in the same frame."""
     options = dict(options)
-    method, is_stated = options.pop("method", "joint"), options.pop("is_stated", False)
     lost, is_remade = options.pop("lost", 0.0), options.pop("is_remade", False)
     scatter = options.pop("scatter", None)
     f, w, rate, truth, motion = make(seed, **options)
@@ -98,9 +68,7 @@ def answer(make, options, seed):
         if is_remade:
             t = np.arange(len(f)) / rate
     recording = Recording(t, f, w, rate, accelerometer_unit="counts", gyroscope_unit="counts")
-    more = {"turns_deg": [angle for _, _, angle in motion.turns]} if is_stated else {}
-    result = calibrate(recording, gravity_m_s2=G, method=method, **more)
-    return result, truth if method == "faces" else lower(truth)
+    return calibrate(recording, gravity_m_s2=G), lower(truth)
 
 
 def session(make, options, seed):
@@ -112,7 +80,7 @@ def session(make, options, seed):
     a, g = result.accelerometer, result.gyroscope
     if g is None:
         return "refused", None
-    free = np.nonzero(np.tril(np.ones((3, 3))) if options.get("method") != "faces" else np.ones((3, 3)))
+    free = np.tril_indices(3)
     z = {"S_f": ((a.S - truth.S_f) / np.where(a.sigma_S > 0.0, a.sigma_S, np.inf))[free]}
     z |= {"b_f": (a.b - truth.b_f) / a.sigma_b}
     z |= {"S_w": ((g.S - truth.S_w) / g.sigma_S).ravel(), "b_w": (g.b - truth.b_w) / g.sigma_b}
@@ -156,26 +124,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sessions", type=int, default=20, help="from every first seed")
     parser.add_argument("--first", type=int, nargs="+", default=[0], help="seeds of first sessions")
-    parser.add_argument("--asked", action="store_true", help="the settings of the table of coverage, no others")
-    parser.add_argument("--gyro", type=float, help="°/s")
-    parser.add_argument("--accel", type=float, help="mm/s²")
     parser.add_argument("names", nargs="*")
     parser.add_argument("--design", action="store_true", help="every factor at once, a row for each of its levels")
     given = parser.parse_args()
     print("| setting | trusted, marked, refused | S_f | b_f | S_ω | b_ω | worst | outside |\n" + "|---" * 8 + "|")
+    seeds = [first + k for first in given.first for k in range(given.sessions)]
     if given.design:
-        for name, rows in sorted(by_level([first + k for first in given.first for k in range(given.sessions)]).items()):
+        for name, rows in sorted(by_level(seeds).items()):
             print(line(name, rows))
         return
-    for name, (make, options) in SETTINGS.items():
-        if given.names and not any(word in name for word in given.names):
-            continue
-        if given.asked and name not in ASKED:
-            continue
-        if "scatter" in options and given.gyro is not None:
-            options = options | {"scatter": (given.gyro, given.accel or 0.0)}
-        seeds = [first + k for first in given.first for k in range(given.sessions)]
-        print(line(name, [session(make, options, seed) for seed in seeds]), flush=True)
+    for name, options in SETTINGS.items():
+        if not given.names or any(word in name for word in given.names):
+            print(line(name, [session(hand, options, seed) for seed in seeds]), flush=True)
 
 
 if __name__ == "__main__":
