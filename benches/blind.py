@@ -15,16 +15,13 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import json
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
 
 import numpy as np
 
 from blind_trial.draw import GRADES, Job
 from blind_trial.foreign import FOREIGN
-from blind_trial.score import Result, confusion, summary, trial
+from blind_trial.running import Result, command_line, tried
+from blind_trial.score import confusion, summary, trial
 from blind_trial.sizes import SIZES
 
 
@@ -48,15 +45,6 @@ def drawn(options: argparse.Namespace) -> list[Job]:
     return jobs
 
 
-def run(jobs: list[Job], workers: int) -> Iterator[Result]:
-    """Results in the order of the jobs."""
-    if workers == 1:
-        yield from map(trial, jobs)
-        return
-    with ProcessPoolExecutor(workers) as pool:
-        yield from pool.map(trial, jobs)
-
-
 def line(result: Result) -> str:
     """One trial in one line, with the seed that repeats it."""
     worst = max((abs(v) for _, v in result["z"]), default=0.0)
@@ -69,36 +57,24 @@ def line(result: Result) -> str:
     )
 
 
-def tried(options: argparse.Namespace) -> list[Result]:
-    """Run the trials, print what went wrong as it comes, store every result."""
-    if not (options.each or options.foreign or options.healthy):
-        options.each = 2
-    jobs = [job for job in drawn(options) if options.only_seed in (None, job.seed)]
-    results: list[Result] = []
-    for result in run(jobs, options.jobs):
-        results.append(result)
-        if options.verbose or result["score"] not in ("right", "confounded"):
-            print(line(result), flush=True)
-        if options.json:
-            options.json.write_text(json.dumps(results))
-    return results
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--each", type=int, default=0, help="recordings of every effect, grades in turn")
     parser.add_argument("--foreign", type=int, default=0, help="recordings with a mechanism outside the catalogue")
     parser.add_argument("--healthy", type=int, default=0, help="healthy recordings")
     parser.add_argument("--effect", action="append", choices=SIZES, help="only this effect (repeatable)")
     parser.add_argument("--grade", action="append", choices=GRADES, help="only this noise grade (repeatable)")
     parser.add_argument("--size", type=float, default=1.0, help="size as a fraction of the typical one")
-    parser.add_argument("--seed", type=int, default=1, help="of the draw")
-    parser.add_argument("--only-seed", type=int, help="repeat only the recording of this seed")
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--json", type=Path, help="write every result here")
     parser.add_argument("--verbose", action="store_true", help="print every trial")
     options = parser.parse_args()
-    results = tried(options)
+    if not (options.each or options.foreign or options.healthy):
+        options.each = 2
+    jobs = [job for job in drawn(options) if options.only_seed in (None, job.seed)]
+
+    def shown(result: Result) -> str:
+        return line(result) if options.verbose or result["score"] not in ("right", "confounded") else ""
+
+    results = tried(trial, jobs, options, shown)
     print()
     print(confusion([r for r in results if r["label"] != "healthy"]))
     print()

@@ -4,13 +4,15 @@
     python benches/blind_nuisances.py --each 2 --clean              # no nuisances
     python benches/blind_nuisances.py --only none --each 30         # nuisances alone
     python benches/blind_nuisances.py --only none --each 20 --clean --flicker   # healthy with consumer 1/f noise
+    python benches/blind_nuisances.py --only none --triples 10 --seed 21        # three units told as one
 
-Each trial writes a log and, apart, the sealed answer; the diagnosis sees the log alone.
+Each trial writes a log and, apart, the sealed answer; the diagnosis sees the log alone. ``--triples`` gives sessions of
+three units that share nothing as recordings of one: with flaw ``none`` it counts false names, with another one whether
+values that differ are called the instrument's.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import json
@@ -18,7 +20,7 @@ import os
 import tempfile
 import time
 import warnings
-from concurrent.futures import ProcessPoolExecutor
+from collections import Counter
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -26,12 +28,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import polars as pl
 
+import trihedron
+from blind_trial.running import command_line, tried, within
 from nuisance_trial.draw import ALLOWED_BESIDE, ALSO_RIGHT, FLAWS, G, draw
 
 
 def trial(job):
-    flaw, seed, size, nuisances, flicker, without = job
-    columns, answer = draw(flaw, seed, size, nuisances, flicker, without)
+    columns, answer = draw(*job)
     with tempfile.TemporaryDirectory() as folder:
         log, seal = Path(folder) / "log.csv", Path(folder) / "answer.json"
         pl.DataFrame(columns).write_csv(log)
@@ -40,8 +43,6 @@ def trial(job):
         try:
             with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
                 warnings.simplefilter("ignore")
-                import trihedron
-
                 said = trihedron.diagnose(str(log), gravity_m_s2=G).to_dict()
             crash = ""
         except Exception as error:  # a crash is a result of the trial
@@ -110,63 +111,79 @@ def coverage(answer, model):
     return out
 
 
+N_RECORDINGS = 3
+
+
+def triple(job):
+    """What is said of three sessions of three units as if of one."""
+    flaw, seed = job
+    with tempfile.TemporaryDirectory() as folder:
+        logs = [f"{folder}/{k}.csv" for k in range(N_RECORDINGS)]
+        for k, log in enumerate(logs):
+            pl.DataFrame(draw(flaw, seed * N_RECORDINGS + k)[0]).write_csv(log)
+        try:
+            found = trihedron.diagnose_sessions(logs, gravity_m_s2=G)
+        except ValueError as error:
+            return {"said": f"refused: {str(error)[:100]}", "shared": False, "own": False}
+    best = max((one.score for one in found.candidates), default=0.0)
+    said = "; ".join(f"{e.id} {e.score:.1f} (agree: p {e.p_agree:.1g})" for e in found.effects)
+    own = any(one.is_of_instrument for one in found.effects)
+    return {"said": f"{said or 'nothing shared'} | next {best:.1f}", "shared": bool(found.effects), "own": own}
+
+
+def line(r):
+    """One trial in one line, with the seed that repeats it."""
+    return (
+        f"{r['score']:15s}{r['flaw']:26s}{r['verdict']:17s}{' '.join(r['ids']) or '-'}"
+        f"  conf {[c for c in r.get('confounded', []) if c]} left {','.join(r.get('left', []))}"
+        f" | {','.join(r['nuisances'])} | {r['rate']:.0f} Hz {r['poses']} poses | seed {r['seed']}"
+        f" | {r['seconds']:.1f} s {r['crash']}"
+    )
+
+
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
+    parser.set_defaults(seed=11)
     parser.add_argument("--each", type=int, default=3)
-    parser.add_argument("--seed", type=int, default=11)
     parser.add_argument("--size", type=float, default=1.0)
     parser.add_argument("--clean", action="store_true", help="no nuisances")
     parser.add_argument("--without", action="append", default=[], help="leave this nuisance out, all else the same")
     parser.add_argument("--flicker", action="store_true", help="1/f noise as consumer parts have it (0.3 mg, 20 deg/h)")
     parser.add_argument("--only", action="append", choices=FLAWS)
-    parser.add_argument("--only-seed", type=int)
-    parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--json", type=Path)
+    parser.add_argument("--triples", type=int, help="so many times three units as one, for each flaw")
     options = parser.parse_args()
-    jobs = []
-    for k in range(options.each):
-        for i, flaw in enumerate(FLAWS):
-            if not options.only or flaw in options.only:
-                seed = options.seed * 100_000 + k * 100 + i
-                if options.only_seed in (None, seed):
-                    jobs.append((flaw, seed, options.size, not options.clean, options.flicker, options.without))
-    results = []
-    with ProcessPoolExecutor(options.jobs) as pool:
-        for r in pool.map(trial, jobs) if options.jobs > 1 else map(trial, jobs):
-            results.append(r)
-            print(f"{r['score']:15s}{r['flaw']:26s}{r['verdict']:17s}{' '.join(r['ids']) or '-'}"
-                  f"  conf {[c for c in r.get('confounded', []) if c]} left {','.join(r.get('left', []))}"
-                  f" | {','.join(r['nuisances'])} | {r['rate']:.0f} Hz {r['poses']} poses | seed {r['seed']}"
-                  f" | {r['seconds']:.1f} s {r['crash']}", flush=True)  # fmt: skip
-            if options.json:
-                options.json.write_text(json.dumps(results))
-    report(results)
+    flaws = [(i, flaw) for i, flaw in enumerate(FLAWS) if not options.only or flaw in options.only]
+    if options.triples:
+        jobs = [(flaw, options.seed * 1000 + k) for _, flaw in flaws for k in range(options.triples)]
+        results = tried(triple, jobs, options, lambda r: r["said"])
+        shared, own = (sum(r[key] for r in results) for key in ("shared", "own"))
+        print(f"{len(results)} triples: {shared} share an effect, {own} called the instrument's")
+        return
+    how = (options.size, not options.clean, options.flicker, options.without)
+    jobs = [(flaw, options.seed * 100_000 + k * 100 + i, *how) for k in range(options.each) for i, flaw in flaws]
+    report(tried(trial, [job for job in jobs if options.only_seed in (None, job[1])], options, line))
 
 
 def report(results):
     hidden = sum(r["score"] == "hidden" for r in results)
     n = len(results) - hidden
-    scores = {}
-    for r in results:
-        scores[r["score"]] = scores.get(r["score"], 0) + 1
-    shares = [f"{k} {v} ({100 * v / max(n, 1):.0f} %)" for k, v in sorted(scores.items()) if k != "hidden"]
+    shares = [
+        f"{k} {v} ({100 * v / max(n, 1):.0f} %)"
+        for k, v in sorted(Counter(r["score"] for r in results).items())
+        if k != "hidden"
+    ]
     print(f"\n{n} visible trials, {hidden} hidden: {', '.join(shares)}")
     print(f"trials with a mechanism that is not there: {sum(bool(r.get('false')) for r in results)}; "
           f"an effect with no value above its sigma: {sum(bool(r.get('worthless')) for r in results)}")  # fmt: skip
+    seen = [r for r in results if r.get("z")]
+    answered = [r for r in seen if r["score"] in ("right", "shared", "nuisance first")]
     for sensor in ("accelerometer", "gyroscope"):
-        z = np.array([v for r in results if r.get("z") for v in r["z"].get(sensor, [])])
-        right = np.array([v for r in results if r.get("z") and r["score"] in ("right", "shared", "nuisance first")
-                          for v in r["z"].get(sensor, [])])  # fmt: skip
-        if len(z):
-            print(f"{sensor}: |z| < 1.96 in {100 * np.mean(np.abs(z) < 1.96):.0f} % of S entries, in answered trials "
-                  f"{100 * np.mean(np.abs(right) < 1.96) if len(right) else 0:.0f} %")  # fmt: skip
-        linear = np.array([v for r in results if r.get("z_linear") for v in r["z_linear"].get(sensor, [])])
-        if len(linear):
-            print(f"{sensor}, the linear model without effects (calibration.baseline): "
-                  f"{100 * np.mean(np.abs(linear) < 1.96):.0f} %, rms z {np.sqrt(np.mean(linear**2)):.2f}")  # fmt: skip
-    print(
-        f"CPU {np.sum([r['seconds'] for r in results]):.0f} s, median {np.median([r['seconds'] for r in results]):.1f}"
-    )
+        for what, key, of in (("S", "z", seen), ("S of answered trials", "z", answered),
+                              ("S of calibration.baseline, without effects", "z_linear", seen)):  # fmt: skip
+            if z := [v for r in of for v in r[key].get(sensor, [])]:
+                print(f"{sensor}, {what}: {within(z)}")
+    seconds = [r["seconds"] for r in results]
+    print(f"CPU {sum(seconds):.0f} s, median {np.median(seconds):.1f}")
 
 
 if __name__ == "__main__":

@@ -15,21 +15,21 @@ question is asked of the two logs alone and its answer written to ``found.json``
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 import tempfile
 import warnings
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.linalg import polar
+from scipy.spatial.transform import Rotation
 
 import trihedron
-from blind_trial.draw import grade_profile, moves_of
+from blind_trial.draw import grade_profile, moves_of, rows
+from blind_trial.running import command_line, tried, within
 from blind_trial.sizes import ON_A_TABLE, SIZES, Session
 from trihedron.diagnose.effects import catalogue
 from trihedron.files.log import write_recording
@@ -60,38 +60,27 @@ class Pair:
     by_file: bool = False
 
 
-def matrix(S: np.ndarray) -> Any:
-    return tuple(tuple(float(v) for v in row) for row in S)
-
-
-def triple(b: np.ndarray) -> Any:
-    return tuple(float(v) for v in b)
-
-
-def turned(angle: np.ndarray) -> np.ndarray:
-    """Rotation matrix of a rotation vector."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_rotvec(angle).as_matrix())
+def channels(S: Any, b: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Gains (3,), directions (3, 3) and offsets (3,) of an instrument: raw = gain (direction · truth) + offset."""
+    M = np.linalg.inv(np.array(S))
+    k = np.linalg.norm(M, axis=1)
+    return k, M / k[:, None], -M @ np.array(b)
 
 
 def moved(kind: str, accel: Any, gyro: Any, rng: np.random.Generator) -> tuple[Any, Any]:
     """One number moved, in the direction in which the instrument is made: raw = S⁻¹(truth - b)."""
     sign = rng.choice((-1.0, 1.0), 3) * rng.uniform(0.5, 1.5, 3)
     if kind == "accel-bias":
-        accel = replace(accel, b=triple(np.array(accel.b) + 0.03 * sign))
+        accel = replace(accel, b=rows(np.array(accel.b) + 0.03 * sign))
     elif kind == "gyro-bias":
-        gyro = replace(gyro, b=triple(np.array(gyro.b) + np.radians(0.3) * sign))
+        gyro = replace(gyro, b=rows(np.array(gyro.b) + np.radians(0.3) * sign))
     elif kind in ("accel-scale", "gyro-scale", "accel-misalignment", "gyro-misalignment", "triad-alignment"):
         sensor = accel if kind.startswith("accel") else gyro
-        M = np.linalg.inv(np.array(sensor.S))
-        k = np.linalg.norm(M, axis=1)
-        n = M / k[:, None]
-        offset = -M @ np.array(sensor.b)
+        k, n, offset = channels(sensor.S, sensor.b)
         if kind.endswith("scale"):
             k, offset = k * (1 + 0.004 * sign), offset * (1 + 0.004 * sign)
         elif kind == "triad-alignment":
-            n = n @ turned(0.006 * sign).T
+            n = n @ Rotation.from_rotvec(0.006 * sign).as_matrix().T
         else:
             # Two axes opened against each other, their mean direction kept, so that the triad does not turn.
             i, j = rng.choice(3, 2, replace=False)
@@ -104,7 +93,7 @@ def moved(kind: str, accel: Any, gyro: Any, rng: np.random.Generator) -> tuple[A
             n[i] = np.cos(angle / 2) * centre - np.sin(angle / 2) * side
             n[j] = np.cos(angle / 2) * centre + np.sin(angle / 2) * side
         S = np.linalg.inv(k[:, None] * n)
-        sensor = replace(sensor, S=matrix(S), b=triple(-S @ offset))
+        sensor = replace(sensor, S=rows(S), b=rows(-S @ offset))
         accel, gyro = (sensor, gyro) if kind.startswith("accel") else (accel, sensor)
     return accel, gyro
 
@@ -129,7 +118,7 @@ def make(pair: Pair) -> tuple[Recording, Recording, float, dict[str, Any]]:
         sim_a, sim_g = profile.unit(number + 1)
     elif pair.kind == "noise":
         factor = float(rng.uniform(1.6, 2.5))
-        sim_g = replace(gyro, noise=replace(gyro.noise, N=triple(factor * np.array(gyro.noise.N) * np.ones(3))))
+        sim_g = replace(gyro, noise=replace(gyro.noise, N=rows(factor * np.array(gyro.noise.N) * np.ones(3))))
     elif pair.kind == "resolution":
         sim_a = replace(accel, adc=replace(accel.adc, lsb=accel.adc.lsb * float(rng.choice((16.0, 64.0)))))
     else:
@@ -159,23 +148,16 @@ def true_differences(sim: Any, real: Any, kind: str) -> dict[str, list[float]]:
     """Recording minus simulation, group by group, from the two truths and nothing of the tool's own formulas."""
     out: dict[str, list[float]] = {}
     axes = {}
-    for name in ("accel", "gyro"):
-        side = []
-        for truth in (sim, real):
-            S = np.array(getattr(truth, "accelerometer_S" if name == "accel" else "gyroscope_S"))
-            b = np.array(getattr(truth, "accelerometer_b" if name == "accel" else "gyroscope_b"))
-            M = np.linalg.inv(S)
-            k = np.sqrt((M**2).sum(axis=1))
-            n = (M.T / k).T
-            cosines = n @ n.T
-            side.append((-(M @ b) / k, np.log(k), np.arccos(cosines[[0, 0, 1], [1, 2, 2]]), n))
-        for group, index in (("bias", 0), ("scale", 1), ("misalignment", 2)):
-            out[f"{name}-{group}"] = (side[1][index] - side[0][index]).tolist()
-        axes[name] = (side[0][3], side[1][3])
-    from scipy.linalg import polar
-    from scipy.spatial.transform import Rotation
-
-    R = [polar(axes["gyro"][s])[0] @ polar(axes["accel"][s])[0].T for s in (0, 1)]
+    for name, sensor in (("accel", "accelerometer"), ("gyro", "gyroscope")):
+        sides = [channels(getattr(truth, f"{sensor}_S"), getattr(truth, f"{sensor}_b")) for truth in (sim, real)]
+        axes[name] = [polar(n)[0] for _, n, _ in sides]
+        of_group = {
+            "bias": [offset / k for k, _, offset in sides],
+            "scale": [np.log(k) for k, _, _ in sides],
+            "misalignment": [np.arccos((n @ n.T)[[0, 0, 1], [1, 2, 2]]) for _, n, _ in sides],
+        }
+        out |= {f"{name}-{group}": (recorded - made).tolist() for group, (made, recorded) in of_group.items()}
+    R = [gyro @ accel.T for gyro, accel in zip(axes["gyro"], axes["accel"], strict=True)]
     out["triad-alignment"] = Rotation.from_matrix(R[1] @ R[0].T).as_rotvec().tolist()
     if kind == "gravity":
         out["accel-scale"] = [0.0] * 3
@@ -183,21 +165,10 @@ def true_differences(sim: Any, real: Any, kind: str) -> dict[str, list[float]]:
     return out
 
 
-def seal(pair: Pair, folder: Path) -> None:
-    """The two logs, the question, and the answer nobody may read yet."""
-    simulated, recording, gravity, answer = make(pair)
-    write_recording(simulated, folder / "simulation.csv")
-    write_recording(recording, folder / "recording.csv")
-    (folder / "question.json").write_text(json.dumps({"gravity_m_s2": gravity, "by_file": pair.by_file}))
-    (folder / "sealed.json").write_text(json.dumps(answer))
-
-
-def ask(folder: Path) -> None:
+def ask(folder: Path, gravity: float, by_file: bool) -> None:
     """The answer to the two logs, written down before the seal is opened."""
-    question = json.loads((folder / "question.json").read_text())
-    gravity = question["gravity_m_s2"]
     recording, simulated = (trihedron.read(folder / f"{name}.csv") for name in ("recording", "simulation"))
-    if question["by_file"]:
+    if by_file:
         known = trihedron.calibrate(simulated, gravity_m_s2=gravity)
         found = trihedron.diagnose(recording, calibration=known)
     else:
@@ -210,9 +181,12 @@ def trial(pair: Pair) -> dict[str, Any]:
     result: dict[str, Any] = {"kind": pair.kind, "seed": pair.seed, "by_file": pair.by_file, "crash": ""}
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        seal(pair, folder)
+        simulated, recording, gravity, answer = make(pair)
+        write_recording(simulated, folder / "simulation.csv")
+        write_recording(recording, folder / "recording.csv")
+        (folder / "sealed.json").write_text(json.dumps(answer))
         try:
-            ask(folder)
+            ask(folder, gravity, pair.by_file)
         except Exception as error:  # a crash is a result
             return {**result, "crash": f"{type(error).__name__}: {error}", "right": False, "false": [], "z": {}}
         document = json.loads((folder / "found.json").read_text())
@@ -237,13 +211,13 @@ def scored(pair: Pair, document: dict[str, Any], answer: dict[str, Any]) -> dict
     # A linear file of a log with an effect has taken it up: its numbers are right for that log and true of no unit.
     is_bent = pair.by_file and answer["kind"] in ("surplus", "both")
     for group, values in answer["numbers"].items():
-        rows = [p for p in document["parameters"] if p["id"] == group]
+        said = [p for p in document["parameters"] if p["id"] == group]
         if any(abs(v) > 1e-9 for v in values):
             may.add(group)
-        if len(rows) == len(values):
-            errors = [(p["difference"] - v) / p["std"] for p, v in zip(rows, values, strict=True)]
+        if len(said) == len(values):
+            errors = [(p["difference"] - v) / p["std"] for p, v in zip(said, values, strict=True)]
             z |= {} if group in is_open or is_bent else {group: errors}
-            if any(abs(v) > 5 * p["std"] for p, v in zip(rows, values, strict=True)):
+            if any(abs(v) > 5 * p["std"] for p, v in zip(said, values, strict=True)):
                 must.add(group)
         elif group == "gravity":
             must.add(group)
@@ -287,13 +261,16 @@ def scored(pair: Pair, document: dict[str, Any], answer: dict[str, Any]) -> dict
     }  # fmt: skip
 
 
+def line(result: dict[str, Any]) -> str:
+    """A pair in which something went wrong."""
+    is_odd = not result["right"] or result["false"] or result.get("missed") or result.get("first") is False
+    return str({k: v for k, v in result.items() if k != "z"}) if is_odd else ""
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--pairs", type=int, default=32)
-    parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kind", action="append", choices=KINDS)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
     kinds = options.kind or list(KINDS)
@@ -301,31 +278,18 @@ def main() -> None:
         Pair(kinds[k % len(kinds)], int(rng.integers(1 << 30)), (k // len(kinds)) % 3 == 2)
         for k in range(options.pairs)
     ]
-    results = []
-    with ProcessPoolExecutor(options.jobs) as pool:
-        for r in pool.map(trial, pairs):
-            results.append(r)
-            if not r["right"] or r["false"] or r.get("missed") or r["crash"] or r.get("first") is False:
-                print({k: v for k, v in r.items() if k != "z"}, flush=True)
-    by_group = {g: np.array([v for r in results for v in r["z"].get(g, ())]) for g in GROUPS}
-    z = np.concatenate(list(by_group.values()))
-    n = len(results)
-    print(f"\n{n} pairs: verdict right {sum(r['right'] for r in results)}, with a false name "
+    results = tried(trial, [pair for pair in pairs if options.only_seed in (None, pair.seed)], options, line)
+    print(f"\n{len(results)} pairs: verdict right {sum(r['right'] for r in results)}, with a false name "
           f"{sum(bool(r['false']) for r in results)}, a group missed {sum(bool(r.get('missed')) for r in results)}, "
           f"crashes {sum(bool(r['crash']) for r in results)}")  # fmt: skip
     firsts = [r["first"] for r in results if r.get("first") is not None]
     print(f"effect first: {sum(firsts)} of {len(firsts)}")
-    if len(z):
-        inside = np.mean(np.abs(z) < 1.96)
-        print(f"numbers: {len(z)} differences, rms z {np.sqrt(np.mean(z**2)):.2f}, within 1.96: {inside:.3f}")
-    for group, own in by_group.items():
-        if len(own):
-            inside = np.mean(np.abs(own) < 1.96)
-            print(f"  {group}: {len(own)}, rms z {np.sqrt(np.mean(own**2)):.2f}, within 1.96: {inside:.3f}")
+    by_group = {g: [v for r in results for v in r["z"].get(g, ())] for g in GROUPS}
+    for group, z in {"all groups": [v for own in by_group.values() for v in own], **by_group}.items():
+        if z:
+            print(f"{group}: {len(z)} differences, {within(z)}")
     print(Counter((r["kind"], r.get("verdict")) for r in results))
-    if options.json:
-        options.json.write_text(json.dumps(results))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -35,6 +35,11 @@ class Job:
         return self.foreign or " + ".join(self.effects) or "healthy"
 
 
+def rows(S: np.ndarray) -> Any:
+    """Numbers of a vector, or of a matrix row by row, as records of a sensor hold them."""
+    return tuple(rows(row) if row.ndim else float(row) for row in np.asarray(S))
+
+
 def grade_profile(grade: str) -> Profile:
     """The class of instrument; the consumer gyro on its ±500 °/s range, which hand moves do not leave.
 
@@ -43,9 +48,8 @@ def grade_profile(grade: str) -> Profile:
     profile = profile_by_name(grade)
     if grade != "mpu":
         return profile
-    wide = np.diag([math.radians(1.0 / 65.5)] * 3)
-    rows = tuple((float(r[0]), float(r[1]), float(r[2])) for r in wide)
-    return replace(profile, gyroscope=replace(profile.gyroscope, S=(rows[0], rows[1], rows[2])))
+    wide = rows(np.diag([math.radians(1.0 / 65.5)] * 3))
+    return replace(profile, gyroscope=replace(profile.gyroscope, S=wide))
 
 
 def table_session(layout: int, rng: np.random.Generator) -> Motion:

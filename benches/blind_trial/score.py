@@ -13,8 +13,8 @@ import numpy as np
 
 import trihedron
 from blind_trial.draw import Job, make
+from blind_trial.running import Result
 
-Result = dict[str, Any]
 HELD_OUT = 1.3
 """Chi-square per degree of freedom on unseen poses and moves that an explained recording should stay below."""
 COLUMNS = ("right", "confounded", "second", "missed", "wrong")

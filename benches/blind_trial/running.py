@@ -1,0 +1,44 @@
+"""Blind trials: their command line, run side by side, every result printed and stored as it comes."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Result = dict[str, Any]
+
+
+def command_line(text: str) -> argparse.ArgumentParser:
+    """The options that every kind of trial has."""
+    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, default=1, help="of the draw")
+    parser.add_argument("--only-seed", type=int, help="repeat only the recording of this seed")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--json", type=Path, help="write every result here")
+    return parser
+
+
+def tried(
+    trial: Callable[[Any], Result], jobs: Iterable[Any], options: argparse.Namespace, line: Callable[[Result], str]
+) -> list[Result]:
+    """Results in the order of the jobs; of each a line is printed, unless it is empty."""
+    results: list[Result] = []
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for result in pool.map(trial, jobs) if options.jobs > 1 else map(trial, jobs):
+            results.append(result)
+            if text := line(result):
+                print(text, flush=True)
+            if options.json:
+                options.json.write_text(json.dumps(results))
+    return results
+
+
+def within(z: Any) -> str:
+    """Share of errors within 1.96 σ and their rms."""
+    return f"{100 * np.mean(np.abs(z) < 1.96):.1f} % within 1.96 σ, rms z {np.sqrt(np.mean(np.square(z))):.2f}"
