@@ -26,10 +26,11 @@ import numpy as np
 
 import trihedron
 from trihedron.api.capturing import column_namer
+from trihedron.capture.account import Count
 from trihedron.capture.protocols import decoder_factory
 from trihedron.capture.recorder import Recorder
 from trihedron.capture.sources import open_source
-from trihedron.files.frame_declaration import read_frame_declaration
+from trihedron.files.frame_declaration import FrameDeclaration, read_frame_declaration
 from trihedron.records import Recording
 from trihedron.simulate.device.encoders import Scales
 from trihedron.simulate.device.faults import Faults, Sent, parse_faults
@@ -76,34 +77,44 @@ def served(device: Device, line: PseudoTerminal, sent: Sent):
     thread.join()
 
 
+def recorded(device: Device, log: Path, wait_for_return_s: float, silence_s: float) -> tuple[Sent, Count]:
+    """What the board sent and what the recorder counts, once everything is sent and the port silent."""
+    line = PseudoTerminal(log.parent / "port")  # a name that stays the same when it comes back
+    # The port is open before the first byte is sent: nothing is lost for want of a reader.
+    source, sent, spoken = open_source(line.name), Sent(), device.protocol
+    make = decoder_factory(BOARDS[spoken][0] if isinstance(spoken, str) else spoken, column_namer())
+    recorder = Recorder(source, make, log, wait_for_return_s=wait_for_return_s, silence_s=silence_s)
+    thread = threading.Thread(target=lambda: serve(device, line, sent=sent))
+    thread.start()
+    for _ in recorder:
+        pass
+    thread.join()
+    return sent, recorder.count
+
+
+def spoken_by(board: str, declaration: str, folder: Path) -> str | FrameDeclaration:
+    """The board's protocol by name, or the frame that it declares."""
+    if board != "declared":
+        return board
+    (folder / "declared.toml").write_text(declaration)
+    return read_frame_declaration(folder / "declared.toml")
+
+
 def faults(frames: str = "1e5", kinds: str = "1%", *only: str) -> None:
     """The account of every board, as fast as it can be read."""
     n, total = int(float(frames)), np.zeros(2, dtype=int)
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        (folder / "declared.toml").write_text(DECLARED)
-        declaration = read_frame_declaration(folder / "declared.toml")
-        for board in only or BOARDS:
-            read_as, rate_hz = BOARDS[board]
-            line = PseudoTerminal(folder / "port")  # a name that stays the same when it comes back
-            # The port is open before the first byte is sent: nothing is lost for want of a reader.
-            source, sent = open_source(line.name), []
-            spoken = declaration if board == "declared" else board
-            device = Device(readings(n, rate_hz), spoken, replace(parse_faults(kinds), clean_ends=30), 0.0, seed=7)
-            thread = threading.Thread(target=lambda d=device, p=line, s=sent: s.append(serve(d, p)))
-            make = decoder_factory(declaration if read_as == "declared" else read_as, column_namer())
+    for board in only or BOARDS:
+        with tempfile.TemporaryDirectory() as name:
+            log, spoken = Path(name) / "log.csv", spoken_by(board, DECLARED, Path(name))
+            clean = replace(parse_faults(kinds), clean_ends=30)
+            device = Device(readings(n, BOARDS[board][1]), spoken, clean, 0.0, seed=7)
             # A board that goes away comes back; one that has sent everything does not.
-            away_s = 5.0 if "disconnect" in kinds else 0.0
-            recorder = Recorder(source, make, folder / f"{board}.csv", wait_for_return_s=away_s, silence_s=120.0)
-            thread.start()
-            for _ in recorder:
-                pass
-            thread.join()
-            count, rows = recorder.count, sum(row[0].isdigit() for row in (folder / f"{board}.csv").open())
-            missing = sent[0].frames - rows - count.lost
-            total += (sent[0].frames, missing)
-            account = f"sent {sent[0].frames:8d} = saved {rows:8d} + lost {count.lost:6d} + {missing}"
-            print(f"{board:20s} {account} (corrupt pieces {count.corrupt}, {count.tally})", flush=True)
+            sent, count = recorded(device, log, 5.0 if "disconnect" in kinds else 0.0, 120.0)
+            rows = sum(row[0].isdigit() for row in log.open())
+        missing = sent.frames - rows - count.lost
+        total += (sent.frames, missing)
+        account = f"sent {sent.frames:8d} = saved {rows:8d} + lost {count.lost:6d} + {missing}"
+        print(f"{board:20s} {account} (corrupt pieces {count.corrupt}, {count.tally})", flush=True)
     print(f"{total[0]} frames; not accounted for: {total[1]}")
 
 
@@ -159,30 +170,16 @@ def one_run(run: Run) -> str:
 
     Where a count began anew, or may have gone round, the log says that more may be lost than it counts.
     """
-    read_as, n = BOARDS[run.board][0], int(run.seconds * run.rate_hz)
+    n = int(run.seconds * run.rate_hz)
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        (folder / "declared.toml").write_text(run.declaration)
-        declaration = read_frame_declaration(folder / "declared.toml") if run.board == "declared" else None
-        line, sent = PseudoTerminal(folder / "port"), []
-        source = open_source(line.name)
-        scales = Scales(1.0, 1.0)
-        device = Device(numbered(n, run.rate_hz), declaration or run.board, run.faults, 1.0, run.seed, scales=scales)
-        thread = threading.Thread(target=lambda: sent.append(serve(device, line)))
-        recorder = Recorder(
-            source, decoder_factory(declaration or read_as, column_namer()), folder / "log.csv",
-            wait_for_return_s=4.0 if run.faults.disconnect_s else 0.0, silence_s=20.0,
-        )  # fmt: skip
-        thread.start()
-        for _ in recorder:
-            pass
-        thread.join()
-        log = trihedron.read(folder / "log.csv")
-        count = recorder.count
+        path, spoken = Path(name) / "log.csv", spoken_by(run.board, run.declaration, Path(name))
+        device = Device(numbered(n, run.rate_hz), spoken, run.faults, 1.0, run.seed, scales=Scales(1.0, 1.0))
+        sent, count = recorded(device, path, 4.0 if run.faults.disconnect_s else 0.0, 20.0)
+        log = trihedron.read(path)
     assert log.accelerometer is not None
     values = log.accelerometer * (9.80665 if log.accelerometer_unit == "g" else 1.0)
     number = np.rint(values[:, 0]) + 1000 * np.rint(values[:, 1])
-    missing = sent[0].frames - log.n_samples - count.lost
+    missing = sent.frames - log.n_samples - count.lost
     worst = 0.0
     for begin, end in pairwise((0.0, *run.faults.disconnect_s, run.seconds)):
         rows = (number > (begin + 0.1) * run.rate_hz) & (number < (end - 0.3) * run.rate_hz)
@@ -191,7 +188,7 @@ def one_run(run: Run) -> str:
     is_accounted = missing == 0 or (missing > 0 and count.is_least)
     is_ok = is_accounted and worst < 100.0 and bool(np.all(np.diff(log.time_s) > 0.0))
     lost = f"{'at least ' * count.is_least}{count.lost}"
-    account = f"sent {sent[0].frames} = saved {log.n_samples} + lost {lost} + {missing}; time {worst:.0f} ppm"
+    account = f"sent {sent.frames} = saved {log.n_samples} + lost {lost} + {missing}; time {worst:.0f} ppm"
     return f"{'ok ' if is_ok else 'NOT'} {run.seed} {run.board} {run.rate_hz:g} Hz: {account}; {run.faults}"
 
 

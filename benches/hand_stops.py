@@ -19,6 +19,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
+from nuisance_trial.hand import minimum_jerk
 from trihedron.records import Recording
 from trihedron.segment import segment_recording
 
@@ -39,11 +40,6 @@ class Stops:
     pauses: list[tuple[int, int]]
     still: np.ndarray
     """(N, 6) what noiseless sensors would read if the body stood still where it is."""
-
-
-def _smooth(x):
-    x = np.clip(x, 0.0, 1.0)
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
 
 
 def _tremor(rng, n, rate, low, high):
@@ -85,7 +81,7 @@ def _shaking(rng, t, rate, poses):
         drift = 2 * np.pi * np.cumsum(rng.normal(size=last - first)) * 0.02 / np.sqrt(rate)
         beat = 1.0 + 0.2 * np.sin(2 * np.pi * rng.uniform(0.3, 1.5) * t[here] + rng.uniform(0, 6))
         wave = np.sin(2 * np.pi * hz * rng.uniform(0.99, 1.01) * t[here] + drift)
-        edge = _smooth((t[here] - t[first]) / 0.1) * _smooth((t[last - 1] - t[here]) / 0.1)
+        edge = minimum_jerk((t[here] - t[first]) / 0.1) * minimum_jerk((t[last - 1] - t[here]) / 0.1)
         out[here] = size * rng.uniform(0.5, 1.5) * (edge * beat * wave)[:, None] * rng.normal(size=3) / np.sqrt(3.0)
         about = np.linalg.norm(rng.normal(size=3)) * rng.normal(size=3)
         turning[here] = size / radius / (2 * np.pi * hz) * (edge * beat * np.roll(wave, 1))[:, None] * about / 3.0
@@ -105,10 +101,10 @@ def _path(rng, parts, edges, rate):
         if name == "stroke":
             way = Rotation.random(random_state=int(rng.integers(2**31))).as_rotvec() * rng.uniform(0.3, 1.0)
             bow = rng.normal(size=3) * 0.3
-            path = Rotation.from_rotvec(np.outer(np.sin(np.pi * _smooth(x)) ** 2, bow))
-            turned = attitude * path * Rotation.from_rotvec(np.outer(_smooth(x), way))
+            path = Rotation.from_rotvec(np.outer(np.sin(np.pi * minimum_jerk(x)) ** 2, bow))
+            turned = attitude * path * Rotation.from_rotvec(np.outer(minimum_jerk(x), way))
             step = rng.normal(size=3) * 0.15
-            place[first:last] += np.outer(_smooth(x), step)
+            place[first:last] += np.outer(minimum_jerk(x), step)
             at = at + step
         elif name == "pause":
             # The hand sags while it waits.
@@ -134,11 +130,11 @@ def session(seed, kind):
     t = np.arange(n) / rate
     rotation, place = _path(rng, parts, edges, rate)
     lever = rng.normal(size=3) * 0.02
-    rates = np.gradient(np.unwrap(np.zeros((n, 3)), axis=0), axis=0)
+    rates = np.zeros((n, 3))
     rates[1:-1] = (rotation[:-2].inv() * rotation[2:]).as_rotvec() * rate / 2.0
     force = np.gradient(np.gradient(place + rotation.apply(lever), axis=0), axis=0) * rate**2 + [0.0, 0.0, G]
-    poses = [(int(a), int(b)) for (name, _), a, b in zip(parts, edges[:-1], edges[1:], strict=True) if name == "pose"]
-    pauses = [(int(a), int(b)) for (name, _), a, b in zip(parts, edges[:-1], edges[1:], strict=True) if name == "pause"]
+    spans = list(zip((name for name, _ in parts), *np.stack([edges[:-1], edges[1:]]).tolist(), strict=True))
+    poses, pauses = ([(a, b) for name, a, b in spans if name == wanted] for wanted in ("pose", "pause"))
     accel = rotation.inv().apply(force)
     still = np.hstack([rotation.inv().apply([0.0, 0.0, G]), np.zeros((n, 3))])
     if kind in ("shaken", "all"):

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from confidence.motion import matrix
 from trihedron import _core
 from trihedron.simulate import Disturb, Motion, MoveTo, Oscillate, Pose, Turn, Vibrate, hand_session
 from trihedron.simulate.motion.attitude import attitude_with_up, up_in_body
@@ -14,18 +15,6 @@ G = 9.81
 EARTH = (0.0, 4.2e-5, 5.9e-5)
 # Fifth and sixth powers of the step in the quadratures below, on motions of at most a few rad/s.
 STEP_S = 1e-3
-
-
-def matrices(q):
-    w, x, y, z = q.T
-    return np.stack(
-        [
-            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
-            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
-            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
-        ],
-        -2,
-    )
 
 
 def busy_motion():
@@ -61,7 +50,7 @@ def test_rate_integrates_to_the_attitude_within_1e_9(earth):
         # Fourth-order Magnus: σ = h (w1 + w2)/2 - √3 h²/12 [w2, w1] for Ṙ = R [ω]x.
         sigma = 0.5 * h * (w1 + w2) + np.sqrt(3.0) * h * h / 12.0 * np.cross(w1, w2)
         q, *_ = plan.evaluate(np.array([start + 1e-12, stop - 1e-12]), G, earth)
-        first, last = matrices(q)
+        first, last = matrix(q)
         total = first
         for step in _core.rotation_from_vector(np.ascontiguousarray(sigma)):
             total = total @ step
@@ -96,11 +85,11 @@ def test_specific_force_integrates_to_the_travel_within_1e_9():
     t = (mid[:, None] + 0.5 * h * nodes).ravel()
     w = np.tile(0.5 * h * weights, n)
     q, _, _, f = plan.evaluate(t, G)
-    acceleration = np.einsum("nij,nj->ni", matrices(q), f) - [0, 0, G]
+    acceleration = np.einsum("nij,nj->ni", matrix(q), f) - [0, 0, G]
     assert np.abs(w @ acceleration).max() < 1e-9  # at rest again
     shift = (w * (1.7 - t)) @ acceleration
     ends, *_ = plan.evaluate(np.array([0.0, 1.8]), G)
-    first, last = matrices(ends)
+    first, last = matrix(ends)
     assert np.abs(shift - (travel + (last - first) @ arm)).max() < 1e-9
 
 

@@ -8,9 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from confidence.motion import G
-from confidence.sensor import Truth
+from confidence.sensor import DEG, Truth
 
-DEG = np.pi / 180.0
 FINE = 8  # steps of the motion in a sample
 
 
@@ -63,7 +62,8 @@ class Path:
 
 
 def robot(seed, rate_hz=100.0, pose_s=3.0, n_poses=20, speed_deg_s=90.0, **sensor):
-    """Axis after axis at one speed behind ramps; the arm rings at 12 to 25 Hz where it stops."""
+    """Axis after axis at one speed behind ramps; the arm rings at 12 to 25 Hz where it stops. Counts (n, 3) of
+    accelerometer and gyro, rate, truth and motion."""
     rng = np.random.default_rng([502, seed])
     path = Path(rate_hz, rng, 0.25)
     path.rest(pose_s)
@@ -77,11 +77,6 @@ def robot(seed, rate_hz=100.0, pose_s=3.0, n_poses=20, speed_deg_s=90.0, **senso
             path.turn(axis, progress / progress[-1], angle)
         path.rock(0.5, 0.08, rng.uniform(12.0, 25.0), 0.15 * DEG, rng)
         path.rest(pose_s * rng.uniform(0.8, 1.3))
-    return finished(path, rate_hz, seed, sensor)
-
-
-def finished(path, rate_hz, seed, sensor):
-    """Counts (n, 3) of accelerometer and gyro, rate, truth and motion."""
     f, w, motion = path.seen()
     return (*read(f, w, rate_hz, np.random.default_rng([505, seed]), **sensor), motion)
 

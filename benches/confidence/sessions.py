@@ -41,13 +41,18 @@ def hand(seed, n_poses=18, move_s=2.0, pose_s=4.0, rate_hz=100.0, law=None, **se
     return (*read_out(motion, per, rng, **sensor), motion)
 
 
+def leaning(tilt_deg):
+    """A table's tilt [rad], and the turn of the room that lays it level."""
+    tilt = np.radians(tilt_deg)
+    return tilt, np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
+
+
 def table(seed, turns=(90, -90), rate_deg_s=90.0, tilt_deg=1.0, pose_s=4.0, rate_hz=100.0, bases=FACES, **sensor):
     """Faces set down by hand on a table that is not level, turned there by known angles at a constant rate."""
     rng = np.random.default_rng([12, seed])
     sensor.setdefault("gyro_range", np.radians(500.0 if rate_deg_s < 300.0 else 2000.0))
     steps, first = [], None
-    tilt = np.radians(tilt_deg)
-    lean = np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
+    tilt, lean = leaning(tilt_deg)
     for up in bases:
         target = lean @ attitude(up, rng.uniform(0, 2 * np.pi))
         if first is None:
@@ -64,8 +69,7 @@ def table(seed, turns=(90, -90), rate_deg_s=90.0, tilt_deg=1.0, pose_s=4.0, rate
 def manual(seed, rate_deg_s=120.0, tilt_deg=0.5, n_poses=18, **sensor):
     """The session of the manual's section 4: 18 poses by hand, then ±8π on three faces that are not parallel."""
     rng = np.random.default_rng([13, seed])
-    tilt = np.radians(tilt_deg)
-    lean = np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
+    tilt, lean = leaning(tilt_deg)
     targets = [attitude(d, rng.uniform(0, 2 * np.pi)) for d in directions(n_poses, rng)]
     steps = [Step(4.0)]
     for target in targets[1:]:
