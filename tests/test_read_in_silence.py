@@ -1,17 +1,13 @@
 """What would be read wrong without a word: clocks that count, two devices in a stream, swapped axes, unknown units."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from formats.layout import G
+from formats.written import session
 from trihedron.read import ReadError, read_recording
 from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit, RateUnit
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches" / "formats"))
-from drawn import G, session
 
 HEADER = "t,ax,ay,az,gx,gy,gz"
 

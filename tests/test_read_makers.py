@@ -1,14 +1,9 @@
 """Logs laid out as each maker's program writes them come out with their numbers, units, rate and all their rows."""
 
-import sys
-from pathlib import Path
-
 import pytest
 
+from formats.table import LAYOUTS, read_layout, verdict
 from trihedron.records import Severity
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches" / "formats"))
-from table import LAYOUTS, read_layout, verdict
 
 
 @pytest.mark.parametrize("name", LAYOUTS)

@@ -1,19 +1,14 @@
 """What a text states of its clock, its units and its devices, in the many ways that people and programs write it."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import trihedron
+from formats.written import session
 from trihedron.read import ReadError, read_recording
 from trihedron.read.names import clock_said, is_rate, known_unit, parse_name
 from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit, RateUnit
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches" / "formats"))
-from drawn import session
 
 T, FORCE, RATE = (lambda s: (s.time_s, s.force, s.rate))(session(np.random.default_rng(7), 50.0, 10))
 NAMES = "ax,ay,az,gx,gy,gz"

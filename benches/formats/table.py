@@ -11,10 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "makers"))
-import more_layouts  # noqa: F401 -- its layouts join the others
-from layouts import LAYOUTS, Layout
-
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+from makers import LAYOUTS, Layout
 from trihedron.read import ReadError, read_recording
 from trihedron.records import Recording
 
@@ -84,7 +82,7 @@ def main() -> int:
         target = Path(sys.argv[sys.argv.index("--write") + 1])
         target.write_text(
             "# Makers' layouts\n\nMade by `python benches/formats/table.py --write docs/reading-makers.md`: files laid "
-            "out as each maker's program writes them (each generator of `tests/makers/layouts.py` names the "
+            "out as each maker's program writes them (each generator of `tests/makers/` names the "
             "document), read without a word from the user but what stands behind the name.\n\n" + text
         )
     return int(wrong > 0)

@@ -18,9 +18,8 @@ import test_read_ecosystems as ecosystems
 from attacks.cases import Attack
 from attacks.inputs import answered, read_whole
 from attacks.mutations import of_bytes, of_json
+from makers import LAYOUTS
 from test_read import readings
-
-sys.path[:0] = [str(Path(__file__).parents[1] / "makers"), str(Path(__file__).parents[2] / "benches" / "formats")]
 
 TABLE = readings(120)
 
@@ -110,8 +109,6 @@ def _logs() -> Iterator[tuple[str, Log]]:
 
 def _of_makers() -> Iterator[tuple[str, Log]]:
     """The first five hundred lines of text as makers' programs write it; archives whole."""
-    from table import LAYOUTS
-
     for name, make in LAYOUTS.items():
         made = make()
         files = {k: v if v[:2] == b"PK" else b"\n".join(v.split(b"\n")[:500]) for k, v in made.files.items()}

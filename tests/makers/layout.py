@@ -1,0 +1,72 @@
+"""Text logs as their makers' programs write them: one function per layout, after the maker's document named in it.
+
+Written from documents and from the writers' sources, not from our readers. Each returns the files, what the user has to
+say, and what must come out: the readings in the log's unit, their number and the rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+
+import numpy as np
+
+from makers.session import Session
+
+EPOCH = datetime(2024, 3, 1, 12, 0, 0)
+EPOCH_S = 1709294400.0
+SI = ("m/s^2", "rad/s")
+COUNTS = ("counts", "counts")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """``files`` name and bytes; ``accelerometer``/``gyroscope`` (n, 3) as written; ``rows`` of all files together."""
+
+    maker: str
+    files: dict[str, bytes]
+    rate_hz: float
+    accelerometer: np.ndarray | None
+    gyroscope: np.ndarray | None
+    units: tuple[str, str]
+    rows: int
+    options: dict[str, object] = field(default_factory=dict)
+    per_sensor: bool = False
+    merged: bool = False
+
+
+LAYOUTS: dict[str, Callable[[], Layout]] = {}
+
+
+def layout(make: Callable[[], Layout]) -> Callable[[], Layout]:
+    LAYOUTS[make.__name__] = make
+    return make
+
+
+def written(*columns: np.ndarray, separator: str = ",", end: str = "\n", form: str = "{!r}") -> str:
+    table = zip(*columns, strict=True)
+    return "".join(
+        separator.join(v if isinstance(v, str) else form.format(v) for v in (plain(v) for v in row)) + end
+        for row in table
+    )
+
+
+def plain(value: object) -> object:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def dates(s: Session, form: str, digits: int = 6) -> list[str]:
+    out = []
+    for t in s.time_s:
+        text = (EPOCH + timedelta(seconds=round(float(t), 6))).strftime(form)
+        out.append(text[: len(text) - 6 + digits] if form.endswith("%f") else text)
+    return out
+
+
+def in_si(s: Session, digits: int = 6) -> tuple[np.ndarray, np.ndarray]:
+    return np.round(s.force, digits), np.round(s.rate, digits)
+
+
+def nanoseconds(s: Session) -> list[int]:
+    return [round(EPOCH_S) * 10**9 + round(t * 1e9) for t in s.time_s]
