@@ -3,22 +3,19 @@
 import numpy as np
 import pytest
 
+import test_read_in_silence as texts
 import trihedron
-from formats.written import session
 from trihedron.read import ReadError, read_recording
 from trihedron.read.names import clock_said, is_rate, known_unit, parse_name
 from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
-T, FORCE, RATE = (lambda s: (s.time_s, s.force, s.rate))(session(np.random.default_rng(7), 50.0, 10))
+T, FORCE, RATE = texts.motion(50.0, 7)
 NAMES = "ax,ay,az,gx,gy,gz"
 
 
 def written(path, clock, names, remark="", force=FORCE, rate=RATE):
-    rows = zip(clock, force.tolist(), rate.tolist(), strict=True)
-    body = "".join(f"{t},{','.join(f'{v:.7g}' for v in (*a, *w))}\n" for t, a, w in rows)
-    path.write_text(f"{remark}{names}\n{body}")
-    return path
+    return texts.written(path, *texts.table(clock, force, rate), header=names, remark=remark)
 
 
 def doubts(recording):
