@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from trihedron.cli.options import Force, Json, LogSource, Report, progress, with_options
-from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
+from trihedron.cli.options import LogSource, progress, with_options
+from trihedron.cli.output import Results, leave, say, show
 from trihedron.cli.streamed import Kept, needs_stream
 from trihedron.files.output import write_whole
 
@@ -71,9 +71,10 @@ Full = Annotated[
 ]
 
 
-@with_options(source=LogSource)
+@with_options(source=LogSource, results=Results)
 def allan(
     source: LogSource,
+    *,
     gyro_lsb: GyroLsb = None,
     accel_lsb: AccelLsb = None,
     calibration: Of = None,
@@ -86,16 +87,14 @@ def allan(
     samples: Samples = None,
     stream: Stream = False,
     checkpoint: Kept = None,
-    json: Json = None,
-    report: Report = None,
     full: Full = False,
-    force: Force = False,
+    results: Results,
 ) -> None:
     """Identify the noise terms of a long static log: how large, how certain, how long to average."""
     stretches = [_stretch(text) for text in exclude or []]
     if not 0.0 < accuracy < 1000.0:
         raise typer.BadParameter(f"--accuracy is a positive number of per cent, not {accuracy:g}")
-    check_outputs(json, csv, plot, force=force, report=report, inputs=(*source.files, calibration))
+    results.check(csv, plot, inputs=(*source.files, calibration))
     if calibration is not None and (curve or stream):
         raise typer.BadParameter("--calibration goes with a log that is read whole: no --curve, no --stream")
     needs_stream(checkpoint, stream=stream)
@@ -116,23 +115,22 @@ def allan(
     from trihedron.report.noise import all_findings, noise_report
     from trihedron.report.noise_files import curve_csv, noise_record
 
-    wants_all = full or json is not None or report is not None
-    lengths = recording_lengths(found, accuracy / 100.0) if wants_all else None
+    is_written = results.json is not None or results.report is not None
+    lengths = recording_lengths(found, accuracy / 100.0) if full or is_written else None
     document = noise_report(found, lengths, accuracy / 100.0)
-    machine = noise_record(found, lengths, accuracy / 100.0) if json is not None or report is not None else {}
-    show(document, json, sections=None if full else FIRST_SCREEN)
+    machine = noise_record(found, lengths, accuracy / 100.0) if is_written else {}
+    show(document, results.json, sections=None if full else FIRST_SCREEN)
     if csv is not None:
-        write_whole(csv, curve_csv(found), overwrite=force)
+        write_whole(csv, curve_csv(found), overwrite=results.force)
         say(f"curve: {csv}")
     if plot is not None:
         from trihedron.report.drawing import png_of
         from trihedron.report.noise import noise_picture
 
-        write_whole(plot, png_of(noise_picture(found)), overwrite=force)
+        write_whole(plot, png_of(noise_picture(found)), overwrite=results.force)
         say(f"plot: {plot}")
-    write_report(document, machine, report, force=force)
-    write_json(machine, json, force=force, document=document)
-    if not full and report is None:
+    results.write(document, machine)
+    if not full and results.report is None:
         say("Data-sheet units, how long to record, Kalibr's names: --full; curves: --plot F.png or --report F.html.")
     leave(all_findings(found))
 

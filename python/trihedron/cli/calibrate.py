@@ -8,17 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from trihedron.cli.calibrate_sessions import By, Labels, calibrate_beside, calibrate_many
-from trihedron.cli.options import (
-    Force,
-    GravitySource,
-    Json,
-    LogsSource,
-    ReferenceColumns,
-    Report,
-    progress,
-    with_options,
-)
-from trihedron.cli.output import Ending, check_outputs
+from trihedron.cli.options import GravitySource, LogsSource, ReferenceColumns, progress, with_options
+from trihedron.cli.output import Ending, Results
 from trihedron.cli.streamed import Kept, Stream, calibrate_stream, needs_stream
 
 FIRST_SCREEN = 2
@@ -74,10 +65,11 @@ Output = Annotated[
 Full = Annotated[bool, typer.Option("--full", help="Print the whole report, with every pose and move.")]
 
 
-@with_options(sources=LogsSource, place=GravitySource)
+@with_options(sources=LogsSource, place=GravitySource, results=Results)
 def calibrate(
     sources: LogsSource,
     place: GravitySource,
+    *,
     method: Method = "joint",
     frame: Frame = None,
     faces: Faces = None,
@@ -95,18 +87,16 @@ def calibrate(
     by: By = None,
     labels: Labels = None,
     output: Output = None,
-    json: Json = None,
-    report: Report = None,
     full: Full = False,
-    force: Force = False,
+    results: Results,
 ) -> None:
     """Calibrate both sensors from a log of poses and moves.
 
     With several logs of one unit: one model, and how far every parameter repeats.
     """
-    check_outputs(output, json, force=force, report=report, inputs=sources.files)
+    results.check(output, inputs=sources.files)
     needs_stream(checkpoint, stream=stream)
-    ending = Ending(output, json, report, full, force)
+    ending = Ending(output, results, full)
     choices = _choices(method, frame, faces, turns, axis_signs, loss)
     if turntable is not None:
         choices |= {"turntable_deg_s": numbers("--turntable", turntable), "turntable_sigma": turntable_error / 100.0}

@@ -7,17 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trihedron.cli.options import (
-    Force,
-    GravitySource,
-    Json,
-    LogsSource,
-    ReferenceColumns,
-    Report,
-    progress,
-    with_options,
-)
-from trihedron.cli.output import check_outputs, leave, say, tell_all
+from trihedron.cli.options import GravitySource, LogsSource, ReferenceColumns, progress, with_options
+from trihedron.cli.output import Results, leave, say
 
 if TYPE_CHECKING:
     from trihedron.records.results import DiagnosisResult
@@ -50,10 +41,11 @@ Alpha = Annotated[float, typer.Option(metavar="P", help="Chance that a healthy l
 Full = Annotated[bool, typer.Option("--full", help="Print the whole report, with every candidate.")]
 
 
-@with_options(sources=LogsSource, place=GravitySource)
+@with_options(sources=LogsSource, place=GravitySource, results=Results)
 def diagnose(
     sources: LogsSource,
     place: GravitySource,
+    *,
     calibration: Calibration = None,
     against: Against = None,
     reference: Reference = None,
@@ -61,10 +53,8 @@ def diagnose(
     improved: Improved = None,
     updated: Updated = None,
     alpha: Alpha = 0.01,
-    json: Json = None,
-    report: Report = None,
     full: Full = False,
-    force: Force = False,
+    results: Results,
 ) -> None:
     """Where a log and its model differ, which effects are missing, and does adding it help. Status 0 if it ran.
 
@@ -83,11 +73,11 @@ def diagnose(
         )
     if improved is not None and against is not None and improved.resolve() == against.resolve():
         raise typer.BadParameter("--improved would overwrite the scenario that it improves; give it another name")
-    check_outputs(json, updated, improved, force=force, report=report, inputs=(*sources.files, calibration, against))
+    results.check(updated, improved, inputs=(*sources.files, calibration, against))
     if sources.are_many(None):
         if any(one is not None for one in (calibration, against, reference, improved, updated)):
             raise typer.BadParameter("several logs are diagnosed without a model: each by itself, and what all share")
-        _diagnose_many(sources, place, alpha, json, report, force=force)
+        _diagnose_many(sources, place, alpha, results)
         return
     from trihedron.files.calibration import read_calibration, write_calibration
 
@@ -111,18 +101,18 @@ def diagnose(
         )
     document = diagnosis_report(result, str(against or calibration or ""))
     machine = diagnosis_document(result)
-    tell_all(document, machine, json, report, force=force, sections=None if full else first_screen(result))
+    results.tell(document, machine, None if full else first_screen(result))
     if improved is not None and against is not None:
-        _improve(against, result, improved, force=force)
+        _improve(against, result, improved, force=results.force)
     if updated is not None:
         if result.updated is None:
             say(f"{updated}: not written, the poses of this log do not carry a calibration of their own.")
         else:
-            write_calibration(result.updated, updated, overwrite=force)
+            write_calibration(result.updated, updated, overwrite=results.force)
             say(f"calibration of this log: {updated}")
     elif result.updated is not None and any(p.significant for p in result.parameters):
         say("The calibration that this log itself gives: --updated FILE.")
-    if not full and report is None:
+    if not full and results.report is None:
         _point_to_more(result)
     if known is not None:
         from trihedron.api.applying import doubted
@@ -131,23 +121,15 @@ def diagnose(
         leave(doubted(known))
 
 
-def _diagnose_many(
-    sources: LogsSource, place: GravitySource, alpha: float, json: Path | None, report: Path | None, *, force: bool
-) -> None:
+def _diagnose_many(sources: LogsSource, place: GravitySource, alpha: float, results: Results) -> None:
     """Every log by itself, and what all of one unit share."""
     from trihedron.api import diagnosing_sessions
     from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
 
     recordings = [source.read() for source in sources.each()]
     with progress("diagnosing") as tell:
-        found = diagnosing_sessions.diagnose_sessions(
-            recordings,
-            **place.said,
-            alpha=alpha,
-            progress=tell,
-        )
-    document, machine = shared_diagnosis_report(found), shared_diagnosis_record(found)
-    tell_all(document, machine, json, report, force=force)
+        found = diagnosing_sessions.diagnose_sessions(recordings, **place.said, alpha=alpha, progress=tell)
+    results.tell(shared_diagnosis_report(found), shared_diagnosis_record(found))
 
 
 def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -> None:

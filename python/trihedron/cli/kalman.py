@@ -7,16 +7,17 @@ from typing import Annotated, Any
 
 import typer
 
-from trihedron.cli.options import Force, GravitySource, Json, LogSource, Report, progress, with_options
-from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
+from trihedron.cli.options import GravitySource, LogSource, progress, with_options
+from trihedron.cli.output import Results, leave, say, show
 
 FIRST_SCREEN = 3
 
 
-@with_options(source=LogSource, place=GravitySource)
+@with_options(source=LogSource, place=GravitySource, results=Results)
 def kalman(
     source: LogSource,
     place: GravitySource,
+    *,
     reference: Annotated[
         Path | None,
         typer.Option(
@@ -39,15 +40,13 @@ def kalman(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="FILE", help="Write the calibration file (JSON).")
     ] = None,
-    json: Json = None,
-    report: Report = None,
     full: Annotated[bool, typer.Option("--full", help="Print the whole report.")] = False,
-    force: Force = False,
+    results: Results,
 ) -> None:
     """Calibrate the accelerometer by Kalman filter, pose by pose, with its noise in the state."""
     if frame not in ("lower", "symmetric"):
         raise typer.BadParameter(f"--frame is one of lower, symmetric, not {frame!r}")
-    check_outputs(output, json, force=force, report=report, inputs=(*source.files, reference, noise))
+    results.check(output, inputs=(*source.files, reference, noise))
     recording = source.read()
     from trihedron.api import filtering
     from trihedron.files.calibration import write_calibration
@@ -59,12 +58,11 @@ def kalman(
         result = filtering.kalman(recording, reference, **options, progress=tell)
     document = kalman_report(result.outcome, result.calibration)
     machine = kalman_record(result.outcome, result.calibration)
-    show(document, json, sections=None if full else FIRST_SCREEN)
+    show(document, results.json, sections=None if full else FIRST_SCREEN)
     if output is not None:
-        write_calibration(result.calibration, output, overwrite=force)
+        write_calibration(result.calibration, output, overwrite=results.force)
         say(f"calibration: {output}")
-    write_report(document, machine, report, force=force)
-    write_json(machine, json, force=force, document=document)
-    if not full and report is None:
+    results.write(document, machine)
+    if not full and results.report is None:
         say("Every pose: --full; convergence, innovations and residuals drawn: --report FILE.html.")
     leave(result.findings)

@@ -7,17 +7,8 @@ from typing import Annotated
 
 import typer
 
-from trihedron.cli.options import (
-    Force,
-    GravitySource,
-    Json,
-    LogSource,
-    ReferenceColumns,
-    Report,
-    progress,
-    with_options,
-)
-from trihedron.cli.output import check_outputs, leave, put, say, show, write_json, write_report
+from trihedron.cli.options import GravitySource, LogSource, ReferenceColumns, progress, with_options
+from trihedron.cli.output import Results, leave, put, say, show, write_json, write_report
 from trihedron.files.output import write_whole
 
 FIRST_SCREEN = 2
@@ -53,10 +44,11 @@ Output = Annotated[
 Full = Annotated[bool, typer.Option("--full", help="Print the test on the other half and all findings as well.")]
 
 
-@with_options(source=LogSource, place=GravitySource)
+@with_options(source=LogSource, place=GravitySource, results=Results)
 def noise(
     source: LogSource,
     place: GravitySource,
+    *,
     static: Static = None,
     reference: Reference = None,
     reference_columns: ReferenceColumns = None,
@@ -64,15 +56,12 @@ def noise(
     horizon: Horizon = "1,10,60",
     to: To = None,
     output: Output = Path("-"),
-    json: Json = None,
-    report: Report = None,
     full: Full = False,
-    force: Force = False,
+    results: Results,
 ) -> None:
     """N and K for your filter: what its errors in motion are made of, beside the values of a static log."""
     horizons = _horizons(horizon)
-    inputs = (*source.files, static, reference)
-    check_outputs(json, None if to is None else output, force=force, report=report, inputs=inputs)
+    results.check(None if to is None else output, inputs=(*source.files, static, reference))
     recording = source.read()
     from trihedron.api import filter_noising
     from trihedron.files.formats.filter_noise import filter_noise_text
@@ -93,13 +82,13 @@ def noise(
     if text is not None and str(output) == "-":
         put(text)
     else:
-        show(document, json, sections=None if full else FIRST_SCREEN)
-    write_report(document, machine, report, force=force)
+        show(document, results.json, sections=None if full else FIRST_SCREEN)
+    write_report(document, machine, results.report, force=results.force)
     if text is not None and str(output) != "-":
-        write_whole(output, text, overwrite=force)
+        write_whole(output, text, overwrite=results.force)
         say(f"noise for {to}: {output}")
-    write_json(machine, json, force=force, document=document)
-    if not full and report is None:
+    write_json(machine, results.json, force=results.force, document=document)
+    if not full and results.report is None:
         say("The test on the other half: --full; with the picture: --report FILE.html.")
     leave(found.findings)
 

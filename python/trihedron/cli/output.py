@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from trihedron.cli.options import Force, Json, Report
 from trihedron.cli.provenance import with_provenance
 from trihedron.cli.speech import speaks_unicode
 from trihedron.files.output import check_free, check_report, write_whole
@@ -80,14 +81,35 @@ def write_json(machine: dict[str, Any], target: Path | None, *, force: bool, doc
 
 
 @dataclass(frozen=True)
+class Results:
+    """Where a result goes beside the screen, as said on the command line."""
+
+    json: Json = None
+    report: Report = None
+    force: Force = False
+
+    def check(self, *more: Path | None, inputs: Iterable[Path | None] = ()) -> None:
+        """As :func:`check_outputs`, with ``more`` files that the command writes."""
+        check_outputs(*more, self.json, force=self.force, report=self.report, inputs=inputs)
+
+    def tell(self, document: Document, machine: dict[str, Any], sections: int | None = None) -> None:
+        """On stdout (its first ``sections``), as JSON and as a report, where these are asked for."""
+        show(document, self.json, sections=sections)
+        self.write(document, machine)
+
+    def write(self, document: Document, machine: dict[str, Any]) -> None:
+        """As a report and as JSON, where these are asked for."""
+        write_report(document, machine, self.report, force=self.force)
+        write_json(machine, self.json, force=self.force, document=document)
+
+
+@dataclass(frozen=True)
 class Ending:
     """Where a calibration goes, and how much of its report is printed."""
 
     output: Path | None
-    json: Path | None
-    report: Path | None
+    results: Results
     full: bool
-    force: bool
 
     def tell(
         self,
@@ -103,32 +125,16 @@ class Ending:
         """
         from trihedron.files.calibration import write_calibration
 
-        show(document, self.json, sections=None if self.full else sections)
+        json, report = self.results.json, self.results.report
+        show(document, json, sections=None if self.full else sections)
         if self.output is not None:
-            write_calibration(calibration, self.output, overwrite=self.force)
+            write_calibration(calibration, self.output, overwrite=self.results.force)
             say(f"calibration: {self.output}")
-        if self.json is not None or self.report is not None:
-            made = machine()
-            write_report(document, made, self.report, force=self.force)
-            write_json(made, self.json, force=self.force, document=document)
-        if more and not self.full and self.report is None:
+        if json is not None or report is not None:
+            self.results.write(document, machine())
+        if more and not self.full and report is None:
             say(more)
         leave(calibration.findings)
-
-
-def tell_all(
-    document: Document,
-    machine: dict[str, Any],
-    json: Path | None,
-    report: Path | None,
-    *,
-    force: bool,
-    sections: int | None = None,
-) -> None:
-    """A result on stdout (its first ``sections``), as JSON and as a report, where these are asked for."""
-    show(document, json, sections=sections)
-    write_report(document, machine, report, force=force)
-    write_json(machine, json, force=force, document=document)
 
 
 def show(document: Document, json_target: Path | None, *, sections: int | None) -> None:

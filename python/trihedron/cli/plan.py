@@ -7,11 +7,13 @@ from typing import Annotated
 import typer
 
 from trihedron.cli.calibrate import numbers
-from trihedron.cli.options import Force, Json, Report
-from trihedron.cli.output import check_outputs, tell_all
+from trihedron.cli.options import with_options
+from trihedron.cli.output import Results
 
 
+@with_options(results=Results)
 def plan(
+    *,
     turns: Annotated[
         str, typer.Option(metavar="LIST", help="Known turns about every axis, in degrees: '90,-90' or '1440,-1440'.")
     ] = "90,-90",
@@ -22,12 +24,10 @@ def plan(
     gyro_noise: Annotated[float, typer.Option(metavar="X", help="White noise of the gyro [deg/s/√Hz].")] = 0.005,
     accel_noise: Annotated[float, typer.Option(metavar="X", help="White noise of the accelerometer [µg/√Hz].")] = 150.0,
     turn_error: Annotated[float, typer.Option(metavar="DEG", help="Standard error of a turn's angle (wall).")] = 0.0,
-    json: Json = None,
-    report: Report = None,
-    force: Force = False,
+    results: Results,
 ) -> None:
     """Before an experiment: how certain would turns, poses and moves make the answer, and which are worth what?"""
-    check_outputs(json, force=force, report=report)
+    results.check()
     from trihedron import units
     from trihedron.api.planning import plan as make_plan
     from trihedron.report.plan import plan_record, plan_report
@@ -42,4 +42,4 @@ def plan(
     )
     document = plan_report(planned)
     machine = plan_record(planned)
-    tell_all(document, machine, json, report, force=force)
+    results.tell(document, machine)

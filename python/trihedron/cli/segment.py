@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from trihedron.cli.options import Force, Json, LogSource, Report, progress, with_options
-from trihedron.cli.output import check_outputs, leave, tell_all
+from trihedron.cli.options import LogSource, progress, with_options
+from trihedron.cli.output import Results, leave
 from trihedron.cli.streamed import Kept, Stream, needs_stream, segment_stream
 
 
-@with_options(source=LogSource)
-def segment(
-    source: LogSource,
-    stream: Stream = False,
-    checkpoint: Kept = None,
-    report: Report = None,
-    json: Json = None,
-    force: Force = False,
-) -> None:
+@with_options(source=LogSource, results=Results)
+def segment(source: LogSource, *, stream: Stream = False, checkpoint: Kept = None, results: Results) -> None:
     """Find the poses and the moves between them."""
-    check_outputs(json, force=force, report=report, inputs=source.files)
+    results.check(inputs=source.files)
     needs_stream(checkpoint, stream=stream)
     if stream:
-        segment_stream(source, report, json, checkpoint, force=force)
+        segment_stream(source, results, checkpoint)
         return
     recording = source.read()
     from trihedron.api import reading
@@ -30,5 +23,5 @@ def segment(
     with progress("segmenting") as tell:
         segments = reading.segment(recording, progress=tell)
     document, machine = segments_report(segments, recording), segments_record(segments, recording)
-    tell_all(document, machine, json, report, force=force)
+    results.tell(document, machine)
     leave((*recording.findings, *segments.findings))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from trihedron.cli.options import GravitySource, LogSource, progress
-from trihedron.cli.output import Ending, leave, say, tell_all
+from trihedron.cli.output import Ending, Results, leave, say
 
 if TYPE_CHECKING:
     from trihedron.api.streaming import LogOnDisk
@@ -68,9 +68,7 @@ def opened(source: LogSource) -> LogOnDisk:
         )
 
 
-def segment_stream(
-    source: LogSource, report: Path | None, json: Path | None, checkpoint: Path | None, *, force: bool
-) -> None:
+def segment_stream(source: LogSource, results: Results, checkpoint: Path | None) -> None:
     """Poses of a log on disk."""
     log = opened(source)
     from trihedron.api.streaming import condensed, segment_file
@@ -82,7 +80,7 @@ def segment_stream(
     # Figures and times come from the rows of moves and of the ends of poses.
     recording, shown = condensed(log, segments)
     document, machine = segments_report(shown, recording), segments_record(shown, recording)
-    tell_all(document, machine, json, report, force=force)
+    results.tell(document, machine)
     leave(segments.findings)
 
 

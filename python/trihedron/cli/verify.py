@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trihedron.cli.options import Force, GravitySource, Json, LogSource, LogsSource, Report, progress, with_options
-from trihedron.cli.output import check_outputs, leave, say, tell_all
+from trihedron.cli.options import GravitySource, LogSource, LogsSource, progress, with_options
+from trihedron.cli.output import Results, leave, say
 
 if TYPE_CHECKING:
     from trihedron.records import Calibration
@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 FIRST_SCREEN = 2
 
 
-@with_options(source=LogsSource, place=GravitySource)
+@with_options(source=LogsSource, place=GravitySource, results=Results)
 def verify(
     source: LogsSource,
     place: GravitySource,
+    *,
     limit_mg: Annotated[
         float | None,
         typer.Option(
@@ -31,10 +32,8 @@ def verify(
     limit_deg: Annotated[
         float | None, typer.Option(metavar="DEG", help="The same for the tilt error after a rotation.")
     ] = None,
-    json: Json = None,
-    report: Report = None,
     full: Annotated[bool, typer.Option("--full", help="Print the whole report, with every pose and move.")] = False,
-    force: Force = False,
+    results: Results,
 ) -> None:
     """Test calibrations on a recording that they were not made from: CALIBRATION LOG, or LOG A B C ...
 
@@ -42,7 +41,7 @@ def verify(
     limit is exceeded, or, without one, when the miss is more than ten times what was expected; of several, when the
     best does not fit.
     """
-    check_outputs(json, force=force, report=report, inputs=source.files)
+    results.check(inputs=source.files)
     from trihedron.api import verifying
     from trihedron.api.ranking import rank
     from trihedron.report.machine import verification_record
@@ -55,7 +54,7 @@ def verify(
         with progress("ranking") as tell:
             ranking = rank(paths, recording, progress=tell, **place.said)
         document, machine = ranking_report(ranking), ranking_record(ranking)
-        tell_all(document, machine, json, report, force=force, sections=None if full else FIRST_SCREEN)
+        results.tell(document, machine, None if full else FIRST_SCREEN)
         leave(ranking.best.verification.findings)
         return
     from trihedron.report import verification_report
@@ -66,8 +65,8 @@ def verify(
         )
     document = verification_report(result.verification, result.segments, recording)
     machine = verification_record(result.verification)
-    tell_all(document, machine, json, report, force=force, sections=None if full else FIRST_SCREEN)
-    if not full and report is None:
+    results.tell(document, machine, None if full else FIRST_SCREEN)
+    if not full and results.report is None:
         say("Every pose and move: --full, or --report FILE.html with figures.")
     leave(result.findings)
 
