@@ -66,6 +66,24 @@ def read_text(path: str | os.PathLike[str], what: str) -> str:
         raise DocumentError(f"this is not a {what} (not text); check the name.") from None
 
 
+def read_json(path: str | os.PathLike[str], what: str, meant: str, refusal: type[RefusedError]) -> Any:
+    """The JSON of a file that should be ``what``; where it is none, ``meant`` says which file was.
+
+    Raises
+    ------
+    refusal
+        In one sentence, as :func:`read_text` and :func:`parse_json` find it.
+    """
+    try:
+        text = read_text(path, what)
+    except DocumentError as error:
+        raise refusal(of_path(path, error)) from None
+    try:
+        return parse_json(text)
+    except DocumentError as error:
+        raise refusal(f"{Path(path)}: {error}; {meant}.") from None
+
+
 def parse_json(text: str) -> Any:
     """JSON with finite numbers, sane depth and every key once: of two values neither may win silently.
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.documents import DocumentError, of_path, parse_json, read_text
+from trihedron.documents import read_json
 from trihedron.errors import RefusedError
 from trihedron.files.output import write_whole
 from trihedron.records import (
@@ -82,16 +82,8 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
     >>> trihedron.read_calibration("calibration.json").gyroscope.b  # doctest: +SKIP
     """
     path = Path(path)
-    try:
-        text = read_text(path, "calibration file")
-    except DocumentError as error:
-        raise CalibrationFileError(of_path(path, error)) from None
-    try:
-        document = parse_json(text)
-    except DocumentError as error:
-        raise CalibrationFileError(
-            f"{path}: {error}; name a calibration file written by `trihedron calibrate -o` (it comes before the log)."
-        ) from None
+    meant = "name a calibration file written by `trihedron calibrate -o` (it comes before the log)"
+    document = read_json(path, "calibration file", meant, CalibrationFileError)
     return calibration_from_document(document, str(path))
 
 

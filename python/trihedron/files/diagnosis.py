@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from trihedron.documents import DocumentError, of_path, parse_json, read_text
+from trihedron.documents import read_json
 from trihedron.errors import RefusedError
 from trihedron.files.calibration import plain
 from trihedron.records.diagnosis import SCHEMA_VERSION, Diagnosis
@@ -42,14 +42,8 @@ def read_diagnosis(path: str | os.PathLike[str]) -> dict[str, Any]:
         When the file is missing, is no JSON, or does not follow the schema.
     """
     path = Path(path)
-    try:
-        text = read_text(path, "diagnosis")
-    except DocumentError as error:
-        raise DiagnosisFileError(of_path(path, error)) from None
-    try:
-        document = parse_json(text)
-    except DocumentError as error:
-        raise DiagnosisFileError(f"{path}: {error}; name a file written by `trihedron diagnose --json`.") from None
+    meant = "name a file written by `trihedron diagnose --json`"
+    document = read_json(path, "diagnosis", meant, DiagnosisFileError)
     if not isinstance(document, dict) or "verdict" not in document:
         raise DiagnosisFileError(
             f"{path}: this JSON is not a diagnosis; name a file written by `trihedron diagnose --json`."

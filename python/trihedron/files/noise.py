@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from trihedron.documents import DocumentError, of_path, parse_json, read_text
+from trihedron.documents import read_json
 from trihedron.errors import RefusedError
 from trihedron.files.formats.contract import NoiseFigure, SensorNoise
 
@@ -28,16 +28,8 @@ def read_noise(path: str | os.PathLike[str]) -> tuple[dict[str, SensorNoise], fl
     NoiseFileError
         When the file is missing or is not what ``trihedron allan --json`` writes, or its readings are not in SI.
     """
-    path = Path(path)
-    try:
-        text = read_text(path, "file of noise terms")
-    except DocumentError as error:
-        raise NoiseFileError(of_path(path, error)) from None
-    try:
-        document = parse_json(text)
-    except DocumentError as error:
-        raise NoiseFileError(f"{path}: {error}; name a file written by `trihedron allan --json`.") from None
-    return noise_figures(document, str(path))
+    meant = "name a file written by `trihedron allan --json`"
+    return noise_figures(read_json(path, "file of noise terms", meant, NoiseFileError), str(Path(path)))
 
 
 def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict[str, SensorNoise], float]:

@@ -6,7 +6,7 @@ import os
 from dataclasses import fields
 from pathlib import Path
 
-from trihedron.documents import DocumentError, of_path, parse_json, read_text
+from trihedron.documents import read_json
 from trihedron.read.errors import ReadError
 from trihedron.records import AxisNoise
 
@@ -22,14 +22,7 @@ def read_axis_noise(path: str | os.PathLike[str]) -> tuple[AxisNoise, AxisNoise,
         (a ``ValueError``) when the file is no such JSON, or a term is unknown or negative.
     """
     file = Path(path)
-    try:
-        text = read_text(file, "file of noise terms")
-    except DocumentError as error:
-        raise ReadError(of_path(file, error)) from None
-    try:
-        said = parse_json(text)
-    except DocumentError as error:
-        raise ReadError(f"{file}: {error}; write one object with the noise terms.") from None
+    said = read_json(file, "file of noise terms", "write one object with the noise terms", ReadError)
     if not isinstance(said, dict) or not said:
         raise ReadError(f'{file}: write the noise terms as one object, such as {{"white": 0.002, "walk": 1e-5}}.')
     unknown = sorted(set(said) - set(TERMS))

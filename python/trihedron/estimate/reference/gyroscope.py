@@ -30,7 +30,6 @@ class GyroFit:
     offset_s: float
     rate: float
     solution: Solution
-    has_rate: bool
     middle_s: float
     size: FloatArray
 
@@ -75,7 +74,7 @@ def fit_gyroscope(
             break
     assert solution is not None
     A, a = solution.theta[:9].reshape(3, 3), solution.theta[9:12]
-    return GyroFit(A, a, offset_s, rate, solution, clock > 1, middle, size)
+    return GyroFit(A, a, offset_s, rate, solution, middle, size)
 
 
 def _quick(target: FloatArray, design: FloatArray) -> FloatArray:
