@@ -17,14 +17,15 @@ import tempfile
 import threading
 import time
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import trihedron
+from board import Board, counts_recording
 from trihedron.api.capturing import column_namer
 from trihedron.capture.account import Count
 from trihedron.capture.protocols import decoder_factory
@@ -54,27 +55,10 @@ BOARDS = {
 SHORT_S, LONG_S = 4.0, 14.0
 
 
-def readings(n: int, rate_hz: float, seed: int = 0) -> Recording:
-    """Ten-bit readings without meaning."""
-    values = np.round(np.random.default_rng(seed).uniform(0.0, 1023.0, (n, 6)))
-    return Recording(np.arange(n) / rate_hz, values[:, :3], values[:, 3:], rate_hz, "counts", "counts")
-
-
-@contextmanager
-def served(device: Device, line: PseudoTerminal, sent: Sent):
-    """The board at work in a thread, until the block ends."""
-    ended = threading.Event()
-
-    def board() -> None:
-        with suppress(OSError):
-            serve(device, line, is_wanted=lambda: not ended.is_set(), sent=sent)
-
-    thread = threading.Thread(target=board, daemon=True)
-    thread.start()
-    yield
-    ended.set()
-    line.patience_s = 0.0
-    thread.join()
+def capturing(port: str, log: str, protocol: str) -> list[str]:
+    """The command that records a board."""
+    command = [sys.executable, "-m", "trihedron", "capture", port, "-o", log]
+    return [*command, "--protocol", protocol, "--baud", "115200"]
 
 
 def recorded(device: Device, log: Path, wait_for_return_s: float, silence_s: float) -> tuple[Sent, Count]:
@@ -107,7 +91,7 @@ def faults(frames: str = "1e5", kinds: str = "1%", *only: str) -> None:
         with tempfile.TemporaryDirectory() as name:
             log, spoken = Path(name) / "log.csv", spoken_by(board, DECLARED, Path(name))
             clean = replace(parse_faults(kinds), clean_ends=30)
-            device = Device(readings(n, BOARDS[board][1]), spoken, clean, 0.0, seed=7)
+            device = Device(counts_recording(n, BOARDS[board][1]), spoken, clean, 0.0, seed=7)
             # A board that goes away comes back; one that has sent everything does not.
             sent, count = recorded(device, log, 5.0 if "disconnect" in kinds else 0.0, 120.0)
             rows = sum(row[0].isdigit() for row in log.open())
@@ -206,16 +190,15 @@ def kill(kills: str = "50") -> None:
     lost = []
     with tempfile.TemporaryDirectory() as name:
         for seed in range(int(kills)):
-            line, log, sent = PseudoTerminal(Path(name) / f"tty{seed}"), Path(name) / f"log{seed}.csv", Sent()
-            command = [sys.executable, "-m", "trihedron", "capture", line.name, "-o", str(log)]
-            command += ["--protocol", "xsens-mtdata2", "--baud", "115200"]
-            process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
-            with served(Device(readings(60_000, 1000.0, seed), "xsens-mtdata2", seed=seed), line, sent):
+            log = Path(name) / f"log{seed}.csv"
+            board = Board(counts_recording(60_000, 1000.0, seed), "xsens-mtdata2", speed=1.0)
+            process = subprocess.Popen(capturing(board.port, str(log), "xsens-mtdata2"), stderr=subprocess.DEVNULL)
+            with board:
                 while not (log.exists() and log.stat().st_size > 2000):
                     time.sleep(0.01)
                 time.sleep(random.Random(seed).uniform(0.0, 2.0))
                 process.send_signal(signal.SIGKILL)
-                sent_then = sent.frames
+                sent_then = board.sent.frames
                 process.wait()
             lost.append(sent_then / 1000.0 - int(trihedron.read(log).auxiliary["device_ticks"][-1]) * 1e-4)
     print(f"{kills} kills: lost median {1e3 * np.median(lost):.0f} ms, most {1e3 * max(lost):.0f} ms; every file reads")
@@ -223,19 +206,17 @@ def kill(kills: str = "50") -> None:
 
 def cpu(rate_hz: str = "1000", *only: str) -> None:
     """CPU of the process over 4 and over 14 seconds, the difference over ten."""
-    for board in only or ("xsens-mtdata2", "lines", "xio", "sparkfun-6dof"):
+    for protocol in only or ("xsens-mtdata2", "lines", "xio", "sparkfun-6dof"):
         spent = []
         for seconds in (SHORT_S, LONG_S):
-            line = PseudoTerminal()
-            device = Device(readings(int((seconds + 60.0) * float(rate_hz)), float(rate_hz)), board)
+            sent = counts_recording(int((seconds + 60.0) * float(rate_hz)), float(rate_hz))
             before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            with tempfile.TemporaryDirectory() as folder, served(device, line, Sent()):
-                command = [sys.executable, "-m", "trihedron", "capture", line.name, "-o", f"{folder}/log.csv"]
-                command += ["--protocol", BOARDS[board][0], "--baud", "115200", "--seconds", str(seconds)]
-                subprocess.run(command, check=True, capture_output=True)
+            with tempfile.TemporaryDirectory() as folder, Board(sent, protocol, speed=1.0) as board:
+                command = capturing(board.port, f"{folder}/log.csv", BOARDS[protocol][0])
+                subprocess.run([*command, "--seconds", str(seconds)], check=True, capture_output=True)
             after = resource.getrusage(resource.RUSAGE_CHILDREN)
             spent.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
-        print(f"{board:16s} {rate_hz} Hz: {100 * (spent[1] - spent[0]) / (LONG_S - SHORT_S):.1f} % of a core")
+        print(f"{protocol:16s} {rate_hz} Hz: {100 * (spent[1] - spent[0]) / (LONG_S - SHORT_S):.1f} % of a core")
 
 
 if __name__ == "__main__":

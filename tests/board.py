@@ -46,7 +46,7 @@ class Board:
 
     def _run(self):
         try:
-            self.sent = serve(self.device, self.line, is_wanted=lambda: not self._ended.is_set())
+            serve(self.device, self.line, is_wanted=lambda: not self._ended.is_set(), sent=self.sent)
         except OSError:
             # Its reader was killed, as a test wanted.
             return
