@@ -167,15 +167,3 @@ def correlations(calibration: Calibration) -> tuple[list[str], FloatArray]:
     free = np.flatnonzero(sigma > 0.0)
     r = calibration.covariance[np.ix_(free, free)] / np.outer(sigma[free], sigma[free])
     return [names[k] for k in free], r
-
-
-def correlation_table(calibration: Calibration) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]] | None:
-    """Head and rows of the correlations of all free parameters, two decimals."""
-    kept, r = correlations(calibration)
-    if not kept:
-        return None
-    rows = tuple(
-        (kept[i], *("" if j > i else "1" if j == i else f"{r[i, j]:.2f}".replace("-", "−") for j in range(len(kept))))
-        for i in range(len(kept))
-    )
-    return ("", *kept), rows
