@@ -169,7 +169,7 @@ def parameter_table(name: str, sensor: SensorCalibration) -> Table:
     of_S = "S dimensionless" if sensor.raw_unit == sensor.si_unit else f"S in {unit} per {one_of(sensor.raw_unit)}"
     caption = (
         f"{name.capitalize()}: {true} = S {raw}′ + b, with the reading {raw}′ in {unit_in_print(sensor.raw_unit)}, "
-        f"{of_S}; value ± standard uncertainty (1 σ), and σ in % of the value"
+        f"{of_S}; value ± standard uncertainty (1 σ), and σ in % of the value where below 100 %"
     )
     return Table(head, rows, caption)
 

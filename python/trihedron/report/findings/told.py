@@ -76,7 +76,7 @@ def _axes(parts: Sequence[re.Match[str]], rest: str) -> str:
 
 
 def _things(parts: Sequence[re.Match[str]], rest: str) -> str:
-    """``Moves 7, 9 and 22: each has a gravity error of ...``"""
+    """``Moves 7, 9 and 22: each has a tilt error of ...``"""
     return f"{parts[0][1]}s {listed([part[2] for part in parts])}: each {rest}"
 
 
