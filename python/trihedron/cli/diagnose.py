@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Calibration = Annotated[
     Path | None,
     typer.Option(
-        "--calibration", metavar="FILE", help="Calibration to hold against the log; otherwise one is fitted to it."
+        "--calibration", metavar="FILE", help="Calibration to compare with the log; otherwise one is fitted to it."
     ),
 ]
 Against = Annotated[

@@ -66,7 +66,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "Written for a filter:",
             "trihedron noise flight.csv --static rest.csv --reference truth.csv --to kalibr -o imu.yaml",
         ),
-        ("Without a reference, N and K from static stretches and gravity:", "trihedron noise flight.csv"),
+        ("Without a reference, N and K from static intervals and gravity:", "trihedron noise flight.csv"),
     ),
     "allan": (
         ("The terms, the curves and Kalibr's imu.yaml:", "trihedron allan static.csv --report noise.html"),

@@ -225,8 +225,8 @@ def _as_given(given: Calibration, recording: Recording, segments: Segments) -> S
             "m/s^2",
         )
     ]
-    if len(checked.rest_rate):
-        domains.append(StageDomain("static-gyro", float(np.sqrt(np.mean(checked.rest_rate**2))), None, "rad/s"))
+    if len(checked.static_rate):
+        domains.append(StageDomain("static-gyro", float(np.sqrt(np.mean(checked.static_rate**2))), None, "rad/s"))
     if len(checked.angle_deg):
         domains.append(
             StageDomain(

@@ -107,7 +107,7 @@ def next_step_in_words(diagnosis: Diagnosis) -> str:
     rivals = next((effect for effect in diagnosis.effects if effect.confounded_with), None)
     if rivals is not None and rivals.separating_experiment:
         others = listed(list(rivals.confounded_with))
-        return f"Tell {rivals.id} from {others} first: {rivals.separating_experiment}."
+        return f"Separate {rivals.id} from {others} first: {rivals.separating_experiment}."
     if diagnosis.parameters:
         return "Take over what the recording says: --improved FILE.toml (simulation) or --updated FILE (calibration)."
     return "Store the effects with the calibration, for trihedron apply: trihedron calibrate LOG --extended -o FILE."

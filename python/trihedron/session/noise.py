@@ -73,7 +73,7 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
         or segments.accelerometer_sigma_mean is None
         or segments.accelerometer_mean is None
     ):
-        raise RefusedError("the segments do not say how certain their hold means are")
+        raise RefusedError("the segments state no uncertainty of their pose means")
     step_s = 1.0 / recording.rate_hz
     floor = LEAST_SHARE * max(float(np.abs(segments.accelerometer_mean).max()), 1e-300)
     has_rate = recording.gyroscope is not None and segments.gyroscope_sigma is not None

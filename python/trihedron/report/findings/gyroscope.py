@@ -30,7 +30,7 @@ _MOVES = (
         "contradicting",
         WARNING,
         "the stated speeds of {turns:.0f} steady turns are off by {scatter_percent:.2g} % rms, {common_percent:+.2g} % "
-        "on average, beside what moves and poses tell: more than noise explains; each was given that "
+        "on average, from what moves and poses give: more than noise explains; each was given that "
         "uncertainty.",
         "another speed than stated, a table that does not keep it, or a sensor that S and b do not describe.",
         "Count the turns in a minute; state --turntable-error.",

@@ -66,9 +66,9 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "velocity-over-move": "velocity error over a rotation",
         # empirical relations of what stays unexplained
         "relation-follows": "The {sensor}'s {is_at_rest:?bias|reading in motion} ({axes:axes}) follows {depends:and}: "
-        "{share:.0f %} of the held-out misfit.",
+        "{share:.0f %} of the cross-validated misfit.",
         "relation-follows-room": "The gyro's bias follows a vector fixed in the room, {inclination_deg:.0f}° ± "
-        "{inclination_sigma_deg:.0f}° from the vertical: {share:.0f %} of the held-out misfit.",
+        "{inclination_sigma_deg:.0f}° from the vertical: {share:.0f %} of the cross-validated misfit.",
         "relation-form": "reading of {axes:axes} grows by {terms:& + }",
         "relation-form-room": "bias = K Rᵀ m, m a unit vector fixed in the room",
         "angle-to-vertical": "angle to the vertical",
