@@ -86,29 +86,35 @@ def calibrate(
     segments : Segments, optional
         Static poses and the moves between them; found when not given.
     gravity_m_s2 or latitude_deg, height_m : float
-        |g| at the place. When nothing is said a standard value is used, and a finding says what that may cost.
+        |g| at the place. Without it 9.80665 m/s² is used, and a finding states the possible error.
     method : "joint", "separate" or "faces"
         Method 2 with both sensors in one fit (default) or one after the other; or method 1.
     frame : "lower", "symmetric" or "case"
         Body frame: ``lower`` (triangular, X along accelerometer X) for method 2 and ``case`` for method 1 unless said.
     faces : sequence of ±1, ±2, ±3 or 0
-        Method 1: the axis of the case that points up in every pose; 0 leaves a pose out.
+        Method 1: the axis of the case that points up in every pose; 0 excludes a pose.
     turns_deg : sequence of float
-        The angle of every turn on a table, about the axis that points up; 0 leaves a turn out. Method 1: of the turns
-        between poses on the same face, where multiples of 90° are recognised when nothing is said and the scale is
+        The angle of every turn on a table, about the axis that points up; 0 excludes a turn. Method 1: of the turns
+        between poses on the same face, where multiples of 90° are recognised if none is given and the scale is
         known. Method 2: of the turns between poses of the same tilt, in any pose; the gyro is then calibrated by them.
     axis_signs : three of ±1
         Method 2: the sign with which each raw axis follows its axis of the body, by the board's documentation.
     loss : "linear", "huber", "soft_l1" or "cauchy"
-        Method 2: how far outlying poses count; other than ``linear`` with ``separate`` or an accelerometer alone.
+        Method 2: how outlying poses are weighted; other than ``linear`` with ``separate`` or an accelerometer alone.
     gyroscope_nominal : float
-        rad/s per raw unit, where readings are counts and too few moves tell it.
+        rad/s per raw unit, where readings are counts and too few moves determine it.
     turntable_deg_s : sequence of float
-        Speeds of a turntable, the unit on it anyhow, °/s: one for all steady turns of the log, or one a turn in order;
-        0 leaves one out. ``turntable_sigma`` is their common relative standard error.
+        Speeds of a turntable [°/s], the unit on it in any orientation: one for all steady turns of the log, or one per
+        turn in order; 0 excludes one.
+    turntable_sigma : float
+        Relative standard error of the table's speed, common to all turns.
     reference : path, Recording or ReferenceMotion
-        Known motion beside the log (rate table, optical tracking, another unit): both sensors are held against it, and
-        static poses are not needed. ``reference_columns`` says its columns where their names do not.
+        Known motion beside the log (rate table, optical tracking, another unit): both sensors are calibrated by it, and
+        static poses are not needed.
+    reference_columns : str
+        Its columns, where names do not state them.
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------
@@ -119,7 +125,7 @@ def calibrate(
     Raises
     ------
     ValueError
-        When the question cannot be answered; one sentence says why and what to do.
+        When the log does not determine a calibration or an argument is wrong; one sentence says why and what to do.
 
     Examples
     --------

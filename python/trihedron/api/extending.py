@@ -21,14 +21,21 @@ from trihedron.records.words import words
 
 
 def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress | None = None) -> CalibrationResult:
-    """A calibration with the effects that its own recording demands: S, b fitted with them, effects in ``extensions``.
+    """A calibration with the physical effects found in its recording: S, b fitted with them, effects in ``extensions``.
 
-    Frame ``lower``: effects are stated along the sensor's axes and in this trihedron.
+    Parameters
+    ----------
+    result : CalibrationResult
+        Of :func:`trihedron.calibrate`, in the lower-triangular frame.
+    alpha : float
+        False-alarm probability of the diagnosis.
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------
     CalibrationResult
-        The calibration with the physical effects that its recording demands.
+        The extended calibration; unchanged where no effect is found or none improves the prediction.
 
     Raises
     ------

@@ -46,7 +46,7 @@ def guide(
     height_m: float | None = None,
     on_pose: Tell | None = None,
 ) -> tuple[CalibrationResult, VerificationResult | None]:
-    """What a guided session would have made of a log: calibrated when ``accuracy`` is reached, verified on the rest.
+    """A guided session replayed from a log: calibrated when ``accuracy`` is reached, verified on the rest.
 
     Parameters
     ----------
@@ -54,10 +54,10 @@ def guide(
         Poses and moves.
     accuracy : str
         When to stop: ``"accel 0.05 %, gyro 0.1 %"``.
-    gravity_m_s2 : float, optional
-        |g| where it was recorded; or ``latitude_deg`` (and ``height_m``), from which it follows.
+    gravity_m_s2 or latitude_deg, height_m : float
+        |g| at the place [m/s²], or the place from which it follows (degrees, m).
     on_pose : callable, optional
-        Is given the guide's view (instruction, next pose, uncertainties) after every pose.
+        Called with the guide's view (instruction, next pose, uncertainties) after every pose.
 
     Returns
     -------

@@ -44,7 +44,7 @@ def calibrate_sessions(
     alpha: float = ALPHA,
     progress: Progress | None = None,
 ) -> SessionsResult:
-    """Calibrate many recordings of one unit, and say how far each parameter repeats.
+    """Calibrate many recordings of one unit, with the repeatability of each parameter.
 
     Parameters
     ----------
@@ -60,7 +60,9 @@ def calibrate_sessions(
     frame : "lower" or "symmetric"
         Body frame of the common calibration.
     alpha : float
-        Chance that any number of a unit that did not change is called changed.
+        Probability that any parameter of a unit that did not change is called changed.
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------
