@@ -200,7 +200,7 @@ def _excess(sensor: SensorCalibration) -> float:
 
 
 def _bias_drift(result: CalibrationResult, n: int) -> FloatArray:
-    """Variance (n,) by which zeros of a session like this differ from one to the next (eq. 9.3)."""
+    """Variance (n,) by which biases of a session like this differ from one to the next (eq. 9.3)."""
     out = np.zeros(n)
     accel, gyro, segments = result.accelerometer, result.gyroscope, result.segments
     quality = accel.quality

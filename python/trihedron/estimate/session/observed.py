@@ -55,7 +55,7 @@ class Observed:
     prior: tuple[FloatArray, FloatArray] | None = None
 
     def model(self) -> _core.SessionModel:
-        """The Rust model; zeros may scatter from pose to pose as far as the evidence goes."""
+        """The Rust model; biases may scatter from pose to pose as far as the evidence goes."""
         poses = _core.SessionPoses(
             time_s=self.pose_time_s,
             force=self.pose_force,
