@@ -21,7 +21,7 @@ from trihedron.report.diagnosis_overview_charts import traces_chart
 from trihedron.report.disc import drawn_disc
 from trihedron.report.document import Picture, Table
 from trihedron.report.effect_rest_charts import rest_panels
-from trihedron.report.findings.told import told_once
+from trihedron.report.findings.grouping import combined
 from trihedron.report.findings.wording import filled
 from trihedron.report.many_charts import sessions_chart
 from trihedron.report.notes import _box, _covered, apart
@@ -190,7 +190,7 @@ def test_small_numbers_have_one_notation_in_tables_and_sentences():
     seen = filled("K is below {limit:.2g} {unit:unit}/√s.", {"limit": 7.3e-5, "unit": "m/s^2"}, {})
     assert seen == "K is below 7.3e−5 m/s²/√s."
     one = Finding(FindingCode.UNIT_DETECTED, Severity.NOTE, "K is below 7.3e−5 m/s².", "", "")
-    (both,) = told_once([one, replace(one, seen="K is below 1.2e−4 m/s².")])
+    (both,) = combined([one, replace(one, seen="K is below 1.2e−4 m/s².")])
     assert both.seen == "K is below 7.3e−5 to 1.2e−4 m/s²."
 
 

@@ -130,8 +130,8 @@ def anchor_of(S_a: FloatArray, S_g: FloatArray | None) -> Anchor:
 def numbers_of(
     S_a: FloatArray, b_a: FloatArray, S_g: FloatArray | None, b_g: FloatArray | None, anchor: Anchor
 ) -> FloatArray:
-    """(9,) or (21,) parameters: bias, log_scale, angle of the accelerometer, of the gyro, and the rotation vector of its
-    triad from the anchor's (eq. 9.1)."""
+    """(9,) or (21,) parameters: bias, log_scale, angle of the accelerometer, of the gyro, and the rotation vector
+    of its triad from the anchor's (eq. 9.1)."""
     accel = invariants(S_a, b_a)
     if S_g is None or b_g is None or anchor.triad is None:
         return accel.vector()

@@ -147,7 +147,7 @@ def _check_adc(given: Sequence[AxisNoise], recording: Recording, segments: Segme
     if not windows:
         return
     inside = noise_of_poses(readings, recording.rate_hz, windows)
-    # Codes between the poses count too: inside a hold a coarse ADC shows one.
+    # Codes between the poses count too: inside a pose a coarse ADC shows one.
     steps = recording.facts.of("accelerometer").step.tolist()
     octaves = [axis.octaves for axis in inside]
     check_same_adc(given, steps, octaves, recording.rate_hz, recording.source)

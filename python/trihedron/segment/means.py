@@ -76,7 +76,7 @@ def average_poses(
 
 
 def _shrunk(ratio: FloatArray, freedom: FloatArray, steady: npt.NDArray[np.bool_]) -> FloatArray:
-    """(h, k) excess of every hold on axes that are alike: drawn towards 1 where steady, at its own word elsewhere."""
+    """(h, k) excess of every pose on axes that are alike: drawn towards 1 where steady, at its own word elsewhere."""
     r, nu = ratio.mean(axis=1), freedom * ratio.shape[1]
     prior = _prior_freedom(r[steady], nu[steady])
     pulled = ((prior + nu * r) / (prior + nu))[:, None]
