@@ -37,7 +37,7 @@ Exclude = Annotated[
     ),
 ]
 KeepEvents = Annotated[
-    bool, typer.Option("--keep-events", help="Leave nothing out by itself: knocks, shaking and steps stay in.")
+    bool, typer.Option("--keep-events", help="Exclude nothing automatically: knocks, vibration and steps stay in.")
 ]
 Accuracy = Annotated[
     float,
