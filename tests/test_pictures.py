@@ -123,11 +123,11 @@ def test_without_an_effect_the_model_is_not_written_down_twice():
 
 def test_a_candidate_that_another_effect_made_needless_says_which():
     tried = (
-        Candidate("sensor-lag", 2e-17, True, stands_against="gyro-g-sensitivity"),
+        Candidate("sensor-lag", 2e-17, True, superseded_by="gyro-g-sensitivity"),
         Candidate("accel-cubic", 0.6, True),
     )
     table = candidates_table(SimpleNamespace(effects=(), candidates=tried))
-    assert [row[-1] for row in table.rows] == ["needless beside gyro-g-sensitivity", "not needed"]
+    assert [row[-1] for row in table.rows] == ["redundant with gyro-g-sensitivity", "not needed"]
 
 
 def counts_model(S, b):

@@ -79,7 +79,7 @@ CARRIED: tuple[Domain, ...] = ("static-accel", "moves")
 def _spoilt(diagnosis: Diagnosis) -> tuple[str, float, float, str] | None:
     """A domain whose held-out rms the effects raise, before and after, its unit: that carries over to nothing."""
     stages = {stage.stage: {d.domain: d for d in stage.domains} for stage in diagnosis.stages}
-    before, after = stages.get("numbers", {}), stages.get("effects", {})
+    before, after = stages.get("parameters", {}), stages.get("effects", {})
     for domain in CARRIED:
         if domain in before and domain in after and after[domain].rms > MAY_RISE * before[domain].rms:
             return domain, before[domain].rms, after[domain].rms, before[domain].unit

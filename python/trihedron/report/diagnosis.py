@@ -135,7 +135,7 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     places = tuple(
         (MEANING[d.domain], place)
         for d in diagnosis.domains
-        if d.disagrees and d.domain != "numbers" and (place := where_in_words(d))
+        if d.disagrees and d.domain != "parameters" and (place := where_in_words(d))
     )
     if places:
         blocks.append(Facts(places))

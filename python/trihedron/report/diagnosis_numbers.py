@@ -41,7 +41,7 @@ _SIZE = re.compile(r"(?<![\w.])\d[\d.]*(?:e[+−-]?\d+)?")
 _HEAD = ("parameter", "model", "recording", "recording − model", "p of its group")
 _STAGES = {
     "as-given": "as given",
-    "numbers": "parameters",
+    "parameters": "parameters",
     "noise": "noise",
     "effects": "effects",
 }

@@ -34,7 +34,7 @@ MEANING = {
     "rate": "angular rate beside the reference",
     "within-static": "noise within static poses",
     "timing": "even sampling (seen in motion)",
-    "numbers": "parameters of the model",
+    "parameters": "parameters of the model",
     "noise": "noise and sampling",
 }
 MOST_NAMED = 4
