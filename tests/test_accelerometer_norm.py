@@ -40,6 +40,9 @@ def test_six_faces_are_refused_and_the_missing_poses_named():
     assert refusal.severity is Severity.SERIOUS
     assert "6 of the 9" in refusal.seen
     assert refusal.action.count(" up") >= 3
+    assert "--method faces" in refusal.action
+    few = calibrate_norm(readings(np.vstack([up, [[0.6, 0.8, 0.0]]]), 1), SIGMA, G)[1]
+    assert all("--method faces" not in finding.action for finding in few)
     assert sensor.observability.rank == 6
     # Scales and biases are seen, the three angles are as unknown as for any triad off the shelf: 10 % of the scale.
     assert np.all(sensor.sigma_S[np.tril_indices(3, -1)] > 0.09 * 2.4e-3)

@@ -170,7 +170,7 @@ def test_poses_that_do_not_determine_the_answer_end_with_status_two_and_poses_to
     assert main(["calibrate", str(log), "--gravity", G]) == 2, name
     out = capsys.readouterr().out
     assert "NOT TO BE TRUSTED" in out
-    assert "Add poses" in out
+    assert "add poses" in out.lower()
     assert main(["check", str(log)]) == 2
 
 

@@ -208,6 +208,24 @@ def test_the_verdict_is_not_said_twice(tmp_path, browser):
     page.close()
 
 
+def test_findings_of_the_first_screen_are_told_in_words_and_six_faces_their_method(tmp_path, browser):
+    write_recording(simulate(scenario_by_name("six-faces"), 1)[0], tmp_path / "six.csv")
+    assert main(["calibrate", str(tmp_path / "six.csv"), "--gravity", "9.8", "--report", str(tmp_path / "r.html")]) == 2
+    page = Visit(browser, tmp_path / "r.html", 1280, "light").page
+    assert "--method faces" in page.inner_text(".next")
+    also = page.locator(".foremost a")
+    assert all(len(words.split()) > 3 and "-" not in words.split()[0] for words in also.all_inner_texts()[:2])
+    page.close()
+
+
+def test_tools_of_every_figure_are_seen_and_named_apart(folder, browser):
+    page = Visit(browser, folder / "calibrate.html", 1280, "dark").page
+    names = [button.get_attribute("aria-label") for button in page.query_selector_all(".tools button")]
+    assert len(set(names)) == len(names)
+    assert page.evaluate("getComputedStyle(document.querySelector('.tools')).opacity") == "1"
+    page.close()
+
+
 def test_a_hundred_poses_fit_two_hundred_kilobytes(tmp_path):
     motion = hand_session(n_poses=100, pose_s=2.0, move_s=1.5, first_pose_s=5.0)
     write_recording(simulate(replace(scenario_by_name("hand-session"), motion=motion), 5)[0], tmp_path / "log.csv")

@@ -51,6 +51,13 @@ def test_a_pose_cut_where_it_was_bumped_keeps_its_number(made):
     assert obs.move_names(range(3, 6)) == ("move 4", "a disturbance in pose 5", "move 5")
 
 
+def test_a_domain_agrees_exactly_up_to_the_limit_that_its_figure_shows(made):
+    _, _, found = made
+    judged = [one for one in found.domains if one.limit is not None]
+    assert {one.domain for one in judged} >= {"static-accel", "moves", "dynamics"}
+    assert all(one.disagrees == (one.chi2_per_dof > one.limit) for one in judged)
+
+
 def test_a_bias_has_one_sign_and_one_value_in_every_report(made):
     recording, result, _ = made
     text = trihedron.report(result)
@@ -78,9 +85,9 @@ def test_the_uncertainty_of_a_scale_is_one_figure_wherever_it_is_stated(made):
     document = calibration_report(result.calibration)
     axes = next(s for s in document.sections if s.heading == "Axes").blocks
     for sensor, table in zip(("accelerometer", "gyroscope"), axes, strict=True):
-        worst = max((row[2] for row in table.rows), key=lambda said: float(said.split()[0]))
+        worst = max((row[2] for row in table.rows), key=float)
         headline = next(h for h in document.headlines if h.what == f"{sensor} scale uncertainty")
-        assert f"{headline.value} {headline.unit}" == worst
+        assert (table.head[2], headline.unit, headline.value) == ("relative σ [%]", "%", worst)
         # A bias stands once, in SI, over the sensitivity; the raw reading at zero input has another name.
         assert table.head[-1].startswith("reading at zero input, −S⁻¹ b [count")
     one = replace(result.accelerometer, S=np.eye(3), raw_unit="m/s^2")

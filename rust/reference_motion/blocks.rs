@@ -196,27 +196,27 @@ fn path(of: &Log<'_>, truth: &Truth<'_>, first: usize, block: usize, next: &mut 
             exp(&(sum * h + change * (h * h * x * x * x / 12.0)))
         };
         let middle = at.turned * part(0.5);
-        let add = |moments: &DMatrix<f64>, x: f64| {
-            let mut sum = moments.clone();
+        let add = |moments: &mut DMatrix<f64>, x: f64| {
             let (s0, s1) = (&of.signals[i * q..][..q], &of.signals[(i + 1) * q..][..q]);
-            for j in 0..q {
-                let s = x * h * (s0[j] + 0.5 * x * (s1[j] - s0[j]));
+            for ((mut column, from), to) in moments.column_iter_mut().zip(s0).zip(s1) {
+                let s = x * h * (from + 0.5 * x * (to - from));
                 for b in 0..3 {
                     for k in 0..3 {
-                        sum[(3 * b + k, j)] += middle[(b, k)] * s;
+                        column[3 * b + k] += middle[(b, k)] * s;
                     }
                 }
             }
-            sum
         };
         while *next < truth.time_s.len() && truth.time_s[*next] < from_s + h {
             let x = (truth.time_s[*next] - from_s) / h;
             if is_valid && !at.is_lost && x >= 0.0 {
                 let turned = at.turned * part(x);
+                let mut moments = at.moments.clone();
+                add(&mut moments, x);
                 at.rows.push(Row {
                     time_s: truth.time_s[*next],
                     turned,
-                    moments: add(&at.moments, x),
+                    moments,
                     bias: at.bias + middle * (x * h),
                     rate: turned * (w0 + (w1 - w0) * x),
                     attitude: truth.attitude[*next],
@@ -225,7 +225,7 @@ fn path(of: &Log<'_>, truth: &Truth<'_>, first: usize, block: usize, next: &mut 
             *next += 1;
         }
         if is_valid {
-            at.moments = add(&at.moments, 1.0);
+            add(&mut at.moments, 1.0);
             at.bias += middle * h;
             at.turned *= part(1.0);
         } else {

@@ -109,7 +109,7 @@ def filter_noise(
     else:
         if own is None:
             why = (
-                "its readings are counts of unknown size"
+                "its readings are counts of unknown size (--gyro-lsb and --accel-lsb of `trihedron allan` say it)"
                 if rate_to_si(recording.gyroscope_unit) is None
                 else f"the sensor is not static in it for {SHORTEST_REST_S:.0f} s"
             )
@@ -196,7 +196,8 @@ def _static(given: Noise | str | os.PathLike[str]) -> Static:
     known = _sensors(given)
     if not known:
         raise RefusedError(
-            f"{given.source}: the static log is in counts; give the JSON of `trihedron allan LOG --calibration FILE`."
+            f"{given.source}: the static log is in counts; give the JSON of `trihedron allan LOG` with --calibration "
+            "FILE, or with --gyro-lsb and --accel-lsb, the sizes of a count."
         )
     return known
 

@@ -152,24 +152,21 @@ def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArra
 
 
 def explain_as_much(one: BiasStrength, model: Hypothesis, tried: Iterable[Tried]) -> list[Tried]:
-    """Effects of the same sensor that leave the process no stronger than the part's noise, at odds of twenty to one or
-    better; likeliest first.
+    """Effects of the same sensor that explain as much while the process is no stronger than the part's noise, at odds
+    of twenty to one or better; likeliest first.
 
     A process that is named was chosen from the catalogue as an effect is, and owes the same price for it.
     """
-    s = one.effect.sensor
-    corner, scatter, _ = noise_bounds(model)
-    out = []
-    for other in tried:
-        columns = (other.term.distortion.force, other.term.distortion.rate)[s]
-        corners, scatters, _, _ = other.asked.strengths
-        own = scatters[1:] if s else scatters[:1]
-        is_noise = corners[s] >= corner[s] if one.effect.walks else max(own) <= scatter[s]
-        if (
-            columns is not None
-            and is_noise
-            and other.score + one.price > -NEAR
-            and other.term.effect.id != one.effect.id
-        ):
-            out.append(other)
-    return sorted(out, key=lambda other: -other.score)
+
+    def acts(other: Tried) -> bool:
+        columns = other.term.distortion
+        return (columns.force, columns.rate)[one.effect.sensor] is not None and other.term.effect.id != one.effect.id
+
+    # Bounds make nothing likelier: only what comes near without them is asked.
+    near = [other for other in tried if acts(other) and other.score + one.price > -NEAR]
+    asked = model.asked([other.term for other in near], bounds_without(model, one.effect)) if near else []
+    found = [
+        replace(other, score=2.0 * (bounded.log_evidence - model.log_evidence) - other.term.paid, asked=bounded)
+        for other, bounded in zip(near, asked, strict=True)
+    ]
+    return sorted((other for other in found if other.score + one.price > -NEAR), key=lambda other: -other.score)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -9,7 +10,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.hypothesis import Asked, Hypothesis, Term
+from trihedron.diagnose.hypothesis import Asked, Hypothesis, Look, Term
 
 PRIOR_SCALES = (1.0, 0.3, 0.1)
 """Parts differ by ten from what data sheets of their kind say: the size expected is one of these times that."""
@@ -18,7 +19,7 @@ RESCALED = (3.0, 0.3)
 N_LEADERS = 3
 """Effects taken from every look at the whole catalogue to the full evidence."""
 SHAPES_KEPT = 2
-"""Shapes of one effect that go along."""
+"""Shapes of one effect that go along, of those that its size so far makes possible and of those that it does not."""
 N_RESIZED = 3
 """Candidates whose expected size is asked anew."""
 NEAR = 6.0
@@ -115,17 +116,28 @@ def price_of_choice(reasons: Iterable[str | None]) -> float:
 
 def _leaders(model: Hypothesis, terms: list[Term]) -> list[Term]:
     """The candidates that gain most one linear step from the fit, at its strengths and at others, as large as fits."""
-    gains = np.stack([look.gain for look in model.looked_at(terms, PRIOR_SCALES)], axis=1)
+    looks = model.looked_at(terms, PRIOR_SCALES)
+    gains = np.stack([look.gain for look in looks], axis=1)
+    possible = [_can_be(model, term, look) for term, look in zip(terms, looks, strict=True)]
     kept: dict[int, int] = {}
     for look in range(gains.shape[2]):
         best = gains[:, :, look].max(axis=0)
-        count: dict[str, int] = {}
+        count: Counter[tuple[str, bool]] = Counter()
+        led: set[str] = set()
         for k in np.argsort(-best).tolist():
-            effect_id = terms[k].effect.id
-            if count.get(effect_id, 0) < SHAPES_KEPT and (effect_id in count or len(count) < N_LEADERS):
-                count[effect_id] = count.get(effect_id, 0) + 1
+            shape = terms[k].effect.id, possible[k]
+            if count[shape] < SHAPES_KEPT and (shape[0] in led or len(led) < N_LEADERS):
+                count[shape] += 1
+                led.add(shape[0])
                 kept.setdefault(k, int(gains[:, k, look].argmax()))
     return [replace(terms[k], sizes=terms[k].sizes * PRIOR_SCALES[scale]) for k, scale in kept.items()]
+
+
+def _can_be(model: Hypothesis, term: Term, look: Look) -> bool:
+    """Whether an effect can have the size that it has in a look, or would in columns made for that size."""
+    effect = term.effect
+    is_plausible = effect.is_plausible_variant(term.variant, look.value, look.covariance)
+    return is_plausible or effect.rescaled(model.context, term.variant, look.value) is not None
 
 
 def _is_possible(term: Term, asked: Asked) -> bool:

@@ -240,12 +240,13 @@ class Context:
         return out
 
     def between_poses(self, per_pose: FloatArray) -> FloatArray:
-        """(points, ...) a per-hold quantity, carried linearly in time through the moves."""
+        """(points, ...) a quantity of the poses, carried through the moves as far as the angle has been turned."""
         out = np.zeros((self.n_points, *per_pose.shape[1:]))
         out[: self.obs.n_poses] = per_pose
         for where, (before, after) in zip(self.moves, self.obs.move_poses, strict=True):
-            t = self.time_s[where]
-            blend = ((t - t[0]) / max(t[-1] - t[0], 1e-12)).reshape(-1, *([1] * (per_pose.ndim - 1)))
+            size = np.linalg.norm(self.rate[where], axis=1)
+            turned = np.concatenate([[0.0], np.cumsum(0.5 * (size[1:] + size[:-1]) * np.diff(self.time_s[where]))])
+            blend = (turned / max(turned[-1], 1e-12)).reshape(-1, *([1] * (per_pose.ndim - 1)))
             out[where] = per_pose[before] * (1 - blend) + per_pose[after] * blend
         return out
 

@@ -106,9 +106,10 @@ class Hypothesis:
         """Blocks of poses and moves predicted from all others."""
         return predict_held_out(self.fitted, folds_of(self.fitted))
 
-    def asked(self, terms: Sequence[Term]) -> list[Asked]:
-        """What every one of some terms would come to beside those that are there."""
-        found = self.fitted.line.core.evidence(_columns(terms), [self.strengths, *ELSEWHERE], self.within)
+    def asked(self, terms: Sequence[Term], within: Bounds | None = None) -> list[Asked]:
+        """What every one of some terms would come to beside those that are there, its noise ``within`` bounds."""
+        starts = [self.strengths, *ELSEWHERE]
+        found = self.fitted.line.core.evidence(_columns(terms), starts, self.within if within is None else within)
         return [Asked(*one) for one in found]
 
     def looked_at(

@@ -7,7 +7,7 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.accepted import held_out_records
 from trihedron.diagnose.relations.search import Follows, Related
-from trihedron.diagnose.relations.signals import ROOM_VECTOR
+from trihedron.diagnose.relations.signals import NOT_TURNED, ROOM_VECTOR
 from trihedron.records.diagnosis import EffectParameter, Relation
 from trihedron.records.domains import Domain, HeldOut
 from trihedron.records.words import relation_experiment, relation_resembles, words
@@ -44,18 +44,21 @@ def _share(held: HeldOut | None) -> float:
 
 def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, held: HeldOut | None) -> Relation:
     signal, sigma = one.signal, np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    size, error = (x.reshape(len(one.axes), -1) for x in (value, sigma))
+    # What poses held of it that no rotation led to is no coefficient.
+    told = [k for k, name in enumerate(signal.names) if name != NOT_TURNED]
+    size, error = (x.reshape(len(one.axes), -1)[:, told] for x in (value, sigma))
+    names = tuple(signal.names[k] for k in told)
     out = OUT[signal.sensor]
-    units = [out if unit == "1" else f"({out})/({unit})" for unit in signal.units]
+    units = [out if signal.units[k] == "1" else f"({out})/({signal.units[k]})" for k in told]
     axes = tuple(AXES[a] for a in one.axes)
     return Relation(
         sensor=signal.sensor,
-        depends_on=signal.names,
-        form=words("relation-form", axes=axes, terms=[f"c{k + 1}·({name})" for k, name in enumerate(signal.names)]),
+        depends_on=names,
+        form=words("relation-form", axes=axes, terms=[f"c{k + 1}·({name})" for k, name in enumerate(names)]),
         coefficients=tuple(
             EffectParameter(f"{axis}: {name}", float(size[i, j]), float(error[i, j]), units[j])
             for i, axis in enumerate(axes)
-            for j, name in enumerate(signal.names)
+            for j, name in enumerate(names)
         ),
         share=_share(held),
         held_out=held,
@@ -63,7 +66,7 @@ def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, held: He
         experiment=relation_experiment(signal.family),
         statement=words(
             "relation-follows", sensor="gyro" if signal.sensor == "gyroscope" else signal.sensor,
-            is_at_rest=not signal.is_motion, axes=axes, depends=signal.names, share=_share(held),
+            is_at_rest=not signal.is_motion, axes=axes, depends=names, share=_share(held),
         ),
     )  # fmt: skip
 

@@ -28,8 +28,9 @@ from trihedron.diagnose.session.state import (
 from trihedron.diagnose.shapes import as_fits_best
 from trihedron.threads import side_by_side
 
-WORTH_FITTING = 20.0
-"""Difference of scores, one linear step from the fit, within which rivals are fitted in full."""
+WORTH_FITTING, OF_THE_BEST = 20.0, 0.5
+"""Difference of scores, one linear step from the fit, within which rivals are fitted in full; and the part of the best
+score from which they are: the larger an effect, the farther off is what one step says of it."""
 N_RIVALS = 3
 """Rivals fitted in full."""
 N_SENSORS = 2
@@ -206,7 +207,8 @@ class _State:
 
 def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Term | None]:
     """The hypothesis with the best of the candidates that come near the first, each fitted in full."""
-    near = [one for one in standing if one.score > standing[0].score - WORTH_FITTING][:N_RIVALS]
+    first = standing[0].score
+    near = [one for one in standing if one.score > min(first - WORTH_FITTING, OF_THE_BEST * first)][:N_RIVALS]
     best: tuple[float, Hypothesis, Term] | None = None
     for term, larger in side_by_side(lambda one: _fitted_beside(model, one), near):
         value, covariance = larger.value(len(larger.terms) - 1)

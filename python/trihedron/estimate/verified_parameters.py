@@ -61,18 +61,16 @@ def shift_findings(parameters: tuple[JudgedParameter, ...]) -> list[Finding]:
     if not judged or not any(one.sigma_file > 0.0 for one in parameters):
         return []
     limit = -float(probability.ndtri(0.5 * FALSE_ALARM / len(judged)))
-    shifted = [one for one in judged if abs(one.times_sigma) > limit]
+    shifted = sorted((one for one in judged if abs(one.times_sigma) > limit), key=lambda one: -abs(one.times_sigma))
     if not shifted:
         return []
-    worst = max(shifted, key=lambda one: abs(one.times_sigma))
     return [
         Finding.of(
             FindingCode.CALIBRATION_SHIFT,
             parameters=[_label(one) for one in shifted],
             n_parameters=len(shifted),
             n_judged=len(judged),
-            worst=_label(worst),
-            times_sigma=abs(worst.times_sigma),
+            times_sigma=abs(shifted[0].times_sigma),
         )
     ]
 

@@ -27,7 +27,11 @@ class Where(Plain):
 
 @dataclass(frozen=True)
 class DomainTest(Plain):
-    """Residuals of one domain, whitened by the predicted noise, against what a healthy recording gives."""
+    """Residuals of one domain, whitened by the predicted noise, against what a healthy recording gives.
+
+    ``limit`` is the χ² per degree of freedom up to which the domain agrees; ``None`` where something else decides: its
+    loudest pose, line or time.
+    """
 
     domain: Domain
     chi2_per_dof: float
@@ -37,6 +41,7 @@ class DomainTest(Plain):
     where: Where = Where()
     rms: float = 0.0
     unit: str = ""
+    limit: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

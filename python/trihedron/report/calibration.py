@@ -94,14 +94,9 @@ def _headlines(calibration: Calibration) -> list[Headline]:
             out.append(Headline("tilt error after a rotation", plain_number(seen[-1][1]), "°", beside))
     for name, sensor in _sensors(calibration):
         with suppress(ValueError):
-            words, unit = _relative(float(axes_of(sensor).scale_sigma.max()))
-            out.append(Headline(f"{name} scale uncertainty", words, unit, "1 σ, worst axis"))
+            worst = plain_number(100.0 * float(axes_of(sensor).scale_sigma.max()), 2)
+            out.append(Headline(f"{name} scale uncertainty", worst, "%", "1 σ, worst axis"))
     return out
-
-
-def _relative(sigma: float) -> tuple[str, str]:
-    """A relative uncertainty and its unit: ppm below a tenth of a percent, else %."""
-    return (plain_number(1e6 * sigma, 2), "ppm") if sigma < 1e-3 else (plain_number(100.0 * sigma, 2), "%")
 
 
 def verdict(calibration: Calibration) -> str:
@@ -197,9 +192,13 @@ def _axes_block(name: str, sensor: SensorCalibration) -> Block:
 
 def axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
     raw, si = unit_in_print(sensor.raw_unit), unit_in_print(sensor.si_unit)
-    head = ["", "scale (sensitivity)" if raw == si else f"scale (sensitivity) [{raw} per {si}]", "relative σ"]
+    head = ["", "scale (sensitivity)" if raw == si else f"scale (sensitivity) [{raw} per {si}]", "relative σ [%]"]
     rows = [
-        [XYZ[i], with_sigma(axes.sensitivity[i], axes.sigma_sensitivity[i]), " ".join(_relative(axes.scale_sigma[i]))]
+        [
+            XYZ[i],
+            with_sigma(axes.sensitivity[i], axes.sigma_sensitivity[i]),
+            plain_number(100.0 * axes.scale_sigma[i], 2),
+        ]
         for i in range(3)
     ]
     if raw != si:

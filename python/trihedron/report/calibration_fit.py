@@ -14,7 +14,7 @@ from trihedron.report.calibration_charts import move_noise_deg
 from trihedron.report.document import Table
 from trihedron.report.many_charts import shown
 from trihedron.report.numbers import how_many, in_mm_s2, plain_number, with_sigma
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
+from trihedron.units import degrees_from_radians
 
 METHODS = {
     "joint": "both sensors in one fit of poses and moves",
@@ -103,8 +103,8 @@ def figures_table(calibration: Calibration, session_fit: Mapping[str, str]) -> T
     rows = []
     at_rest = calibration.accelerometer.quality
     if at_rest is not None:
-        held = "–" if at_rest.held_out_rms is None else _mm(at_rest.held_out_rms)
-        rows.append(("gravity error in static poses", _mm(at_rest.rms), held, _mm(at_rest.floor)))
+        held = "–" if at_rest.held_out_rms is None else in_mm_s2(at_rest.held_out_rms)
+        rows.append(("gravity error in static poses", in_mm_s2(at_rest.rms), held, in_mm_s2(at_rest.floor)))
     moved = None if calibration.gyroscope is None else calibration.gyroscope.quality
     seen = [f"{plain_number(rms)}°" for _, rms, _ in angles_of(moved)] if moved is not None else []
     if moved is not None and seen:
@@ -118,7 +118,3 @@ def figures_table(calibration: Calibration, session_fit: Mapping[str, str]) -> T
         f"poses with {AT_REST}, rotations with the {AFTER_MOVES}"
     )
     return Table(head, tuple((row[0], session_fit.get(row[0], "–"), *row[1:]) for row in rows), caption)
-
-
-def _mm(value: float) -> str:
-    return f"{plain_number(mm_s2_from_m_s2(value))} mm/s²"

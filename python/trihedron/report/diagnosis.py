@@ -141,7 +141,7 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
         blocks.append(Facts(places))
     own = getattr(diagnosis, "calibration", None)
     if own is not None and not getattr(diagnosis, "model_is_given", False):
-        table = figures_table(own, {MEANING[d.domain]: rms_in_words(d).replace(" °", "°") for d in diagnosis.domains})
+        table = figures_table(own, {MEANING[d.domain]: rms_in_words(d) for d in diagnosis.domains})
         blocks += [table] if table is not None else []
     return tuple(blocks)
 

@@ -152,8 +152,7 @@ def _spectra(compared: Sequence[NoiseDifference]) -> dict[tuple[str, str], Spect
     rows: dict[tuple[str, str], list[tuple[float, float, float, float]]] = {}
     for n in compared:
         if n.band_hz is not None and n.model and n.recording and n.sensor in SENSORS:
-            factor = PRINTED["m/s^2" if n.sensor == "accelerometer" else "rad/s"][0]
-            rows.setdefault((n.sensor, n.axis), []).append((*n.band_hz, factor * n.model, factor * n.recording))
+            rows.setdefault((n.sensor, n.axis), []).append((*n.band_hz, n.model, n.recording))
     out = {}
     for key, found in rows.items():
         if len(found) >= FEWEST_OCTAVES:
@@ -170,7 +169,7 @@ def _without_gaps(edges: FloatArray, model: FloatArray, own: FloatArray) -> Spec
 
 
 def _unit(sensor: str) -> str:
-    return PRINTED["m/s^2" if sensor == "accelerometer" else "rad/s"][1]
+    return "m/s²" if sensor == "accelerometer" else "rad/s"
 
 
 def _said(sensor: str) -> str:

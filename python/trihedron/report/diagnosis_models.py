@@ -14,6 +14,7 @@ from trihedron.report.numbers import (
     MINUS,
     engineering_exponent,
     listed,
+    one_of,
     plain_number,
     power_of_ten,
     unit_in_print,
@@ -37,7 +38,10 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         ]
         rows += [(f"b_{AXES[i]}", *(_cell(model, "b", (i,)) for model in models)) for i in range(3)]
         head = ("", "linear model", "with the effects")[: 1 + len(models)]
-        blocks.append(Table(head, tuple(rows), f"{name.capitalize()}, raw in {unit_in_print(before['raw_unit'])}"))
+        raw, si = unit_in_print(before["raw_unit"]), "m/s²" if name == "accelerometer" else "rad/s"
+        of_S = "dimensionless" if raw == si else f"in {si} per {one_of(raw)}"
+        caption = f"{name.capitalize()}, the reading in {raw}: S {of_S}, b in {si}"
+        blocks.append(Table(head, tuple(rows), caption))
     gravity = getattr(diagnosis, "gravity_source", "")
     facts = [("gravity", f"{diagnosis.gravity_m_s2:.5f} m/s²" + (f", {gravity}" if gravity else ""))]
     for name in ("accelerometer", "gyroscope"):

@@ -8,8 +8,8 @@ from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDif
 from trihedron.report.axes import BIAS
 from trihedron.report.document import Block, Facts, Paragraph, Table
 from trihedron.report.findings import ranged
-from trihedron.report.numbers import MINUS, decimals_of, plain_number, unit_in_print, with_sigma
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_radians
+from trihedron.report.numbers import MINUS, decimals_of, plain_number, unit_in_print, with_sigma, with_unit
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 NAMED_SIGMAS = 3.0
 """Components of a group that differs are named from here on; the largest always is."""
@@ -242,19 +242,19 @@ def in_print(p: ParameterDifference) -> tuple[float, str]:
 def _difference(p: ParameterDifference) -> str:
     scale, unit = _unit(p, is_difference=True)
     text = with_sigma(scale * p.difference, scale * p.std)
-    return ("" if text.startswith(MINUS) else "+") + text + (f" {unit}" if unit else "")
+    return with_unit(("" if text.startswith(MINUS) else "+") + text, unit)
 
 
 def _size(p: ParameterDifference) -> str:
     scale, unit = _unit(p, is_difference=True)
-    return f"{plain_number(abs(scale * p.difference), 2)}{' ' + unit if unit else ''}"
+    return with_unit(plain_number(abs(scale * p.difference), 2), unit)
 
 
 def _value(p: ParameterDifference, value: float) -> str:
     scale, unit = _unit(p, is_difference=False)
     # The error of a scale is relative to it.
     sigma = p.std * abs(value) if p.id in ("accel-scale", "gyro-scale") else scale * p.std
-    return f"{_as_known(scale * value, sigma)}{' ' + unit if unit else ''}"
+    return with_unit(_as_known(scale * value, sigma), unit)
 
 
 def _as_known(value: float, sigma: float) -> str:
@@ -276,7 +276,7 @@ def _unit(p: ParameterDifference, *, is_difference: bool) -> tuple[float, str]:
         return degrees_from_radians(1.0), "°/s"
     if p.unit == "m/s^2":
         return mm_s2_from_m_s2(1.0), "mm/s²"
-    return (mrad_from_radians(1.0), "mrad") if is_difference else (degrees_from_radians(1.0), "°")
+    return degrees_from_radians(1.0), "°"
 
 
 def _sensor(n: NoiseDifference) -> str:

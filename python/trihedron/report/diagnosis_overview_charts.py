@@ -23,10 +23,12 @@ from trihedron.units import ratio_of_units
 
 ROW_PX = 26
 """A row of names on a page."""
-LEAST_CHI2 = 0.3
-"""Where bars of χ² per degree of freedom begin: what noise explains is 1."""
-SLIVER = 1.04
-"""Of the least: what lies below it is drawn so long, to be seen and pointed at."""
+BESIDE = 0.15
+"""Of a row, by which what is found without the effects stands above its middle, and with them below it."""
+FEWEST_DOMAINS = 2
+"""That are drawn beside one another; of one the table says it."""
+ROOM = 1.6
+"""Factor by which an axis of χ² reaches beyond what it holds."""
 TWO_SIGMA = 2.0
 WINDOW_S = 6.0
 """Of traces drawn: a move and its poses on both sides."""
@@ -37,43 +39,42 @@ RATIOS = ("N", "B", "K", "Q", "bandwidth", "resolution", "range", "rate", "corre
 
 
 def strengths_picture(diagnosis: Diagnosis) -> Picture | None:
-    """How far each domain disagrees, beside what noise explains."""
-    if not any(d.chi2_per_dof > 0.0 for d in diagnosis.domains):
+    """How far each domain disagrees, beside what noise explains and what still agrees."""
+    if sum(d.chi2_per_dof > 0.0 for d in diagnosis.domains) < FEWEST_DOMAINS:
         return None
-    caption = "How far the recording and the model disagree, domain by domain: χ² per degree of freedom; 1 is what "
-    caption += "noise alone explains."
+    caption = "How far the recording and the model disagree, domain by domain. χ² per degree of freedom is about 1 by "
+    caption += "noise alone; inside the shade the domain agrees (a healthy recording leaves one of them in "
+    caption += f"{100.0 * diagnosis.alpha:g} % of cases). Without a shade the loudest pose, line or time decides."
     return Picture("strengths", caption, partial(strengths_chart, diagnosis))
 
 
 def strengths_chart(diagnosis: Diagnosis) -> Chart:
-    """A bar a domain, as modelled and with the effects."""
+    """A row a domain: its limit, and dots as modelled and with the effects."""
     tests = [d for d in diagnosis.domains if d.chi2_per_dof > 0.0]
     after = {d.domain: d.chi2_per_dof for d in diagnosis.remaining} if diagnosis.effects else {}
-    chi2 = np.array([d.chi2_per_dof for d in tests])
-    differs = np.array([d.disagrees for d in tests])
-    sides: list[list[tuple[str, Colour, FloatArray]]] = [
-        [
-            ("disagrees", "accent", np.where(differs, chi2, math.nan)),
-            ("agrees", "soft", np.where(differs, math.nan, chi2)),
-        ]
+    names = tuple(MEANING[d.domain] for d in tests)
+    rows, apart = -np.arange(1.0, len(tests) + 1.0), BESIDE if after else 0.0
+    before, differs = np.array([d.chi2_per_dof for d in tests]), np.array([d.disagrees for d in tests])
+    with_them = np.array([after.get(d.domain, math.nan) for d in tests])
+    limit = np.array([d.limit or math.nan for d in tests])
+    seen = np.concatenate([before, with_them[with_them > 0.0], limit[np.isfinite(limit)], [1.0]])
+    low, high = float(seen.min()) / ROOM, float(seen.max()) * ROOM
+    told = [f"{what}: agrees up to χ²/dof {plain_number(v)}" for what, v in zip(names, limit, strict=True)]
+    base = np.full(len(tests), low)
+    marks: list[Mark] = [Level(x=1.0, name="noise alone", is_dashed=True)]
+    if np.any(np.isfinite(limit)):
+        marks.insert(0, Bars(limit, rows, 4.0 * BESIDE, told, "agrees up to here", "shade", base, is_across=True))
+    sides: list[tuple[str, Colour, FloatArray, FloatArray]] = [
+        ("disagrees", "accent", np.where(differs, before, math.nan), rows + apart),
+        ("agrees", "soft", np.where(differs, math.nan, before), rows + apart),
+        ("with the effects", "c1", with_them, rows - apart),
     ]
-    if after:
-        sides.append([("with the effects", "c1", np.array([after.get(d.domain, math.nan) for d in tests]))])
-    marks: list[Mark] = []
-    width = 0.7 / len(sides)
-    names = tuple(MEANING.get(d.domain, d.domain) for d in tests)
-    base = np.full(len(tests), LEAST_CHI2)
-    for k, side in enumerate(sides):
-        place = -np.arange(1.0, len(tests) + 1.0) + width * (0.5 * (len(sides) - 1) - k)
-        for name, colour, values in side:
-            if np.any(np.isfinite(values)):
-                told = [f"{what}, {name}: χ²/dof {plain_number(v)}" for what, v in zip(names, values, strict=True)]
-                shown = np.maximum(values, SLIVER * LEAST_CHI2)
-                marks.append(Bars(shown, place, 0.92 * width, told, name, colour, base, is_across=True))
-    marks.append(Level(x=1.0, name="noise alone", is_dashed=True))
-    top = float(np.nanmax([np.nanmax(v, initial=1.0) for side in sides for _, _, v in side]))
-    x = Scale("χ² per degree of freedom", is_log=True, limits=(LEAST_CHI2, max(2.0 * top, 4.0)))
-    return Chart((Panel(x, Scale("", names=names), tuple(marks), height_px=2 * ROW_PX + ROW_PX * len(tests)),))
+    for name, colour, values, at in sides:
+        if np.any(np.isfinite(values)):
+            told = [f"{what}, {name}: χ²/dof {plain_number(v)}" for what, v in zip(names, values, strict=True)]
+            marks.append(Points(values, at, told, None, name, colour))
+    x = Scale("χ² per degree of freedom (logarithmic)", is_log=True, limits=(low, high))
+    return Chart((Panel(x, Scale("", names=names), tuple(marks), height_px=ROW_PX * (len(tests) + 1)),))
 
 
 def forest_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:

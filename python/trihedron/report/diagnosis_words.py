@@ -14,6 +14,7 @@ from trihedron.report.numbers import (
     unit_in_print,
     unit_with_power,
     with_sigma,
+    with_unit,
 )
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
@@ -145,7 +146,7 @@ def size_in_words(value: float, unit: str) -> str:
         return f"{plain_number(degrees_from_radians(value))} °/s"
     if unit == "s":
         return f"{plain_number(ms_from_s(value))} ms"
-    return plain_number(value) + ("" if unit in ("", "1", "raw") else f" {printed_unit(unit)}")
+    return with_unit(plain_number(value), "" if unit == "raw" else printed_unit(unit))
 
 
 def printed_unit(unit: str) -> str:
@@ -225,5 +226,8 @@ def headlines_of(diagnosis: Diagnosis) -> tuple[Headline, ...]:
     if not tests:
         return ()
     worst = min((d for d in tests if d.disagrees), key=lambda d: d.p_value, default=tests[0])
-    beside = f"χ² per degree of freedom, 1 by noise alone; p {p_in_words(worst.p_value)}"
-    return (Headline(MEANING[worst.domain], plain_number(worst.chi2_per_dof), "", beside),)
+    chi2, judged = plain_number(worst.chi2_per_dof), f"1 by noise alone; p {p_in_words(worst.p_value)}"
+    if not worst.unit:
+        return (Headline(f"{MEANING[worst.domain]}, χ²/dof", chi2, "", judged),)
+    size, _, unit = rms_in_words(worst).partition(" ")
+    return (Headline(MEANING[worst.domain], size, unit, f"rms by this diagnosis; χ²/dof {chi2}, {judged}"),)

@@ -97,7 +97,7 @@ def _driver_in_words(one: EffectCurve) -> tuple[str, float, str]:
 
 
 def _added_in_print(one: EffectCurve) -> tuple[float, str]:
-    return (1e6, "ppm") if one.is_relative else PRINTED["m/s^2" if one.sensor == "accelerometer" else "rad/s"]
+    return (100.0, "%") if one.is_relative else PRINTED["m/s^2" if one.sensor == "accelerometer" else "rad/s"]
 
 
 def _explained(

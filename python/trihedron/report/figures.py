@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable, Sequence
+from textwrap import fill
 from typing import cast
 
 import numpy as np
@@ -40,6 +41,8 @@ COLOURS: dict[Colour, str] = {
     "c1": "#0072B2", "c2": "#E69F00", "c3": "#009E73", "accent": "#D55E00", "ink": "#222222", "shade": "#DDE5EC",
     "soft": "#8A949C", "grey": "#B4BCC2", "warn": "#D55E00",
 }  # fmt: skip
+MOST_LETTERS = 24
+"""Of a name beside its row, which wraps there, and of one below its place, which is cut at its front."""
 MOST_NAMES = 24
 """Places along an axis that are named below it; more are counted."""
 _UNIT = re.compile(r" +\[")
@@ -188,7 +191,7 @@ def _draw_panel(axis: Axes, panel: Panel) -> None:
     axis.set_ylabel(_UNIT.sub("\n[", panel.y.label), fontsize=8)
     if panel.y.names:
         places = [-k for k in range(1, len(panel.y.names) + 1)]
-        axis.set_yticks(places, [_short(n) for n in panel.y.names], fontsize=7)
+        axis.set_yticks(places, [fill(n, MOST_LETTERS) for n in panel.y.names], fontsize=7)
         axis.set_ylim(places[-1] - 0.6, -0.4)
     if panel.x.limits is not None:
         axis.set_xlim(*panel.x.limits)
@@ -246,4 +249,4 @@ def _draw(axis: Axes, mark: Mark) -> None:
 
 
 def _short(name: str) -> str:
-    return name if len(name) <= 24 else f"…{name[-23:]}"
+    return name if len(name) <= MOST_LETTERS else f"…{name[1 - MOST_LETTERS :]}"

@@ -7,6 +7,7 @@ from typing import Any
 
 from trihedron.arrays import XYZ
 from trihedron.records.filter_noise import Bounded, FilterNoise, IntervalCheck, SensorFilterNoise, StaticNoise
+from trihedron.records.finding import FindingCode
 from trihedron.records.plain import as_plain
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.filter_noise_charts import OF_SENSOR, horizon_chart
@@ -56,8 +57,14 @@ def filter_noise_report(found: FilterNoise) -> Document:
         sections=tuple(sections),
         headlines=tuple(headline for one in found.sensors for headline in _headlines(one)),
         lead=picture if tested else None,
-        next_step=NEXT if is_trustworthy else "",
+        next_step=_next_step(found) if is_trustworthy else "",
     )
+
+
+def _next_step(found: FilterNoise) -> str:
+    """N and K for the filter, unless most of what they would stand for is what a calibration removes."""
+    first = (f.action for f in found.findings if f.code is FindingCode.FILTER_NOISE_UNCALIBRATED)
+    return next(first, NEXT)
 
 
 def _headlines(one: SensorFilterNoise) -> list[Headline]:

@@ -18,7 +18,8 @@ OF_SENSOR = {
 
 def horizon_chart(found: FilterNoise) -> Chart:
     """One panel a sensor that was tested on the half that the fit did not see."""
-    return Chart(tuple(_panel(one) for one in found.sensors if one.consistency), columns=2)
+    panels = tuple(_panel(one) for one in found.sensors if one.consistency)
+    return Chart(panels, columns=len(panels))
 
 
 def _panel(one: SensorFilterNoise) -> Panel:

@@ -20,7 +20,9 @@ _NO_UNIT = (
     "The unit of the log is not known: say it with --gyro-unit and --accel-unit, or the size of a count with "
     "--gyro-lsb and --accel-lsb."
 )
-NEXT = "Take N, B, K into a filter (trihedron export --noise); average no longer than stated."
+NEXT = "Take N, B, K into a filter (trihedron export --noise); average for no longer than the best averaging time."
+SAY_COUNTS = """State the size of a count, for terms in SI: --gyro-lsb and --accel-lsb of the data sheet, as in \
+--gyro-lsb "0.00763 deg/s" --accel-lsb "0.061 mg", or --calibration FILE."""
 
 
 def noise_report(
@@ -52,7 +54,7 @@ def noise_report(
         is_trustworthy=noise.is_trustworthy,
         headlines=tuple(_headlines(groups)),
         lead=_lead(noise, groups) if groups else None,
-        next_step=NEXT if noise.is_trustworthy else "",
+        next_step=_next_step(noise),
         sections=(
             Section("Result", tuple(tables)),
             Section("Data sheet", tuple(dict.fromkeys(b for unit, axes in groups for b in _customary(axes, unit)))),
@@ -65,32 +67,36 @@ def noise_report(
     )
 
 
+def _next_step(noise: Noise) -> str:
+    if not noise.is_trustworthy:
+        return ""
+    return NEXT if all(customary(TermName.WHITE, axis.unit) for axis in noise.axes) else SAY_COUNTS
+
+
 def _headlines(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Headline]:
-    """White noise of each sensor, root mean square of its axes, and how long to average."""
+    """White noise of each sensor, root mean square of its axes, data sheets' unit beside, and how long to average."""
     out = []
     for unit, axes in groups:
         name = {"gyro": "gyroscope", "accel": "accelerometer"}.get(axes[0].name.split()[0], axes[0].name.split()[0])
-        factor, printed = _density_unit(unit)
         present = [a.terms[TermName.WHITE].value for a in axes if a.terms[TermName.WHITE].is_present]
         if present:
-            rms = factor * math.sqrt(float(np.mean(np.square(present))))
-            beside = f"N, rms of {how_many(len(present), 'axis').replace('axiss', 'axes')}"
-            out.append(Headline(f"{name}, white noise", plain_number(rms), printed, beside))
+            rms = math.sqrt(float(np.mean(np.square(present))))
+            n = "1 axis" if len(present) == 1 else f"{len(present)} axes"
+            beside = f"N, rms of {n}{_on_data_sheets(rms, unit)}"
+            out.append(Headline(f"{name}, white noise", plain_number(rms), unit_of(TermName.WHITE, unit), beside))
         best = [found[0] for a in axes if (found := a.optimal_averaging()) is not None]
         if best:
             low, high = (plain_number(t, 2) for t in (min(best), max(best)))
             words = low if low == high else f"{low} to {high}"
-            out.append(Headline(f"{name}, average for", words, "s", "where the Allan deviation is least"))
+            beside = "where the Allan deviation is least" + ("" if low == high else ", axis by axis")
+            out.append(Headline(f"{name}, best averaging time", words, "s", beside))
     return out
 
 
-def _density_unit(unit: str) -> tuple[float, str]:
-    """Factor and unit that data sheets use for a density."""
+def _on_data_sheets(density: float, unit: str) -> str:
     if unit == "rad/s":
-        return degrees_from_radians(1.0), "°/s/√Hz"
-    if unit == "m/s^2":
-        return micro_g_from_m_s2(1.0), "µg/√Hz"
-    return 1.0, f"{unit_in_print(unit)}/√Hz"
+        return f"; {plain_number(degrees_from_radians(density))} °/s/√Hz"
+    return f"; {plain_number(micro_g_from_m_s2(density))} µg/√Hz" if unit == "m/s^2" else ""
 
 
 def _kalibr(noise: Noise) -> tuple[Block, ...]:
@@ -166,7 +172,7 @@ def _intervals(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Section]:
 
 def _intervals_table(axes: list[NoiseAxis], unit: str) -> Table:
     def cell(term: NoiseTerm) -> str:
-        return f"{plain_number(term.lower, 2)} … {plain_number(term.upper, 2)}"
+        return f"{plain_number(term.lower)} … {plain_number(term.upper)}"
 
     rows = [
         (f"{term.value}  {TERM_WORDS[term]} [{unit_of(term, unit)}]", *(cell(axis.terms[term]) for axis in axes))

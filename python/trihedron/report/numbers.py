@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from trihedron.units import mg_from_m_s2, mm_s2_from_m_s2
+from trihedron.units import mm_s2_from_m_s2
 
 MINUS = "−"
 
@@ -87,6 +87,11 @@ def unit_in_print(unit: str) -> str:
     return unit.replace("^2", "²").replace("^3", "³").replace("sqrt(Hz)", "√Hz").replace("sqrt(s)", "√s")
 
 
+def with_unit(number: str, unit: str) -> str:
+    """``2.04 mm/s²``, ``0.03°``."""
+    return f"{number}{unit}" if unit == "°" else f"{number} {unit}".rstrip()
+
+
 def how_many(n: int, noun: str) -> str:
     """``1 pose``, ``24 poses``."""
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
@@ -112,6 +117,5 @@ def one_of(unit: str) -> str:
 
 
 def in_mm_s2(acceleration_m_s2: float) -> str:
-    """An acceleration in mm/s², and in mg."""
-    mm_s2, mg = mm_s2_from_m_s2(acceleration_m_s2), mg_from_m_s2(acceleration_m_s2)
-    return f"{plain_number(mm_s2)} mm/s² ({plain_number(mg, 2)} mg)"
+    """An acceleration in the unit that every report has for errors."""
+    return f"{plain_number(mm_s2_from_m_s2(acceleration_m_s2))} mm/s²"

@@ -47,7 +47,8 @@
     value(share, way) { const [a, b] = this.now[way], v = a + share * (b - a); return this.log[way] ? 10 ** v : v; }
     tools() {
       const box = document.createElement("div"); box.className = "tools";
-      const about = this.svg.getAttribute("aria-label").split(":")[0];
+      const named = [".ptitle", ".ylabel", ".xlabel"].map((part) => this.node.querySelector(part)?.textContent.trim());
+      const about = named.filter(Boolean).join(", ");
       for (const [sign, words, act] of [["+", "Zoom in", () => this.zoom(0.5)], [MINUS, "Zoom out", () => this.zoom(2)], ["\u27f2", "Whole figure", () => this.reset()]]) {
         const b = document.createElement("button");
         b.type = "button"; b.textContent = sign; b.title = words; b.setAttribute("aria-label", words + ": " + about); b.onclick = act; box.append(b);

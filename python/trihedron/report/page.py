@@ -36,6 +36,9 @@ WORDY = 28
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 SHORT = 12
 """Names of rows that are no longer are never broken."""
+_ASIDE = re.compile(r" \([^)]*\)")
+MOST_OTHERS = 2
+"""Findings that the first screen names behind the foremost; the others are counted."""
 _DASHED = re.compile(r"(?<![\w-])-{1,2}[A-Za-z][\w/+-]*")
 
 
@@ -63,20 +66,20 @@ def to_html(document: Document) -> str:
     return printable(page)
 
 
-def _noticed(document: Document) -> tuple[Markup, list[str], str]:
-    """What the first screen says of findings: the foremost, names of the others that are no notes, where all stand."""
+def _noticed(document: Document) -> tuple[Markup, list[tuple[str, str]], str]:
+    """What the first screen says of findings: the foremost, severity and clause of those next in weight, the place."""
     first = document.foremost
     if first is None:
         return Markup(""), [], ""
-    others = []
-    for severity in (Severity.SERIOUS, Severity.WARNING):
-        named = [f.code.value.replace("-", " ") for f in document.findings if f.severity is severity and f is not first]
-        others += [f"{severity.value} {', '.join(dict.fromkeys(named))}"] if named else []
+    graver = [f for f in document.findings if f.severity is not Severity.NOTE and f is not first]
+    others = [(f.severity.value, first_clause(_ASIDE.sub("", f.seen)).rstrip(".")) for f in graver[:MOST_OTHERS]]
+    others += [("", f"{len(graver) - MOST_OTHERS} more")] if len(graver) > MOST_OTHERS else []
     listing = (any(isinstance(block, FindingList) for block in section.blocks) for section in document.sections)
     clause = first_clause(first.seen).rstrip(".")
     rest = first.seen[len(clause) :].lstrip(" .;")
     seen = rest[:1].upper() + rest[1:] if clause.lower() in document.verdict.lower() else first.seen
-    told = f"{seen} → {first.action}" if first.action and first.severity is not Severity.SERIOUS else seen
+    is_said = not first.action or first.action[1:] == document.what_next[1:]
+    told = seen if is_said else f"{seen} → {first.action}"
     return unbroken(told), others, f"s{list(listing).index(True) + 1}"
 
 

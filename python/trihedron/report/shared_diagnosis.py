@@ -175,7 +175,8 @@ def candidates_chart(candidates: Sequence[SharedCandidate]) -> Chart:
     score = np.array([one.score for one in candidates])
     told = [f"{one.id}: score {plain_number(one.score)}" for one in candidates]
     bars = Bars(score, place, BAR, told, "tried in all recordings together", "soft", is_across=True)
-    x = Scale("score", includes=(0.0,))
+    # Room on the side that no score may reach, so that what would gain is seen to have a place.
+    x = Scale("score", includes=(0.0, -0.1 * float(score.min())))
     names = tuple(one.id for one in candidates)
-    panel = Panel(x, Scale("", names=names), (bars, Level(x=0.0)), height_px=ROW_PX * (len(names) + 1))
-    return Chart((panel,))
+    marks = (bars, Level(x=0.0, name="gains from here on"))
+    return Chart((Panel(x, Scale("", names=names), marks, height_px=ROW_PX * (len(names) + 1)),))

@@ -41,7 +41,7 @@ class SensorLag(Effect):
         return out
 
     def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:
-        if SECOND not in variant.label:
+        if SECOND not in variant.label or not value[0] > 0.0:
             return None
         name = variant.label.split(",")[0]
         return _second_order(context, name, variant.scale * float(value[0]), variant.label)

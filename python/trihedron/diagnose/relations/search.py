@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
-from trihedron.arrays import AXES
+from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.candidates import PRIOR_SCALES
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, rate_only
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again
-from trihedron.diagnose.relations.signals import ROOM_VECTOR, Signal, room, signals
+from trihedron.diagnose.relations.signals import HISTORY, NOT_TURNED, ROOM_VECTOR, Signal, room, signals
 
 N_FITTED = 3
 """Relations whose strengths of noise are found anew before the best is chosen."""
 ALL_AXES = (0, 1, 2)
-ANY_BY_ANY = ("rate", "last rotation", "rate products")
+ANY_BY_ANY = ("rate", HISTORY, "rate products")
 """Families of vectors: three of their variables may act on any axis together."""
 MOST_RELATIONS = 3
 """A longer list is no law that a person would check."""
@@ -84,7 +85,7 @@ def related(model: Hypothesis, limit: float) -> Related:
 def _best(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> Follows | None:
     """The relation that gains most of those that look best at fixed strengths, each family once."""
     context = model.context
-    leading: list[tuple[float, Signal, Way, float]] = []
+    leading: list[list[tuple[float, Signal, Way, float]]] = []
     n_tried = 0
     # One family at a time: the columns of all of them together are larger than the log.
     for whole in _families(context):
@@ -94,14 +95,11 @@ def _best(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> 
         parts = [[a * m + k for a in axes for k in names] for names, axes in ways]
         looks = model.looked_at([whole.term], PRIOR_SCALES, parts)
         n_tried += len(ways)
-        if ways:
-            first = max(range(len(ways)), key=lambda k: float(looks[k].gain.max()))
-            gain = looks[first].gain.max(axis=1)
-            leading.append((float(gain.max()), signal, ways[first], PRIOR_SCALES[int(gain.argmax())]))
-        # Only the leaders keep their columns.
-        leading = sorted(leading, key=lambda one: -one[0])[:N_FITTED]
+        leading = _led(leading, signal, ways, [look.gain for look in looks])
     paid = 2.0 * float(np.log(max(n_tried, 1) * len(PRIOR_SCALES)))
-    each = [_part(context, signal, way, scale, paid) for gain, signal, way, scale in leading if 2.0 * gain > paid]
+    # Led under several strengths: with the larger gain, which comes last.
+    ahead = {(id(one[1]), one[2]): one for one in sorted(chain(*leading), key=lambda one: one[0])}.values()
+    each = [_part(context, signal, way, scale, paid) for gain, signal, way, scale in ahead if 2.0 * gain > paid]
     if not each:
         return None
     asked = model.asked([one.term for one in each])
@@ -111,18 +109,38 @@ def _best(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> 
     return each[best] if scores[best] > 0.0 else None
 
 
+def _led(
+    leading: list[list[tuple[float, Signal, Way, float]]], signal: Signal, ways: list[Way], gains: list[FloatArray]
+) -> list[list[tuple[float, Signal, Way, float]]]:
+    """The leaders under every strength of noise, and of one family more the way that gains most under each.
+
+    Quiet noise takes what it leaves for what many columns explain, loud noise for what one does.
+    """
+    if not ways:
+        return leading
+    stacked = np.stack(gains)  # (ways, scales, strengths)
+    out = leading or [[] for _ in range(stacked.shape[2])]
+    for look, kept in enumerate(out):
+        way, scale = np.unravel_index(int(stacked[:, :, look].argmax()), stacked.shape[:2])
+        kept.append((float(stacked[way, scale, look]), signal, ways[way], PRIOR_SCALES[scale]))
+        # Only the leaders keep their columns.
+        out[look] = sorted(kept, key=lambda one: -one[0])[:N_FITTED]
+    return out
+
+
 Way = tuple[tuple[int, ...], tuple[int, ...]]
 """Numbers of the variables, and of the axes that follow them."""
 
 
 def _ways(signal: Signal) -> list[Way]:
     """Each variable on each axis and on all of them; the first three, and three more, as any axis by any axis."""
-    n = len(signal.names)
     if signal.family == "room":
-        return [(tuple(range(n)), ALL_AXES)]
-    ways: list[Way] = [((k,), axes) for k in range(n) for axes in ((0,), (1,), (2,), ALL_AXES)]
+        return [(tuple(range(len(signal.names))), ALL_AXES)]
+    always = tuple(k for k, name in enumerate(signal.names) if name == NOT_TURNED)
+    n = len(signal.names) - len(always)
+    ways: list[Way] = [((k, *always), axes) for k in range(n) for axes in ((0,), (1,), (2,), ALL_AXES)]
     if signal.family in ANY_BY_ANY:
-        ways += [((k, k + 1, k + 2), ALL_AXES) for k in range(0, n - 2, 3)]
+        ways += [((k, k + 1, k + 2, *always), ALL_AXES) for k in range(0, n - 2, 3)]
     return ways
 
 

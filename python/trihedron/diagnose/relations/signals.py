@@ -17,6 +17,8 @@ from trihedron.diagnose.context import Context
 
 Sensor = Literal["accelerometer", "gyroscope"]
 ROOM_VECTOR = "vector fixed in the room"
+HISTORY, NOT_TURNED = "last rotation", "before any rotation"
+"""What a rotation leaves behind; a pose that none led to (the first, one after a gap) may hold any of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,20 +86,20 @@ def _gyro_only(context: Context) -> list[Signal]:
 
 
 def _history(context: Context, sensor: Sensor) -> list[Signal]:
-    """The rotation that led to a pose."""
+    """The rotation that led to a pose, about the axes of the gyros themselves: a small one has their sign."""
     turn = np.zeros_like(context.fitted.state.up)
+    unknown = np.ones((len(turn), 1))
     for where, (_, after) in zip(context.moves, context.obs.move_poses, strict=True):
-        turn[after] = np.trapezoid(context.rate[where], context.time_s[where], axis=0)
-    angle, sign = context.between_poses(turn), context.between_poses(np.sign(turn))
-    size = context.between_poses(np.linalg.norm(turn, axis=1, keepdims=True))
-    out = [
-        Signal(sensor, "last rotation", (f"last rotation about {AXES[a]}",), angle[:, [a]], ("rad",)) for a in range(3)
+        turn[after] = np.trapezoid(context.axis_rate[where], context.time_s[where], axis=0)
+        unknown[after] = 0.0
+    columns = {f"last rotation about {AXES[a]}": (turn[:, [a]], "rad") for a in range(3)}
+    columns |= {f"sign of the last rotation about {AXES[a]}": (np.sign(turn[:, [a]]), "1") for a in range(3)}
+    columns["size of the last rotation"] = np.linalg.norm(turn, axis=1, keepdims=True), "rad"
+    columns[NOT_TURNED] = unknown, "1"
+    return [
+        Signal(sensor, HISTORY, (name,), context.between_poses(value), (unit,))
+        for name, (value, unit) in columns.items()
     ]
-    out += [
-        Signal(sensor, "last rotation", (f"sign of the last rotation about {AXES[a]}",), sign[:, [a]], ("1",))
-        for a in range(3)
-    ]
-    return [*out, Signal(sensor, "last rotation", ("size of the last rotation",), size, ("rad",))]
 
 
 def _warming(context: Context, sensor: Sensor) -> list[Signal]:

@@ -14,6 +14,7 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.jumps import jumps_in_poses
 from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.session.state import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
+from trihedron.probability import f_upper
 from trihedron.records.domains import Domain, DomainTest, Where
 from trihedron.session.noise import NOISE_CORNER_S
 
@@ -87,7 +88,7 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
 
     ``alpha`` is the chance that a healthy recording disagrees in any domain; it is shared by six domains.
     """
-    used = fitted.leverage
+    used, share = fitted.leverage, alpha / N_DOMAINS_TESTED
     physical, rms_unit = physical_rms(fitted)
     tests = []
     for label, name in ROW_DOMAINS.items():
@@ -100,18 +101,18 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
         chi2 = float(((fitted.system.residual[rows] * _unsettled(fitted, label, rows)) ** 2).sum()) * excess**2
         per_dof = chi2 / dof
         p = float(fdtrc(dof, NOISE_DOF, per_dof))
-        disagrees = p < alpha / N_DOMAINS_TESTED
+        limit: float | None = f_upper(dof, NOISE_DOF, share)
+        disagrees = p < share
         where = locate(fitted, label) if disagrees else Where()
         if not disagrees and label in (STATIC_ACCEL, STATIC_GYRO):
             inside, changing = _inside_poses(fitted, label), _strayed(fitted, label)
             other = min((inside, changing), key=lambda look: look[0])
             # Two more looks at the same domain.
-            if 2.0 * other[0] < alpha / N_DOMAINS_TESTED:
+            if 2.0 * other[0] < share:
                 p, disagrees, where = 2.0 * other[0], True, other[2]
-                per_dof = max(per_dof, other[1])
-        tests.append(
-            DomainTest(name, per_dof, dof, p, disagrees, where, physical.get(label, 0.0), rms_unit.get(label, ""))
-        )
+                per_dof, limit = max(per_dof, other[1]), None
+        rms, unit = physical.get(label, 0.0), rms_unit.get(label, "")
+        tests.append(DomainTest(name, per_dof, dof, p, disagrees, where, rms, unit, limit))
     return tuple(tests)
 
 

@@ -25,10 +25,14 @@ COUNTS = 6.0
 """Chi-square by which a step must beat the curve to count: white noise does it in one pose of some hundred."""
 TURNS = 4.0
 """How much larger than usual what the other sensor reads at the step marks it as motion (a pose that slips)."""
-LAG, LIKE_A_WALK = 4, 3.0
-"""Ratio of squared differences four blocks apart to neighbours': white noise 0.7 to 1.4, flicker 1.3 to 2.8, with jumps
-in a third of the poses up to 3; a walk 3.4 to 8 (25 poses)."""
-N_POOL, N_DRAWS, SEED, N_NOISES = 40_000, 20_000, 1, 3
+LAG = 4
+"""Blocks between two whose difference, over that of neighbours, says the colour of the noise: squared, 1 when it is
+white, 2 for flicker, 5.5 for a walk."""
+COLOUR_SPREAD = 0.85
+"""Standard deviation of that ratio's logarithm, times the root of the number of poses (drawn for all colours)."""
+FLICKER, WALK = (0.0, 0.5, 1.0, 2.0), (0.3, 0.5, 1.0, 4.0)
+"""Flicker, or a walk, over white noise of one, that a pool of poses is drawn with."""
+N_POOL, N_DRAWS, SEED = 20_000, 20_000, 1
 FEWEST_POSES = 12
 N_LOOKS = 3
 """Axes."""
@@ -59,8 +63,8 @@ class _Steps:
 def jumps_in_poses(obs: Observations) -> Jumps:
     """Whether some poses are better described by a step than slow noise ever is.
 
-    White noise and flicker beat a cubic by a step with a known chance, and so do walks where the blocks look like one;
-    the largest is the p-value.
+    Noise beats a cubic by a step with a chance that its colour sets: the p-value is that of the colours between white
+    and a walk, each weighed by how well it agrees with the differences inside the poses.
     A step at which the other sensor reads a motion is a pose that slipped.
     """
     still = np.array([not pose.is_unsteady for pose in obs.segments.poses])
@@ -79,9 +83,7 @@ def jumps_in_poses(obs: Observations) -> Jumps:
         total = counted.sum(axis=0)
         axis = int(total.argmax())
         if total[axis] > 0.0:
-            nulls = _nulls(len(which), N_NOISES if _walks(own.blocks[:, :, axis]) else N_NOISES - 1)
-            chance = max(float((1 + (null >= total[axis]).sum()) / (N_DRAWS + 1)) for null in nulls)
-            p[k] = min(1.0, N_LOOKS * chance)
+            p[k] = min(1.0, N_LOOKS * _chance(len(which), float(total[axis]), _colour(own.blocks[:, :, axis])))
         found = np.flatnonzero(counted[:, axis])
         ratio[k] = 1.0 + float(counted[:, axis].max())
         poses[k] = which[found[np.argsort(-counted[found, axis])]][: max(1, len(which) // 10)]
@@ -121,10 +123,10 @@ def _steps(blocks: FloatArray) -> _Steps:
     return _Steps(explained - curve, k[best], (whole - explained) / (N_BLOCKS - 3), x)
 
 
-def _walks(blocks: FloatArray) -> bool:
-    """Whether blocks four apart differ so much more than neighbours as only a walk's do (medians, jumps aside)."""
+def _colour(blocks: FloatArray) -> float:
+    """Logarithm of the ratio of squared differences, blocks some apart over neighbours (medians, jumps aside)."""
     near, far = (float(np.median((blocks[:, lag:] - blocks[:, :-lag]) ** 2)) for lag in (1, LAG))
-    return far > LIKE_A_WALK * near
+    return float(np.log(far / near))
 
 
 def _moved(own: _Steps, other: _Steps | None, sensor: int) -> npt.NDArray[np.bool_]:
@@ -144,28 +146,37 @@ def _moved(own: _Steps, other: _Steps | None, sensor: int) -> npt.NDArray[np.boo
     return np.asarray(out)
 
 
+def _chance(n_poses: int, total: float, colour: float) -> float:
+    """Of a sum as large in noise whose differences are of this colour."""
+    colours, sums = _nulls(n_poses)
+    agree = np.exp(-0.5 * n_poses * ((colour - colours) / COLOUR_SPREAD) ** 2)
+    larger = (1 + (sums >= total).sum(axis=1)) / (N_DRAWS + 1)
+    # Redder than a walk is as red as one.
+    return float(agree @ larger / agree.sum()) if agree.sum() > 0.0 else float(larger[-1])
+
+
 @lru_cache(maxsize=16)
-def _nulls(n: int, n_noises: int) -> tuple[FloatArray, ...]:
-    """Draws of the sum for ``n`` poses of white noise, of flicker, and of a walk, or of the first of these."""
+def _nulls(n: int) -> tuple[FloatArray, FloatArray]:
+    """(colours,) and (colours, draws): the sum for ``n`` poses of noise of each colour."""
     rng = np.random.default_rng(SEED)
-    return tuple(pool[rng.integers(0, len(pool), (N_DRAWS, n))].sum(axis=1) for pool in _pools()[:n_noises])
+    colours, pools = _pools()
+    return colours, np.array([pool[rng.integers(0, len(pool), (N_DRAWS, n))].sum(axis=1) for pool in pools])
 
 
 @lru_cache(maxsize=1)
-def _pools() -> tuple[FloatArray, ...]:
-    """What single poses of the three noises count."""
+def _pools() -> tuple[FloatArray, FloatArray]:
+    """(colours,) and (colours, poses): what single poses of every noise count."""
     rng = np.random.default_rng(SEED)
-    white = rng.normal(size=(N_POOL, 4 * N_BLOCKS))
-    # 1/f by Kasdin's filter (fractional integration of order one half), and white over it summed up.
+    white, other = rng.normal(size=(2, N_POOL, 4 * N_BLOCKS))
+    # 1/f by Kasdin's filter (fractional integration of order one half), and white noise summed up.
     taps = np.ones(4 * N_BLOCKS)
     for j in range(1, len(taps)):
         taps[j] = taps[j - 1] * (j - 0.5) / j
-    flicker = white @ toeplitz(taps, np.zeros(len(taps))).T
-    out = []
-    for series in (white, flicker, np.cumsum(white, axis=1)):
-        blocks = series.reshape(N_POOL, N_BLOCKS, 4).mean(axis=2)[:, :, None]
-        noise = np.sqrt(np.median(np.diff(blocks, axis=1) ** 2) / 0.4549 / 2.0)
-        steps = _steps(blocks / noise)
-        counted = np.where(steps.left < LOUD, np.maximum(steps.beats - COUNTS, 0.0), 0.0)
-        out.append(counted[:, 0])
-    return tuple(out)
+    flicker, walk = other @ toeplitz(taps, np.zeros(len(taps))).T, np.cumsum(other, axis=1)
+    colours, counts = [], []
+    for series in (*(white + c * flicker for c in FLICKER), *(white + c * walk for c in WALK)):
+        blocks = series.reshape(N_POOL, N_BLOCKS, 4).mean(axis=2)
+        steps = _steps((blocks / np.sqrt(np.median(np.diff(blocks, axis=1) ** 2) / 0.4549 / 2.0))[:, :, None])
+        colours.append(_colour(blocks))
+        counts.append(np.where(steps.left < LOUD, np.maximum(steps.beats - COUNTS, 0.0), 0.0)[:, 0])
+    return np.array(colours), np.array(counts)

@@ -136,19 +136,35 @@ def identify(means: FloatArray, raw_unit: AccelerationUnit) -> IntArray:
     ValueError
         When the readings hold no sphere and their unit has no nominal zero.
     """
+    centred = _about_centre(means)
+    if centred is not None:
+        return _nearest(centred)
+    if acceleration_to_si(raw_unit) is not None:
+        return _nearest(means)
+    raise RefusedError(
+        f"{len(means)} poses in counts are too few to identify the faces: record all six faces, or say which "
+        "face is up in each pose"
+    )
+
+
+def are_six_faces(means: FloatArray) -> bool:
+    """Whether poses of mean readings (n, 3) are the faces of a case, each at least once, and nothing else."""
+    centred = _about_centre(means)
+    return centred is not None and set(_nearest(centred).tolist()) == set(FACES)
+
+
+def _about_centre(means: FloatArray) -> FloatArray | None:
+    """(n, 3) readings about the centre of the sphere through them, none where they hold no sphere."""
     spread = np.abs(means - means.mean(axis=0)).max()
     unit = (means - means.mean(axis=0)) / (spread if spread > 0 else 1.0)
     design = np.column_stack([2.0 * unit, np.ones(len(unit))])
-    if np.linalg.matrix_rank(design, tol=1e-2) == 4:
-        solution = np.linalg.lstsq(design, np.sum(unit**2, axis=1), rcond=None)[0]
-        centred = unit - solution[:3]
-    elif acceleration_to_si(raw_unit) is not None:
-        centred = means
-    else:
-        raise RefusedError(
-            f"{len(means)} poses in counts are too few to identify the faces: record all six faces, or say which "
-            "face is up in each pose"
-        )
+    if np.linalg.matrix_rank(design, tol=1e-2) < 4:
+        return None
+    return np.asarray(unit - np.linalg.lstsq(design, np.sum(unit**2, axis=1), rcond=None)[0][:3])
+
+
+def _nearest(centred: FloatArray) -> IntArray:
+    """Face (n,) of directions (n, 3): that of the largest component; 0 where it is no face."""
     norm = np.linalg.norm(centred, axis=1)
     axis = np.argmax(np.abs(centred), axis=1)
     largest = centred[np.arange(len(centred)), axis]

@@ -11,6 +11,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.accelerometer import inputs, verdict
+from trihedron.estimate.accelerometer.face_poses import are_six_faces
 from trihedron.estimate.accelerometer.poses import ENTRIES, PoseDesign
 from trihedron.records.calibration import FitQuality, Frame, SensorCalibration
 from trihedron.records.finding import Finding
@@ -217,10 +218,15 @@ def _assemble(
         covariance_scale=scale,
     )
     findings = [
-        *verdict.convergence_findings(fit.is_converged, words(fit.stopped_because)),
         *verdict.observability_findings(
-            design, relative_sigma, observability.advice, is_anchored=fit.is_anchored, anchor=_core.ANCHOR
+            design,
+            relative_sigma,
+            observability.advice,
+            is_anchored=fit.is_anchored,
+            anchor=_core.ANCHOR,
+            are_faces=are_six_faces(values),
         ),
+        *verdict.convergence_findings(fit.is_converged, words(fit.stopped_because)),
         *verdict.model_findings(S, unit, signs_are_known=signs_are_known),
         *verdict.residual_findings(chi2, dof, rms, floor),
         *verdict.held_out_findings(unseen, apart[:, 1], apart[:, 2], dof),

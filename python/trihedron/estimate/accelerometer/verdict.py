@@ -44,9 +44,15 @@ def residual_findings(chi2: float, dof: int, rms: float, floor: float) -> list[F
 
 
 def observability_findings(
-    design: PoseDesign, relative_sigma: float, advice: tuple[str, ...], *, is_anchored: bool, anchor: float
+    design: PoseDesign,
+    relative_sigma: float,
+    advice: tuple[str, ...],
+    *,
+    is_anchored: bool,
+    anchor: float,
+    are_faces: bool,
 ) -> list[Finding]:
-    """Nothing, a warning, or a refusal, with the poses to add."""
+    """Nothing, a warning, or a refusal, with the poses to add; faces of a case have a method of their own."""
     if design.rank < 9:
         return [
             Finding.of(
@@ -56,6 +62,7 @@ def observability_findings(
                 n_parameters=9,
                 unseen=_unseen(design),
                 anchor=anchor,
+                are_faces=are_faces,
                 advice=advice,
             )
         ]
@@ -68,6 +75,7 @@ def observability_findings(
                 at_worst=min(worst, 1.0),
                 weakest=design.weakest(),
                 anchor=anchor,
+                are_faces=are_faces,
                 advice=advice,
                 rank=design.rank,
                 n_parameters=9,

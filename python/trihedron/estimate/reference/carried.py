@@ -56,7 +56,7 @@ def _under(
     if nodes is None:
         return direct @ mean, direct @ cov @ direct.T
     joint, prior = _prior(problem, nodes, np.exp(strengths[k]))
-    table = np.ascontiguousarray(np.column_stack([problem.table(), joint]))
+    table = np.ascontiguousarray(np.column_stack([problem.table, joint]))
     gram = problem.blocks.normal(table, np.exp(strengths[k]).tolist()).gram
     p = len(problem.index)
     by_slow, told = gram[p + 1 :, : p + 1], gram[p + 1 :, p + 1 :]

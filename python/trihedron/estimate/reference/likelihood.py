@@ -10,12 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize
 
 from trihedron._core import ReferenceBlocks
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.threads import side_by_side
+
+Height = Callable[[FloatArray], float]
 
 STRENGTHS = ("angle_walk", "bias_walk", "white", "world", "world_s", "body", "body_s")
 TYPICAL = np.log([2e-4, 2e-5, 3e-4, 1e-3, 8.0, 1e-3, 8.0])
@@ -47,6 +51,7 @@ class Problem:
     index: IntArray
     bias: slice
 
+    @cached_property
     def table(self) -> FloatArray:
         """Columns and observations side by side, as the filter takes them."""
         return np.ascontiguousarray(np.column_stack([self.columns, self.observed]))
@@ -68,7 +73,7 @@ class Equations:
 
 def equations(problem: Problem, strengths: FloatArray) -> Equations:
     """Normal equations of a recording under ``strengths``, logarithms in the order of :data:`STRENGTHS`."""
-    found = problem.blocks.normal(problem.table(), np.exp(strengths).tolist())
+    found = problem.blocks.normal(problem.table, np.exp(strengths).tolist())
     gram, far = found.gram, (strengths - TYPICAL) / SPREAD
     constant = -0.5 * (gram[-1, -1] + found.log_det + 3 * found.rows * np.log(2.0 * np.pi) + float(far @ far))
     return Equations(gram[:-1, :-1], gram[:-1, -1], constant, found.mean_bias, found.cov_mean_bias)
@@ -85,6 +90,13 @@ class Together:
 
 def together(problems: Sequence[Problem], found: Sequence[Equations]) -> Together:
     """Recordings in one fit, the prior of every parameter counted once."""
+    L, half, evidence = _eliminated(problems, found)
+    inverse = np.linalg.inv(L)
+    return Together(inverse.T @ half, inverse.T @ inverse, evidence)
+
+
+def _eliminated(problems: Sequence[Problem], found: Sequence[Equations]) -> tuple[FloatArray, FloatArray, float]:
+    """Root L of the information, L⁻¹ times the moment, and the log evidence."""
     n = 1 + max(int(p.index.max()) for p in problems)
     information, moment, centre, constant = np.eye(n), np.zeros(n), np.zeros(n), 0.0
     for problem, one in zip(problems, found, strict=True):
@@ -96,8 +108,7 @@ def together(problems: Sequence[Problem], found: Sequence[Equations]) -> Togethe
     L = np.linalg.cholesky(information)
     half = np.linalg.solve(L, moment)
     evidence = constant - 0.5 * float(centre @ centre) + 0.5 * float(half @ half) - float(np.sum(np.log(np.diag(L))))
-    inverse = np.linalg.inv(L)
-    return Together(inverse.T @ half, inverse.T @ inverse, evidence)
+    return np.asarray(L), half, evidence
 
 
 def at_the_point(problems: Sequence[Problem], strengths: FloatArray) -> float:
@@ -121,33 +132,50 @@ class Fitted:
     strengths: FloatArray
     draws: FloatArray
 
+    def spread(self) -> FloatArray:
+        """(a recording, 7, 7) roots of the covariance of the strengths' logarithms."""
+        return np.array([np.linalg.cholesky(np.cov(one.T)) for one in self.draws.swapaxes(0, 1)])
 
-def most_likely(problems: Sequence[Problem], start: FloatArray | None = None) -> tuple[FloatArray, float]:
-    """(a recording, 7) logarithms of the strengths of greatest posterior, and the log evidence there."""
+
+def most_likely(
+    problems: Sequence[Problem], start: FloatArray | None = None, spread: FloatArray | None = None
+) -> tuple[FloatArray, float]:
+    """(a recording, 7) logarithms of the strengths of greatest posterior, and the log evidence there.
+
+    ``spread`` (a recording, 7, 7) are roots of the covariance that a neighbouring hypothesis gives them at ``start``:
+    in their units the descent is round, and a few steps are enough.
+    """
     best = np.tile(TYPICAL, (len(problems), 1)) if start is None else start.copy()
-    bounds = list(zip(TYPICAL - FARTHEST * SPREAD, TYPICAL + FARTHEST * SPREAD, strict=True))
+    roots = np.tile(np.eye(len(TYPICAL)), (len(problems), 1, 1)) if spread is None else spread
     # From strengths of a neighbouring hypothesis one round over the recordings is enough.
     for _ in range(1 if len(problems) == 1 or start is not None else 2):
-        for k in range(len(problems)):
+        for k, root in enumerate(roots):
             height = _heights(problems, best, k)
-
-            def descent(x: FloatArray, height: Callable[[FloatArray], float] = height) -> tuple[float, FloatArray]:
-                here = height(x)
-                return -here, np.array([(here - height(x + STEP * e)) / STEP for e in np.eye(len(x))])
-
-            best[k] = minimize(
-                descent, best[k], jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 3e-6, "maxiter": 60}
-            ).x
+            best[k] = _highest(height, best[k], root)
     return best, height(best[-1])
 
 
-def _heights(problems: Sequence[Problem], strengths: FloatArray, k: int) -> Callable[[FloatArray], float]:
+def _highest(height: Height, start: FloatArray, root: FloatArray) -> FloatArray:
+    """(7,) where the height is greatest, sought from ``start`` in units of ``root`` (7, 7)."""
+
+    def at(z: FloatArray) -> FloatArray:
+        return np.clip(start + root @ z, TYPICAL - FARTHEST * SPREAD, TYPICAL + FARTHEST * SPREAD)
+
+    def descent(z: FloatArray) -> tuple[float, FloatArray]:
+        here, *ahead = side_by_side(lambda one: height(at(one)), [z, *(z + STEP * np.eye(len(z)))])
+        return -here, np.array([(here - one) / STEP for one in ahead])
+
+    found = minimize(descent, np.zeros(len(start)), jac=True, method="L-BFGS-B", options={"ftol": 3e-6, "maxiter": 60})
+    return at(found.x)
+
+
+def _heights(problems: Sequence[Problem], strengths: FloatArray, k: int) -> Height:
     """Log evidence as a function of the strengths of one recording, those of the others as they are."""
     found = [equations(p, s) if j != k else None for j, (p, s) in enumerate(zip(problems, strengths, strict=True))]
 
     def height(x: FloatArray) -> float:
         own = equations(problems[k], x)
-        return together(problems, [own if one is None else one for one in found]).evidence
+        return _eliminated(problems, [own if one is None else one for one in found])[2]
 
     return height
 
@@ -163,7 +191,7 @@ def fit(problems: Sequence[Problem], start: FloatArray | None = None) -> Fitted:
     return Fitted(means.mean(axis=0), covariance, evidence, best, draws)
 
 
-def _walk(height: Callable[[FloatArray], float], start: FloatArray) -> FloatArray:
+def _walk(height: Height, start: FloatArray) -> FloatArray:
     """(k, 7) draws by a Metropolis walk: Haario's steps, from the curvature first and then from the walk itself."""
     n = len(start)
     values, vectors = np.linalg.eigh(_curvature(height, start))
@@ -197,7 +225,7 @@ def _with_mean_bias(problems: Sequence[Problem], strengths: FloatArray) -> tuple
     return change @ all_of.mean + shift, change @ all_of.covariance @ change.T + added
 
 
-def _curvature(function: Callable[[FloatArray], float], at: FloatArray) -> FloatArray:
+def _curvature(function: Height, at: FloatArray) -> FloatArray:
     """Minus the second derivatives (n, n) of a function of (n,)."""
     n, h = len(at), CURVATURE_STEP * np.eye(len(at))
     here = function(at)

@@ -102,7 +102,7 @@ def fit_motion(
 
 def slow_error(problem: Problem, strengths: FloatArray, mean: FloatArray) -> SlowError:
     """The reference's slow error, smoothed under ``strengths`` (7,), of parameters (p,) with biases at the start."""
-    *_, world, body = problem.blocks.smoothed(problem.table(), np.exp(strengths).tolist())
+    *_, world, body = problem.blocks.smoothed(problem.table, np.exp(strengths).tolist())
     theta = np.append(-mean[problem.index], 1.0)
     return SlowError(problem.blocks.time_s(), *((one @ theta).reshape(-1, 3) for one in (world, body)))
 
@@ -182,7 +182,7 @@ def _tuned(found: MotionFit, names: tuple[str, ...], wider: Mapping[str, float])
     points = [replace(p, g=np.zeros((3, 3)), bend=np.zeros(6)) for p in found.points]
     where = places(found.sides, names)
     problems = _problems(found.sides, points, where, wider)
-    strengths, evidence = most_likely(problems, found.fitted.strengths)
+    strengths, evidence = most_likely(problems, found.fitted.strengths, found.fitted.spread())
     all_of = together(problems, [equations(p, s) for p, s in zip(problems, strengths, strict=True)])
     fitted = Fitted(all_of.mean, all_of.covariance, evidence, strengths, strengths[None])
     return MotionFit(found.sides, points, where, problems, fitted, wider)

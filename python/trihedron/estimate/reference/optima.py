@@ -35,8 +35,9 @@ def refuse_two_clocks(found: MotionFit, k: int) -> None:
     if not others:
         return
     best = max(others, key=lambda i: heights[i])
-    there = most_likely([problem(shifts[best])], strengths)[1]
-    here = most_likely([problem(0.0)], strengths)[1]
+    spread = found.fitted.spread()[k : k + 1]
+    there = most_likely([problem(shifts[best])], strengths, spread)[1]
+    here = most_likely([problem(0.0)], strengths, spread)[1]
     if 2.0 * (here - there) < ACCEPTED:
         at = float(found.value(k, "clock")[0])
         raise RefusedError(

@@ -18,10 +18,19 @@ BODY = STRENGTHS.index("body")
 
 def bias_over_time(found: MotionFit, k: int) -> BiasOverTime:
     """Bias of recording k in every block, g-sensitivity at the recording's mean specific force included."""
+    each = [_bias_at(found, k, strengths) for strengths in found.fitted.draws]
+    values = np.array([value for value, _ in each])
+    # Of strengths that nobody knows: their mean, and how far the answers lie apart besides.
+    variance = np.mean([own for _, own in each], axis=0) + values.var(axis=0)
+    return BiasOverTime(found.problems[k].blocks.time_s(), values.mean(axis=0), np.sqrt(variance))
+
+
+def _bias_at(found: MotionFit, k: int, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Value and variance (m, 3) at given strengths (a recording, 7)."""
     side, own, problem = found.sides[k], found.places[k], found.problems[k]
-    all_of = posterior(found, found.fitted.strengths)
+    all_of = posterior(found, strengths)
     mean, cov = all_of.mean[problem.index], all_of.covariance[np.ix_(problem.index, problem.index)]
-    columns, beside, _, _ = problem.blocks.smoothed(problem.table(), np.exp(found.fitted.strengths[k]).tolist())
+    columns, beside, _, _ = problem.blocks.smoothed(problem.table, np.exp(strengths[k]).tolist())
     m = len(beside)
     columns = columns.reshape(m, 3, -1)
     change = -columns[:, :, :-1]
@@ -34,9 +43,8 @@ def bias_over_time(found: MotionFit, k: int) -> BiasOverTime:
         for i in range(3):
             change[:, i, at[3 * i : 3 * i + 3]] -= force * problem.sigma[at[3 * i : 3 * i + 3]]
         value = value - found.points[k].g @ force
-    covariance = beside + change @ cov @ np.swapaxes(change, 1, 2)
-    sigma = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
-    return BiasOverTime(problem.blocks.time_s(), value + change @ mean, sigma)
+    variance = np.diagonal(beside + change @ cov @ np.swapaxes(change, 1, 2), axis1=1, axis2=2)
+    return value + change @ mean, np.maximum(variance, 0.0)
 
 
 def error_over_time(found: MotionFit, k: int) -> ErrorOverTime:
@@ -48,7 +56,7 @@ def error_over_time(found: MotionFit, k: int) -> ErrorOverTime:
     problem = found.problems[k]
     mean = posterior(found, found.fitted.strengths).mean[problem.index]
     strengths = np.exp(found.fitted.strengths[k])
-    columns, beside, _, _ = problem.blocks.smoothed(problem.table(), strengths.tolist())
+    columns, beside, _, _ = problem.blocks.smoothed(problem.table, strengths.tolist())
     m = len(beside)
     columns = columns.reshape(m, 3, -1)
     walked = columns[:, :, -1] - columns[:, :, :-1] @ mean

@@ -50,7 +50,7 @@ def surprises(found: MotionFit, k: int) -> FloatArray:
     """(m,) probability that a block lies as far from its prediction as it does, the fit being right; 1 without rows."""
     problem = found.problems[k]
     with_ = np.exp(found.fitted.strengths[k]).tolist()
-    normal = problem.blocks.normal(problem.table(), with_)
+    normal = problem.blocks.normal(problem.table, with_)
     theta = found.fitted.mean[problem.index]
     left = (normal.innovations @ np.append(-theta, 1.0)).reshape(-1, 3)
     # The bias in `mean` is that over time; at the start it is another: the filter's own first blocks take that up.

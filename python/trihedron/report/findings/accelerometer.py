@@ -10,6 +10,8 @@ NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 _UNQUIET = "Poses not quite still, bias drift between poses, nonlinearity, or noise of the means underestimated."
 _LOOK = "Look at the residual per pose; `trihedron diagnose` names the effect."
 _ADD_POSES = "Add poses with {advice:numbered}."
+_FACES_OR_POSES = "{are_faces:?These are six faces of a case: calibrate with --method faces, or add|Add} poses with "
+_FACES_OR_POSES += "{advice:numbered}."
 
 ENTRIES = (
     Entry(
@@ -40,7 +42,7 @@ ENTRIES = (
         "The poses determine {rank:.0f} of the {n_parameters:.0f} parameters of the accelerometer; not observable: "
         "{unseen:&, }, constrained to {anchor:.0f %} of an ideal triad.",
         "Too few different orientations: six faces alone are six equations for nine parameters.",
-        _ADD_POSES,
+        _FACES_OR_POSES,
     ),
     Entry(
         Code.NOT_OBSERVABLE,
@@ -49,7 +51,7 @@ ENTRIES = (
         "The poses determine the accelerometer so weakly that some pose could be wrong by {at_worst:.2g %} of "
         "gravity; least certain is the {weakest}. All parameters were constrained to {anchor:.0f %} of an ideal triad.",
         "The orientations are too much alike.",
-        _ADD_POSES,
+        _FACES_OR_POSES,
         numbers=("rank", "n_parameters", "worst_prediction_g"),
     ),
     Entry(
@@ -156,7 +158,7 @@ ENTRIES = (
         Code.RESIDUAL_ABOVE_NOISE,
         "verify-rest",
         WARNING,
-        "The gravity error in static poses, {norm_rms_m_s2:.3g mm/s²} rms ({norm_rms_m_s2:.2g mg}), exceeds noise and "
+        "The gravity error in static poses, {norm_rms_m_s2:.3g mm/s²} rms, exceeds noise and "
         "uncertainty: χ²/dof {chi2_per_dof:.2g}, each pose weighed by its own.",
         "The sensor has changed since (temperature, shock, supply), gravity is another here, or poses were not still.",
         "Calibrate again near the conditions of use; compare the two calibrations.",

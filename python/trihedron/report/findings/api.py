@@ -75,7 +75,7 @@ _VERIFIED = (
         "",
         WARNING,
         "{n_parameters:.0f} of {n_judged:.0f} parameters that this log can judge differ from the file by more than "
-        "both uncertainties allow: {parameters:first 8}; most {worst}, {times_sigma:.1f} times.",
+        "both uncertainties allow (largest difference first, {times_sigma:.1f} σ): {parameters:first 8}.",
         "A calibration shift between sessions (temperature, shock, bias repeatability), or a wrong file.",
         "See the table of parameters; calibrate several sessions together to learn how far each repeats.",
     ),
@@ -168,7 +168,8 @@ _USE = (
         Code.LIMIT_EXCEEDED,
         "rest",
         SERIOUS,
-        "The gravity error in static poses is {rms_mg:.3g} mg rms; the limit is {limit_mg:g} mg.",
+        "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms ({rms_m_s2:.3g mg}); the limit is "
+        "{limit_mg:g} mg.",
         "The calibration is less accurate here than required.",
         "Calibrate again, or accept a wider limit.",
     ),

@@ -58,8 +58,8 @@ ENTRIES = (
         Code.FILTER_NOISE_UNCALIBRATED,
         "",
         WARNING,
-        "At least {share:.0%} of the {sensor}'s error over {horizon_s:.3g} s is what a calibration would remove (scale "
-        "and misalignment, g-sensitivity, temperature): more than all noise that N and K represent.",
+        "At least {share:.0f %} of the {sensor}'s error over {horizon_s:.3g} s is what a calibration would remove "
+        "(scale and misalignment, g-sensitivity, temperature): more than all noise that N and K represent.",
         "The log was not corrected, or by parameters that no longer hold. Such errors follow the motion: no noise of a "
         "filter represents them.",
         "Calibrate first (trihedron calibrate LOG --reference MOTION -o FILE), correct the log with trihedron apply, "
