@@ -159,7 +159,7 @@ def test_attitude_carried_by_the_gyro_is_better_by_the_reference_on_a_part_it_di
     before, after = (r.error_rad for r in result.reference.replay)
     assert after < 0.5 * before
     assert "carried" not in str(result)  # words of the code stay in the code
-    assert "held out" in str(result)
+    assert "cross-validated" in str(result)
 
 
 def neighbour(seed, seconds):
