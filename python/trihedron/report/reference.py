@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.arrays import AXES
 from trihedron.records import Calibration
-from trihedron.records.reference import AgainstReference, Estimate, FitToReference, ReferenceError
+from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, FitToReference, ReferenceError
 from trihedron.records.results import CalibrationResult
 from trihedron.report.calibration import calibration_report
 from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
@@ -247,7 +247,7 @@ def _effect(ident: str, one: Estimate) -> Table:
         )
     title = _EFFECTS.get(ident, ident).capitalize()
     if one.score is not None:
-        title += f"   score {plain_number(one.score, 3)} (named from 8{_shown_from(ident, one)})"
+        title += f"   score {plain_number(one.score, 3)} (named from {NAMED_FROM:g}{_shown_from(ident, one)})"
     return Table(("", "", "", "", ""), tuple(rows), title)
 
 
