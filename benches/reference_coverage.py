@@ -28,7 +28,7 @@ from reference_rig import G, commanded_table, measured_table, tracked
 from reference_truths import truth
 from trihedron.errors import RefusedError
 from trihedron.estimate.reference.fit import fit_reference
-from trihedron.estimate.reference.motion import ACCEPTED
+from trihedron.records.reference import NAMED_FROM
 
 
 def shaken(seed):
@@ -128,7 +128,7 @@ def told(kind, runs, n_refused, cpu_s):
         for has in (False, True):
             score = np.array([r[1].get(name, -np.inf) for r in runs if (name in r[2]) == has])
             if len(score):
-                named, beside = int(np.sum(score > ACCEPTED)), "with" if has else "without"
+                named, beside = int(np.sum(score > NAMED_FROM)), "with" if has else "without"
                 print(f"  {name:26} named in {named} of {len(score)} {beside} it")
     sys.stdout.flush()
 

@@ -202,6 +202,8 @@ def test_verbs_say_what_they_return_and_their_examples_run(recording, result):
         if inspect.isfunction(verb):
             assert "Returns\n" in said or name == "write_calibration", name
             assert "Examples\n" in said, name
+            for parameter in inspect.signature(verb).parameters:
+                assert re.search(rf"^(\w+(,| or) )*{parameter}\b", said, re.MULTILINE), f"{name}: {parameter}"
         if ">>>" in said:
             names = {"trihedron": trihedron, "recording": recording, "result": result}
             names |= getattr(inspect.unwrap(verb), "__globals__", {}) | names

@@ -91,7 +91,7 @@ def test_the_demonstration_writes_its_files_and_never_over_others(tmp_path, monk
     assert main(["demo", "--seed", "3"]) == 0
     out = capsys.readouterr().out
     assert "Compare with the truth" in out
-    assert "The seal, opened now" in out
+    assert "The drawn flaw" in out
     names = {"session.csv", "second-session.csv", "calibration.json", "report.html", "verification.html", "truth.json"}
     names |= {"unit.csv", "simulation.toml", "improved.toml", "disagreement.html", "sealed.json"}
     assert {p.name for p in Path("trihedron-demo").iterdir()} == names
@@ -124,7 +124,7 @@ def test_calibrating_a_plain_log_loads_no_scipy(session):
 def test_a_reader_that_leaves_early_is_no_error(session):
     command = f"{sys.executable} -m trihedron apply {session / 'c.json'} {session / 'log.csv'} | head -1"
     done = subprocess.run(["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True)
-    assert done.stdout.startswith("time_s,acc_x")
+    assert done.stdout.startswith("t [s],ax [m/s^2]")
     assert "Traceback" not in done.stderr
     assert "Exception" not in done.stderr
 

@@ -243,7 +243,7 @@ def test_a_static_log_gives_back_the_static_values_with_a_factor_of_one():
 
 
 def test_without_a_reference_the_tilt_over_moves_is_shown_beside_what_noise_predicts():
-    log = turned_between_rests(scale=1.02)
+    log = turned_between_intervals(scale=1.02)
     found = trihedron.filter_noise(log, static=trihedron.allan(resting(2)))
     assert found.tilt is not None
     # Two per cent of 90°; noise at rest predicts hundredths of a degree.
@@ -251,22 +251,22 @@ def test_without_a_reference_the_tilt_over_moves_is_shown_beside_what_noise_pred
     assert found.tilt.predicted < 0.1 * found.tilt.actual
 
 
-def test_without_a_reference_a_bias_that_changes_between_rests_is_shown_beside_what_noise_predicts():
-    log = turned_between_rests(scale=1.0)
+def test_without_a_reference_a_bias_that_changes_between_intervals_is_shown_beside_what_noise_predicts():
+    log = turned_between_intervals(scale=1.0)
     rest = trihedron.allan(resting(2))
-    found = trihedron.filter_noise(log, static=rest).rests
+    found = trihedron.filter_noise(log, static=rest).intervals
     assert found.n == 4
     # Four stretches of 30 s: N / sqrt(15), a limit of K on top of it; twelve axes' changes scatter by a quarter.
     assert 0.4 * N / np.sqrt(15) < found.bias_change < 1.6 * N / np.sqrt(15)
     assert found.predicted > 0.9 * N / np.sqrt(15)
-    assert found.gravity_scatter < 1e-4
+    assert found.gravity_spread < 1e-4
     drifting = replace(log, gyroscope=log.gyroscope + 1e-4 * log.time_s[:, None])
-    worse = trihedron.filter_noise(drifting, static=rest).rests
+    worse = trihedron.filter_noise(drifting, static=rest).intervals
     assert worse.bias_change == pytest.approx(32 * 1e-4, rel=0.05)
     assert worse.predicted < 0.3 * worse.bias_change
 
 
-def turned_between_rests(scale):
+def turned_between_intervals(scale):
     """Rests of 30 s with quarter turns about X between, a gyro whose scale is off."""
     rng = np.random.default_rng(7)
     rate = np.concatenate([x for _ in range(3) for x in (np.zeros(3000), np.full(200, np.pi / 4))] + [np.zeros(3000)])

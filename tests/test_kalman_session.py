@@ -54,13 +54,13 @@ def test_a_simulated_dividing_head_gives_the_instrument_back(head, table):
     assert {f.code for f in result.findings} == {FindingCode.NOISE_ASSUMED}
 
 
-def test_hold_numbers_pick_still_poses_and_a_mismatch_is_said(head, table):
+def test_pose_numbers_pick_poses_and_a_mismatch_is_said(head, table):
     recording, segments = head
     few = PoseTable(table.specific_force[::9], pose=np.arange(0, 324, 9))
     assert len(pose_readings(recording, segments, few).mean) == 36
     with pytest.raises(ValueError, match=r"lists 36 poses, but .* has 324 poses"):
         pose_readings(recording, segments, PoseTable(table.specific_force[::9]))
-    with pytest.raises(ValueError, match="pose 500 is asked for"):
+    with pytest.raises(ValueError, match="pose 500 is requested"):
         pose_readings(recording, segments, PoseTable(table.specific_force[:1], pose=np.array([499])))
     with pytest.raises(ValueError, match="each once"):
         pose_readings(recording, segments, PoseTable(table.specific_force[:2], pose=np.array([3, 3])))

@@ -68,6 +68,11 @@ RETIRED = {
     r"\b(taken|takes?) off\b": "compensate",
     r"\bspeaks? against\b": "no problems found",
     r"\bgains? most from\b": "most useful next pose",
+    r"\bask(s|ed) for\b|\bknows of\b": "request, need",
+    r"\b(is|are|was|were|be|not) told\b|\btells? (its?|them|whether|nothing|which|what|how)\b": "show, state",
+    r"\bspared\b|\bcharged\b|\bstands? for\b|\bpays? for\b": "exclude, add to the variance, represent, correct for",
+    r"\bheld-out\b": "cross-validated",
+    r"\bhonest(ly)?\b|\bswallow(s|ed)?\b": "valid, absorb",
     r"\bnumbers (differ|re-estimated)\b|\bother numbers\b|\bnumbers of (any|the|a given) (model|device)": "parameters",
 }
 ALLOWED = {

@@ -21,7 +21,7 @@ from trihedron.report.diagnosis_overview_charts import traces_chart
 from trihedron.report.disc import drawn_disc
 from trihedron.report.document import Picture, Table
 from trihedron.report.effect_rest_charts import rest_panels
-from trihedron.report.findings.told import told_once
+from trihedron.report.findings.grouping import combined
 from trihedron.report.findings.wording import filled
 from trihedron.report.many_charts import sessions_chart
 from trihedron.report.notes import _box, _covered, apart
@@ -123,11 +123,11 @@ def test_without_an_effect_the_model_is_not_written_down_twice():
 
 def test_a_candidate_that_another_effect_made_needless_says_which():
     tried = (
-        Candidate("sensor-lag", 2e-17, True, stands_against="gyro-g-sensitivity"),
+        Candidate("sensor-lag", 2e-17, True, superseded_by="gyro-g-sensitivity"),
         Candidate("accel-cubic", 0.6, True),
     )
     table = candidates_table(SimpleNamespace(effects=(), candidates=tried))
-    assert [row[-1] for row in table.rows] == ["needless beside gyro-g-sensitivity", "not needed"]
+    assert [row[-1] for row in table.rows] == ["redundant with gyro-g-sensitivity", "not needed"]
 
 
 def counts_model(S, b):
@@ -190,7 +190,7 @@ def test_small_numbers_have_one_notation_in_tables_and_sentences():
     seen = filled("K is below {limit:.2g} {unit:unit}/√s.", {"limit": 7.3e-5, "unit": "m/s^2"}, {})
     assert seen == "K is below 7.3e−5 m/s²/√s."
     one = Finding(FindingCode.UNIT_DETECTED, Severity.NOTE, "K is below 7.3e−5 m/s².", "", "")
-    (both,) = told_once([one, replace(one, seen="K is below 1.2e−4 m/s².")])
+    (both,) = combined([one, replace(one, seen="K is below 1.2e−4 m/s².")])
     assert both.seen == "K is below 7.3e−5 to 1.2e−4 m/s²."
 
 

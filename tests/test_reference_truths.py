@@ -9,8 +9,7 @@ import trihedron
 from reference_rig import G, turn
 from reference_truths import truth
 from trihedron.estimate.reference.fit import fit_reference
-from trihedron.estimate.reference.motion import ACCEPTED
-from trihedron.records.reference import ReferenceMotion
+from trihedron.records.reference import NAMED_FROM, ReferenceMotion
 
 
 def z_of_bias(found, trial):
@@ -35,7 +34,7 @@ def test_a_drone_under_a_tracker_of_attitudes_has_the_g_sensitivity_that_it_has(
     trial = truth(4, "drone", has_g_sensitivity=True)
     found = fit_reference(trial.log, trial.motion, G)
     one = found.effects["gyro-g-sensitivity"]
-    assert one.score > ACCEPTED
+    assert one.score > NAMED_FROM
     assert np.abs((one.value - trial.unit.g_sensitivity.ravel()) / one.std).max() < 4.5
     assert np.abs(z_of_bias(found, trial)).max() < 4.5
 

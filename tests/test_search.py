@@ -80,7 +80,7 @@ def test_every_candidate_says_why_it_was_not_taken():
     assert found.tried["accel-scale-asymmetry"].score < threshold(0.01)
     said = diagnosed("accel-quadratic", 4, k2=(6e-4, -6e-4, 6e-4)).to_dict()
     rows = {row["id"]: row for row in said["candidates"] if row["applicable"] and row["score"] is not None}
-    assert rows["accel-scale-asymmetry"]["stands_against"] == "accel-quadratic"
+    assert rows["accel-scale-asymmetry"]["superseded_by"] == "accel-quadratic"
     for row in rows.values():
         assert row["size"], row["id"]
         if row["id"] not in {effect["id"] for effect in said["effects"]}:

@@ -2,7 +2,7 @@
 
 Two sessions have each their own lower frame, and ``S_r S_m⁻¹`` leaks from one number into another: a pure change in
 scale lights up the off-diagonals. In the distort direction ``M = S⁻¹`` rows are ``k_i n_i``: sensitivity k of axis i
-and its unit vector n. Scales, zeros along the own axis and angles between axes are then the same in every frame.
+and its unit vector n. Scales, biases along the own axis and angles between axes are then the same in every frame.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ STEP = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Invariants:
-    """``zero`` (3,) [SI] along each axis, ``log_scale`` (3,) ln of raw units per SI, ``angle`` (3,) [rad] between axes
+    """``bias`` (3,) [SI] along each axis, ``log_scale`` (3,) ln of raw units per SI, ``angle`` (3,) [rad] between axes
     (1,2), (1,3), (2,3), ``axes`` (3, 3) rows n_i in the model's own frame."""
 
     bias: FloatArray
@@ -31,12 +31,12 @@ class Invariants:
     axes: FloatArray
 
     def vector(self) -> FloatArray:
-        """(9,) zero, log_scale, angle."""
+        """(9,) bias, log_scale, angle."""
         return np.concatenate([self.bias, self.log_scale, self.angle])
 
 
 def invariants(S: FloatArray, b: FloatArray) -> Invariants:
-    """Equation 9.1: ``M = S⁻¹``, ``k_i = |M_i|``, ``n_i = M_i/k_i``, ``zero_i = -(M b)_i/k_i``."""
+    """Equation 9.1: ``M = S⁻¹``, ``k_i = |M_i|``, ``n_i = M_i/k_i``, ``bias_i = -(M b)_i/k_i``."""
     M = np.linalg.inv(S)
     k = np.linalg.norm(M, axis=1)
     n = M / k[:, None]
@@ -130,8 +130,8 @@ def anchor_of(S_a: FloatArray, S_g: FloatArray | None) -> Anchor:
 def numbers_of(
     S_a: FloatArray, b_a: FloatArray, S_g: FloatArray | None, b_g: FloatArray | None, anchor: Anchor
 ) -> FloatArray:
-    """(9,) or (21,) numbers of both sensors: zero, log_scale, angle of the accelerometer, of the gyro, and the rotation
-    vector of its triad from the anchor's (eq. 9.1)."""
+    """(9,) or (21,) parameters: bias, log_scale, angle of the accelerometer, of the gyro, and the rotation vector
+    of its triad from the anchor's (eq. 9.1)."""
     accel = invariants(S_a, b_a)
     if S_g is None or b_g is None or anchor.triad is None:
         return accel.vector()
@@ -155,7 +155,7 @@ def model_of_numbers(
 ) -> tuple[FloatArray, FloatArray, FloatArray | None, FloatArray | None]:
     """``(S_a, b_a, S_g, b_g)`` in frame ``lower``: the inverse of :func:`numbers_of`.
 
-    ``S = (K N)⁻¹``, ``b = -S (k ∘ zero)``. Rows of N_a follow from the angles, n_1 along X and n_2 in the plane of
+    ``S = (K N)⁻¹``, ``b = -S (k ∘ bias)``. Rows of N_a follow from the angles, n_1 along X and n_2 in the plane of
     axes 1 and 2; ``N_g = √(Gram of its angles) · R · U_a``.
     """
     N_a = _lower_axes(numbers[6:9], anchor.signs)

@@ -217,17 +217,12 @@ impl Hypothesis {
         strengths.iter().map(one).collect()
     }
 
-    /// The strengths that make the rows likeliest, sought from the best of some, near it or anywhere, and what they gain in
-    /// log-evidence over that one.
+    /// The strengths that make the rows likeliest, sought from the best of some, and what they gain in log-evidence over
+    /// that one.
     ///
     /// # Errors
     /// When there are none.
-    pub fn likeliest(
-        &self,
-        starts: &[Strengths],
-        within: &Within,
-        is_near: bool,
-    ) -> Result<(Strengths, f64)> {
+    pub fn likeliest(&self, starts: &[Strengths], within: &Within) -> Result<(Strengths, f64)> {
         let values = self.at_each(starts);
         let best = starts
             .iter()
@@ -236,7 +231,7 @@ impl Hypothesis {
             .ok_or_else(|| Error::bad_input("strengths to begin from are missing"))?;
         let mut search = Search::new(self, best.0, within);
         let before = search.value();
-        search.run(is_near);
+        search.run();
         Ok((search.strengths(), search.value() - before))
     }
 
@@ -261,7 +256,7 @@ impl Hypothesis {
     /// # Errors
     /// When there are none, or nothing determines the session there.
     pub fn tuned(&self, starts: &[Strengths], within: &Within) -> Result<Found> {
-        let (strengths, _) = self.likeliest(starts, within, true)?;
+        let (strengths, _) = self.likeliest(starts, within)?;
         let log_evidence = self.at_each(&[strengths])[0];
         let (chain, side) = self.system(&strengths)?;
         let factor = chain.factor(RIDGE, None)?;

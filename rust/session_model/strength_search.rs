@@ -162,8 +162,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// From strengths that are likeliest for nearly the same rows (`is_near`) nothing leaps.
-    pub(super) fn run(&mut self, is_near: bool) {
+    pub(super) fn run(&mut self) {
         let mut step = [FIRST_STEP; DIRECTIONS.len()];
         for pass in 0..MOST_PASSES {
             let before = self.value;
@@ -171,10 +170,10 @@ impl<'a> Search<'a> {
                 // Axes go their own way once they have gone together.
                 let is_first = direction.start == SCATTER_AT + 1 && direction.len() == 1;
                 if self.is_free(direction.start) && !(is_first && pass == 0) {
-                    self.along(direction, step, is_near);
+                    self.along(direction, step);
                 }
             }
-            if pass == 0 && !is_near {
+            if pass == 0 {
                 self.exchange();
             }
             if self.value - before < ENOUGH {
@@ -244,8 +243,8 @@ impl<'a> Search<'a> {
     }
 
     /// A step either way, doubled while it gains; then where a parabola is highest.
-    fn along(&mut self, direction: &Range<usize>, step: &mut f64, is_near: bool) {
-        if self.is_nothing(direction) && (is_near || !self.rises(direction)) {
+    fn along(&mut self, direction: &Range<usize>, step: &mut f64) {
+        if self.is_nothing(direction) && !self.rises(direction) {
             return;
         }
         let (here, i) = (self.x, direction.start);

@@ -27,7 +27,7 @@ pub fn tune(
     let mut found = fit_from(session, start, None, strengths, distortion, true)?;
     for round in 0..MOST_ROUNDS {
         let (best, gain) =
-            Hypothesis::of(&found, &[], &[])?.likeliest(&[found.strengths], within, round > 0)?;
+            Hypothesis::of(&found, &[], &[])?.likeliest(&[found.strengths], within)?;
         let moved = best.changed_from(&found.strengths);
         if round > 0 && gain < WORTH_A_FIT {
             break;

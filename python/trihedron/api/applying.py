@@ -60,7 +60,16 @@ def calibration_of(given: AnyCalibration) -> Calibration:
 
 
 def write_calibration(calibration: AnyCalibration, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write a calibration file in one step, never over another file unless told to.
+    """Write a calibration file in one step, never over another file unless ``overwrite`` is set.
+
+    Parameters
+    ----------
+    calibration : result of a calibration, Calibration or file
+        What to write, as JSON of its schema (docs/calibration-file.md).
+    path : file
+        Where to.
+    overwrite : bool
+        Replace a file that exists.
 
     Raises
     ------
@@ -78,8 +87,15 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
     """The recording in SI, in the calibration's body frame: ``S raw + b`` for every row.
 
     Where the calibration is extended, its effects are compensated first; a finding names those that cannot be. Where it
-    follows temperature, S and b are those of each sample's temperature; outside the range for which it was made the
-    ends are held and a serious finding says so.
+    follows temperature, S and b are those of each sample's temperature; outside the calibrated range they
+    keep their values at its limits, with a serious finding.
+
+    Parameters
+    ----------
+    calibration : result of a calibration, Calibration or file
+        What to apply.
+    recording : Recording, or what trihedron.read takes
+        Raw readings in the units that the calibration was made for.
 
     Returns
     -------
@@ -90,7 +106,7 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
     ------
     ValueError
         When the recording is in other units than the calibration was made for, or has no sensor that was calibrated;
-        when the calibration is no sensor's (S singular, a negative variance).
+        when S is singular or a variance negative.
 
     Examples
     --------

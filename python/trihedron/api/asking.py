@@ -150,7 +150,7 @@ def _switch(where: str, _name: str, value: Any) -> bool:
 
 def _callable(where: str, value: Any) -> Any:
     if not callable(value) or isinstance(value, type):
-        raise WrongTypeError(f"{where} is a function that is told how far the work is, not {said(value)}.")
+        raise WrongTypeError(f"{where} is a function called with the progress of the work, not {said(value)}.")
     return value
 
 

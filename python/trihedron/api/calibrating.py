@@ -43,16 +43,14 @@ if TYPE_CHECKING:
 
 Method = Literal["joint", "separate", "faces"]
 METHODS: tuple[Method, ...] = get_args(Method)
-"""``joint``: any poses, both sensors in one fit (method 2). ``separate``: the same, one sensor after the other.
-``faces``: faces of the case and turns by known angles (method 1)."""
 
 Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
 
 COUNTS_OF_POSES = (FindingCode.FEW_POSES, FindingCode.NOT_STATIC)
 """Findings that say themselves how many poses there are."""
-MOST_CREEPING = 0.05
-"""Share of poses that may be seen to creep. The creep that is seen is the top of what is not: with one of 18 seen, on a
-support that yields, the gyro's scale lay outside its 95 % bars in a fifth of its elements."""
+MOST_SETTLING = 0.05
+"""Share of poses that may visibly settle, as more settle unseen: with one of 18, on a support that yields, a fifth of
+the elements of the gyro's scale lay outside their 95 % interval."""
 
 Found = tuple[Finding, ...]
 
@@ -86,40 +84,44 @@ def calibrate(
     segments : Segments, optional
         Static poses and the moves between them; found when not given.
     gravity_m_s2 or latitude_deg, height_m : float
-        |g| at the place. When nothing is said a standard value is used, and a finding says what that may cost.
+        |g| at the place. Without it 9.80665 m/s² is used, and a finding states the possible error.
     method : "joint", "separate" or "faces"
-        Method 2 with both sensors in one fit (default) or one after the other; or method 1.
+        Any poses, both sensors in one fit (default) or one after the other; or faces of a square case and known turns.
     frame : "lower", "symmetric" or "case"
-        Body frame: ``lower`` (triangular, X along accelerometer X) for method 2 and ``case`` for method 1 unless said.
+        Body frame: ``case`` by default with faces, else ``lower`` (triangular, X along accelerometer X).
     faces : sequence of ±1, ±2, ±3 or 0
-        Method 1: the axis of the case that points up in every pose; 0 leaves a pose out.
+        With ``"faces"``: the axis of the case that points up in every pose; 0 excludes a pose.
     turns_deg : sequence of float
-        The angle of every turn on a table, about the axis that points up; 0 leaves a turn out. Method 1: of the turns
-        between poses on the same face, where multiples of 90° are recognised when nothing is said and the scale is
-        known. Method 2: of the turns between poses of the same tilt, in any pose; the gyro is then calibrated by them.
+        Angle [°] of every turn on a table, about the axis that points up, between poses of the same tilt; 0 excludes a
+        turn. With ``"faces"`` multiples of 90° are recognised where the scale is known.
     axis_signs : three of ±1
-        Method 2: the sign with which each raw axis follows its axis of the body, by the board's documentation.
+        Sign of each raw axis along its axis of the body, from the board's documentation; not with ``"faces"``.
     loss : "linear", "huber", "soft_l1" or "cauchy"
-        Method 2: how far outlying poses count; other than ``linear`` with ``separate`` or an accelerometer alone.
+        Weight of outlying poses; other than ``linear`` with ``"separate"`` or an accelerometer alone.
     gyroscope_nominal : float
-        rad/s per raw unit, where readings are counts and too few moves tell it.
+        Nominal scale [rad/s per raw unit], for counts where too few moves determine it.
     turntable_deg_s : sequence of float
-        Speeds of a turntable, the unit on it anyhow, °/s: one for all steady turns of the log, or one a turn in order;
-        0 leaves one out. ``turntable_sigma`` is their common relative standard error.
+        Speed of a turntable [°/s], the unit in any orientation: one for all steady turns, or one each; 0 excludes one.
+    turntable_sigma : float
+        Relative standard error of the table's speed, common to all turns.
     reference : path, Recording or ReferenceMotion
-        Known motion beside the log (rate table, optical tracking, another unit): both sensors are held against it, and
-        static poses are not needed. ``reference_columns`` says its columns where their names do not.
+        Known motion beside the log (rate table, optical tracking, another unit): both sensors are calibrated by it, and
+        static poses are not needed.
+    reference_columns : str
+        Its columns, where names do not state them.
+    progress : callable
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------
     CalibrationResult
-        ``accelerometer`` and ``gyroscope`` (None without one) with ``S`` (3, 3), ``b`` (3,), ``sigma_S``, ``sigma_b``
-        and ``covariance`` (12, 12); ``findings``, ``segments``, ``recording``. ``print`` shows the report.
+        ``accelerometer``, ``gyroscope`` (None without one), each with ``S`` (3, 3) [SI per raw unit], ``b`` (3,) [SI],
+        ``sigma_S``, ``sigma_b``, ``covariance`` (12, 12); ``findings``, ``segments``. ``print`` shows the report.
 
     Raises
     ------
     ValueError
-        When the question cannot be answered; one sentence says why and what to do.
+        When the log does not determine a calibration or an argument is wrong; one sentence says why and what to do.
 
     Examples
     --------
@@ -194,7 +196,7 @@ def _as_they_weigh(segments: Segments) -> Found:
     """Findings of the segmentation; that holds settling is serious for a calibration where it is no exception."""
     return tuple(
         replace(finding, severity=Severity.SERIOUS)
-        if finding.code is FindingCode.POSE_SETTLING and finding.numbers["poses"] > MOST_CREEPING * segments.n_poses
+        if finding.code is FindingCode.POSE_SETTLING and finding.numbers["poses"] > MOST_SETTLING * segments.n_poses
         else finding
         for finding in segments.findings
     )

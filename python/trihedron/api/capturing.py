@@ -96,13 +96,15 @@ def capture(
     output : path
         The log to write.
     protocol, baud, columns, time_unit
-        What the board speaks; found when not said.
+        Protocol, baud rate, columns of text lines and unit of the board's time; detected when not given.
     seconds : float, optional
         When to stop; Ctrl-C, or ``on_block`` that returns False, stops any time, and what came is in the log.
     rate_hz : float, optional
         Rate of a board that sends no time.
     wait_s : float
         How long to wait for a board that was unplugged.
+    overwrite : bool
+        Replace a log that exists.
     on_block : callable, optional
         Is given every block of samples as it is written.
 
@@ -161,7 +163,7 @@ def stopped_by_interrupt(recorder: Recorder) -> Iterator[None]:
 
 
 def ports() -> list[Port]:
-    """The serial ports that are plugged in.
+    """The serial ports that are plugged in; takes no arguments and never raises.
 
     Returns
     -------

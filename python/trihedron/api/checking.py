@@ -13,15 +13,27 @@ from trihedron.units import STANDARD_GRAVITY_M_S2
 
 
 def check(recording: AnyRecording, *, progress: Progress | None = None) -> CheckResult:
-    """Audit of the log, poses, and the uncertainties that a calibration from it would have.
+    """Whether a log is fit for calibration: its faults, its poses, and the uncertainties to expect.
 
-    The uncertainties come from the poses, the moves and the sensor's noise; gravity hardly matters for them and is not
-    asked for.
+    The uncertainties follow from the poses, the moves and the sensor's noise; they hardly depend on gravity, which is
+    not needed.
+
+    Parameters
+    ----------
+    recording : Recording, or what trihedron.read takes
+        The log to check.
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------
     CheckResult
         ``is_fit``, ``findings``, the poses found and the uncertainties to expect.
+
+    Raises
+    ------
+    ValueError
+        When the log cannot be read.
 
     Examples
     --------

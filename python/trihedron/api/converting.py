@@ -14,8 +14,19 @@ from trihedron.records import Recording
 def convert(log: Any, output: str | os.PathLike[str], *, overwrite: bool = False, **options: Any) -> Recording:
     """Write a log as .csv, .npz or .parquet: time [s], readings in their own unit, temperature and supply.
 
-    ``log`` is a recording, or whatever :func:`trihedron.read` takes, with its ``options``. Names of columns state the
-    units, so that the file is read again without a question; missing readings are NaN. Time starts at zero.
+    Column names state the units, so that the file is read again without options; missing readings are NaN. Time starts
+    at 0 s.
+
+    Parameters
+    ----------
+    log : Recording, or what trihedron.read takes
+        What to write.
+    output : file
+        ``.csv``, ``.npz`` or ``.parquet``.
+    overwrite : bool
+        Replace a file that exists.
+    options
+        Of :func:`trihedron.read`.
 
     Returns
     -------

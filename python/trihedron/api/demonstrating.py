@@ -55,8 +55,16 @@ def demo(
 ) -> tuple[Demonstration, Disagreement]:
     """Two acts, simulated: calibrate and compare with the truth; then a simulation that a log contradicts.
 
-    Files go to ``folder``; ``seed`` draws unit and flaw of the second act. ``.document`` of each is its story, which
-    ``print`` shows.
+    ``print`` of either act shows its report.
+
+    Parameters
+    ----------
+    folder : path
+        Where logs, calibrations and reports go.
+    seed : int
+        Draws the unit and the flaw of the second act.
+    overwrite : bool
+        Replace files of a folder that exists.
 
     Returns
     -------

@@ -53,26 +53,30 @@ def diagnose(
     alpha: float = 0.01,
     progress: Progress | None = None,
 ) -> DiagnosisResult:
-    """Where a recording and its model differ, which physics is missing, how large it is, and how sure that is.
+    """Where a recording and its model differ, which physical effects are missing, their size and its uncertainty.
 
     Parameters
     ----------
     recording : Recording, or what trihedron.read takes
         Poses and moves of one sensor.
     gravity_m_s2 or latitude_deg, height_m : float
-        |g| at the place; with a ``calibration`` that of the calibration unless said.
+        |g| at the place; with a ``calibration`` that of the calibration unless given.
     segments : Segments, optional
         Poses and moves; found when not given.
     calibration : calibration or path, optional
-        The model to be held against the recording, with its uncertainties. Without it one is fitted to the recording.
+        The model to compare with the recording, with its uncertainties. Without it one is fitted to the recording.
     against : Recording, Scenario or path, optional
         The user's simulation as the model: a simulated recording, with everything that it contains, or a scenario
         (``.toml``), whose instrument is moved as the recording was.
     reference : path, Recording or ReferenceMotion, optional
         Known motion beside the log: attitude, rate or pose with a clock of its own, or the log of another unit that
-        moved along (docs/reference.md). ``reference_columns`` says its columns where their names do not.
+        moved along (docs/reference.md).
     alpha : float
-        Chance that a healthy recording is called anything but consistent.
+        Probability that a healthy recording is called anything but consistent.
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
+    reference_columns : str, optional
+        Its columns, where names do not state them.
 
     Returns
     -------
@@ -82,7 +86,7 @@ def diagnose(
     Raises
     ------
     ValueError
-        When there is nothing to hold a model against, units differ, or two models are given.
+        When the log has nothing to compare a model with, units differ, or two models are given.
 
     Examples
     --------

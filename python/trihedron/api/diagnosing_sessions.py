@@ -34,6 +34,8 @@ def diagnose_sessions(
         |g| at the place, as for :func:`calibrate`.
     alpha : float
         Chance that healthy recordings are said to share an effect.
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------

@@ -82,7 +82,7 @@ class MovedAlike:
         cut = resegment(recording, segments)
         self._motion = twin_scenario(recording, cut, own).motion
         self._known: list[tuple[Scenario, tuple[float | None, float | None]]] = []
-        carried = carried_misses(own, recording, cut)
+        carried = tilt_errors_of(own, recording, cut)
         self.poses = _of_poses(own)
         self.moves = _of_moves(carried)
         # The one that is spared is often the longest.
@@ -108,7 +108,7 @@ class MovedAlike:
             return None, None
         if result.calibration.gyroscope is None:
             return _of_poses(result.calibration), None
-        carried = carried_misses(result.calibration, log, resegment(log, result.segments))
+        carried = tilt_errors_of(result.calibration, log, resegment(log, result.segments))
         return _of_poses(result.calibration), _of_moves(carried)
 
 
@@ -139,7 +139,7 @@ def flicker_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float
 def bias_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
     """By how much the accelerometer's bias must be another in every pose [m/s²] for lengths of gravity to miss alike.
 
-    The worst pose of either side is spared: one that was pushed makes no scatter for all of them. ``None`` where both
+    The worst pose of either side is excluded: a disturbed one is no scatter of all of them. ``None`` where both
     miss alike, or the scenario misses more without any scatter to take out.
     """
     part = better.accelerometer
@@ -156,7 +156,7 @@ def bias_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, f
 def bias_in_moves(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
     """By how much the gyro's bias must stray in moves [rad/s] for an improved scenario to miss as the recording does.
 
-    Gravity carried through the moves of the recording and of the scenario moved alike, the worst of either side spared:
+    Tilt errors after the rotations of the recording and of the scenario moved alike, the worst of either side excluded:
     what the recording misses more is put on the bias, the same on all axes. ``None`` where both miss alike, or the
     scenario misses more without any straying to take out.
     """
@@ -224,39 +224,36 @@ def _of_poses(calibration: Calibration) -> float | None:
     quality = calibration.accelerometer.quality
     if quality is None or quality.dof < FEWEST_POSES_TO_SPARE:
         return None
-    return _spared(quality.residual) * len(quality.residual) / quality.dof
+    return _mean_square_without_worst(quality.residual) * len(quality.residual) / quality.dof
 
 
-def _of_moves(carried: CarriedMisses) -> float | None:
-    """Mean square of the angles by which gravity carried through the moves misses [rad²], but for the worst."""
-    return _spared(carried.angle_rad) if len(carried.angle_rad) >= FEWEST_MOVES else None
+def _of_moves(carried: TiltErrors) -> float | None:
+    """Mean square of the tilt errors after rotations [rad²], without the worst."""
+    return _mean_square_without_worst(carried.angle_rad) if len(carried.angle_rad) >= FEWEST_MOVES else None
 
 
-def _spared(misses: FloatArray) -> float:
+def _mean_square_without_worst(misses: FloatArray) -> float:
     """Mean square of all but the largest."""
     return float(np.mean(np.sort(misses**2)[:-1]))
 
 
-# What a recording's own calibration leaves of its moves: gravity carried through each by the gyro.
-
-
 @dataclass(frozen=True, eq=False)
-class CarriedMisses:
-    """Angle (m,) [rad] by which gravity carried through each move misses the pose after it, and the moves' length.
+class TiltErrors:
+    """Tilt error (m,) [rad] after each rotation by a recording's own calibration, and the rotations' length.
 
-    Moves beyond the gyro's range are none of them: what was cut off there is no zero that strays.
+    Without rotations beyond the gyro's range: clipping is no bias error.
     """
 
     angle_rad: FloatArray
     duration_s: FloatArray
 
 
-def carried_misses(own: Calibration, recording: Recording, segments: Segments) -> CarriedMisses:
-    """What a recording's own calibration leaves of its moves."""
+def tilt_errors_of(own: Calibration, recording: Recording, segments: Segments) -> TiltErrors:
+    """Tilt errors after rotations by a recording's own calibration."""
     checked = verify_calibration(own, recording, segments, own.gravity_m_s2, own.gravity_source)
     t = recording.time_s
     cut = np.asarray(recording.facts.of("gyroscope").at_limits(len(t)).any(axis=1))
     sound = np.array([not cut[a.stop : b.start].any() for a, b in pairwise(segments.poses)], dtype=np.bool_)
     lasts = [float(t[min(b.start, len(t) - 1)] - t[a.stop - 1]) for a, b in pairwise(segments.poses)]
-    told = sound[checked.moves]
-    return CarriedMisses(radians_from_degrees(1.0) * checked.angle_deg[told], np.array(lasts)[checked.moves][told])
+    used = sound[checked.moves]
+    return TiltErrors(radians_from_degrees(1.0) * checked.angle_deg[used], np.array(lasts)[checked.moves][used])

@@ -50,6 +50,8 @@ def export(
         (.param, .parm, QGroundControl's .params); "none" where the readings were raw.
     output : path, optional
         Where to write; of several files each takes its own ending.
+    overwrite : bool
+        Replace a file that exists.
 
     Returns
     -------

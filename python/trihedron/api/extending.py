@@ -21,14 +21,21 @@ from trihedron.records.words import words
 
 
 def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress | None = None) -> CalibrationResult:
-    """A calibration with the effects that its own recording demands: S, b fitted with them, effects in ``extensions``.
+    """A calibration with the physical effects found in its recording: S, b fitted with them, effects in ``extensions``.
 
-    Frame ``lower``: effects are stated along the sensor's axes and in this trihedron.
+    Parameters
+    ----------
+    result : CalibrationResult
+        Of :func:`trihedron.calibrate`, in the lower-triangular frame.
+    alpha : float
+        False-alarm probability of the diagnosis.
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------
     CalibrationResult
-        The calibration with the physical effects that its recording demands.
+        The extended calibration; unchanged where no effect is found or none improves the prediction.
 
     Raises
     ------
@@ -72,7 +79,7 @@ CARRIED: tuple[Domain, ...] = ("static-accel", "moves")
 def _spoilt(diagnosis: Diagnosis) -> tuple[str, float, float, str] | None:
     """A domain whose held-out rms the effects raise, before and after, its unit: that carries over to nothing."""
     stages = {stage.stage: {d.domain: d for d in stage.domains} for stage in diagnosis.stages}
-    before, after = stages.get("numbers", {}), stages.get("effects", {})
+    before, after = stages.get("parameters", {}), stages.get("effects", {})
     for domain in CARRIED:
         if domain in before and domain in after and after[domain].rms > MAY_RISE * before[domain].rms:
             return domain, before[domain].rms, after[domain].rms, before[domain].unit

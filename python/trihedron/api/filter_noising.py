@@ -14,7 +14,7 @@ from trihedron.api.reading import AnyRecording, read, recording_of, segment
 from trihedron.api.referring import AnyReference, motion_of
 from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.filter_noise.beside_reference import Asked, beside_reference
-from trihedron.estimate.filter_noise.rests import at_rest, between_rests, tilt_over_moves, unlike_axes
+from trihedron.estimate.filter_noise.static_intervals import at_rest, between_intervals, tilt_over_moves, unlike_axes
 from trihedron.files.formats.contract import NoiseFigure
 from trihedron.files.noise import read_noise
 from trihedron.records import Finding, FindingCode, Noise, Recording, Segments
@@ -22,7 +22,7 @@ from trihedron.records.filter_noise import (
     BiasModel,
     Bounded,
     FilterNoise,
-    RestCheck,
+    IntervalCheck,
     SensorFilterNoise,
     StaticNoise,
     TiltCheck,
@@ -62,11 +62,11 @@ def filter_noise(
         The log in motion.
     static : Noise or path, optional
         The sensor at rest: what ``trihedron.allan`` found, a static log, or the JSON of ``trihedron allan``. Without it
-        the longest rest of the log, if it lasts 20 s.
+        the longest static interval of the log, if it lasts 20 s.
     reference : path, Recording or ReferenceMotion, optional
-        Attitude, and with a position also the accelerometer's part. Without it only what rests and gravity tell.
+        Attitude, and with a position also the accelerometer's part. Without it only static intervals and gravity count.
     reference_columns : str, optional
-        Its columns, where names do not tell.
+        Its columns, where names do not say.
     band_hz : float, optional
         Vibration is looked for above this frequency; a quarter of the sampling rate otherwise.
     horizons_s : sequence of float
@@ -77,7 +77,7 @@ def filter_noise(
     Returns
     -------
     FilterNoise
-        N [SI/√Hz] and K [SI/√s] of each sensor with 95 % intervals, shares by cause, and NEES on the held-out half.
+        N [SI/√Hz] and K [SI/√s] of each sensor with 95 % intervals, shares by cause, and NEES on the half held out.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def filter_noise(
     own = None if segments is None else _of_rest(recording, segments)
     known = _static(static) if static is not None else _sensors(own)
     findings = (*recording.findings, *(said if reference is not None else ()))
-    tilt, rests, source = None, None, ""
+    tilt, intervals, source = None, None, ""
     if reference is not None:
         motion = motion_of(reference, reference_columns)
         asked = Asked(horizons, band, gravity, known.get("gyroscope"), known.get("accelerometer"))
@@ -114,15 +114,23 @@ def filter_noise(
                 else f"the sensor is not static in it for {SHORTEST_REST_S:.0f} s"
             )
             raise RefusedError(
-                f"{recording.source}: {why}, so that it does not tell its own noise; give known motion beside it "
+                f"{recording.source}: {why}, so it does not show the sensor's own noise; give known motion beside it "
                 "(--reference), or run `trihedron allan` on a static log of ten minutes or more."
             )
         sensors = tuple(_at_rest(own, sensor, known) for sensor in UNITS if at_rest(own.axes, UNITS[sensor]))
         if segments is not None:
-            tilt, rests = _from_rest_to_rest(recording, segments, known)
+            tilt, intervals = _between_intervals(recording, segments, known)
         findings = (*findings, Finding.of(FindingCode.FILTER_NOISE_AT_REST))
     return FilterNoise(
-        sensors, recording.source, source, recording.rate_hz, band, recording.duration_s, tilt, rests, tuple(findings)
+        sensors,
+        recording.source,
+        source,
+        recording.rate_hz,
+        band,
+        recording.duration_s,
+        tilt,
+        intervals,
+        tuple(findings),
     )
 
 
@@ -178,7 +186,7 @@ def _static(given: Noise | str | os.PathLike[str]) -> Static:
     """What is known of the sensor at rest, by sensor."""
     if isinstance(given, str | os.PathLike) and os.fspath(given).lower().endswith(".json"):
         figures, _ = read_noise(given)
-        return {name: StaticNoise(_told(one.N), _told(one.K)) for name, one in figures.items()}
+        return {name: StaticNoise(_bounded(one.N), _bounded(one.K)) for name, one in figures.items()}
     if isinstance(given, str | os.PathLike):
         given = allan(read(given))
     if not isinstance(given, Noise):
@@ -194,7 +202,7 @@ def _static(given: Noise | str | os.PathLike[str]) -> Static:
     return known
 
 
-def _told(figure: NoiseFigure) -> Bounded:
+def _bounded(figure: NoiseFigure) -> Bounded:
     value, is_limit = figure.value, figure.is_limit
     return Bounded(0.0 if is_limit else value, 0.0 if is_limit else value / FILE_PART, value * FILE_PART, is_limit)
 
@@ -210,15 +218,15 @@ def _at_rest(own: Noise, sensor: str, known: Static) -> SensorFilterNoise:
     )  # fmt: skip
 
 
-def _from_rest_to_rest(
+def _between_intervals(
     recording: Recording, segments: Segments, known: Static
-) -> tuple[TiltCheck | None, RestCheck | None]:
+) -> tuple[TiltCheck | None, IntervalCheck | None]:
     scale = rate_to_si(recording.gyroscope_unit)
     if recording.gyroscope is None or scale is None or "gyroscope" not in known:
         return None, None
     rate = np.nan_to_num(recording.gyroscope * scale)
     told = (recording.with_distinct_timestamps().time_s, rate, segments, known["gyroscope"])
-    return tilt_over_moves(*told), between_rests(*told)
+    return tilt_over_moves(*told), between_intervals(*told)
 
 
 def _noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:

@@ -55,7 +55,7 @@ def kalman(
     recording : Recording, or what trihedron.read takes
         The log of poses.
     reference : PoseTable or file, optional
-        Attitudes of the poses: pitch and roll, or directions. Without it the length of gravity must do.
+        Attitudes of the poses: pitch and roll, or directions. Without it only the length of gravity is used.
     sigma_angle_deg : float
         Standard error of the angles in the file.
     noise : AxisNoise, three of them, Noise, or file
@@ -63,6 +63,12 @@ def kalman(
         Without it, what is seen inside the poses.
     frame : "lower" or "symmetric"
         Body frame where there is no reference; with one it is the frame of the reference.
+    segments : Segments, optional
+        Poses; found when not given.
+    gravity_m_s2 or latitude_deg, height_m : float
+        |g| at the place [m/s²], or the place from which it follows (degrees, m).
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------
@@ -72,7 +78,7 @@ def kalman(
     Raises
     ------
     ValueError
-        When the question cannot be answered; one sentence says why and what to do.
+        When poses, table and noise do not determine a calibration; one sentence says why and what to do.
 
     Examples
     --------
@@ -141,7 +147,7 @@ def _check_adc(given: Sequence[AxisNoise], recording: Recording, segments: Segme
     if not windows:
         return
     inside = noise_of_poses(readings, recording.rate_hz, windows)
-    # Codes between the poses count too: inside a hold a coarse ADC shows one.
+    # Codes between the poses count too: inside a pose a coarse ADC shows one.
     steps = recording.facts.of("accelerometer").step.tolist()
     octaves = [axis.octaves for axis in inside]
     check_same_adc(given, steps, octaves, recording.rate_hz, recording.source)

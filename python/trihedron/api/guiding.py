@@ -37,7 +37,7 @@ from trihedron.units import (
 )
 
 PRIOR = 0.1
-"""What is believed of a board before its first pose: scales within 10 %, axes within 0.1 rad, zeros within 0.1 g."""
+"""Prior of a board before its first pose: scales within 10 %, axes within 0.1 rad, biases within 0.1 g."""
 
 SHORTEST_POSE_S, LONGEST_POSE_S = 3.0, 12.0
 USUAL_POSE_S = 4.0

@@ -46,14 +46,14 @@ def allan(
     gyroscope_lsb: str | None = None,
     calibration: AnyCalibration | None = None,
 ) -> Noise:
-    """Noise terms of every axis of a static recording, in SI units where the log tells them (docs/noise.md).
+    """Noise terms of every axis of a static recording, in SI units where they are known (docs/noise.md).
 
     Parameters
     ----------
     recording : Recording, or what trihedron.read takes
         A static log, an hour or more.
     exclude_s : sequence of (float, float)
-        Stretches [s] that the fit leaves out.
+        Intervals [s] to exclude.
     automatic : bool
         Whether disturbances are found and excluded.
     clusters : sequence of int, optional
@@ -61,7 +61,7 @@ def allan(
     accelerometer_lsb, gyroscope_lsb : str, optional
         The size of a count of a log in counts: ``"0.05 deg/s"``.
     calibration : CalibrationResult, Calibration or path, optional
-        Of the unit: it tells the size of a count of every axis.
+        Of the unit: it gives the size of a count of every axis.
 
     Returns
     -------
@@ -75,8 +75,8 @@ def allan(
 
     Examples
     --------
-    >>> rest = {"t": [k / 100 for k in range(6000)], "acc": [[0.0, 0.0, 9.8]] * 6000}
-    >>> found = trihedron.allan(rest)  # doctest: +SKIP
+    >>> static = {"t": [k / 100 for k in range(6000)], "acc": [[0.0, 0.0, 9.8]] * 6000}
+    >>> found = trihedron.allan(static)  # doctest: +SKIP
     >>> found.axis("gyro x").terms  # doctest: +SKIP
     """
     recording = recording_of(recording)

@@ -53,7 +53,7 @@ class Improvement:
 
 
 def improve(
-    scenario: str | Path, found: DiagnosisResult, *, stage: Literal["numbers", "noise", "effects"] = "effects"
+    scenario: str | Path, found: DiagnosisResult, *, stage: Literal["parameters", "noise", "effects"] = "effects"
 ) -> Improvement:
     """The user's scenario file with numbers, noise, sampling and physics of the recording.
 
@@ -69,7 +69,7 @@ def improve(
     tables: dict[str, dict[str, Any]] = {"accelerometer": {}, "gyroscope": {}, "clock": {}, "environment": {}}
     _numbers(tables, given, found)
     _gravity(tables, given, found)
-    if stage == "numbers":
+    if stage == "parameters":
         return Improvement(improved_scenario(scenario, tables, [], []), {})
     _noise(tables, given, found)
     if stage == "noise":

@@ -36,13 +36,17 @@ def plan(
     Parameters
     ----------
     turns_deg : sequence of float
-        The turns about every one of the three axes, each taking ``turn_s``.
+        The turns about each of the three axes [°].
+    turn_s : float
+        Duration of one turn [s].
     pose_s : float
-        How long every pose, and the one stretch without rotation, lasts.
+        Duration of a pose, and of the static interval before the turns [s].
     gyroscope_density, accelerometer_density : float
-        White noise [rad/s/√Hz, m/s²/√Hz]; that of a consumer part unless said.
+        White noise [rad/s/√Hz, m/s²/√Hz]; that of a consumer part by default.
     sigma_turn_rad : float
-        Standard error of a turn's angle (the wall).
+        Standard error of a turn's angle [rad].
+    gravity_m_s2 : float
+        |g| [m/s²].
 
     Returns
     -------

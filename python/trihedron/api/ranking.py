@@ -46,6 +46,10 @@ def rank(
     recording : Recording, or what trihedron.read takes
     gravity_m_s2 or latitude_deg, height_m : float
         As for :func:`calibrate`; else that which the calibrations of ours state.
+    segments : Segments, optional
+        Poses and moves; found when not given.
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------

@@ -52,9 +52,9 @@ def read(
         ``"time=t,ax=3,ay=4,az=5"`` (names, or numbers from 1), or roles in file order ``"t,ax,ay,az,-,gx,gy,gz"``;
         ``time=none`` ignores a time column.
     rate_hz : float
-        Sampling rate [Hz] of a log without a time column. A time column wins; a rate that contradicts it is a finding.
+        Sampling rate [Hz] of a log without a time column. A time column has precedence; a contradiction is a finding.
     accelerometer_unit, gyroscope_unit, time_unit : str
-        Units, where what is detected from names and readings is wrong.
+        Units, where the detected ones are wrong.
     device : int
         Which device (from 1) of an archive of several.
     topic : str
@@ -200,12 +200,24 @@ def segments_of(given: Segments | None, recording: Recording, progress: Progress
 
 
 def segment(recording: AnyRecording, *, progress: Progress | None = None) -> Segments:
-    """Static poses and the moves between them, separated by the sensor's own noise: nothing to set.
+    """Static poses and the moves between them, separated by the sensor's own noise, without any threshold to set.
+
+    Parameters
+    ----------
+    recording : Recording, or what trihedron.read takes
+        Readings of one or both sensors.
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------
     Segments
         ``poses`` and ``moves``, mean reading of every pose (n, 3) in raw units and its standard error.
+
+    Raises
+    ------
+    ValueError
+        When the log cannot be read.
 
     Examples
     --------

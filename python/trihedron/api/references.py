@@ -44,7 +44,20 @@ def calibrate_references(
 ) -> ReferencesResult:
     """Calibrate one unit from recordings that each have a reference: S and effects are shared, biases are not.
 
-    The calibration's bias is the mean over the recordings, and how far it repeats counts in its uncertainty.
+    The calibration's bias is the mean over the recordings, and its uncertainty includes the repeatability.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording, or of what trihedron.read takes
+        One unit, moved in any way.
+    references : sequence of path, Recording or ReferenceMotion
+        Known motion beside each (docs/reference.md).
+    reference_columns : str, optional
+        Their columns, where names do not state them.
+    frame : "lower", "symmetric" or "case"
+        Body frame; ``case`` is that of the reference.
+    gravity_m_s2 or latitude_deg, height_m : float
+        |g| at the place [m/s²], or the place from which it follows (degrees, m).
 
     Returns
     -------

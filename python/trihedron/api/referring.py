@@ -14,7 +14,7 @@ from trihedron.api.reading import read
 from trihedron.diagnose.against.fitted import FittedModel, model_of_calibration
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.errors import RefusedError
-from trihedron.estimate.reference import ACCEPTED, fit_reference, turns_of_frame
+from trihedron.estimate.reference import fit_reference, turns_of_frame
 from trihedron.read import ReadError
 from trihedron.read.reference.motion import of_recording, read_reference
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, SensorCalibration
@@ -28,7 +28,7 @@ from trihedron.records.diagnosis import (
     Verdict,
 )
 from trihedron.records.domains import DomainTest
-from trihedron.records.reference import AgainstReference, Estimate, ReferenceMotion
+from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, ReferenceMotion
 from trihedron.sensor_model import in_frame
 from trihedron.units import acceleration_to_si
 
@@ -160,7 +160,7 @@ def _nominal(recording: Recording, gravity: float) -> tuple[SensorCalibration, F
 def effects_of(found: AgainstReference) -> tuple[AcceptedEffect, ...]:
     """Effects that the evidence names, the strongest first (the Bayes factor bounds p)."""
     named = [(one.score or 0.0, ident, one) for ident, one in found.effects.items()]
-    return tuple(_accepted(ident, one) for score, ident, one in sorted(named, reverse=True) if score > ACCEPTED)
+    return tuple(_accepted(ident, one) for score, ident, one in sorted(named, reverse=True) if score > NAMED_FROM)
 
 
 def _accepted(ident: str, one: Estimate) -> AcceptedEffect:
@@ -255,7 +255,7 @@ def _rate(found: AgainstReference) -> DomainTest:
     """Rate inside the motion: p is that of the effects tried on it, the search paid for."""
     score = max([0.0, *(one.score or 0.0 for one in found.effects.values())])
     return DomainTest(
-        "rate", 1.0, float(3 * found.gyroscope.n_rows), float(np.exp(-0.5 * score)), score > ACCEPTED,
+        "rate", 1.0, float(3 * found.gyroscope.n_rows), float(np.exp(-0.5 * score)), score > NAMED_FROM,
         rms=found.gyroscope.rms, unit="rad/s",
     )  # fmt: skip
 

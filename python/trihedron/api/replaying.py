@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.api.choices import settle_gravity
 from trihedron.api.guiding import conclude, examine, part_of
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.capture.guide import Guide
 from trihedron.errors import RefusedError
 from trihedron.records import Recording
-from trihedron.records.guiding import Accuracy, GuideView
+from trihedron.records.guiding import Accuracy, Examination, GuideView
 from trihedron.records.results import CalibrationResult, VerificationResult
-from trihedron.units import STANDARD_GRAVITY_M_S2
 
 STEP_S = 0.25
 """Of a replayed log: as the blocks of a live one."""
@@ -42,9 +42,11 @@ def guide(
     accuracy: str = DEFAULT_ACCURACY,
     *,
     gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
     on_pose: Tell | None = None,
 ) -> tuple[CalibrationResult, VerificationResult | None]:
-    """What a guided session would have made of a log: calibrated when ``accuracy`` is reached, verified on the rest.
+    """A guided session replayed from a log: calibrated when ``accuracy`` is reached, verified on the rest.
 
     Parameters
     ----------
@@ -52,10 +54,10 @@ def guide(
         Poses and moves.
     accuracy : str
         When to stop: ``"accel 0.05 %, gyro 0.1 %"``.
-    gravity_m_s2 : float, optional
-        |g| where it was recorded.
+    gravity_m_s2 or latitude_deg, height_m : float
+        |g| at the place [m/s²], or the place from which it follows (degrees, m).
     on_pose : callable, optional
-        Is given the guide's view (instruction, next pose, uncertainties) after every pose.
+        Called with the guide's view (instruction, next pose, uncertainties) after every pose.
 
     Returns
     -------
@@ -71,13 +73,13 @@ def guide(
     --------
     >>> calibrated, checked = trihedron.guide("session.csv", "accel 0.1 %, gyro 0.2 %")  # doctest: +SKIP
     """
-    done = replay(recording_of(recording), Accuracy.parse(accuracy), gravity_m_s2=gravity_m_s2, on_pose=on_pose)
-    return conclude(done.recording, done.cut_s, gravity_m_s2=gravity_m_s2)
+    said = {"gravity_m_s2": gravity_m_s2, "latitude_deg": latitude_deg, "height_m": height_m}
+    wanted, gravity = Accuracy.parse(accuracy), settle_gravity(**said)[0]
+    done = replay(recording_of(recording), wanted, gravity_m_s2=gravity, on_pose=on_pose)
+    return conclude(done.recording, done.cut_s, **said)
 
 
-def replay(
-    recording: Recording, wanted: Accuracy, *, gravity_m_s2: float | None = None, on_pose: Tell | None = None
-) -> Replay:
+def replay(recording: Recording, wanted: Accuracy, *, gravity_m_s2: float, on_pose: Tell | None = None) -> Replay:
     """Lead the guide through a log, block by block, as if it were live.
 
     Raises
@@ -86,9 +88,12 @@ def replay(
         When the log has no accelerometer.
     """
     readings = readings_of(recording)
-    gravity = gravity_m_s2 or STANDARD_GRAVITY_M_S2
     now_s = 0.0
-    made = Guide(wanted, lambda: examine(part_of(recording, -math.inf, now_s + 1e-9), wanted, gravity_m_s2=gravity))
+
+    def so_far() -> Examination:
+        return examine(part_of(recording, -math.inf, now_s + 1e-9), wanted, gravity_m_s2=gravity_m_s2)
+
+    made = Guide(wanted, so_far)
     n_events = 0
     for first, last in steps(recording.time_s):
         now_s = float(recording.time_s[last - 1])

@@ -44,7 +44,7 @@ def calibrate_sessions(
     alpha: float = ALPHA,
     progress: Progress | None = None,
 ) -> SessionsResult:
-    """Calibrate many recordings of one unit, and say how far each parameter repeats.
+    """Calibrate many recordings of one unit, with the repeatability of each parameter.
 
     Parameters
     ----------
@@ -60,7 +60,9 @@ def calibrate_sessions(
     frame : "lower" or "symmetric"
         Body frame of the common calibration.
     alpha : float
-        Chance that any number of a unit that did not change is called changed.
+        Probability that any parameter of a unit that did not change is called changed.
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------
@@ -198,7 +200,7 @@ def _excess(sensor: SensorCalibration) -> float:
 
 
 def _bias_drift(result: CalibrationResult, n: int) -> FloatArray:
-    """Variance (n,) by which zeros of a session like this differ from one to the next (eq. 9.3)."""
+    """Variance (n,) by which biases of a session like this differ from one to the next (eq. 9.3)."""
     out = np.zeros(n)
     accel, gyro, segments = result.accelerometer, result.gyroscope, result.segments
     quality = accel.quality

@@ -25,17 +25,24 @@ from trihedron.simulate import simulate as run
 
 
 def simulate(scenario: str | os.PathLike[str] | Scenario, seed: int = 0) -> tuple[Recording, Truth]:
-    """Simulate a scenario: a record, the name of a ready-made one, or a TOML file (docs/simulation.md).
+    """Simulate an instrument in motion (docs/simulation.md).
+
+    Parameters
+    ----------
+    scenario : str, path or Scenario
+        The name of a ready-made one (``trihedron simulate --list``), a ``.toml`` file, or a record.
+    seed : int
+        Draws the noise; equal scenario and seed give equal bits.
 
     Returns
     -------
     (Recording, Truth)
-        The log as an instrument would write it, and what it was really exposed to and made of.
+        The log as the instrument writes it, and its true motion, parameters and effects.
 
     Raises
     ------
     ValueError
-        When there is no such scenario, or it asks for what cannot be.
+        When there is no such scenario, or its values are impossible.
 
     Examples
     --------
@@ -82,7 +89,16 @@ def with_effects(scenario: str | os.PathLike[str] | Scenario, effects: Sequence[
 
 
 def twin(recording: AnyRecording, calibration: AnyCalibration, seed: int = 0) -> tuple[Recording, Truth]:
-    """Repeat a recording as a simulation: its poses, moves, timing, noise and resolution.
+    """Digital twin: repeat a recording as a simulation: its poses, moves, timing, noise and resolution.
+
+    Parameters
+    ----------
+    recording : Recording, or what trihedron.read takes
+        A session with poses and both sensors.
+    calibration : result of a calibration, Calibration or file
+        Of its unit.
+    seed : int
+        Draws the noise.
 
     Returns
     -------

@@ -30,9 +30,21 @@ def verify(
 ) -> VerificationResult:
     """Gravity error in static poses and tilt error after rotations, in a recording that the calibration has not seen.
 
-    Without ``gravity_m_s2`` or a place, gravity is that of the calibration. ``limit_mg`` and ``limit_deg`` are what the
-    user can accept (rms): beyond them a serious finding says so. Where no limit is said, a miss of more than ten times
-    what noise and the stated errors allow is serious; where one is said and kept, it is a warning.
+    Parameters
+    ----------
+    calibration : result of a calibration, Calibration or file
+        What to test.
+    recording : Recording, or what trihedron.read takes
+        A session that the calibration was not made from.
+    segments : Segments, optional
+        Poses and moves; found when not given.
+    gravity_m_s2 or latitude_deg, height_m : float
+        |g| at the place; that of the calibration unless given.
+    limit_mg, limit_deg : float, optional
+        Accepted rms of the gravity error [mg] and of the tilt error [°]: beyond one a serious finding says so. Without
+        a limit, errors above ten times those expected are serious; with one that is kept they are a warning.
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------

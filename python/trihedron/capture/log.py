@@ -154,7 +154,7 @@ class GrowingLog:
 
     def _refused(self, error: OSError) -> DiskError:
         full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-        why = "the disk is full" if full else f"the disk refuses to write ({error.strerror})"
+        why = "the disk is full" if full else f"the disk cannot be written ({error.strerror})"
         remedy = "free some space and capture anew" if full else "check the disk"
         return DiskError(
             f"{self.path}: {why}; {self.rows_saved} rows are saved and readable, nothing after them: {remedy}.",

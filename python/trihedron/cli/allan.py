@@ -26,7 +26,7 @@ AccelLsb = Annotated[
 ]
 Of = Annotated[
     Path | None,
-    typer.Option("--calibration", metavar="FILE", help="Calibration of the unit: it tells the size of a count."),
+    typer.Option("--calibration", metavar="FILE", help="Calibration of the unit: it gives the size of a count."),
 ]
 Exclude = Annotated[
     list[str] | None,
@@ -37,7 +37,7 @@ Exclude = Annotated[
     ),
 ]
 KeepEvents = Annotated[
-    bool, typer.Option("--keep-events", help="Leave nothing out by itself: knocks, shaking and steps stay in.")
+    bool, typer.Option("--keep-events", help="Exclude nothing automatically: knocks, vibration and steps stay in.")
 ]
 Accuracy = Annotated[
     float,
@@ -45,7 +45,7 @@ Accuracy = Annotated[
 ]
 Plot = Annotated[
     Path | None,
-    typer.Option("--plot", metavar="FILE.png", help="Draw the Allan curves (the report holds them as well)."),
+    typer.Option("--plot", metavar="FILE.png", help="Draw the Allan curves (also in the report)."),
 ]
 Csv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write the Allan curve as a table.")]
 Curve = Annotated[

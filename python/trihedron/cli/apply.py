@@ -47,7 +47,7 @@ def apply(
     from trihedron.report.machine import recording_record
 
     done = applying.apply(known, recording)
-    write_recording(done, output, is_corrected=True, overwrite=force)
+    write_recording(done, output, overwrite=force)
     if str(output) != "-":
         is_even = any(finding.code is FindingCode.EVEN_CLOCK for finding in recording.findings)
         clock = f", timestamps of an even clock of {done.rate_hz:.6g} Hz" if is_even else ""

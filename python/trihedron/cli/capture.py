@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from trihedron.cli.guide import DEFAULT_ACCURACY
-from trihedron.cli.options import Force
+from trihedron.cli.options import Force, GravitySource, with_options
 
 if TYPE_CHECKING:
     from trihedron.capture.recorder import Block, Recorder
@@ -50,9 +50,6 @@ Guide = Annotated[bool, typer.Option("--guide", help="Lead through a calibration
 Browser = Annotated[bool, typer.Option("--browser", help="The guide as a page in the browser.")]
 NoOpen = Annotated[bool, typer.Option("--no-open", help="With --browser: print the link, open nothing.")]
 Accuracy = Annotated[str, typer.Option("--accuracy", metavar="TEXT", help='Of the guide: "accel 0.05 %, gyro 0.1 %".')]
-Gravity = Annotated[
-    float | None, typer.Option("--gravity", metavar="M/S2", help="|g| where the board is, for the guide's calibration.")
-]
 Calibration = Annotated[
     Path | None, typer.Option("--calibration", metavar="FILE", help="Of the guide: calibration to write at the end.")
 ]
@@ -60,7 +57,9 @@ Bell = Annotated[bool, typer.Option("--bell", help="Of the guide: ring when a po
 ListThem = Annotated[bool, typer.Option("--list", help="List the protocols and stop.")]
 
 
+@with_options(place=GravitySource)
 def capture(
+    place: GravitySource,
     port: Port = None,
     output: Output = None,
     protocol: Protocol = "auto",
@@ -74,7 +73,6 @@ def capture(
     browser: Browser = False,
     no_open: NoOpen = False,
     accuracy: Accuracy = DEFAULT_ACCURACY,
-    gravity: Gravity = None,
     calibration: Calibration = None,
     bell: Bell = False,
     list_them: ListThem = False,
@@ -119,14 +117,14 @@ def capture(
             recorder,
             output,
             accuracy,
-            gravity,
+            place.gravity_m_s2,
             browser=browser,
             bell=bell,
             open_browser=not no_open,
             seconds=seconds,
         )
     conclude(recorder, output, recorder.count.tally.saved, is_ended_well=made.is_done)
-    finish(read(output), made.cut_s, gravity, calibration, force=force)
+    finish(read(output), made.cut_s, place, calibration, force=force)
 
 
 def record(recorder: Recorder, output: Path, seconds: float | None) -> None:

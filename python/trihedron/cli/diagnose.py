@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Calibration = Annotated[
     Path | None,
     typer.Option(
-        "--calibration", metavar="FILE", help="Calibration to hold against the log; otherwise one is fitted to it."
+        "--calibration", metavar="FILE", help="Calibration to compare with the log; otherwise one is fitted to it."
     ),
 ]
 Against = Annotated[
@@ -32,7 +32,8 @@ Reference = Annotated[
     typer.Option("--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log."),
 ]
 Improved = Annotated[
-    Path | None, typer.Option("--improved", metavar="FILE.toml", help="Write the scenario with what the log says.")
+    Path | None,
+    typer.Option("--improved", metavar="FILE.toml", help="Write the scenario with the parameters of the log."),
 ]
 Updated = Annotated[
     Path | None, typer.Option("--updated", metavar="FILE", help="Write the calibration that this log itself gives.")
@@ -133,7 +134,7 @@ def _diagnose_many(sources: LogsSource, place: GravitySource, alpha: float, resu
 
 
 def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -> None:
-    """The scenario with what the log says, and what could not be put into it."""
+    """The scenario with the parameters of the log, and what could not be put into it."""
     from trihedron.api import improving
     from trihedron.files.scenario import write_scenario
 

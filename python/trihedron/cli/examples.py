@@ -16,8 +16,8 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "ports": (("What is plugged in, and what it might be:", "trihedron ports"),),
     "capture": (
-        ("The only board that is plugged in, for ten minutes:", "trihedron capture -o log.csv --seconds 600"),
-        ("Led through a calibration:", "trihedron capture -o log.csv --guide --calibration cal.json"),
+        ("A serial board, for ten minutes:", "trihedron capture /dev/ttyUSB0 -o log.csv --seconds 600"),
+        ("Led through a calibration:", "trihedron capture /dev/ttyUSB0 -o log.csv --guide --calibration cal.json"),
         ("A stream over the network:", "trihedron capture tcp://192.168.1.20:9000 -o log.csv"),
     ),
     "guide": (
@@ -35,7 +35,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("The table of poses and the signals with them shaded:", "trihedron segment log.csv --report poses.html"),
     ),
     "calibrate": (
-        ("Everything by itself; gravity from the latitude:", "trihedron calibrate log.csv --latitude 50.1 -o cal.json"),
+        ("Everything detected; gravity from the latitude:", "trihedron calibrate log.csv --latitude 50.1 -o cal.json"),
         (
             "Two files, one per sensor, and a report:",
             "trihedron calibrate --accel a.csv --gyro g.csv --report cal.html",
@@ -66,7 +66,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "Written for a filter:",
             "trihedron noise flight.csv --static rest.csv --reference truth.csv --to kalibr -o imu.yaml",
         ),
-        ("Without a reference, N and K from static stretches and gravity:", "trihedron noise flight.csv"),
+        ("Without a reference, N and K from static intervals and gravity:", "trihedron noise flight.csv"),
     ),
     "allan": (
         ("The terms, the curves and Kalibr's imu.yaml:", "trihedron allan static.csv --report noise.html"),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from trihedron.cli.options import Force, LogSource, with_options
+from trihedron.cli.options import Force, GravitySource, LogSource, with_options
 
 if TYPE_CHECKING:
     from trihedron.capture.recorder import Block, Recorder
@@ -26,15 +26,13 @@ DEFAULT_ACCURACY = "accel 0.1 %, gyro 0.2 %"
 Show = Callable[["GuideView"], None]
 
 
-@with_options(source=LogSource)
+@with_options(source=LogSource, place=GravitySource)
 def guide(
     source: LogSource,
+    place: GravitySource,
     accuracy: Annotated[
         str, typer.Option("--accuracy", metavar="TEXT", help='When to stop: "accel 0.05 %, gyro 0.1 %".')
     ] = DEFAULT_ACCURACY,
-    gravity: Annotated[
-        float | None, typer.Option("--gravity", metavar="M/S2", help="|g| where it was recorded.")
-    ] = None,
     every: Annotated[
         bool, typer.Option("--every", help="Print the screen after every pose, not only the last.")
     ] = False,
@@ -55,9 +53,9 @@ def guide(
         if every:
             put(as_text(view, *_size()) + "\n")
 
-    done = replay(source.read(), wanted, gravity_m_s2=gravity, on_pose=tell)
+    done = replay(source.read(), wanted, gravity_m_s2=place.gravity_m_s2, on_pose=tell)
     put(as_text(done.view, *_size()) + "\n")
-    finish(done.recording, done.cut_s, gravity, output, force=force)
+    finish(done.recording, done.cut_s, place, output, force=force)
 
 
 def _size() -> tuple[int, int]:
@@ -82,7 +80,7 @@ def _line(view: GuideView) -> str:
 
 
 def finish(
-    recording: Recording, cut_s: float | None, gravity: float | None, output: Path | None, *, force: bool
+    recording: Recording, cut_s: float | None, place: GravitySource, output: Path | None, *, force: bool
 ) -> None:
     """Calibrate, verify on the poses held back, report; status 2 where the answer is not to be trusted."""
     from trihedron.api.guiding import conclude
@@ -90,7 +88,7 @@ def finish(
     from trihedron.files.calibration import write_calibration
     from trihedron.report import calibration_report, to_text, verification_report
 
-    result, check = conclude(recording, cut_s, gravity_m_s2=gravity)
+    result, check = conclude(recording, cut_s, **place.said)
     put(to_text(calibration_report(result.calibration, result.segments, result.recording), sections=2, style=style()))
     findings = list(result.calibration.findings)
     if check is not None:
@@ -107,7 +105,7 @@ def run_guided(
     recorder: Recorder,
     log: Path,
     accuracy: str,
-    gravity: float | None,
+    gravity_m_s2: float,
     *,
     browser: bool,
     bell: bool,
@@ -118,13 +116,12 @@ def run_guided(
     from trihedron.api.guiding import examine
     from trihedron.api.reading import read
     from trihedron.records.guiding import Accuracy
-    from trihedron.units import STANDARD_GRAVITY_M_S2
 
     wanted = Accuracy.parse(accuracy)
 
     def look() -> Any:
         recorder.write_now()
-        return examine(read(log), wanted, gravity_m_s2=gravity or STANDARD_GRAVITY_M_S2)
+        return examine(read(log), wanted, gravity_m_s2=gravity_m_s2)
 
     made = _guide(wanted, look)
     columns: list[int] = []

@@ -179,7 +179,7 @@ class GravitySource:
     """|g| at the place of the recording, as said on the command line."""
 
     gravity: Annotated[
-        float | None, typer.Option("--gravity", metavar="M_S2", help="Local gravity [m/s^2]. It goes into every scale.")
+        float | None, typer.Option("--gravity", metavar="m/s^2", help="Local gravity, a factor of every scale.")
     ] = None
     latitude: Annotated[
         float | None, typer.Option("--latitude", metavar="DEG", help="Latitude, from which gravity follows (WGS 84).")
@@ -192,6 +192,13 @@ class GravitySource:
     def said(self) -> dict[str, Any]:
         """As the verbs of ``api`` take it."""
         return {"gravity_m_s2": self.gravity, "latitude_deg": self.latitude, "height_m": self.height}
+
+    @property
+    def gravity_m_s2(self) -> float:
+        """The number, given in either way or standard."""
+        from trihedron.api.choices import settle_gravity
+
+        return settle_gravity(**self.said)[0]
 
 
 def with_options(**groups: type) -> Callable[[Callable[..., None]], Callable[..., None]]:

@@ -206,7 +206,7 @@ def leave(findings: Iterable[Finding]) -> None:
     """End with status 2, and the reason on stderr, when a serious finding says that the answer is not to be trusted."""
     reasons = [finding.seen for finding in findings if finding.severity.value == "serious"]
     if reasons:
-        from trihedron.report.findings.told import first_clause
+        from trihedron.report.findings.grouping import first_clause
 
         more = f" ({len(reasons) - 1} more)" if len(reasons) > 1 else ""
         say(f"trihedron: not to be trusted: {first_clause(reasons[0])}{more}")

@@ -57,9 +57,9 @@ def with_noise_stage(
         own = given
     out: list[Stage] = []
     for stage in stages:
-        misfit = given if stage.stage in ("as-given", "numbers") else own
+        misfit = given if stage.stage in ("as-given", "parameters") else own
         out.append(_with(stage, misfit))
-        if stage.stage == "numbers":
+        if stage.stage == "parameters":
             out.append(_with(Stage("noise", stage.domains), own))
     return tuple(out)
 
@@ -191,7 +191,7 @@ def _numbers_test(parameters: tuple[ParameterDifference, ...]) -> DomainTest:
     significant = [p for p in parameters if p.significant]
     channels = tuple(dict.fromkeys(f"{p.id} {p.name}" for p in significant))
     return DomainTest(
-        "numbers",
+        "parameters",
         f_upper(n, SPREAD_DOF, max(worst.p_value, 1e-300)),
         float(n),
         worst.p_value,
@@ -225,8 +225,8 @@ def _as_given(given: Calibration, recording: Recording, segments: Segments) -> S
             "m/s^2",
         )
     ]
-    if len(checked.rest_rate):
-        domains.append(StageDomain("static-gyro", float(np.sqrt(np.mean(checked.rest_rate**2))), None, "rad/s"))
+    if len(checked.static_rate):
+        domains.append(StageDomain("static-gyro", float(np.sqrt(np.mean(checked.static_rate**2))), None, "rad/s"))
     if len(checked.angle_deg):
         domains.append(
             StageDomain(

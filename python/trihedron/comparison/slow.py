@@ -92,7 +92,7 @@ def slow_noise(model: Side, recording: Side, *, alpha: float) -> tuple[NoiseDiff
     the recording has a name of its own, or disagrees and has none: a walk would be a second name for it.
     """
     out: list[NoiseDifference] = []
-    # A free curve through a simulation's zeros is no mechanism: its walk is. A recording's may be one.
+    # A free curve through a simulation's biases is no mechanism: its walk is. A recording's may be one.
     biases = gyro_biases(*model, with_curve=True), gyro_biases(*recording, with_curve=_has_curve(model[0]))
     rate_hz = model[1].rate_hz
     if biases[0] and biases[1]:

@@ -216,7 +216,7 @@ def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ..
 
 def held_out_stages(bare: Hypothesis, answer: Answer) -> tuple[Stage, ...]:
     """The recording predicted by its own numbers, and, where effects were accepted, by numbers and effects."""
-    stages = (Stage("numbers", _stage(bare)),)
+    stages = (Stage("parameters", _stage(bare)),)
     return (*stages, Stage("effects", _stage(answer.found.model))) if answer.ids else stages
 
 

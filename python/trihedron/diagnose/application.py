@@ -34,7 +34,7 @@ class SignalMissing(RefusedError):
 
 @dataclass(frozen=True, eq=False)
 class SampleContext(Context):
-    """What an effect may look at when it is taken off: every sample is a point, holds and moves are not known."""
+    """What an effect may look at when it is taken off: every sample is a point, poses and moves are not known."""
 
     recording: Recording = field(kw_only=True)
     given_force: FloatArray = field(kw_only=True)

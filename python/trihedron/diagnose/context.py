@@ -68,16 +68,16 @@ class Context:
     # -- motion ---------------------------------------------------------------------------------------------------
     @property
     def force(self) -> FloatArray:
-        """(points, 3) specific force: exactly g along the fitted vertical in holds."""
+        """(points, 3) specific force: exactly g along the fitted vertical in poses."""
         return self.fitted.line.path.force
 
     @property
     def rate(self) -> FloatArray:
-        """(points, 3) angular rate: zero in holds."""
+        """(points, 3) angular rate: zero in poses."""
         return self.fitted.line.path.rate
 
     def derivative(self, values: FloatArray) -> FloatArray:
-        """(points, 3) time derivative inside moves; zero in holds."""
+        """(points, 3) time derivative inside moves; zero in poses."""
         return _core.move_derivative(self.time_s, np.ascontiguousarray(values), self.move_edges)
 
     @cached_property
@@ -92,7 +92,7 @@ class Context:
 
     @cached_property
     def gravity_in_moves(self) -> FloatArray:
-        """(points, 3) minus gravity in the body, carried by the gyro from each move's start; the force in holds."""
+        """(points, 3) minus gravity in the body, carried by the gyro from each move's start; the force in poses."""
         path, state, h = self.fitted.line.path, self.fitted.state, self.obs.n_poses
         out = self.force.copy()
         for where, (before, _) in zip(self.moves, self.obs.move_poses, strict=True):
@@ -141,7 +141,7 @@ class Context:
 
     @cached_property
     def history(self) -> FloatArray:
-        """(n, 3) specific force along each accelerometer's axis at every sample: the fitted pose in holds."""
+        """(n, 3) specific force along each accelerometer's axis at every sample: the fitted pose in poses."""
         obs, state = self.obs, self.fitted.state
         force = obs.raw_force @ state.accel_S.T + state.accel_b
         for i, pose in enumerate(obs.segments.poses):

@@ -57,7 +57,7 @@ def diagnose_recording(
     Parameters
     ----------
     recording, segments : Recording, Segments
-        Raw readings with their still poses and moves.
+        Raw readings with their poses and moves.
     calibration : Calibration
         Linear model of both sensors: the start of the fit; with ``calibration_is_given`` also its prior, so that the
         recording is held against that calibration and not against one fitted to it.

@@ -108,8 +108,8 @@ class Hypothesis:
 
     def asked(self, terms: Sequence[Term], within: Bounds | None = None) -> list[Asked]:
         """What every one of some terms would come to beside those that are there, its noise ``within`` bounds."""
-        starts = [self.strengths, *ELSEWHERE]
-        found = self.fitted.line.core.evidence(_columns(terms), starts, self.within if within is None else within)
+        bounds = self.within if within is None else within
+        found = self.fitted.line.core.evidence(_columns(terms), [self.strengths, *ELSEWHERE], bounds)
         return [Asked(*one) for one in found]
 
     def looked_at(

@@ -38,7 +38,7 @@ def integrate_rate(
     time_s : (n,)
         Instants [s], rising, at any spacing; a timestamp may repeat (nothing turns in between).
     rate : (n, 3)
-        Angular rate [rad/s] along the axes of the body, zero and scale corrected (:func:`trihedron.apply`).
+        Angular rate [rad/s] along the axes of the body, bias and scale corrected (:func:`trihedron.apply`).
     form : "matrices", "quaternions" or "vectors"
         ``(n, 3, 3)``; ``(n, 4)`` as x y z w, the order of SciPy, without jumps of sign; or rotation vectors ``(n, 3)``
         [rad], of length up to π.

@@ -30,10 +30,10 @@ def densities(verifications: list[Verification]) -> list[FloatArray]:
     calibration that misses twice as far is log 2 behind in every point.
     """
     has_angle = all(len(v.angle_deg) for v in verifications)
-    has_rest = all(len(v.rest_rate) for v in verifications)
+    has_rest = all(len(v.static_rate) for v in verifications)
     out = []
     for v in verifications:
-        parts = [v.norm_error, *([v.angle_deg] if has_angle else []), *([v.rest_rate.ravel()] if has_rest else [])]
+        parts = [v.norm_error, *([v.angle_deg] if has_angle else []), *([v.static_rate.ravel()] if has_rest else [])]
         points = []
         for part in parts:
             variance = max(float(np.mean(part**2)), np.finfo(float).tiny)

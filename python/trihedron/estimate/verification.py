@@ -80,7 +80,7 @@ def verify_calibration(
         angle_deg=moves.angle_deg,
         angle_noise_deg=moves.noise_deg,
         angle_sigma_deg=moves.sigma_deg,
-        rest_rate=rest,
+        static_rate=rest,
         moves=moves.which,
         moves_left_out=moves.left_out,
         parameters=parameters,

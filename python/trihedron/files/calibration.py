@@ -67,6 +67,11 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike[str], *,
 def read_calibration(path: str | os.PathLike[str]) -> Calibration:
     """Read and check a calibration file.
 
+    Parameters
+    ----------
+    path : file
+        JSON as ``write_calibration`` writes it.
+
     Returns
     -------
     Calibration

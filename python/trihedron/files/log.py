@@ -16,7 +16,7 @@ from trihedron.records.recording import Recording
 from trihedron.subprocesses import check_tables
 
 LOG_SUFFIXES = (".csv", ".npz", ".parquet")
-_TIMES = ("t [s]", "time_s")
+_TIME = "t [s]"
 
 
 def check_format(path: str | os.PathLike[str]) -> None:
@@ -31,13 +31,10 @@ def check_format(path: str | os.PathLike[str]) -> None:
         raise OutputError(f"{path}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
 
 
-def write_recording(
-    recording: Recording, path: str | os.PathLike[str], *, is_corrected: bool = False, overwrite: bool = False
-) -> None:
+def write_recording(recording: Recording, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write time [s] as the log counts it, the sensors in their own units, and every other column; units in the names.
 
-    What was corrected (``is_corrected``) is in SI: ``time_s``, ``acc_x … acc_z``, ``gyr_x … gyr_z``, all digits. ``-``
-    is CSV on stdout.
+    ``-`` is CSV on stdout.
 
     Raises
     ------
@@ -46,7 +43,7 @@ def write_recording(
     """
     check_format(path)
     check_tables()
-    columns = _corrected_columns(recording) if is_corrected else _columns(recording)
+    columns = _columns(recording)
     if str(path) == "-":
         sys.stdout.write(_frame(columns).write_csv())
         return
@@ -64,7 +61,7 @@ def write_recording(
 
 def _columns(recording: Recording) -> dict[str, FloatArray]:
     # Nanoseconds: finer digits are rounding of 1/rate, and long in text.
-    columns: dict[str, FloatArray] = {"t [s]": np.round(recording.start_epoch_s + recording.time_s, 9)}
+    columns: dict[str, FloatArray] = {_TIME: np.round(recording.start_epoch_s + recording.time_s, 9)}
     for letter, sensor, unit in (
         ("a", recording.accelerometer, recording.accelerometer_unit),
         ("g", recording.gyroscope, recording.gyroscope_unit),
@@ -84,18 +81,10 @@ def _others(recording: Recording) -> dict[str, FloatArray]:
     return columns
 
 
-def _corrected_columns(recording: Recording) -> dict[str, FloatArray]:
-    columns: dict[str, FloatArray] = {"time_s": recording.start_epoch_s + recording.time_s}
-    for name, readings in (("acc", recording.accelerometer), ("gyr", recording.gyroscope)):
-        if readings is not None:
-            columns |= {f"{name}_{axis}": readings[:, k] for k, axis in enumerate(AXES)}
-    return columns | _others(recording)
-
-
 def _frame(columns: dict[str, FloatArray]) -> pl.DataFrame:
     """Whole numbers as integers: a log of counts reads as one."""
     series = {}
     for name, values in columns.items():
         whole = bool(np.all(np.isfinite(values))) and bool(np.all(values == np.round(values)))
-        series[name] = values.astype(np.int64) if whole and name not in _TIMES else np.ascontiguousarray(values)
+        series[name] = values.astype(np.int64) if whole and name != _TIME else np.ascontiguousarray(values)
     return pl.DataFrame(series)

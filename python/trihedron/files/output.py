@@ -147,7 +147,7 @@ def check_report(path: Path) -> None:
         Naming the endings that there are.
     """
     if path.suffix.lower() not in (".html", ".txt", ".json"):
-        raise OutputError(f"{path}: the ending tells the format of a report; give .html, .txt or .json.")
+        raise OutputError(f"{path}: the file's ending selects the format of a report; give .html, .txt or .json.")
 
 
 def check_free(

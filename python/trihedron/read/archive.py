@@ -173,7 +173,7 @@ def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], device: int | 
         names += ["" if block else f"{name}[{i}]" for i in range(array.shape[1])]
         columns += [_column(array[:, i]) for i in range(array.shape[1])]
     if device is not None and not used_device:
-        raise ReadError(f"{path}: a device was asked for but the file holds one device only; leave --device out.")
+        raise ReadError(f"{path}: a device was given, but the file holds one device only; leave --device out.")
     if not columns:
         raise ReadError(
             f"{path}: there is no numeric array of rows in this file (it holds {', '.join(arrays) or 'nothing'})."

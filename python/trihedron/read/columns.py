@@ -110,25 +110,6 @@ def _stated(table: Table, chosen: Columns, explicit: Columns | None) -> Columns:
     return replace(chosen, time_unit=said.unit) if said.unit and chosen.time is not None else chosen
 
 
-def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
-    """Which column became what, and what was kept aside."""
-    roles = []
-    for role in ("time", "accelerometer", "gyroscope", "temperature", "supply"):
-        value = getattr(columns, role)
-        if value is not None:
-            which = value if isinstance(value, tuple) else (value,)
-            roles.append((role, " ".join(table.label(c) for c in which)))
-    rest = [table.label(c) for c in range(len(table.columns)) if c not in columns.used() and len(table.columns[c])]
-    return Finding.of(
-        FindingCode.COLUMNS_RECOGNISED,
-        has_file=bool(file_name),
-        file=file_name,
-        roles=roles,
-        has_rest=bool(rest),
-        rest=rest[:24],
-    )
-
-
 def _mapped(table: Table, mapping: str, sensor: Sensor | None) -> Columns:
     roles: dict[str, int] = {}
     for position, item in enumerate(part.strip() for part in mapping.split(",")):

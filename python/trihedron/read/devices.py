@@ -174,7 +174,7 @@ def one_device(
     if column < 0:
         if choice.instance is not None:
             raise ReadError(
-                f"{table.path}: instance {choice.instance} was asked for, but no column identifies devices; leave "
+                f"{table.path}: instance {choice.instance} was given, but no column identifies devices; leave "
                 "--instance out."
             )
         return table

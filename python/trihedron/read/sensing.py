@@ -18,7 +18,7 @@ from trihedron.records import Finding, FindingCode
 from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si
 
 NEAR_GRAVITY = 0.2
-"""An uncalibrated accelerometer at rest may be this far off: scale a few per cent, zero offset a tenth of g."""
+"""An uncalibrated accelerometer at rest may be this far off: scale a few per cent, bias a tenth of g."""
 MG_OR_GAL = 0.015
 """Share of a length by which a thousand mg must stand off 980.665 cm/s^2; the two differ by 0.02."""
 WHOLE = "whole numbers"

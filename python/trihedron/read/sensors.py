@@ -15,7 +15,8 @@ from trihedron.read.clock.order import in_order
 from trihedron.read.clock.rate import mean_rate_hz, steps_of
 from trihedron.read.clock.settle import settle_clock
 from trihedron.read.clock.unit import TICKS, Witness, counts_rows
-from trihedron.read.columns import Columns, Sensor, find_columns, statement
+from trihedron.read.column_statement import mapping_of, statement
+from trihedron.read.columns import Columns, Sensor, find_columns
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
 from trihedron.read.names import is_rate
@@ -151,10 +152,12 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
     if accelerometer is None and gyroscope is None:
         raise ReadError(f"{path}: the {sensor} is not among its columns; the other sensor is: swap the two files.")
     if chosen.positional and accelerometer is not None and gyroscope is not None:
-        is_swapped = _is_gyro_first(accelerometer, gyroscope, rate, findings)
-        if is_swapped:
+        is_first, why = order_of_triads(accelerometer, gyroscope, rate)
+        if is_first is False:
             accelerometer, gyroscope = gyroscope, accelerometer
             chosen = replace(chosen, accelerometer=chosen.gyroscope, gyroscope=chosen.accelerometer)
+        order = why if is_first is None else f"{why}-{'accelerometer' if is_first else 'gyro'}"
+        findings.append(Finding.of(FindingCode.COLUMNS_ASSUMED, f"six-{order}", mapping=mapping_of(chosen)))
     findings.insert(len(table.findings), statement(table, chosen, path.name if sensor else ""))
     for name, triad, where in (
         ("accelerometer", accelerometer, chosen.accelerometer),
@@ -207,14 +210,6 @@ def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[
         )
     )
     return Clock(np.delete(clock.time_s, drop), clock.start_s, np.delete(rows, drop), clock.findings)
-
-
-def _is_gyro_first(first: FloatArray, second: FloatArray, rate_hz: float, findings: list[Finding]) -> bool:
-    """Whether the first of two unnamed triads is the gyro; what was decided, and why, becomes a finding."""
-    is_first, why = order_of_triads(first, second, rate_hz)
-    order = why if is_first is None else f"{why}-{'accelerometer' if is_first else 'gyro'}"
-    findings.append(Finding.of(FindingCode.COLUMNS_ASSUMED, f"six-{order}"))
-    return is_first is False
 
 
 def _witness(table: Table, chosen: Columns) -> Witness:

@@ -104,7 +104,7 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
     if magic.startswith(b"PK\x03\x04"):
         return read_zip(path, choice, progress)
     if choice.device is not None:
-        raise ReadError(f"{path}: a device was asked for but this is not an .npz archive; leave --device out.")
+        raise ReadError(f"{path}: a device was given, but this is not an .npz archive; leave --device out.")
     # Tables bring a large library with them, which arrays do not need.
     if magic.startswith(b"PAR1"):
         from trihedron.read.parquet import read_parquet

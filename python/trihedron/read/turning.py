@@ -100,7 +100,7 @@ def turning_of(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float)
     if not finite.any():
         return None
     usual = float(np.median(norm[finite]))
-    # Raw zeros may be far off (a gyro of 10 bits reads 512 at rest): the median is the bias, or near it.
+    # Raw biases may be large (a gyro of 10 bits reads 512 at rest): the median is the bias, or near it.
     w = w - np.median(w[finite], axis=0)
     good = finite & (np.abs(norm - usual) < _NEAR_GRAVITY * usual)
     a = a / np.where(finite, norm, 1.0)[:, None]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.read.column_statement import mapping_of
 from trihedron.read.columns import Triad
 from trihedron.read.sensors import Sensors
 from trihedron.read.turning import turning_of
@@ -32,9 +33,7 @@ def unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
         turning = turning_of(accelerometer, rates, rate_hz)
         if turning is None or turning.correlation <= CLEAR_CORRELATION or turning.n < FEWEST_PAIRS:
             continue
-        roles = zip(("ax", "ay", "az", "gx", "gy", "gz"), (*columns.accelerometer, *triad), strict=True)
-        time = [] if columns.time is None else [f"time={columns.time + 1}"]
-        mapping = ",".join([*time, *(f"{role}={column + 1}" for role, column in roles)])
+        mapping = mapping_of(columns, triad)
         listed = " ".join(table.label(column) for column in triad)
         found.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "unnamed-gyro", taken=listed, mapping=mapping))
     return tuple(found)

@@ -167,7 +167,7 @@ class StageDomain(Plain):
 class Stage(Plain):
     """How well the recording is predicted: as given, with numbers, noise, effects re-estimated one after the other."""
 
-    stage: Literal["as-given", "numbers", "noise", "effects"]
+    stage: Literal["as-given", "parameters", "noise", "effects"]
     domains: tuple[StageDomain, ...]
 
 
@@ -176,7 +176,7 @@ class Candidate(Plain):
     """One catalogue effect that was tried, accepted or not, or why it does not apply.
 
     ``score`` is twice the log-evidence that it gains beside what was accepted, corrected for multiple testing; ``size``
-    its parameters there, ``limit95`` what the largest of them is at most (95 %), in its unit; ``stands_against``
+    its parameters there, ``limit95`` what the largest of them is at most (95 %), in its unit; ``superseded_by``
     the accepted effect beside which it is needless, where it would stand without that one.
     """
 
@@ -187,7 +187,7 @@ class Candidate(Plain):
     score: float | None = None
     size: tuple[EffectParameter, ...] = ()
     limit95: float | None = None
-    stands_against: str | None = None
+    superseded_by: str | None = None
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from trihedron.records.frozen import Frozen
 from trihedron.records.plain import Plain
 
 Domain = Literal[
-    "static-accel", "static-gyro", "moves", "dynamics", "rate", "within-static", "timing", "numbers", "noise"
+    "static-accel", "static-gyro", "moves", "dynamics", "rate", "within-static", "timing", "parameters", "noise"
 ]
 DOMAINS: tuple[Domain, ...] = ("static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing")
 

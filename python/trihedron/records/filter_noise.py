@@ -114,7 +114,7 @@ class SensorFilterNoise(Plain):
 
 @dataclass(frozen=True)
 class TiltCheck(Plain):
-    """Without a reference: tilt carried by the gyro from rest to rest against gravity, rms [rad], over ``n`` moves."""
+    """Without a reference: tilt error after a rotation between static intervals, rms [rad], over ``n`` moves."""
 
     n: int
     longest_s: float
@@ -123,20 +123,20 @@ class TiltCheck(Plain):
 
 
 @dataclass(frozen=True)
-class RestCheck(Plain):
-    """Without a reference: change of the gyro's bias between neighbouring static stretches, rms of an axis [rad/s], and
-    what N and K at rest predict of it; scatter of the length of gravity over ``n`` stretches as a part of it."""
+class IntervalCheck(Plain):
+    """Without a reference: change of the gyro's bias between neighbouring static intervals, rms of an axis [rad/s], and
+    what N and K at rest predict of it; scatter of the length of gravity over ``n`` intervals as a part of it."""
 
     n: int
     longest_s: float
     bias_change: float
     predicted: float
-    gravity_scatter: float
+    gravity_spread: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FilterNoise(Presented):
-    """Noise for a filter, of a log: its sensors, and what its rests tell where there is no reference."""
+    """Noise for a filter, of a log: its sensors, and without a reference what its static intervals show."""
 
     sensors: tuple[SensorFilterNoise, ...]
     source: str
@@ -145,7 +145,7 @@ class FilterNoise(Presented):
     band_hz: float
     duration_s: float
     tilt: TiltCheck | None = None
-    rests: RestCheck | None = None
+    intervals: IntervalCheck | None = None
     findings: tuple[Finding, ...] = ()
 
     def __repr__(self) -> str:

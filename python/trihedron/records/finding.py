@@ -201,7 +201,7 @@ class Finding(Frozen, Plain):
     ) -> Finding:
         """A finding by code and values (SI); severity and sentences are the catalogue's (``report/findings``).
 
-        ``case`` tells occasions of one code apart, ``severity`` replaces the usual one where the catalogue allows two,
+        ``case`` separates occasions of one code, ``severity`` replaces the usual one where the catalogue allows two,
         ``numbers`` are figures for machines whose names depend on the recording. A stage writes no sentences: this is
         the one place where a record asks the catalogue for them.
 

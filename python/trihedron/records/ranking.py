@@ -50,9 +50,9 @@ class Ranked:
         return bool(self.suspicions) or not self.verification.is_passed
 
     @property
-    def rest_rms(self) -> float:
+    def static_rate_rms(self) -> float:
         """Rate that is left at rest [rad/s], of the mean over poses; NaN without a gyro."""
-        rest = self.verification.rest_rate
+        rest = self.verification.static_rate
         return float(np.sqrt(np.mean(np.mean(rest, axis=0) ** 2))) if len(rest) else float("nan")
 
 

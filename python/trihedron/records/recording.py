@@ -85,10 +85,10 @@ class Recording(Presented):
         Seconds since the first sample, non-decreasing: the timestamps, or the even clock behind them where ``sampling``
         says so. Gaps are kept.
     accelerometer, gyroscope : (n, 3) or None
-        Raw readings in ``accelerometer_unit`` / ``gyroscope_unit``. At least one sensor is present. Rows that the log
-        lost hold NaN in the sensor that lost them; stages skip them.
+        Raw readings in ``accelerometer_unit`` / ``gyroscope_unit``. At least one sensor is present. A missing
+        reading is NaN; stages skip it.
     rate_hz : float
-        Sampling rate: samples per second outside gaps (a median step would believe timestamps rounded to a
+        Sampling rate: samples per second outside gaps (a median step is biased by timestamps rounded to a
         millisecond).
     temperature_degc, supply_v : (n,) or None
         Auxiliary channels where the log has them.
@@ -218,7 +218,7 @@ class Recording(Presented):
 
     @cached_property
     def facts(self) -> RecordingFacts:
-        """What the readings say of the ADCs behind them: found when first asked for, which the reader does."""
+        """What the readings say of the ADCs behind them: found on first use, by the reader."""
         # How facts are found is a room of its own; a record only carries them.
         found: RecordingFacts = ask("facts_of", self.accelerometer, self.gyroscope, self.rate_hz)
         return found
@@ -232,8 +232,8 @@ class Recording(Presented):
 
     @cached_property
     def low_passes(self) -> dict[str, tuple[LowPass, ...]]:
-        """The filter ahead of each channel by sensor, as white noise in the quietest stretches shows it: found when
-        asked for; none of a sensor that is never static for 32 readings."""
+        """The filter ahead of each channel by sensor, as white noise in the quietest stretches shows it: found on
+        first use; none of a sensor that is never static for 32 readings."""
         found: dict[str, tuple[LowPass, ...]] = ask("find_low_passes", self._readings(), self.rate_hz)
         return found
 

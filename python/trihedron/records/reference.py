@@ -13,6 +13,9 @@ from trihedron.errors import RefusedError
 from trihedron.records.finding import Finding
 from trihedron.records.plain import Layout, Plain
 
+NAMED_FROM = 8.0
+"""Score above which an effect is named, and a clock's offset told from another (docs/reference.md)."""
+
 
 @dataclass(frozen=True, eq=False)
 class ReferenceMotion:

@@ -44,7 +44,7 @@ class Verification(Presented):
     mean allows, ``norm_sigma`` (n,) that and the calibration's own uncertainty. ``angle_deg`` (m,) is the angle between
     gravity carried through a move by the gyro and gravity measured after it; ``angle_noise_deg`` and
     ``angle_sigma_deg`` (m,) the same two predictions for it, ``moves`` (m,) which moves these are: one whose readings
-    stood at the gyro's limit for long carries nothing, and is in ``moves_left_out``. ``rest_rate`` (n, 3) is the
+    stood at the gyro's limit for long carries nothing, and is in ``moves_left_out``. ``static_rate`` (n, 3) is the
     calibrated rate in every pose [rad/s], where the truth is zero: how far the gyro's bias has moved.
     ``parameters`` says the same of every parameter that the log can judge, and names those that it cannot.
     """
@@ -59,7 +59,7 @@ class Verification(Presented):
     angle_deg: FloatArray
     angle_noise_deg: FloatArray
     angle_sigma_deg: FloatArray
-    rest_rate: FloatArray
+    static_rate: FloatArray
     moves: IntArray
     moves_left_out: tuple[int, ...]
     parameters: tuple[JudgedParameter, ...] = ()

@@ -11,7 +11,7 @@ from trihedron.records import Calibration, Recording, Segments, SensorCalibratio
 from trihedron.records.published import AFTER_MOVES, AT_REST
 from trihedron.report.axes import Axes, axes_of
 from trihedron.report.calibration_charts import (
-    correlation_table,
+    correlations,
     strong_correlations,
 )
 from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor
@@ -42,7 +42,7 @@ FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "s
 """The field's names of the frames."""
 NEXT = "Test it on another recording (trihedron verify), then use it (trihedron apply, trihedron export)."
 MOST_PAIRS = 6
-"""Correlated pairs that one line names; the table of correlations holds them all."""
+"""Correlated pairs that one line names; a table further down lists all of them."""
 SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
 
 
@@ -164,7 +164,7 @@ def parameter_table(name: str, sensor: SensorCalibration) -> Table:
     of_S = "S dimensionless" if sensor.raw_unit == sensor.si_unit else f"S in {unit} per {one_of(sensor.raw_unit)}"
     caption = (
         f"{name.capitalize()}: {true} = S {raw}′ + b, with the reading {raw}′ in {unit_in_print(sensor.raw_unit)}, "
-        f"{of_S}; value ± standard uncertainty (1 σ), and σ in % of the value"
+        f"{of_S}; value ± standard uncertainty (1 σ), and σ in % of the value where below 100 %"
     )
     return Table(head, rows, caption)
 
@@ -175,7 +175,7 @@ def _percent(value: float, sigma: float) -> str:
 
 
 def _pairs(strong: list[tuple[str, str, float]]) -> str:
-    more = f"; {len(strong) - MOST_PAIRS} more" if len(strong) > MOST_PAIRS else ""
+    more = f"; {len(strong) - MOST_PAIRS} more (section Uncertainty)" if len(strong) > MOST_PAIRS else ""
     return ", ".join(f"{a} and {b} {plain_number(r, 2)}" for a, b, r in strong[:MOST_PAIRS]) + more
 
 
@@ -243,8 +243,9 @@ def _certainty(calibration: Calibration) -> list[Block]:
     picture = correlation_picture(calibration)
     if picture is not None:
         blocks.append(picture)
-    found = correlation_table(calibration)
-    if found is not None:
-        caption = "Correlations of all free parameters (a: accelerometer, w: gyroscope)"
-        blocks.append(Table(*found, caption))
+    strong, n = strong_correlations(calibration), len(correlations(calibration)[0])
+    if strong:
+        caption = f"Correlations above 0.5; the other {n * (n - 1) // 2 - len(strong)} pairs lie below"
+        pairs = tuple((a, b, plain_number(r, 2)) for a, b, r in strong)
+        blocks.append(Table(("parameter", "with", "correlation"), pairs, caption))
     return blocks

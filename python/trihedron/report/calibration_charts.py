@@ -43,11 +43,13 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
         held = mm_s2(quality.held_out)
         held_sigma = None if quality.held_out_sigma is None else mm_s2(quality.held_out_sigma)
         told = [
-            said(f"held out, {name}", "", v, "mm/s²", None if held_sigma is None else s)
+            said(f"cross-validated, {name}", "", v, "mm/s²", None if held_sigma is None else s)
             for name, v, s in zip(label, held, held if held_sigma is None else held_sigma, strict=True)
         ]
         marks.append(
-            Points(pose + 0.17, held, told, held_sigma, "held out (predicted by a fit without it)", "accent", True)
+            Points(
+                pose + 0.17, held, told, held_sigma, "cross-validated (predicted by a fit without it)", "accent", True
+            )
         )
     told = [said(name, "", v, "mm/s²", s) for name, v, s in zip(label, residual, sigma, strict=True)]
     marks.append(Points(pose - 0.17, residual, told, None, "in sample", "c1"))
@@ -100,8 +102,8 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     if np.any(is_out):
         marks.append(Bars(move - shift, np.where(is_out, quality.angle_deg, np.nan), width, told, "excluded", "soft"))
     if held is not None:
-        told_held = [said(f"held out, {w}", "", v, "°") for w, v in zip(names, held, strict=True)]
-        marks.append(Bars(move + shift, np.where(is_out, np.nan, held), width, told_held, "held out", "accent"))
+        told_held = [said(f"cross-validated, {w}", "", v, "°") for w, v in zip(names, held, strict=True)]
+        marks.append(Bars(move + shift, np.where(is_out, np.nan, held), width, told_held, "cross-validated", "accent"))
     told_noise = [said(f"noise alone, {w}", "", v, "° rms") for w, v in zip(names, noise, strict=True)]
     marks.append(Points(move, noise, told_noise, None, "noise alone (rms)", "ink"))
     shown = np.concatenate([quality.angle_deg[~is_out], [] if held is None else held[~is_out]])
@@ -167,15 +169,3 @@ def correlations(calibration: Calibration) -> tuple[list[str], FloatArray]:
     free = np.flatnonzero(sigma > 0.0)
     r = calibration.covariance[np.ix_(free, free)] / np.outer(sigma[free], sigma[free])
     return [names[k] for k in free], r
-
-
-def correlation_table(calibration: Calibration) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]] | None:
-    """Head and rows of the correlations of all free parameters, two decimals."""
-    kept, r = correlations(calibration)
-    if not kept:
-        return None
-    rows = tuple(
-        (kept[i], *("" if j > i else "1" if j == i else f"{r[i, j]:.2f}".replace("-", "−") for j in range(len(kept))))
-        for i in range(len(kept))
-    )
-    return ("", *kept), rows

@@ -65,7 +65,7 @@ def before_after_panel(calibration: Calibration, means: FloatArray) -> Panel:
     marks: list[Mark] = [Level(y=noise, name="noise alone (rms)", is_dashed=True)] if noise > 0.0 else []
     # As in the residuals beside it: one colour for fits that saw the pose, one for those that did not.
     held = _is_held(quality)
-    kinds = ((before, "before", "soft"), (after, "after" + held * ", held out", "accent" if held else "c1"))
+    kinds = ((before, "before", "soft"), (after, "after" + held * ", cross-validated", "accent" if held else "c1"))
     for values, name, colour in kinds:
         told = [said(f"pose {k}", "", v, "mm/s²") for k, v in enumerate(values, 1)]
         size = np.where(values == 0.0, np.nan, np.abs(values))

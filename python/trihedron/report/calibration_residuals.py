@@ -43,7 +43,7 @@ def _pose_table(sensor: SensorCalibration, quality: FitQuality, segments: Segmen
         "pose",
         *(("mid [s]", "length [s]", "up (body frame)") if is_known else ()),
         "residual [mm/s²]",
-        "held out [mm/s²]",
+        "cross-validated [mm/s²]",
     )
     return Table(head, tuple(rows), "Accelerometer: |f| − |g| of every pose ± what noise alone allows")
 
@@ -83,7 +83,7 @@ def _move_table(quality: FitQuality, segments: Segments | None) -> Table:
         "move",
         *(("poses",) if moves is not None else ()),
         "in sample [°]",
-        "held out [°]",
+        "cross-validated [°]",
         "noise alone [°]",
         "used",
     )

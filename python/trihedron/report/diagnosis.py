@@ -135,7 +135,7 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     places = tuple(
         (MEANING[d.domain], place)
         for d in diagnosis.domains
-        if d.disagrees and d.domain != "numbers" and (place := where_in_words(d))
+        if d.disagrees and d.domain != "parameters" and (place := where_in_words(d))
     )
     if places:
         blocks.append(Facts(places))
@@ -253,7 +253,7 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if not rows:
         return (Paragraph("No effect was added, so there is no before and after."),)
     head = ("effect", "residual", "rms before", "rms after", "χ²/dof before", "χ²/dof after")
-    caption = "Poses and moves predicted by fits that did not see them (held out); noise alone gives χ²/dof 1"
+    caption = "Poses and moves, cross-validated: predicted by fits that did not see them; noise alone gives χ²/dof 1"
     return (Table(head, rows, caption),)
 
 

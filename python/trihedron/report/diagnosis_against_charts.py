@@ -15,7 +15,7 @@ from trihedron.report.document import Block, Picture
 from trihedron.report.numbers import plain_number
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
-STAGES = {"as-given": "as given", "numbers": "parameters", "noise": "noise", "effects": "effects"}
+STAGES = {"as-given": "as given", "parameters": "parameters", "noise": "noise", "effects": "effects"}
 PRINTED = {
     "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
     "rad/s": (degrees_from_radians(1.0), "°/s"),

@@ -115,8 +115,8 @@ def _order(candidate: Candidate) -> float:
 
 def _outcome(candidate: Candidate) -> str:
     """Why an effect that was tried is not in the model: small p alone is no reason beside what was accepted."""
-    if candidate.stands_against is not None:
-        return f"needless beside {candidate.stands_against}"
+    if candidate.superseded_by is not None:
+        return f"redundant with {candidate.superseded_by}"
     return candidate.reason or "not needed"
 
 

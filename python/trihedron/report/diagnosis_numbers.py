@@ -41,7 +41,7 @@ _SIZE = re.compile(r"(?<![\w.])\d[\d.]*(?:e[+−-]?\d+)?")
 _HEAD = ("parameter", "model", "recording", "recording − model", "p of its group")
 _STAGES = {
     "as-given": "as given",
-    "numbers": "parameters",
+    "parameters": "parameters",
     "noise": "noise",
     "effects": "effects",
 }
@@ -200,16 +200,16 @@ def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ..
     stages = [one for k, one in enumerate(diagnosis.stages) if not k or one.domains != diagnosis.stages[k - 1].domains]
     domains = list(dict.fromkeys(d.domain for stage in stages for d in stage.domains))
     cells = {d: [_stage(stage, d) for stage in stages] for d in domains}
-    told = [d for d in domains if len(stages) == 1 or len(set(cells[d])) > 1]
-    rows = tuple((f"{size.get(d, d)} [{_unit_of(stages, d)}]", *cells[d]) for d in told)
+    changed = [d for d in domains if len(stages) == 1 or len(set(cells[d])) > 1]
+    rows = tuple((f"{size.get(d, d)} [{_unit_of(stages, d)}]", *cells[d]) for d in changed)
     if not rows:
         return (Paragraph("No stages: the model was fitted to this recording."),)
     kept = {stage.stage for stage in stages}
     same = [_STAGES[stage.stage] for stage in diagnosis.stages if stage.stage not in kept]
-    caption = "Rms on poses and moves that the fit of each stage did not see"
-    caption += f"; {' and '.join(same)}: as before" if same else ""
-    unchanged = [size.get(d, d) for d in domains if d not in told]
-    caption += f"; {' and '.join(unchanged)}: the same in every stage" if unchanged else ""
+    caption = "Cross-validated rms after each stage"
+    caption += f"; no change by {' and '.join(same)}" if same else ""
+    unchanged = [size.get(d, d) for d in domains if d not in changed]
+    caption += f"; {' and '.join(unchanged)}: no change in any stage" if unchanged else ""
     return (Table(("rms", *(_STAGES[stage.stage] for stage in stages)), rows, caption),)
 
 

@@ -35,7 +35,7 @@ MEANING = {
     "rate": "angular rate beside the reference",
     "within-static": "noise within static poses",
     "timing": "even sampling (seen in motion)",
-    "numbers": "parameters of the model",
+    "parameters": "parameters of the model",
     "noise": "noise and sampling",
 }
 MOST_NAMED = 4
@@ -108,7 +108,7 @@ def next_step_in_words(diagnosis: Diagnosis) -> str:
     rivals = next((effect for effect in diagnosis.effects if effect.confounded_with), None)
     if rivals is not None and rivals.separating_experiment:
         others = listed(list(rivals.confounded_with))
-        return f"Tell {rivals.id} from {others} first: {rivals.separating_experiment}."
+        return f"Separate {rivals.id} from {others} first: {rivals.separating_experiment}."
     if diagnosis.parameters:
         return "Take over what the recording says: --improved FILE.toml (simulation) or --updated FILE (calibration)."
     return "Store the effects with the calibration, for trihedron apply: trihedron calibrate LOG --extended -o FILE."

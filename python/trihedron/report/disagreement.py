@@ -37,15 +37,15 @@ def disagreement_report(
         answer = "The drawn effect is confounded with the first answer in this recording, and the report says so."
     return Document(
         title="A simulation and a log that disagree",
-        subtitle=f"One flaw was drawn (--seed {seed} repeats it) and sealed in a file before anything was computed.",
+        subtitle=f"One flaw was drawn (--seed {seed} repeats it) and written to sealed.json before the diagnosis.",
         verdict=verdict_in_words(found),
         is_trustworthy=True,
         sections=(
             Section("Parameters: this unit differs from the data sheet", (Facts(told or (("", "none differs"),)),)),
             Section("Physics: effects missing from the simulation", effects_blocks(found)),
             Section("Stage by stage", stages_blocks(found, MEANING)),
-            Section("The improved simulation, held against the same log", (Paragraph(verdict_in_words(improved)),)),
-            Section("The seal, opened now", (*_opened(sealed, sizes), Paragraph(answer))),
+            Section("The improved simulation, compared with the same log", (Paragraph(verdict_in_words(improved)),)),
+            Section("The drawn flaw", (*_opened(sealed, sizes), Paragraph(answer))),
             Section("Files", (_files(folder),)),
         ),
     )
@@ -69,7 +69,7 @@ def _files(folder: Path) -> Facts:
         (
             (str(folder / "unit.csv"), "the log of the unit"),
             (str(folder / "simulation.toml"), "the simulation as it was"),
-            (str(folder / "improved.toml"), "the simulation with what the log says; your comments stay"),
+            (str(folder / "improved.toml"), "the simulation with the parameters of the log; your comments stay"),
             (str(folder / "disagreement.html"), "the whole diagnosis, with figures"),
             (str(folder / "sealed.json"), "what was drawn"),
         )

@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from trihedron.arrays import XYZ
-from trihedron.records.filter_noise import Bounded, FilterNoise, RestCheck, SensorFilterNoise, StaticNoise
+from trihedron.records.filter_noise import Bounded, FilterNoise, IntervalCheck, SensorFilterNoise, StaticNoise
 from trihedron.records.finding import FindingCode
 from trihedron.records.plain import as_plain
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
@@ -142,22 +142,22 @@ def _facts(found: FilterNoise) -> tuple[tuple[str, str], ...]:
                 "left over, vibration and bias are in the difference; the heading is not seen)",
             )
         )
-    if found.rests is not None:
-        facts += _of_rests(found.rests)
+    if found.intervals is not None:
+        facts += _of_intervals(found.intervals)
     return tuple(facts)
 
 
-def _of_rests(rests: RestCheck) -> list[tuple[str, str]]:
-    change, predicted = (plain_number(degrees_from_radians(v), 2) for v in (rests.bias_change, rests.predicted))
+def _of_intervals(intervals: IntervalCheck) -> list[tuple[str, str]]:
+    change, predicted = (plain_number(degrees_from_radians(v), 2) for v in (intervals.bias_change, intervals.predicted))
     return [
         (
-            "bias between static stretches",
+            "bias between static intervals",
             f"changes by {change} °/s rms; N and K at rest predict {predicted} °/s (temperature and g-sensitivity are "
             "in the difference)",
         ),
         (
-            "gravity in static stretches",
-            f"differs by {plain_number(100.0 * rests.gravity_scatter, 2)} % rms over {rests.n} (accelerometer "
+            "gravity in static intervals",
+            f"differs by {plain_number(100.0 * intervals.gravity_spread, 2)} % rms over {intervals.n} (accelerometer "
             "calibration left over)",
         ),
     ]
@@ -223,7 +223,7 @@ def filter_noise_record(found: FilterNoise) -> dict[str, Any]:
         "duration_s": found.duration_s,
         "sensors": [as_plain(one) for one in found.sensors],
         "tilt": None if found.tilt is None else as_plain(found.tilt),
-        "rests": None if found.rests is None else as_plain(found.rests),
+        "intervals": None if found.intervals is None else as_plain(found.intervals),
         "findings": [finding.to_dict() for finding in found.findings],
     }
 

@@ -266,5 +266,7 @@ def _logs(summary: FleetSummary) -> Table:
         for log in summary.logs
     )
     return Table(
-        ("log", "device", "status", "verdict", "effects", "poses", "held out [mm/s²]"), rows, "What became of every log"
+        ("log", "device", "status", "verdict", "effects", "poses", "cross-validated [mm/s²]"),
+        rows,
+        "What became of every log",
     )

@@ -95,7 +95,7 @@ def verification_record(verification: Verification) -> dict[str, Any]:
         "tilt_error_sigma_deg": v.angle_sigma_deg,
         "moves": v.moves,
         "moves_excluded": list(v.moves_left_out),
-        "static_rate_rad_s": v.rest_rate,
+        "static_rate_rad_s": v.static_rate,
         "parameters": [vars(one) for one in v.parameters],
         "findings": [finding.to_dict() for finding in v.findings],
     }

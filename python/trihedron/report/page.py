@@ -18,7 +18,7 @@ from markupsafe import Markup, escape
 from trihedron.records import Severity
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 from trihedron.report.drawn import drawn
-from trihedron.report.findings.told import first_clause
+from trihedron.report.findings.grouping import first_clause
 from trihedron.sanitise import one_line, printable
 
 KINDS: dict[type, str] = {

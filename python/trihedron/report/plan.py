@@ -36,7 +36,7 @@ def plan_report(plan: ExperimentPlan) -> Document:
         is_trustworthy=True,
         headlines=tuple(_headlines(plan)),
         lead=_picture(plan.poses),
-        next_step="Choose a set of poses below and record it: trihedron capture --guide leads through it.",
+        next_step="Choose a set of poses below and record it: trihedron capture PORT -o LOG --guide leads through it.",
         sections=(
             Section("Known turns (method 1)", (_turns(plan),)),
             Section(

@@ -192,7 +192,16 @@ def plot(result: object, name: str | None = None, *, ax: Axes | Sequence[Axes] |
 
 
 def report(result: object, path: str | os.PathLike[str] | None = None, *, overwrite: bool = False) -> str:
-    """The whole report of a result as text, and as a file where ``path`` is given: .html with figures, .txt or .json.
+    """The report of a result as text, and as a file where ``path`` is given.
+
+    Parameters
+    ----------
+    result : result of a verb
+        Of calibrate, verify, check, segment, diagnose, allan, plan and the others.
+    path : file, optional
+        ``.html`` with figures, ``.txt`` or ``.json``.
+    overwrite : bool
+        Replace a file that exists.
 
     Returns
     -------

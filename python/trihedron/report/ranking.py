@@ -105,7 +105,7 @@ def _order(ranking: Ranking) -> Table:
             one.maker,
             _with_interval(one.verification.norm_rms, one.norm_interval, mm_s2_from_m_s2(1.0)),
             _with_interval(one.verification.angle_rms_deg, one.angle_interval, 1.0),
-            plain_number(degrees_from_radians(one.rest_rms), 2),
+            plain_number(degrees_from_radians(one.static_rate_rms), 2),
             with_sigma(one.behind, one.behind_sigma) if one.behind_sigma > 0.0 else plain_number(one.behind, 3),
             "rejected" if one.is_rejected else "fits",
         )
@@ -142,7 +142,7 @@ def ranking_record(ranking: Ranking) -> dict[str, object]:
                 "gravity_error_interval_m_s2": list(one.norm_interval),
                 "tilt_error_rms_deg": one.verification.angle_rms_deg,
                 "tilt_error_interval_deg": list(one.angle_interval),
-                "static_rate_rms_rad_s": one.rest_rms,
+                "static_rate_rms_rad_s": one.static_rate_rms,
                 "mistakes": [vars(found) for found in one.suspicions],
                 "without_bias": list(one.without_bias),
                 "findings": [finding.to_dict() for finding in one.verification.findings],

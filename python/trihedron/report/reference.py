@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.arrays import AXES
 from trihedron.records import Calibration
-from trihedron.records.reference import AgainstReference, Estimate, FitToReference, ReferenceError
+from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, FitToReference, ReferenceError
 from trihedron.records.results import CalibrationResult
 from trihedron.report.calibration import calibration_report
 from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
@@ -79,7 +79,7 @@ def reference_headlines(found: AgainstReference) -> list[Headline]:
     out = [Headline("slow error of the reference", size, "°", f"1 σ an axis, within {plain_number(error.slow_s, 2)} s")]
     if found.replay:
         *others, last = found.replay
-        beside = f"by the gyro alone, {last.stage}, held out"
+        beside = f"by the gyro alone, {last.stage}, cross-validated"
         beside += "".join(f"; {plain_number(degrees_from_radians(r.error_rad))}° {r.stage}" for r in others)
         angle = plain_number(degrees_from_radians(last.error_rad))
         out.append(Headline(f"attitude error after {last.horizon_s:g} s", angle, "°", beside))
@@ -199,7 +199,7 @@ def _vector(one: Estimate, scale: float) -> str:
 
 def _left(fit: FitToReference, scale: float, unit: str) -> str:
     text = f"{plain_number(scale * fit.rms)} {unit} rms left up to {plain_number(fit.band_hz, 2)} Hz"
-    text += f", {plain_number(scale * fit.rms_held_out)} {unit} held out in sixteenths"
+    text += f", {plain_number(scale * fit.rms_held_out)} {unit} cross-validated in sixteenths"
     if fit.n_left_out:
         text += f"; {fit.n_left_out} of {fit.n_rows} windows excluded"
     return text
@@ -207,9 +207,8 @@ def _left(fit: FitToReference, scale: float, unit: str) -> str:
 
 def _replayed(error_rad: float, horizon_s: float, n: int) -> str:
     many = "once" if n == 1 else f"{n} times"
-    return (
-        f"{plain_number(degrees_from_radians(error_rad))}° after {horizon_s:g} s by the gyro alone, held out ({many})"
-    )
+    error = plain_number(degrees_from_radians(error_rad))
+    return f"{error}° after {horizon_s:g} s by the gyro alone, cross-validated ({many})"
 
 
 def _matrix(name: str, symbol: str, unit: str, fit: FitToReference) -> Table:
@@ -248,7 +247,7 @@ def _effect(ident: str, one: Estimate) -> Table:
         )
     title = _EFFECTS.get(ident, ident).capitalize()
     if one.score is not None:
-        title += f"   score {plain_number(one.score, 3)} (named from 8{_shown_from(ident, one)})"
+        title += f"   score {plain_number(one.score, 3)} (named from {NAMED_FROM:g}{_shown_from(ident, one)})"
     return Table(("", "", "", "", ""), tuple(rows), title)
 
 

@@ -63,7 +63,7 @@ def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
     elif found.candidates:
         chart = partial(candidates_chart, found.candidates)
         caption = "What each effect would gain with one size in all recordings (twice the log-evidence, less what it "
-        caption += "pays for being one of many): left of 0 nothing."
+        caption += "is corrected for being one of many): left of 0 nothing."
     else:
         return None
     return Picture("shared", caption, chart)

@@ -7,13 +7,15 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.records import Recording, Segments, Verification
+from trihedron.records import FindingCode, Recording, Segments, Verification
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import how_many, in_mm_s2, plain_number, with_sigma
 from trihedron.report.segments import signals_picture
 from trihedron.report.session_charts import verification_chart
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
+
+_ABOVE_NOISE = (FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.HELD_OUT_WORSE)
 
 
 def verification_report(
@@ -34,7 +36,7 @@ def verification_report(
         verdict=verdict_of(
             verification.findings,
             "Verified: errors are within noise and uncertainty.",
-            "Verified",
+            _usable(verification),
             "NOT VERIFIED",
         ),
         is_trustworthy=verification.is_passed,
@@ -43,6 +45,12 @@ def verification_report(
         lead=_errors_picture(verification),
         next_step=USE if verification.is_passed else "",
     )
+
+
+def _usable(v: Verification) -> str:
+    """A warning about the errors themselves takes ``Verified`` away."""
+    is_above = any(finding.code in _ABOVE_NOISE for finding in v.findings)
+    return "Errors exceed noise and uncertainty" if is_above else "Verified"
 
 
 def headlines_of(v: Verification) -> tuple[Headline, ...]:

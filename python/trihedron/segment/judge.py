@@ -30,7 +30,7 @@ def judge_runs(
 ) -> list[Finding]:
     """Settling, bumps and unsteadiness of single poses, each named by its number and time."""
     found: list[Finding] = []
-    sizes = _creep_sizes(channels, runs, noise, CREEP_CHANCE / max(len(runs), 1))
+    sizes = _settling_sizes(channels, runs, noise, CREEP_CHANCE / max(len(runs), 1))
     creeping = [(size, k) for k, size in enumerate(sizes.tolist()) if size > 0.0]
     if creeping:
         worst, k = max(creeping)
@@ -72,7 +72,7 @@ def judge_runs(
     return found
 
 
-def _creep_sizes(channels: Channels, runs: list[Run], noise: MeanNoise, chance: float) -> FloatArray:
+def _settling_sizes(channels: Channels, runs: list[Run], noise: MeanNoise, chance: float) -> FloatArray:
     """(h,) distance of the halves of steady runs in standard errors where it is more than chance allows, else 0."""
     sizes = np.zeros(len(runs))
     judged = [k for k, run in enumerate(runs) if not run.is_unsteady and len(_halves(run)[0]) > 0]

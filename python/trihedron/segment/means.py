@@ -76,7 +76,7 @@ def average_poses(
 
 
 def _shrunk(ratio: FloatArray, freedom: FloatArray, steady: npt.NDArray[np.bool_]) -> FloatArray:
-    """(h, k) excess of every hold on axes that are alike: drawn towards 1 where steady, at its own word elsewhere."""
+    """(h, k) excess of every pose on axes that are alike: drawn towards 1 where steady, at its own word elsewhere."""
     r, nu = ratio.mean(axis=1), freedom * ratio.shape[1]
     prior = _prior_freedom(r[steady], nu[steady])
     pulled = ((prior + nu * r) / (prior + nu))[:, None]
@@ -231,7 +231,7 @@ def upright(mean: FloatArray, *, has_unit: bool) -> FloatArray | None:
     """(h, 3) unit gradients of the length of gravity by the raw means (h, 3) of the accelerometer.
 
     Normals of the ellipsoid with the sensor's axes through the means; where they do not fix one, their own directions
-    if the readings have a unit (zeros are then small beside gravity), else ``None``.
+    if the readings have a unit (biases are then small beside gravity), else ``None``.
     """
     if len(mean) >= FEWEST_ON_ELLIPSOID and np.isfinite(mean).all():
         centre, scale = 0.5 * (mean.max(axis=0) + mean.min(axis=0)), float(np.ptp(mean, axis=0).max())

@@ -15,15 +15,15 @@ from trihedron.segment.means import left_by_rounding
 from trihedron.segment.runs import CREEP_PART, MIN_POSE_S, SAME_POSE, SWAY_RAD, speed_of_moves
 
 TURN_SIGMAS = 6.0
-"""A quiet gyro that reads further than this from the common zero, in robust standard deviations, is turning."""
+"""A quiet gyro that reads further than this from the common bias, in robust standard deviations, is turning."""
 
 
 def turning_blocks(
     channels: Channels, quiet: BoolArray, gravity: float | None, radians_per_reading: float | None
 ) -> BoolArray:
-    """Quiet blocks in which the gyro reads far from its common zero: a slow steady turn, gravity says nothing of.
+    """Quiet blocks in which the gyro reads far from its common bias: a slow steady turn, gravity says nothing of.
 
-    The zero is where the windows of one second are densest, for turns may take most of the time; its scatter is theirs,
+    The bias is where the windows of one second are densest, for turns may take most of the time; its scatter is theirs,
     or that of the poses' nearest windows where that is larger: a bias that depends on the pose is no turn. Where the
     accelerometer sees the tilt too, and the whole turn stays within ``SWAY_RAD`` by both sensors, the pose settles and
     remains a pose: a table that leans a little shows as small a tilt, but the gyro tells how far it turns.
@@ -39,10 +39,10 @@ def turning_blocks(
     for a, b in ranges:
         # Inside the quiet stretch only: the move next to it has its own say.
         second[a:b] = rolling_mean(reading[a:b], channels.blocks(1.0))
-    zero, scatter = _densest(second[quiet])
+    bias, scatter = _densest(second[quiet])
     long = _edges([(a, b) for a, b in ranges if b - a >= channels.blocks(MIN_POSE_S)])
     if len(long) > 2:
-        nearest = np.minimum.reduceat(np.abs(second[: long[-1]] - zero), long[:-1], axis=0)[::2]
+        nearest = np.minimum.reduceat(np.abs(second[: long[-1]] - bias), long[:-1], axis=0)[::2]
         scatter = np.maximum(scatter, 1.4826 * medians(nearest))
     # A few short poses hold a few independent seconds: the shortest interval among them flatters. No window is known
     # better than the white noise of its blocks.
@@ -55,17 +55,17 @@ def turning_blocks(
     noise = medians(channels.variance[quiet][:, gyro]) - channels.quantisation_variance[gyro]
     scatter = np.maximum(scatter, np.sqrt(left_by_rounding(noise, step2)[0] * step2))
     with np.errstate(divide="ignore", invalid="ignore"):
-        distance = np.nan_to_num(np.abs(second - zero) / scatter, nan=0.0)
+        distance = np.nan_to_num(np.abs(second - bias) / scatter, nan=0.0)
     top = speed_of_moves(channels, quiet)
     out[:] = quiet & (distance > TURN_SIGMAS).any(axis=1)
     for a, b in ranges:
         flagged = a + np.flatnonzero(out[a:b])
         if not len(flagged):
             continue
-        is_slow = bool((np.abs(second[flagged] - zero).max(axis=0) < CREEP_PART * top).all())
+        is_slow = bool((np.abs(second[flagged] - bias).max(axis=0) < CREEP_PART * top).all())
         if radians_per_reading is not None:
             # Within a factor of two, which is what is known of the scale.
-            turned = (reading[flagged] - zero).sum(axis=0) * channels.step_s * radians_per_reading
+            turned = (reading[flagged] - bias).sum(axis=0) * channels.step_s * radians_per_reading
             is_slow = is_slow and float(np.linalg.norm(turned)) < 2.0 * SWAY_RAD
         if gravity is not None and is_slow and _tilts_a_little(channels, flagged[0], flagged[-1] + 1, gravity):
             out[a:b] = False
@@ -150,7 +150,7 @@ def drifting_blocks(
     """Blocks (m,) at which the accelerometer's reading moves on, for every window length of ``HALVES_S``.
 
     Over a window the reading changes by noise, and by ``∫ f × ω dt`` if the body turns. The gyro's part is fitted over
-    all windows at once (nine numbers of scale, three of zero: whatever its unit, signs and axes) and the rest is the
+    all windows at once (nine parameters of scale, three of bias: whatever its unit, signs and axes) and the rest is the
     noise of a still sensor, also where nothing in the log is still for as long. A change beyond that noise is motion.
     Marked is the first block of the second half of each window that moves.
     """

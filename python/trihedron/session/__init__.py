@@ -1,1 +1,1 @@
-"""What every estimator of a session of still poses and moves shares: its noise, measured once, and its strengths."""
+"""What every estimator of a session of poses and moves shares: its noise, measured once, and its strengths."""

@@ -54,7 +54,7 @@ def unresolved_variance(
     step_s : float
         Sample step, s.
     quantum : (3,)
-        Step of the converter, whose rounding no hold shows where the zero stays inside one step, and every move does.
+        Resolution (LSB) of the ADC: a pose does not show its rounding where the bias stays inside one step, moves do.
     time_s : (n,)
         Timestamps: filters run from gap to gap, across which smooth motion would look fast.
 

@@ -73,7 +73,7 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
         or segments.accelerometer_sigma_mean is None
         or segments.accelerometer_mean is None
     ):
-        raise RefusedError("the segments do not say how certain their hold means are")
+        raise RefusedError("the segments state no uncertainty of their pose means")
     step_s = 1.0 / recording.rate_hz
     floor = LEAST_SHARE * max(float(np.abs(segments.accelerometer_mean).max()), 1e-300)
     has_rate = recording.gyroscope is not None and segments.gyroscope_sigma is not None
@@ -157,7 +157,7 @@ def scatter_unit(force_sigma: FloatArray, rate_sigma: FloatArray | None, along: 
 
 QUIET, QUIET_OF_NORMAL = 0.3, 0.3853
 """Quantile over the poses of the change from first half to second, and that of |x| for a normal x: slow noise is in all
-poses alike, a zero that jumps only in those where it did."""
+poses alike, a bias that jumps only in those where it did."""
 MAY_EXCEED = 2.5
 """How far the colour of all poses may exceed that of the quiet ones: their quantile is good to a factor of two."""
 
@@ -196,7 +196,7 @@ def coloured_variance(
     return np.outer(move_duration_s, (colour - 1.0) * density**2)
 
 
-# How far 1/f noise carries zeros from pose to pose, from what it does inside poses (docs/model-session.md, 11.12d).
+# How far 1/f noise carries biases from pose to pose, from what it does inside poses (docs/model-session.md, 11.12d).
 
 PARTS = 8
 """Of a pose: their means differ from neighbour to neighbour by white noise, its halves by white noise and flicker."""
@@ -211,7 +211,7 @@ SEEN = 1.0
 
 
 def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray) -> float:
-    """Standard deviation [raw] of a pose's zero about that of the session by flicker alone, along the vertical.
+    """Standard deviation [raw] of a pose's bias about that of the session by flicker alone, along the vertical.
 
     Means of neighbouring parts of length t differ by a variance 2N²/t + 4 ln 2 h of white noise N² and a flicker of
     one-sided density h/f; beneath the frequencies that a pose of length T sees, down to those of a session of length L,

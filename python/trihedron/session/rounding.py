@@ -255,7 +255,7 @@ def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: f
 
 
 def common_bias(bias: FloatArray, var_bias: FloatArray, axes: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Biases (n, 3) and variances of undithered axes: one zero for all poses, as uncertain between them as it scatters.
+    """Biases (n, 3) and variances of undithered axes: one bias for all poses, as uncertain between them as it scatters.
 
     A mean that rounding has moved says nothing of its own pose; what is common to all poses is left to the moves.
     """

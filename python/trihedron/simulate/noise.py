@@ -73,7 +73,7 @@ RESTS = frozenset({"pose", "disturbance", "vibration"})
 
 
 def bias_of_poses(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, rng: np.random.Generator) -> FloatArray:
-    """(n, 3) zeros at ``time_s`` (n,): one normal draw a pose with deviations ``sigma`` (3,), a straight line between.
+    """(n, 3) biases at ``time_s`` (n,): one normal draw a pose with deviations ``sigma`` (3,), a straight line between.
 
     Poses are stretches of rest between which anything moved. Unit: that of ``sigma``.
     """

@@ -1,4 +1,4 @@
-"""Noise of a recording's holds for its twin: N, B and the low-pass that coloured them.
+"""Noise of a recording's poses for its twin: N, B and the low-pass that coloured them.
 
 A non-negative fit to the pooled Allan variance of the poses, for each of a list of filters; the best is kept.
 """

@@ -249,31 +249,6 @@ class LinesDecoder:
         return Frame(counter, ticks, tuple([numbers[i] for i in keep]), text)
 
 
-class SixDofTextDecoder(LinesDecoder):
-    """The 6DOF v4's text: ``A``, count, six readings, ``Z`` between tabs."""
-
-    name = "sparkfun-6dof-text"
-
-    def __init__(self) -> None:
-        columns = (
-            *("count", "acc_x [counts]", "acc_y [counts]", "acc_z [counts]"),
-            *("gyr_y [counts]", "gyr_x [counts]", "gyr_z [counts]"),
-        )
-        super().__init__(lambda _names, rows: LineColumns(columns[: len(rows[0])], counter=0))
-        self.counter_modulus = 1 << 15
-
-    def _take(self, lines: list[bytearray]) -> list[Frame]:
-        inner: list[bytearray] = []
-        for line in lines:
-            fields = line.strip().split(b"\t")
-            if len(fields) == 9 and fields[0] == b"A" and fields[-1] == b"Z":
-                inner.append(bytearray(b"\t".join(fields[1:-1])))
-            elif line.strip():
-                self.corrupt += 1
-                self.skipped_bytes += len(line) + 1
-        return super()._take(inner)
-
-
 def _unprefixed(line: str) -> str:
     return _MONITOR.sub("", line)
 
@@ -301,3 +276,6 @@ def _fields_of_numbers(line: str) -> int:
     line = line.rstrip(" ,;\t")
     fields = line.split(_separator([line]))
     return len(fields) if len(fields) > 1 and all(_is_number(field.strip()) for field in fields) else 0
+
+
+SPOKEN = {LinesDecoder: "text: comma, semicolon, tab or blanks; labels ax:1,ay:2; a monitor's time in front"}

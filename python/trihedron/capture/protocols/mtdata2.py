@@ -122,3 +122,6 @@ def _packets(data: bytes | bytearray, at: int, length: int) -> Packets | None:
         out.append((data[start] << 8 | data[start + 1], start + 3, size))
         start += 3 + size
     return out if start == end else None
+
+
+SPOKEN = {Mtdata2Decoder: "Xsens MTData2 (acceleration, rate of turn, counter, sample time)"}

@@ -71,3 +71,6 @@ class SbgDecoder(FramedDecoder):
             sizes = (*(_PER_M_S2,) * 3, *(per_rad_s,) * 3, _PER_DEGREE_C)
             numbers = [number / size for number, size in zip(numbers, sizes, strict=True)]
         return Frame(None, ticks, tuple(numbers), ",".join(f"{v:.9g}" for v in numbers))
+
+
+SPOKEN = {SbgDecoder: "SBG Systems sbgECom, IMU data and IMU short"}

@@ -10,6 +10,7 @@ import struct
 
 from trihedron.capture.protocols.contract import Frame, printed_numbers
 from trihedron.capture.protocols.framing import FramedDecoder, LineFedDecoder
+from trihedron.capture.protocols.lines import LineColumns, LinesDecoder
 
 _FRAME = struct.Struct(">x7Hx")
 _HIGHEST = 1023
@@ -43,6 +44,28 @@ class SixDofDecoder(FramedDecoder):
         """Counts."""
         numbers = _FRAME.unpack(frame)
         return Frame(numbers[0] % _COUNT_MODULUS, None, numbers[1:], ",".join(map(str, numbers[1:])))
+
+
+class SixDofTextDecoder(LinesDecoder):
+    """The 6DOF v4's text: ``A``, count, six readings, ``Z`` between tabs."""
+
+    name = "sparkfun-6dof-text"
+
+    def __init__(self) -> None:
+        columns = ("count", *SIX_DOF_COLUMNS)
+        super().__init__(lambda _names, rows: LineColumns(columns[: len(rows[0])], counter=0))
+        self.counter_modulus = _COUNT_MODULUS
+
+    def _take(self, lines: list[bytearray]) -> list[Frame]:
+        inner: list[bytearray] = []
+        for line in lines:
+            fields = line.strip().split(b"\t")
+            if len(fields) == 9 and fields[0] == b"A" and fields[-1] == b"Z":
+                inner.append(bytearray(b"\t".join(fields[1:-1])))
+            elif line.strip():
+                self.corrupt += 1
+                self.skipped_bytes += len(line) + 1
+        return super()._take(inner)
 
 
 class RazorDecoder(LineFedDecoder):
@@ -100,3 +123,10 @@ class RazorDecoder(LineFedDecoder):
             return None
         tokens = [text for letter in self._order for text in parts[letter]]
         return Frame(None, None, tuple(map(float, tokens)), ",".join(tokens))
+
+
+SPOKEN = {
+    SixDofDecoder: "SparkFun 6DOF v4, binary frames A ... Z",
+    SixDofTextDecoder: "SparkFun 6DOF v4, text lines A ... Z",
+    RazorDecoder: "SparkFun Razor AHRS, text lines #A-R= #M-R= #G-R=",
+}

@@ -64,3 +64,6 @@ def _checks(content: bytes, check: bytes) -> bool:
     except ValueError:
         return False
     return value == (binascii.crc_hqx(content, 0) if len(check) == 4 else reduce(xor, content, 0))
+
+
+SPOKEN = {VectorNavDecoder: "VectorNav text lines $VNIMU, $VNYMR, $VNQMR, $VNMAR, $VNCMV"}

@@ -103,3 +103,6 @@ def _milliseconds(frame: bytes) -> int:
     """Of the day, of a packet of the clock: year, month, day, hour, minute, second, milliseconds."""
     hour, minute, second, milliseconds = frame[5], frame[6], frame[7], frame[8] | frame[9] << 8
     return (3_600_000 * hour + 60_000 * minute + 1000 * second + milliseconds) % _DAY_MS
+
+
+SPOKEN = {WitMotionDecoder: "WitMotion packets 0x55 0x51, 0x52 (clock 0x50 where it is sent)"}

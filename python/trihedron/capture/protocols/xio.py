@@ -74,3 +74,6 @@ class XioDecoder(LineFedDecoder):
         if values is None or not all(math.isfinite(v) and abs(v) < _LARGEST for v in values):
             return None
         return Frame(None, ticks, tuple(values), text)
+
+
+SPOKEN = {XioDecoder: "xio x-IMU3 inertial messages, text or binary"}

@@ -31,7 +31,7 @@ CODE = "raw_"
 """Begins the name of a parameter that is another one's reading, exact as a converter writes it."""
 
 FAINT = 1.0 - 1.0 / 1.05**2
-"""Of the variance inside still poses: a line of this share raises their scatter by 5 %, as 30 K raise white noise."""
+"""Of the variance inside poses: a line of this share raises their scatter by 5 %, as 30 K raise white noise."""
 
 LARGEST_READ: Mapping[str, float] = MappingProxyType({"accel-bias": STANDARD_GRAVITY_M_S2, "gyro-bias": 1.0})
 """What a scale that follows temperature is a share of where it is taken for a zero: gravity; a turn by hand [rad/s]."""

@@ -262,7 +262,7 @@ def _never_added(
     if not (is_none and would_show):
         return ""
     name = "accelerometer" if prefix == "accel" else "gyro"
-    return words("zeros-never-added", sensor=name)
+    return words("biases-never-added", sensor=name)
 
 
 def _relative_to(prefix: str, a: Invariants, r: Invariants, units: tuple[float | None, float | None]) -> str:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from functools import cache
 from typing import Any
 
 from trihedron.diagnose.effects.contract import Effect
+from trihedron.folders import modules_of
 
 __all__ = ["Effect", "catalogue"]
 
@@ -15,8 +14,8 @@ __all__ = ["Effect", "catalogue"]
 @cache
 def catalogue() -> tuple[Effect, ...]:
     """One instance of every effect in this folder, sorted by id."""
-    for module in pkgutil.iter_modules(__path__):
-        importlib.import_module(f"{__name__}.{module.name}")
+    # An effect that is loaded is found by its class.
+    modules_of(__name__, __path__)
     return tuple(sorted((kind() for kind in _concrete(Effect)), key=lambda effect: effect.id))
 
 

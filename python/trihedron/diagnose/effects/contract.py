@@ -72,7 +72,7 @@ class Effect(ABC):
     is_of_motion: ClassVar[bool] = False
     """Whether it belongs to how the sensor was moved (the arm it was turned on): another session has another."""
     is_of_samples: ClassVar[bool] = False
-    """Whether the share that it states is one of the variance inside still poses (a line)."""
+    """Whether the share that it states is one of the variance inside poses (a line)."""
     leaves_open: ClassVar[tuple[str, ...]] = ()
     """Numbers (ids) whose level depends on where the effect is counted from: a zero at the session's mean temperature
     is no other zero than one at 25 °C."""

@@ -28,7 +28,7 @@ def times_for(context: Context) -> tuple[float, ...]:
 
 
 def shifted(context: Context, values: FloatArray, ahead_s: float) -> FloatArray:
-    """(points, 3) values read ``ahead_s`` later inside moves, their ends held; unchanged in holds.
+    """(points, 3) values read ``ahead_s`` later inside moves, their ends held; unchanged in poses.
 
     By the cubic spline with level ends of every move: a straight line between samples would be a low-pass of its own.
     """

@@ -1,4 +1,4 @@
-"""Resolution too coarse for the noise: means of still poses sit on steps."""
+"""Resolution too coarse for the noise: means of poses sit on steps."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def before_adc(poses: list[FloatArray], step: float) -> tuple[float, FloatArray,
     A hold that sits on a code's middle shows no scatter and one on its edge half a step, whatever the noise: the plain
     scatter says nothing about noise below half a step, the shares of the codes do (interval-censored normal readings).
 
-    Returns sigma in steps, and per hold the posterior mean minus the plain mean and the posterior sigma, in steps.
+    Returns sigma in steps, and per pose the posterior mean minus the plain mean and the posterior sigma, in steps.
     """
     offsets = np.linspace(-0.75, 0.75, 61)
     tables = []

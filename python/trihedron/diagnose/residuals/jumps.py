@@ -1,4 +1,4 @@
-"""Zeros that jump inside still poses: a step through a pose against a smooth curve (eq. 8.7a)."""
+"""Zeros that jump inside poses: a step through a pose against a smooth curve (eq. 8.7a)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Inside the still poses: lines in the spectrum, poses noisier than the others, drift, resolution."""
+"""Inside the poses: lines in the spectrum, poses noisier than the others, drift, resolution."""
 
 from __future__ import annotations
 

@@ -131,7 +131,7 @@ def _noise(recording: Recording, pieces: RestPieces | None, model: LinearModel) 
 def _biases(
     pieces: RestPieces, sensor: Sensor, size: FloatArray, unit: str, alpha: float
 ) -> tuple[DomainTest, DomainTest, list[AcceptedEffect], list[Candidate]]:
-    """One sensor's zeros: as they run, what temperature or a smooth drift takes of them, what stays."""
+    """One sensor's biases: as they run, what temperature or a smooth drift takes of them, what stays."""
     prefix = PREFIX[sensor]
     sigma = pieces.force_sigma if sensor == "accelerometer" else pieces.rate_sigma
     assert sigma is not None
@@ -176,7 +176,7 @@ def _about_poses(pieces: RestPieces, sensor: Sensor) -> FloatArray:
 def _domain(domain: Domain, x: FloatArray, own: FloatArray, unit: str, *, is_named: bool, alpha: float) -> DomainTest:
     """Zeros about the mean of their orientation, in their own unit; they disagree where an effect was named.
 
-    A zero that walks is no disagreement by itself: without an effect nothing contradicts the model.
+    A bias that walks is no disagreement by itself: without an effect nothing contradicts the model.
     """
     chi2 = float(np.mean((x / own) ** 2))
     dof = float(x.size)

@@ -26,7 +26,7 @@ LONGEST_MOVE_S = 180.0
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """Raw readings of one recording, centred, with the layout of its holds and moves.
+    """Raw readings of one recording, centred, with the layout of its poses and moves.
 
     ``segments`` has its poses cut at bumps, ``whole`` as they were found.
     ``raw_force`` (n, 3), ``raw_rate`` (n, 3) are raw readings minus ``force_origin`` / ``rate_origin`` (the mean over
@@ -73,7 +73,7 @@ class Observations:
 
     @property
     def n_poses(self) -> int:
-        """Number of still poses."""
+        """Number of poses."""
         return len(self.pose_force)
 
     @property
@@ -173,7 +173,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
     Raises
     ------
     ValueError
-        When the recording has no accelerometer or fewer than two still poses: there is nothing to hold a twin against.
+        When the recording has no accelerometer or fewer than two poses: there is no session state to compare with.
     """
     recording = recording.with_distinct_timestamps()
     segments, swing = means_beside_lines(recording, segments)

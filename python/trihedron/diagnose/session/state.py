@@ -1,6 +1,6 @@
 """The session model as the diagnosis sees it: a point in its unknowns, what effects add, and the rows judged there.
 
-Unknowns: accelerometer S (lower) and b, gyro S, and for every hold the vertical in the body (2 angles), the gyro bias
+Unknowns: accelerometer S (lower) and b, gyro S, and for every pose the vertical in the body (2 angles), the gyro bias
 and the slow part of the accelerometer bias. Both biases are random walks whose strength comes from the corner time of
 the sensor's noise (docs/model-session.md). The arithmetic is :class:`trihedron._core.SessionModel`.
 """

@@ -32,7 +32,7 @@ def parameter_names() -> tuple[Words, ...]:
         words("scale-of-axis", axis=j + 1) if j == k else words("angle-between-axes", one=k + 1, other=j + 1)
         for j, k in ENTRIES
     ]
-    return (*entries, *(words("zero-of-axis", axis=j + 1) for j in range(3)))
+    return (*entries, *(words("bias-of-axis", axis=j + 1) for j in range(3)))
 
 
 def _unit(directions: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from trihedron.estimate.session.fit import SessionSolution
 from trihedron.probability import chdtrc
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode, Severity
-from trihedron.units import STANDARD_GRAVITY_M_S2, RateUnit, rate_to_si
+from trihedron.units import STANDARD_GRAVITY_M_S2, RateUnit, degrees_from_radians, rate_to_si
 
 MAX_SCALE_RATIO = 1.5
 """Untrimmed MEMS gyros are within 10 % of their data sheet; half as much again is a wrong unit or rate."""
@@ -103,7 +103,7 @@ def _outlier_findings(aligned: Aligned, measured: MoveMeasurements) -> list[Find
                 move=int(index) + 1,
                 before=before + 1,
                 after=after + 1,
-                residual_m_s2=size,
+                residual_deg=degrees_from_radians(size / STANDARD_GRAVITY_M_S2),
                 times=size / sigma,
             )
         )

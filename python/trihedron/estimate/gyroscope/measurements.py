@@ -50,7 +50,7 @@ the correlation that an anti-alias filter leaves between samples."""
 class MoveMeasurements:
     """Everything the alignment needs, in raw units of each sensor.
 
-    ``reading``, ``zero`` (n, 3) are the pose means of accelerometer and gyro, ``var_reading``, ``var_bias`` (n, 3) the
+    ``reading``, ``bias`` (n, 3) are the pose means of accelerometer and gyro, ``var_reading``, ``var_bias`` (n, 3) the
     variances of these means; ``links`` (m, 2) the poses each move joins. ``rows`` (samples,) are the recording's rows
     in and beside moves, move after move, ``time_s`` (samples,) their times, ``edges`` (m, 2) each move among them;
     ``noise_density`` (3,) the angle random walk in raw unit · √s; ``var_bias_walk`` (3,) the variance by which the
@@ -257,7 +257,7 @@ def _bridged(
 def _with_hidden_bias(
     bias: FloatArray, var_bias: FloatArray, segments: Segments, quantum: FloatArray, undithered: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
-    # Rounding hides the same part of every pose's zero: what it hides is fitted to the moves, as one offset.
+    # Rounding hides the same part of every pose's bias: that part is fitted to the moves, as one offset.
     hidden = np.where(undithered, quantum**2 / 12.0, 0.0)
     own = np.maximum(np.asarray(segments.gyroscope_sigma_mean, dtype=np.float64) ** 2 - hidden, 0.0)
     return common_bias(bias, np.where(undithered, own, var_bias), undithered)

@@ -99,10 +99,10 @@ def _unit(axis: int, direction: tuple[float, float, float] | None) -> FloatArray
 
 @dataclass(frozen=True, eq=False)
 class MeasuredTurns:
-    """``raw_angle`` (k, 3) = ∫w' dt and ``duration_s`` (k,) of the turns, the same of the zero turns, and their noise.
+    """``raw_angle`` (k, 3) = ∫w' dt and ``duration_s`` (k,) of the turns and of the static intervals, and their noise.
 
     ``var_rate`` (3,) is ``N²`` in raw unit² · s; ``bias_spread`` (3,) the variance of the true bias between
-    zero turns, ``bias_excess`` (3,) the χ² of its constancy. ``hidden``: what a coarse ADC hides of them.
+    static intervals, ``bias_excess`` (3,) the χ² of its constancy. ``hidden``: what a coarse ADC hides of them.
     """
 
     raw_angle: FloatArray
@@ -117,7 +117,7 @@ class MeasuredTurns:
 
 
 def measure_turns(recording: Recording, turns: Sequence[Turn], static: Sequence[tuple[int, int]]) -> MeasuredTurns:
-    """Integrate turns and zero turns; noise from the zero turns.
+    """Integrate turns and static intervals; noise from the static intervals.
 
     Raises
     ------

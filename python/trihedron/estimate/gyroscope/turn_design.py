@@ -16,7 +16,7 @@ from trihedron.transforms import cross_matrix
 @dataclass(frozen=True, eq=False)
 class TurnDesign:
     """Standard errors by one route: ``scale`` (3,) of a row of ``S_w`` towards each axis, per unit of noise in the raw
-    reading's own unit per rad, and ``zero`` of ``b_w``. With the noise in rad/s/√Hz both are relative and rad/s."""
+    reading's own unit per rad, and ``bias`` of ``b_w``. With the noise in rad/s/√Hz both are relative and rad/s."""
 
     scale: FloatArray
     bias: float
@@ -58,7 +58,7 @@ def design_bias_first(
     noise_density: float,
     sigma_turn_rad: float = 0.0,
 ) -> TurnDesign:
-    """``b_w = φ'_0/Δt_0`` from the zero turn, then ``S_w`` from the turns freed of it: the manual's problem 3.
+    """``b_w = φ'_0/Δt_0`` from the static interval, then ``S_w`` from the turns freed of it: the manual's problem 3.
 
     ``var b = N²/Δt_0``, ``var S_j = 1/Q_j + (P_j/Q_j)² N²/Δt_0``; for one turn ``N² Δt (1 + Δt/Δt_0)/φ²``.
 

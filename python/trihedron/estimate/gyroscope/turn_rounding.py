@@ -70,7 +70,7 @@ Group = tuple[int, float, int]
 
 @dataclass(frozen=True, eq=False)
 class HiddenAngles:
-    """Raw angles of ``turns`` (k, 3, m) and ``zeros`` (z, 3, m) by one standard error of each of m independent errors.
+    """Raw angles of ``turns`` (k, 3, m) and ``static`` (z, 3, m) by one standard error of each of m independent errors.
 
     ``passing`` (k, 3) is the variance by steps that a turn only passes through, where the errors run through all values
     and cancel but for one of them.
@@ -99,12 +99,12 @@ def hidden_angles(
     static: Sequence[tuple[int, int]],
     raw_angle: FloatArray,
 ) -> HiddenAngles | None:
-    """What rounding to ``quantum`` (3,) hides of turns and zero turns; ``None`` where noise dithers every axis.
+    """What rounding to ``quantum`` (3,) hides of turns and static intervals; ``None`` where noise dithers every axis.
 
     A rate that stays inside a step is misread by the same part of it, uniform with q²/12, as long as it stays: for T
     seconds the angle is off by ``q T/√12``. Turns about one axis in one sense that read the same code may have run at
-    one rate (a table's): they share the error, and so do all zero turns. Another code, the other sense, another axis
-    have their own: with w' = z at rest and z ± mω across a turn there and back, all read alike, (z, mω) is uniform on
+    one rate (a table's): they share the error, and so do all static intervals. Another code, sense or axis
+    has its own: with w' = z at rest and z ± mω across a turn there and back, all read alike, (z, mω) is uniform on
     ``|z| + |mω| < q/2``, where mω has the variance q²/24 that two independent errors give it.
     """
     still = np.concatenate([readings[a:b] for a, b in static])

@@ -1,4 +1,4 @@
-"""The linear system of method 1: ``φ'_i = S_w φ_i + b_w Δt_i + δφ_i`` for turns and zero turns, weighed by noise."""
+"""The linear system of method 1: ``φ'_i = S_w φ_i + b_w Δt_i + δφ_i`` weighted by noise."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class TurnSystem:
         return self._noise(self.measured.duration_s, None if hidden is None else hidden.variance_of_turns())
 
     def noise_of_biases(self) -> FloatArray:
-        """(z, 3, 3) of the raw zero turns."""
+        """(z, 3, 3) of the raw static intervals."""
         hidden = self.measured.hidden
         return self._noise(self.measured.static_duration_s, None if hidden is None else hidden.variance_of_biases())
 
@@ -87,7 +87,7 @@ class TurnSystem:
         return matrix
 
     def whitened(self, used: BoolArray, with_biases: bool = True) -> tuple[FloatArray, FloatArray]:
-        """Whitened design (n, 12) and raw turns (n,) of the used turns, then of the zero turns."""
+        """Whitened design (n, 12) and raw turns (n,) of the used turns, then of the static intervals."""
         measured = self.measured
         factor = self.factor(used)
         design = factor @ self.designs(self.angles[used], measured.duration_s[used]).reshape(-1, 12)
@@ -141,7 +141,7 @@ class Solution:
 
 
 def solve(system: TurnSystem, used: BoolArray) -> Solution:
-    """Weighted least squares over turns and zero turns at once."""
+    """Weighted least squares over turns and static intervals at once."""
     matrix, side = system.whitened(used)
     size = np.linalg.norm(matrix, axis=0)
     q, r = np.linalg.qr(matrix / size)

@@ -50,7 +50,7 @@ def calibrate_turns(
     turns : sequence of Turn
         Where the turns are; axis and angle (whole turns too) are found from the data where they are not given.
     zeros : sequence of (start, stop)
-        Stretches without rotation: zero turns.
+        Intervals without rotation.
     nominal_scale : (3, 3) or float, optional
         rad/s per raw unit, to recognise quarter turns; the unit tells it unless readings are counts.
         Turns whose angle and axis are given need none, and are believed where they span three axes.

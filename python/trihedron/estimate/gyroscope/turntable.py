@@ -177,7 +177,7 @@ def on_turntable(
         raise RefusedError("turntable_sigma is the error of turntable_deg_s: give the speeds, too.")
     gyro = calibration.gyroscope
     if gyro is None or recording.gyroscope is None:
-        raise RefusedError("a turntable tells the gyro, and none was calibrated here; log poses and moves as well.")
+        raise RefusedError("a turntable calibrates the gyro, and this log has none; log poses and moves as well.")
     found = plateaus(recording, segments)
     speeds = _speeds(found, speeds_deg_s, recording.rate_hz)
     used = speeds > 0.0

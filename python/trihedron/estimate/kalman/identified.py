@@ -20,7 +20,7 @@ MOST_ABOVE = 2.0
 MOST_BELOW = 3.0
 """The other way round: a sensor may be quieter in a session than in an office, not so in every octave."""
 LARGEST_MISS_OF_GRAVITY = 0.3
-"""Part of g by which a log of rest may miss it as the calibration reads it: ranges differ by factors of two, zeros
+"""Part of g by which a log of rest may miss it as the calibration reads it: ranges differ by factors of two, biases
 from one day to another, or of a second unit of a cheap kind, by less."""
 COARSER = math.sqrt(2.0)
 """Steps that differ by more are of another ADC or range."""

@@ -265,8 +265,8 @@ def _observability(f: FloatArray) -> tuple[Observability, list[Finding]]:
     condition = float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
     weakest = int(np.argmax(np.abs(directions[-1])))
     axis = "" if weakest == 3 else AXES[weakest]
-    name = words("sensitivity-to", axis=axis) if axis else words("zero-reading")
-    advice = words("tilt-towards-vertical", axis=axis) if axis else words("zero-both-ways")
+    name = words("sensitivity-to", axis=axis) if axis else words("bias")
+    advice = words("tilt-towards-vertical", axis=axis) if axis else words("bias-both-ways")
     rank = int(np.sum(values > 1e-9 * values[0]))
     observability = Observability(rank, 4, condition, values, weakest=name, advice=(advice,))
     findings: list[Finding] = []
@@ -274,7 +274,7 @@ def _observability(f: FloatArray) -> tuple[Observability, list[Finding]]:
         findings.append(
             Finding.of(
                 FindingCode.WEAKLY_OBSERVABLE,
-                "kalman-sensitivity" if axis else "kalman-zero",
+                "kalman-sensitivity" if axis else "kalman-bias",
                 axis=axis,
                 condition=condition,
             )

@@ -61,7 +61,7 @@ def pose_readings(recording: Recording, segments: Segments, table: PoseTable | N
         if np.any(chosen >= segments.n_poses):
             worst = int(np.max(chosen)) + 1
             raise RefusedError(
-                f"{table.source}: pose {worst} is asked for, but {recording.source} has {segments.n_poses} poses"
+                f"{table.source}: pose {worst} is requested, but {recording.source} has {segments.n_poses} poses"
             )
         if np.any(np.diff(chosen) <= 0):
             raise RefusedError(f"{table.source}: give the poses in the order in which they were recorded, each once")

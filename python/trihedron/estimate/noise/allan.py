@@ -49,14 +49,18 @@ def allan_deviation(
     ----------
     x : (n,) or (n, channels)
         Equally spaced readings in any unit, float64, float32, int16 or int32 (not copied when C-contiguous). NaN marks
-        a missing reading; clusters are then means of the readings they have, weighted by their number, and freed of
-        what such means scatter about those of all readings (docs/noise.md, section 1).
+        a missing reading; clusters are then means of the readings they have, weighted by their number, with the
+        scatter of such means about those of all readings subtracted (docs/noise.md, section 1).
     rate_hz : float
         Samples per second.
     clusters : (k,) of int, optional
         Readings per cluster; by default four to the octave up to the longest with a term.
-    kind
+    kind : str
         ``overlapping`` uses every start; see :data:`~trihedron.records.noise.AllanKind`.
+    confidence : float
+        Of the intervals.
+    names, units : sequence of str
+        One per channel, for reports.
 
     Returns
     -------

@@ -111,12 +111,16 @@ def identify_noise(
         Equally spaced readings in any unit; NaN marks a missing one.
     rate_hz : float
         Samples per second.
-    names, units
+    names, units : sequence of str
         One per channel.
     exclude_s : sequence of (start, stop)
-        Stretches to leave out, in seconds from the first reading.
-    automatic
-        Leave out knocks and shaken stretches by itself, and start a new level at each step; each is a finding.
+        Intervals to exclude, in seconds from the first reading.
+    automatic : bool
+        Exclude knocks and intervals of vibration, and start a new level at each step; each is a finding.
+    clusters : (k,) of int, optional
+        Readings per cluster of the Allan curve.
+    source : str
+        Name of the log, for reports.
 
     Returns
     -------
@@ -126,12 +130,12 @@ def identify_noise(
     Raises
     ------
     ValueError
-        When the log is shorter than 512 readings, an excluded stretch is no stretch, or a channel does not change.
+        When the log is shorter than 512 readings, an interval to exclude is empty, or a channel does not change.
 
     Examples
     --------
     >>> import numpy as np
-    >>> noise = identify_noise(np.random.default_rng(1).normal(size=100_000), rate_hz=100.0)
+    >>> noise = trihedron.identify_noise(np.random.default_rng(1).normal(size=100_000), rate_hz=100.0)
     >>> round(noise.axes[0].value("N"), 3), noise.axes[0].terms["K"].is_present
     (0.099, False)
     """

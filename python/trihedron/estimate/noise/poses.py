@@ -137,11 +137,11 @@ def noise_of_poses(readings: npt.ArrayLike, rate_hz: float, poses: Sequence[tupl
     Parameters
     ----------
     readings : (n,) or (n, channels)
-        Raw readings; NaN marks a missing one (holds are cut there).
+        Raw readings; NaN marks a missing one (poses are divided there).
     rate_hz : float
         Samples per second.
     poses : sequence of (start, stop)
-        Windows of stillness, in readings.
+        Static intervals, in readings.
 
     Raises
     ------

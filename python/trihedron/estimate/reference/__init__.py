@@ -3,6 +3,5 @@
 from trihedron.estimate.reference.accelerometer import turns_of_frame
 from trihedron.estimate.reference.fit import fit_reference, fit_references, moves_along
 from trihedron.estimate.reference.gyroscope import poses_at_rest
-from trihedron.estimate.reference.motion import ACCEPTED
 
-__all__ = ["ACCEPTED", "fit_reference", "fit_references", "moves_along", "poses_at_rest", "turns_of_frame"]
+__all__ = ["fit_reference", "fit_references", "moves_along", "poses_at_rest", "turns_of_frame"]

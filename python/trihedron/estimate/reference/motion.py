@@ -20,6 +20,7 @@ from trihedron.estimate.reference.likelihood import (
     most_likely,
     together,
 )
+from trihedron.records.reference import NAMED_FROM
 
 ALWAYS = ("S", "b", "clock", "earth", "gyro-g-sensitivity")
 """What every hypothesis holds: g-sensitivity by the size that data sheets give it, named or not."""
@@ -27,8 +28,6 @@ EFFECTS = {"gyro-g-sensitivity": ("gyro-g-sensitivity",), "gyro-scale-nonlineari
 WIDER = (0.3, 1.0, 3.0, 10.0, 30.0)
 """Sizes, in those of data sheets, that a recording may ask for."""
 MARGIN = 2.0
-ACCEPTED = 8.0
-"""Score from which an effect is named (docs/decisions.md)."""
 PAID = 2.0 * np.log(len(WIDER) * len(EFFECTS))
 """What a score pays for what was tried."""
 LARGEST = 100.0
@@ -134,10 +133,10 @@ class Scored:
     @property
     def is_accepted(self) -> bool:
         """Whether it is named."""
-        return self.score > ACCEPTED
+        return self.score > NAMED_FROM
 
     def shown_from(self) -> float:
-        """Size of all its numbers, in those of data sheets, whose expected score is ``ACCEPTED``; infinite if none.
+        """Size of all its numbers, in those of data sheets, whose expected score is ``NAMED_FROM``; infinite if none.
 
         Beside a reference with information Λ of them, numbers of size s raise twice the log evidence by
         Σ λs² - ln(1 + λs²) on average.
@@ -151,7 +150,7 @@ class Scored:
 
         def short(size: float) -> float:
             gain = told * size**2
-            return float(np.sum(gain - np.log1p(gain)) - PAID - ACCEPTED)
+            return float(np.sum(gain - np.log1p(gain)) - PAID - NAMED_FROM)
 
         return float(brentq(short, 0.0, LARGEST)) if short(LARGEST) > 0.0 else float("inf")
 

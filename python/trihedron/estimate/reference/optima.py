@@ -9,7 +9,8 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.reference.likelihood import Problem, equations, most_likely, together
-from trihedron.estimate.reference.motion import ACCEPTED, MotionFit
+from trihedron.estimate.reference.motion import MotionFit
+from trihedron.records.reference import NAMED_FROM
 
 REACH_S, STEP_S = 0.3, 0.02
 """Shifts that are tried: beyond them the sizes of the rates have told one place from another."""
@@ -38,11 +39,11 @@ def refuse_two_clocks(found: MotionFit, k: int) -> None:
     spread = found.fitted.spread()[k : k + 1]
     there = most_likely([problem(shifts[best])], strengths, spread)[1]
     here = most_likely([problem(0.0)], strengths, spread)[1]
-    if 2.0 * (here - there) < ACCEPTED:
+    if 2.0 * (here - there) < NAMED_FROM:
         at = float(found.value(k, "clock")[0])
         raise RefusedError(
             f"{side.reference.motion.source}: the motion fits two offsets of the reference's clock, {at:+.4g} s and "
-            f"{at + shifts[best]:+.4g} s (evidence {2.0 * (here - there):.1f} apart, {ACCEPTED:g} needed): shake the "
+            f"{at + shifts[best]:+.4g} s (evidence {2.0 * (here - there):.1f} apart, {NAMED_FROM:g} needed): shake the "
             "unit once, irregularly, or give the reference timestamps of the log's own clock."
         )
 

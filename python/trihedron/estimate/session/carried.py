@@ -74,7 +74,7 @@ def held_out(
 ) -> HeldOut | None:
     """Every k-th hold, then every k-th move, left out of the whole fit; ``None`` where too few would remain.
 
-    Strengths of the zeros and widening of the moves are those of the whole session; what the others say is one linear
+    Strengths of the biases and widening of the moves are those of the whole session; what the others say is one linear
     step from its optimum (eq. 11.15).
     """
     n, m = len(observed.pose_force), len(observed.before)

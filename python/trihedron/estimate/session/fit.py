@@ -1,4 +1,4 @@
-"""The session solved without effects: both sensors, one zero for the session, and the certainty of all of them."""
+"""The session solved without effects: both sensors, one bias for the session, and their uncertainties."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ STATIC_FORCE, MOVES, DYNAMICS = 0, 2, 3
 class SessionSolution:
     """A session at its optimum, in the lower frame, on raw readings.
 
-    ``S_a``, ``b_a``, ``S_w``, ``b_w`` with their ``covariance`` (24, 24); the zeros are those of one for the session.
+    ``S_a``, ``b_a``, ``S_w``, ``b_w`` with their ``covariance`` (24, 24); biases are those of one for the session.
     ``moves_chi2`` over ``moves_dof`` degrees of freedom of gravity after the moves, in the noise of the samples.
-    ``inflation`` of the moves' standard errors; ``accel_bias_rms`` what the zeros of the holds differ from
+    ``inflation`` of the moves' standard errors; ``accel_bias_rms`` the rms by which the biases of the poses differ from
     the session's by, m/s²: as far as S, b alone must miss.
     """
 

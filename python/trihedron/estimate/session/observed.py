@@ -25,7 +25,7 @@ HELD = 1e-10
 class Observed:
     """One session for the core, readings minus ``force_origin``, ``rate_origin`` (3,).
 
-    Hold means and standard errors (n, 3), densities (3,) raw · √s, the samples of the ``moves`` with the holds
+    Pose means and standard errors (n, 3), densities (3,) raw · √s, the samples of the ``moves`` with the poses
     ``before`` (m,) they begin in; ``force_slope`` (poses, then samples of moves, 3) raw/s, nothing in poses;
     ``force_up``, ``force_scatter`` as in :class:`SessionNoise`. ``rate_hidden`` (like ``force_slope``, one column an
     axis whose noise does not dither its LSB): where readings stand in the LSB of their bias, off by its place inside,
@@ -55,7 +55,7 @@ class Observed:
     prior: tuple[FloatArray, FloatArray] | None = None
 
     def model(self) -> _core.SessionModel:
-        """The Rust model; zeros may scatter from pose to pose as far as the evidence goes."""
+        """The Rust model; biases may scatter from pose to pose as far as the evidence goes."""
         poses = _core.SessionPoses(
             time_s=self.pose_time_s,
             force=self.pose_force,

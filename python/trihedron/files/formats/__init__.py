@@ -11,9 +11,7 @@ import os
 import re
 from dataclasses import replace
 from functools import cache
-from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
 
 import numpy as np
 
@@ -24,6 +22,7 @@ from trihedron.files.calibration import CalibrationFileError, read_calibration
 from trihedron.files.formats.contract import ExportOptions, Format, NoiseFigure, SensorNoise, given
 from trihedron.files.formats.matrices import lower_orthogonal, upper_frame
 from trihedron.files.plausible import require_plausible
+from trihedron.folders import modules_of
 from trihedron.records import Calibration
 from trihedron.sanitise import printable
 
@@ -47,8 +46,7 @@ __all__ = [
 @cache
 def formats() -> dict[str, Format]:
     """Every format by its name."""
-    modules = (import_module(f"{__name__}.{found.name}") for found in iter_modules(__path__))
-    found = [module.FORMAT for module in modules if hasattr(module, "FORMAT")]
+    found = [module.FORMAT for module in modules_of(__name__, __path__) if hasattr(module, "FORMAT")]
     return {one.name: one for one in sorted(found, key=lambda one: one.name)}
 
 

@@ -12,10 +12,9 @@ from trihedron.read.table import Table
 from trihedron.read.text.blocks import Cursor, as_utf8, beginning, blocks
 from trihedron.read.text.dialect import Rewritten, rewrite
 from trihedron.read.text.json_log import is_json, of_json
-from trihedron.read.text.novatel import of_novatel
+from trihedron.read.text.makers import makers
 from trihedron.read.text.reader import TextReader
 from trihedron.read.text.records import split_records
-from trihedron.read.text.sensorstream import of_sensorstream
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress
 
@@ -53,7 +52,7 @@ def read_text(
         if found is not None:
             tables, counts = found
             return _of_records(path, size, progress, tables, dict(counts), sha256)
-    for dialect in (of_novatel, of_sensorstream, rewrite):
+    for dialect in (*makers(), rewrite):
         if dialect(head) is not None:
             rewritten = dialect(_whole(path, compression, size, content))
             if rewritten is not None:

@@ -1,5 +1,5 @@
 """What the tool noticed, in words: the closed catalogue of sentences, and findings as a reader wants them told."""
 
-from trihedron.report.findings.told import findings_block, ranged, told_once, verdict_of
+from trihedron.report.findings.grouping import combined, findings_block, ranged, verdict_of
 
-__all__ = ["findings_block", "ranged", "told_once", "verdict_of"]
+__all__ = ["combined", "findings_block", "ranged", "verdict_of"]

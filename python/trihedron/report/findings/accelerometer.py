@@ -58,7 +58,8 @@ ENTRIES = (
         Code.WEAKLY_OBSERVABLE,
         "poses",
         WARNING,
-        "Some orientations are predicted {times_worse:.2g} times worse than one pose; least certain: {weakest}.",
+        "In some orientations gravity is predicted {times_worse:.2g} times as uncertainly as one pose measures it; "
+        "least certain: {weakest}.",
         "No pose lies near those orientations.",
         _ADD_POSES,
         numbers=("rank", "n_parameters", "worst_prediction_g"),

@@ -289,7 +289,7 @@ _MANY_RECORDINGS = (
         "",
         WARNING,
         "Recording {name} was excluded: {why}.",
-        "One recording that cannot be calibrated does not stop the others.",
+        "This recording alone does not determine a calibration; the others are used.",
         "See `trihedron check {path}`.",
     ),
     Entry(

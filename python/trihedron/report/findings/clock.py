@@ -171,8 +171,8 @@ _HOW = (
     "samples are timestamped on arrival|off by {timestamp_error_s:.2g ms} rms}}"
 )
 _BY_MOTION = (
-    "{motion_tells:?readings in motion follow {followed:.2g %} ± {sigma_followed:.2g %} of that (0 %: sampled evenly, "
-    "100 %: as timestamped)|no motion shows when samples were taken}"
+    "{motion_tells:?readings in motion show {followed:.2g %} ± {sigma_followed:.2g %} of this scatter "
+    "(0 %: sampled evenly, 100 %: sampled at the timestamps)|no motion shows when samples were taken}"
 )
 _WITH_THEM = (
     "period_s", "sigma_period_s", "timestamp_error_s", "shared_fraction", "followed", "sigma_followed", "grid_s",
@@ -185,7 +185,7 @@ _CLOCKS = (
         Code.EVEN_CLOCK,
         "",
         NOTE,
-        f"The timestamps are those of an even clock {_EVEN}, {_HOW}; the even clock was used: {_BY_MOTION}.",
+        f"The timestamps are those of an even clock {_EVEN}, {_HOW}. The even clock was used: {_BY_MOTION}.",
         numbers=_WITH_THEM,
     ),
     Entry(

@@ -13,7 +13,7 @@ ENTRIES = (
         Code.FILTER_NOISE_AT_REST,
         "",
         WARNING,
-        "No reference: N and K are those of this log's static stretches, without what vibration and motion add.",
+        "No reference: N and K are those of this log's static intervals, without what vibration and motion add.",
         "Static stretches and gravity show neither the heading nor what happens during motion.",
         "Give the filter's own result, a tracker or a second unit with --reference MOTION.",
     ),
@@ -59,7 +59,7 @@ ENTRIES = (
         "",
         WARNING,
         "At least {share:.0f %} of the {sensor}'s error over {horizon_s:.3g} s is what a calibration would remove "
-        "(scale and misalignment, g-sensitivity, temperature): more than all noise that N and K stand for.",
+        "(scale and misalignment, g-sensitivity, temperature): more than all noise that N and K represent.",
         "The log was not corrected, or by parameters that no longer hold. Such errors follow the motion: no noise of a "
         "filter represents them.",
         "Calibrate first (trihedron calibrate LOG --reference MOTION -o FILE), correct the log with trihedron apply, "

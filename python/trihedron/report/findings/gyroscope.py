@@ -7,13 +7,13 @@ from trihedron.records.finding import Severity
 from trihedron.report.findings.entry import Entry
 
 NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
-_CONTRADICTING = "rotations that contradict each other, or a start far from the truth"
+_CONTRADICTING = "rotations that contradict each other, or a start far from the truth."
 _LOOK_AT_MOVES = "Look at the residual per move; give the nominal scale."
 _OUTSIDE_THE_MODEL = (
-    "an effect outside the linear model: g-sensitivity, a time offset between the sensors, nonlinearity"
+    "an effect outside the linear model: g-sensitivity, a time offset between the sensors, nonlinearity."
 )
-_BIAS_CHANGES = "warm-up, slow noise, or a bias that depends on attitude (g-sensitivity)"
-_SAME_GRAVITY = "turns about the vertical leave gravity where it was, and a whole turn brings it back"
+_BIAS_CHANGES = "warm-up, slow noise, or a bias that depends on attitude (g-sensitivity)."
+_SAME_GRAVITY = "turns about the vertical leave gravity where it was, and a whole turn brings it back."
 
 _MOVES = (
     Entry(
@@ -30,9 +30,9 @@ _MOVES = (
         "contradicting",
         WARNING,
         "the stated speeds of {turns:.0f} steady turns are off by {scatter_percent:.2g} % rms, {common_percent:+.2g} % "
-        "on average, beside what moves and poses tell: more than noise explains; each was given that "
+        "on average, from what moves and poses give: more than noise explains; each was given that "
         "uncertainty.",
-        "another speed than stated, a table that does not keep it, or a sensor that S and b do not describe",
+        "another speed than stated, a table that does not keep it, or a sensor that S and b do not describe.",
         "Count the turns in a minute; state --turntable-error.",
     ),
     Entry(
@@ -66,7 +66,7 @@ _MOVES = (
         "gyro",
         WARNING,
         "the gyro's axes as logged form a left-handed triad (det S < 0).",
-        "one documented gyro axis is reversed, or two are exchanged",
+        "one documented gyro axis is reversed, or two are exchanged.",
         "Check the axis directions of the board; the calibration itself corrects them.",
         numbers=("determinant",),
     ),
@@ -75,7 +75,7 @@ _MOVES = (
         "gyro-against-accelerometer",
         WARNING,
         "gyro {axes:axes and} point against the accelerometer's axes of the same name.",
-        "the accelerometer's axes as logged are left-handed, or one sensor's signs or order were changed",
+        "the accelerometer's axes as logged are left-handed, or one sensor's signs or order were changed.",
         "Check the axis directions of the board against both data sheets.",
     ),
     Entry(
@@ -83,16 +83,16 @@ _MOVES = (
         "gyro-other-axes",
         WARNING,
         "the gyro's axes as logged point along other axes of the accelerometer than their names say.",
-        "the accelerometer's axes as logged are left-handed, or one sensor's signs or order were changed",
+        "the accelerometer's axes as logged are left-handed, or one sensor's signs or order were changed.",
         "Check the axis directions of the board against both data sheets.",
     ),
     Entry(
         Code.OUTLIER_MOVE,
         "",
         WARNING,
-        "move {move} (pose {before} to pose {after}) has a gravity error of {residual_m_s2:.3g} m/s², {times:.0f} "
+        "move {move} (pose {before} to pose {after}) has a tilt error of {residual_deg:.2g}°, {times:.0f} "
         "times its noise, and is excluded.",
-        "one of its poses was not still, samples were lost, or the gyro was driven beyond its range limit",
+        "one of its poses was not still, samples were lost, or the gyro was driven beyond its range limit.",
         "Look at this move; repeat it.",
     ),
     Entry(
@@ -102,7 +102,7 @@ _MOVES = (
         "the gyro's bias depends on gravity, by up to {per_g_rad_s:.2g °/s} per g ({rate_axis:axis} for force along "
         "{force_axis:axis}); with it, {scatter_left:.0f %} of the bias changes between poses remain. The moves were "
         "fitted without it; S and b alone cannot correct it.",
-        "g-sensitivity of the gyro",
+        "g-sensitivity of the gyro.",
         "Run trihedron diagnose for the extended model.",
         numbers=("largest_rad_s_per_m_s2",),
         or_severity=WARNING,
@@ -128,7 +128,7 @@ _MOVES = (
         Code.NOT_OBSERVABLE,
         "moves-weak",
         SERIOUS,
-        "the moves hardly determine the {weakest}: its σ stands beside it in S.",
+        "the moves hardly determine the {weakest}: see its σ in S.",
         _SAME_GRAVITY,
         "{advice:sentences}",
     ),
@@ -136,7 +136,7 @@ _MOVES = (
         Code.WEAKLY_OBSERVABLE,
         "moves",
         WARNING,
-        "the moves hardly determine the {weakest}: its σ stands beside it in S.",
+        "the moves hardly determine the {weakest}: see its σ in S.",
         _SAME_GRAVITY,
         "{advice:sentences}",
     ),
@@ -170,7 +170,7 @@ _MOVES = (
         WARNING,
         "the gyro clipped in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.3g} s at most; "
         "interpolated with less weight: {bridged}, excluded: {left_out}.",
-        "the sensor was turned faster than its range limit",
+        "the sensor was turned faster than its range limit.",
         "Turn more slowly, or set a wider range.",
     ),
     Entry(
@@ -179,7 +179,7 @@ _MOVES = (
         WARNING,
         "samples are missing inside {moves} of {n_moves} moves (move {which:first 8}); their rotation is uncertain and "
         "they weigh less.",
-        "the logger lost samples while the sensor moved",
+        "the logger lost samples while the sensor moved.",
         "Record again, or log at a rate that the link sustains.",
     ),
     Entry(
@@ -201,7 +201,7 @@ _TURNS = (
         WARNING,
         "turn {turn}, taken as {angle_rad:.0f deg} about {axis:axis}, is off by {deviation_rad:.2g deg} against the "
         "others; it is excluded.",
-        "the case was not pushed home against the wall, or the turn was another one",
+        "the case was not pushed home against the wall, or the turn was another one.",
         "Repeat this turn.",
     ),
     Entry(
@@ -210,7 +210,7 @@ _TURNS = (
         SERIOUS,
         "turn {turn}, taken as {angle_rad:.0f deg} about {axis:axis}, is off by {deviation_rad:.2g deg} against the "
         "others; no third turn shows which of them is wrong.",
-        "the case was not pushed home against the wall, or the turn was another one",
+        "the case was not pushed home against the wall, or the turn was another one.",
         "Repeat this turn.",
     ),
     Entry(
@@ -218,7 +218,7 @@ _TURNS = (
         "scatter",
         WARNING,
         "the turns scatter by {sigma_turn_rad:.2g deg} about their nominal multiples; the uncertainties include it.",
-        "turned by eye, without a wall",
+        "turned by eye, without a wall.",
         "Push the case against a wall before and after each turn.",
     ),
     Entry(
@@ -227,7 +227,7 @@ _TURNS = (
         WARNING,
         "turn {turn} about {axis:axis} is {seen_rad:.1f deg}, far from the stated {wanted_rad:.0f deg}; it is "
         "excluded.",
-        "turned without a wall, or the nominal scale is far off",
+        "turned without a wall, or the nominal scale is far off.",
         "Repeat it against a wall, or give its angle.",
     ),
     Entry(
@@ -236,7 +236,7 @@ _TURNS = (
         WARNING,
         "turn {turn} about {axis:axis} is {seen_rad:.1f deg}, far from any multiple of {wanted_rad:.0f deg}; it is "
         "excluded.",
-        "turned without a wall, or the nominal scale is far off",
+        "turned without a wall, or the nominal scale is far off.",
         "Repeat it against a wall, or give its angle.",
     ),
     Entry(
@@ -244,7 +244,7 @@ _TURNS = (
         "",
         WARNING,
         "only one turn about {axes:axes and}: a wrong angle would not show.",
-        "a wrong angle goes into the scale unnoticed",
+        "a wrong angle goes into the scale unnoticed.",
         "Turn there and back at least once about every axis.",
     ),
     Entry(
@@ -253,7 +253,7 @@ _TURNS = (
         WARNING,
         "the error of the turns exceeds what noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} degrees of "
         "freedom; the standard uncertainties are multiplied by its root.",
-        "turns that were not the stated angle, a table that is not level, or bias drift",
+        "turns that were not the stated angle, a table that is not level, or bias drift.",
         "Repeat the turns against a wall.",
     ),
     Entry(

@@ -76,7 +76,7 @@ ENTRIES = (
     ),
     Entry(
         Code.WEAKLY_OBSERVABLE,
-        "kalman-zero",
+        "kalman-bias",
         WARNING,
         "The attitudes determine the bias {condition:.0f} times worse than the best one.",
         "The poses do not turn every axis towards the vertical, both ways up.",

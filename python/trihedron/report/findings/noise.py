@@ -17,7 +17,7 @@ _LOG = (
         "at-rest",
         WARNING,
         "{share:.2g %} of the rows repeat the row before in every channel.",
-        "the log was written faster than the sensor measures, or resampled by holding the last value",
+        "the log was written faster than the sensor measures, or resampled by holding the last value.",
         "N and Q then depend on the resampling; log at the sensor's own rate.",
     ),
     Entry(
@@ -25,7 +25,7 @@ _LOG = (
         "",
         WARNING,
         "The level jumps {n_steps:?once|{n_steps} times}, by up to {step:abs .3g} {unit} at {time_s:.1f} s.",
-        "the sensor or its table was moved, the supply or a heater switched, or the sensor has telegraph noise",
+        "the sensor or its table was moved, the supply or a heater switched, or the sensor has telegraph noise.",
         "A step looks like K and R; each side is fitted with a level of its own, so that K holds what is left.",
     ),
     Entry(
@@ -33,7 +33,7 @@ _LOG = (
         "",
         NOTE,
         "{n_knocks:# short excursion} of up to {knock:abs .3g} {unit}, the largest at {time_s:.1f} s.",
-        "a knock at the table, a door, a lost or damaged reading",
+        "a knock at the table, a door, a lost or damaged reading.",
         "They raise N and Q; these stretches are excluded.",
     ),
     Entry(
@@ -42,7 +42,7 @@ _LOG = (
         WARNING,
         "For {shaken_s:.3g} s the readings scatter up to {times:.2g} times as much as elsewhere, first at "
         "{first_s:.1f} s.",
-        "motion, vibration or handling during a log that should be still",
+        "motion, vibration or handling during a log that should be still.",
         "They raise N; these stretches are excluded.",
     ),
     Entry(
@@ -50,7 +50,7 @@ _LOG = (
         "throughout",
         SERIOUS,
         "Events cover {share:.0f %} of the log: it is disturbed throughout, and nothing was excluded.",
-        "the sensor was not static",
+        "the sensor was not static.",
         "The terms describe the disturbance as much as the sensor; record a static log.",
     ),
     Entry(
@@ -66,7 +66,7 @@ _LOG = (
         "at-rest",
         SERIOUS,
         "{share:.2g %} of the readings lie on the same extreme value.",
-        "the sensor or the ADC is at its range limit",
+        "the sensor or the ADC is at its range limit.",
         "Every term comes out too small; use a wider range or another orientation.",
     ),
     Entry(
@@ -75,7 +75,7 @@ _LOG = (
         SERIOUS,
         "One reading's noise ({sigma:.3g} {unit}) is below half the resolution (LSB {resolution:.3g} {unit}): "
         "{repeated:.0f %} of the readings repeat the one before.",
-        "the resolution is coarser than the noise",
+        "the resolution is coarser than the noise.",
         "N is that of the rounding, and slow terms may hide inside one step; use a narrower range or a finer output.",
     ),
 )
@@ -86,7 +86,7 @@ _SPECTRUM = (
         "",
         NOTE,
         "{n_lines:# periodic line}: {strongest:each}{has_more:? and {n_more} more|}.",
-        "mains, a fan, vibration of the building, or a clock inside the sensor",
+        "mains, a fan, vibration of the building, or a clock inside the sensor.",
         "A line makes waves in the Allan curve near half its period; its frequencies were excluded from the fit.",
         numbers=("frequency_hz", "amplitude"),
         lines=MappingProxyType({"strongest": "{v0:.4g} Hz ({v1:.2g} {v2})"}),
@@ -96,7 +96,7 @@ _SPECTRUM = (
         "throughout",
         SERIOUS,
         "No part of the upper spectrum is a sum of noise terms.",
-        "resampling, a narrow filter or periodic disturbance shapes the whole band",
+        "resampling, a narrow filter or periodic disturbance shapes the whole band.",
         "N and Q are not those of the sensor; log at its own rate without filtering.",
     ),
     Entry(
@@ -105,7 +105,7 @@ _SPECTRUM = (
         WARNING,
         "Above {highest_hz:.3g} Hz the spectrum leaves the noise terms and falls to {ratio:.3g %} of them at "
         "{nyquist_hz:.3g} Hz.",
-        "a low-pass filter in the sensor or the logger, or averaging by a resampler",
+        "a low-pass filter in the sensor or the logger, or averaging by a resampler.",
         "All terms are quoted from below; averaging times under half a period of that frequency show the filter, and Q "
         "cannot be separated from it.",
     ),
@@ -115,7 +115,7 @@ _SPECTRUM = (
         WARNING,
         "Above {highest_hz:.3g} Hz the spectrum leaves the noise terms and rises to {ratio:.3g %} of them at "
         "{nyquist_hz:.3g} Hz.",
-        "aliasing, resampling, a resonance or vibration",
+        "aliasing, resampling, a resonance or vibration.",
         "All terms are quoted from below; averaging times under half a period of that frequency show the filter, and Q "
         "cannot be separated from it.",
     ),
@@ -124,7 +124,7 @@ _SPECTRUM = (
         "curve",
         WARNING,
         "Below {first_s:.3g} s the curve is not a sum of noise terms.",
-        "a low-pass filter in the sensor or the logger, resampling, or a periodic disturbance",
+        "a low-pass filter in the sensor or the logger, resampling, or a periodic disturbance.",
         "All terms are quoted from longer averaging times; a Q may be the tail of what was excluded.",
     ),
     Entry(
@@ -132,7 +132,7 @@ _SPECTRUM = (
         "",
         WARNING,
         "Near {frequency_hz:.2g} Hz the spectrum lies {deviation:abs .0f %} {deviation:<below|above} the fitted terms.",
-        "disturbance that is not noise (temperature, daily life of the building), or noise of another shape",
+        "disturbance that is not noise (temperature, daily life of the building), or noise of another shape.",
         _WIDENED,
     ),
     Entry(
@@ -140,7 +140,7 @@ _SPECTRUM = (
         "curve",
         WARNING,
         "Near {tau_s:.2g} s the curve lies {deviation:abs .0f %} {deviation:<below|above} the fitted terms.",
-        "a periodic disturbance, temperature, or noise of another shape",
+        "a periodic disturbance, temperature, or noise of another shape.",
         _WIDENED,
     ),
 )
@@ -159,7 +159,7 @@ _TERMS = (
         "",
         WARNING,
         "R and K are hard to separate in a curve: a random walk that happened to go one way has the curve of a ramp.",
-        "the curve keeps the squares of differences and loses their order",
+        "the curve keeps the squares of differences and loses their order.",
         "Identify from the log where there is one.",
     ),
     Entry(
@@ -169,7 +169,7 @@ _TERMS = (
         "Slow noise is there; B and K are not separable here: B at least "
         "{flicker_lower:.2g}, at most {flicker_upper:.2g} {unit:unit}, K at least {walk_lower:.2g}, at most "
         "{walk_upper:.2g} {unit:unit}/√s, not both zero.",
-        "the log is short compared with the times over which flicker and walk differ",
+        "the log is short compared with the times over which flicker and walk differ.",
         "Variances of means use the most likely sum of both; record longer to separate them.",
         numbers=("evidence",),
     ),
@@ -178,7 +178,7 @@ _TERMS = (
         "",
         WARNING,
         "The level drifts by {drift:.3g} {unit} over the log ({slope:.3g} ± {sigma_slope:.1g} {unit}/s).",
-        "warming up, or a change of the room's temperature",
+        "warming up, or a change of the room's temperature.",
         "R describes this log, not the sensor; let it warm up, or log the temperature.",
     ),
     Entry(
@@ -186,7 +186,7 @@ _TERMS = (
         "warm-up",
         WARNING,
         "The level changes by {drift:.3g} {unit} with a time constant of {time_s:.3g} s; that was taken out.",
-        "warming up",
+        "warming up.",
         "The terms are those of the sensor once warm; leave off the first minutes, or log the temperature.",
     ),
     Entry(
@@ -194,7 +194,7 @@ _TERMS = (
         "",
         NOTE,
         "No minimum before the log's end: K is below {limit:.2g} {unit:unit}/√s (upper limit).",
-        "the log is short compared with the sensor's stability",
+        "the log is short compared with the sensor's stability.",
         "Record longer to find the best averaging time.",
     ),
 )

@@ -23,7 +23,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         # parameters of a triad
         "scale-of-axis": "scale of {axis:axis}",
         "angle-between-axes": "angle between {one:axis} and {other:axis}",
-        "zero-of-axis": "bias of {axis:axis}",
+        "bias-of-axis": "bias of {axis:axis}",
         # poses
         "face": "{is_up:?+|-}{axis:axis} up",
         "pose": "{is_up:?+|-}{axis:axis}{towards:run} {is_edge:?edge|corner} up",
@@ -42,9 +42,9 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "moves-about-all": "add moves about all three body axes held level, each with a pose before and after",
         # known attitudes
         "sensitivity-to": "sensitivity to {axis:axis}",
-        "zero-reading": "bias",
+        "bias": "bias",
         "tilt-towards-vertical": "tilt {axis:axis} towards the vertical",
-        "zero-both-ways": "place the axis of this bias up and down",
+        "bias-both-ways": "place the axis of this bias up and down",
         # why a fit ended
         "small-step": "converged: the Gauss-Newton step no longer moves the parameters",
         "small-gradient": "converged: the residual is orthogonal to every parameter",
@@ -54,7 +54,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "closed-form": "closed form",
         "linear-least-squares": "linear least squares",
         # what a model's numbers resemble
-        "zeros-never-added": "All simulated {sensor} biases are 0: was the drawn bias never applied?",
+        "biases-never-added": "All simulated {sensor} biases are 0: was the drawn bias never applied?",
         "accelerometer-scales-relative": "Scales of the accelerometer are relative to the mean of its three axes: the "
         "{side} is in counts ({per_g:.5g} per g), whose nominal size is not known.",
         "gyro-scales-relative": "Scales of the gyro are relative to the mean of its three axes: the {side} is in "
@@ -66,9 +66,9 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "velocity-over-move": "velocity error over a rotation",
         # empirical relations of what stays unexplained
         "relation-follows": "The {sensor}'s {is_at_rest:?bias|reading in motion} ({axes:axes}) follows {depends:and}: "
-        "{share:.0f %} of the held-out misfit.",
+        "{share:.0f %} of the cross-validated misfit.",
         "relation-follows-room": "The gyro's bias follows a vector fixed in the room, {inclination_deg:.0f}° ± "
-        "{inclination_sigma_deg:.0f}° from the vertical: {share:.0f %} of the held-out misfit.",
+        "{inclination_sigma_deg:.0f}° from the vertical: {share:.0f %} of the cross-validated misfit.",
         "relation-form": "reading of {axes:axes} grows by {terms:& + }",
         "relation-form-room": "bias = K Rᵀ m, m a unit vector fixed in the room",
         "angle-to-vertical": "angle to the vertical",

@@ -14,8 +14,8 @@ _SAY_GYRO_UNIT = "Say it with --gyro-unit rad/s, deg/s, ..., or counts, if this 
 _ALIKE = "Both look alike. The calibration differs only in its name of the raw unit."
 _SOURCE = "{is_given:?as you said|by its column names}"
 _TURNING = (
-    "turns of gravity are {factor:.3g} (± {percent:.1g} %) times those of a gyro in {unit} "
-    "(1 where the unit is right; correlation {correlation:.2f})"
+    "gravity rotates by {factor:.3g} (± {percent:.1g} %) times the gyro's angle in {unit} (1 where the unit is right; "
+    "correlation {correlation:.2f})"
 )
 _INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
 _CUT_OFF = "A log that was cut off, or a memory card with errors."
@@ -122,7 +122,7 @@ _WHY_FIRST = {
     "level": "its steady reading stands far above its noise, as gravity does",
 }
 _WHY_UNKNOWN = {"short": "the log is too short", "alike": "both triads look alike"}
-_NAME_THEM = "Name them with --columns, for example --columns ax,ay,az,gx,gy,gz."
+_NAME_THEM = "If that is right, say it: --columns {mapping}; else give their order."
 _COLUMNS = (
     Entry(
         Code.CORRECTED_ON_BOARD,

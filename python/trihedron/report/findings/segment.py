@@ -32,7 +32,7 @@ ENTRIES = (
         Code.POSE_UNSTEADY,
         "",
         WARNING,
-        "{poses:# pose} never {poses:?comes|come} down to the sensor's own noise (pose {which:first 8}; first at "
+        "{poses:# pose} {poses:?stays|stay} noisier than the sensor itself throughout (pose {which:first 8}; first at "
         "{first_s:.1f} s).",
         "The sensor was held in the hand or stood on a support that shakes.",
         "Such a mean weighs less, by its own scatter; put the case on a firm support for a better result.",

@@ -6,6 +6,7 @@ import struct
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from trihedron.errors import RefusedError
 from trihedron.records.frame_declaration import SIZES, FrameDeclaration
@@ -58,7 +59,7 @@ def _xio(scales: Scales, *, binary: bool) -> Encoder:
     return encode
 
 
-def _sparkfun(*, binary: bool) -> Encoder:
+def _sparkfun(_scales: Scales, *, binary: bool) -> Encoder:
     def encode(n: int, _t: float, accel: Reading, gyro: Reading) -> bytes:
         # Pitch comes before roll: the gyro's y before its x.
         numbers = [min(max(round(v), 0), 1023) for v in (*accel, gyro[1], gyro[0], gyro[2])]
@@ -117,7 +118,7 @@ def _number(value: float) -> str:
     return str(int(value)) if float(value).is_integer() else f"{value:.6g}"
 
 
-def _lines(style: str) -> Encoder:
+def _lines(_scales: Scales, *, style: str) -> Encoder:
     names = ("ax", "ay", "az", "gx", "gy", "gz")
 
     def encode(n: int, t: float, accel: Reading, gyro: Reading) -> bytes:
@@ -142,11 +143,20 @@ def _lines(style: str) -> Encoder:
     return encode
 
 
-ENCODERS: tuple[str, ...] = (
-    *("lines", "lines-space", "lines-bare", "lines-label", "lines-equals", "lines-monitor"),
-    *("sparkfun-6dof", "sparkfun-6dof-text", "razor", "xsens-mtdata2", "xio", "xio-text"),
-    *("witmotion", "witmotion-clock", "vectornav", "sbg"),
-)
+ENCODERS: dict[str, Callable[[Scales], Encoder]] = {
+    "lines": partial(_lines, style="comma"),
+    **{f"lines-{style}": partial(_lines, style=style) for style in ("space", "bare", "label", "equals", "monitor")},
+    "sparkfun-6dof": partial(_sparkfun, binary=True),
+    "sparkfun-6dof-text": partial(_sparkfun, binary=False),
+    "razor": lambda _: _razor,
+    "xsens-mtdata2": _mtdata2,
+    "xio": partial(_xio, binary=True),
+    "xio-text": partial(_xio, binary=False),
+    "witmotion": partial(_witmotion, has_clock=False),
+    "witmotion-clock": partial(_witmotion, has_clock=True),
+    "vectornav": _vectornav,
+    "sbg": _sbg,
+}
 """What a simulated board can speak; a declared frame besides."""
 
 LINE_HEADERS = {"lines": "count,time [us],ax,ay,az,gx,gy,gz\r\n", "lines-space": "micros ax ay az gx gy gz\r\n"}
@@ -161,22 +171,11 @@ def encoder_for(protocol: str | FrameDeclaration, scales: Scales | None = None) 
     ValueError
         When no board speaks it.
     """
-    scales = scales or Scales()
     if isinstance(protocol, FrameDeclaration):
         return declared(protocol)
     if protocol not in ENCODERS:
         raise RefusedError(f"no simulated board speaks {protocol!r}; choose {', '.join(ENCODERS)}, or a .toml file.")
-    if protocol.startswith("lines"):
-        return _lines(protocol.partition("-")[2] or "comma")
-    if protocol.startswith("sparkfun"):
-        return _sparkfun(binary=not protocol.endswith("text"))
-    if protocol.startswith("xio"):
-        return _xio(scales, binary=not protocol.endswith("text"))
-    if protocol.startswith("witmotion"):
-        return _witmotion(scales, has_clock=protocol.endswith("clock"))
-    if protocol == "razor":
-        return _razor
-    return {"vectornav": _vectornav, "sbg": _sbg, "xsens-mtdata2": _mtdata2}[protocol](scales)
+    return ENCODERS[protocol](scales or Scales())
 
 
 def declared(frame: FrameDeclaration) -> Encoder:

@@ -16,7 +16,7 @@ _SENSORS = {"3": "acc", "4": "gyro", "5": "mag"}
 _JUDGED = 200
 
 
-def of_sensorstream(text: str) -> Rewritten | None:
+def rewritten(text: str) -> Rewritten | None:
     """A table of time, accelerometer [m/s²], gyro [rad/s] and magnetometer [µT]; None where the text is another."""
     lines = text.replace("\r\n", "\n").split("\n")
     sample = [line for line in lines[:_JUDGED] if line.strip()]

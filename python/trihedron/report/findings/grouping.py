@@ -19,13 +19,13 @@ _AXIS = re.compile(r"^((?:gyro|accel)(?:\s\w+)?|ch\d+|\w+ [xyz123]): (.*)$", re.
 
 def findings_block(findings: Iterable[Finding]) -> FindingList | Paragraph:
     """Gravest first; within a severity in the order of the stages; what recurs, once."""
-    ordered = tuple(sorted(map(_sentence, told_once(findings)), key=lambda f: _ORDER[f.severity]))
+    ordered = tuple(sorted(map(_sentence, combined(findings)), key=lambda f: _ORDER[f.severity]))
     return FindingList(ordered) if ordered else Paragraph("None.")
 
 
 def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) -> str:
     """``bad`` with what the first serious finding says first; ``usable`` with the number of warnings; or ``good``."""
-    found = told_once(findings)
+    found = combined(findings)
     serious = [finding for finding in found if finding.severity is Severity.SERIOUS]
     n_warnings = sum(finding.severity is Severity.WARNING for finding in found)
     if serious:
@@ -39,7 +39,7 @@ def first_clause(seen: str) -> str:
     return re.split(r"(?<=\D)\. (?=[A-Z])|; ", seen, maxsplit=1)[0].rstrip(".") + "."
 
 
-def told_once(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+def combined(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """What several axes, poses or moves have in common as one finding that names them all."""
     groups: dict[tuple[str, str, str, str], list[Finding]] = {}
     for finding in findings:
@@ -76,7 +76,7 @@ def _axes(parts: Sequence[re.Match[str]], rest: str) -> str:
 
 
 def _things(parts: Sequence[re.Match[str]], rest: str) -> str:
-    """``Moves 7, 9 and 22: each has a gravity error of ...``"""
+    """``Moves 7, 9 and 22: each has a tilt error of ...``"""
     return f"{parts[0][1]}s {listed([part[2] for part in parts])}: each {rest}"
 
 

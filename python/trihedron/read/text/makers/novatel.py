@@ -17,7 +17,7 @@ _ANY = re.compile(r"\s*[#%$<][A-Za-z0-9]+,")
 _HEADER = "tow [s],acc x [counts],acc y [counts],acc z [counts],gyro x [counts],gyro y [counts],gyro z [counts]"
 
 
-def of_novatel(text: str) -> Rewritten | None:
+def rewritten(text: str) -> Rewritten | None:
     """A table of GPS seconds and counts per sample on X, Y, Z; the messages hold them as Z, -Y, X, and -Y is
     turned round here.
 

@@ -1,4 +1,4 @@
-"""Without a reference: noise at rest as identified, and what changes from rest to rest."""
+"""Without a reference: noise at rest as identified, and what changes between static intervals."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.records import NoiseAxis, Segments, TermName
-from trihedron.records.filter_noise import Bounded, RestCheck, StaticNoise, TiltCheck
+from trihedron.records.filter_noise import Bounded, IntervalCheck, StaticNoise, TiltCheck
 
 LONGEST_MOVE_S = 60.0
-"""Beyond a minute between two rests the bias may have gone anywhere."""
+"""Beyond a minute between two poses the bias may have gone anywhere."""
 
 
 def at_rest(axes: Sequence[NoiseAxis], unit: str) -> StaticNoise | None:
@@ -36,7 +36,7 @@ def _pooled(axes: Sequence[NoiseAxis], term: TermName) -> Bounded:
         limit = _rms([max(one.limit, one.value) for one in terms])
         return Bounded(0.0, 0.0, limit, True)
     value = _rms([one.value for one in terms])
-    # Axes are told independently: their relative errors add in squares.
+    # Axes are estimated independently: their relative errors add in squares.
     spread = math.sqrt(sum(one.sigma**2 * one.value**2 for one in terms)) / (len(terms) * max(value, 1e-300))
     factor = math.exp(1.96 * spread / max(value, 1e-300))
     return Bounded(value, value / factor, value * factor)
@@ -49,7 +49,7 @@ def _rms(values: Sequence[float]) -> float:
 def tilt_over_moves(time_s: FloatArray, rate: FloatArray, segments: Segments, static: StaticNoise) -> TiltCheck | None:
     """Gravity carried by the gyro (n, 3) [rad/s] over every move against gravity measured after it.
 
-    The bias is the mean of the rests on both sides; turns about the vertical stay unseen. None without a move.
+    The bias is the mean of the poses on both sides; turns about the vertical stay unseen. None without a move.
     """
     means = segments.accelerometer_mean
     if means is None:
@@ -60,24 +60,26 @@ def tilt_over_moves(time_s: FloatArray, rate: FloatArray, segments: Segments, st
         length = float(time_s[move.stop] - time_s[move.start])
         if not 0.0 < length <= LONGEST_MOVE_S:
             continue
-        rests = np.concatenate([before.samples(), after.samples()])
+        static_samples = np.concatenate([before.samples(), after.samples()])
         turned = integrate_rate(
             time_s[move.start : move.stop + 1],
-            rate[move.start : move.stop + 1] - rate[rests].mean(axis=0),
+            rate[move.start : move.stop + 1] - rate[static_samples].mean(axis=0),
             last_only=True,
         )
         up = [means[k] / np.linalg.norm(means[k]) for k in (move.pose_before, move.pose_after)]
         errors.append(float(np.arccos(np.clip(up[1] @ (turned.T @ up[0]), -1.0, 1.0))))
-        rested = len(rests) * float(np.median(np.diff(time_s)))
-        predicted.append(2.0 * static.N.filter_value**2 * (length + length**2 / rested))
+        static_s = len(static_samples) * float(np.median(np.diff(time_s)))
+        predicted.append(2.0 * static.N.filter_value**2 * (length + length**2 / static_s))
         longest = max(longest, length)
     if not errors:
         return None
     return TiltCheck(len(errors), longest, _rms(errors), math.sqrt(float(np.mean(predicted))))
 
 
-def between_rests(time_s: FloatArray, rate: FloatArray, segments: Segments, static: StaticNoise) -> RestCheck | None:
-    """The gyro's mean (n, 3) [rad/s] and gravity's length from one static stretch to the next; None of fewer than two.
+def between_intervals(
+    time_s: FloatArray, rate: FloatArray, segments: Segments, static: StaticNoise
+) -> IntervalCheck | None:
+    """The gyro's mean (n, 3) [rad/s] and gravity's length from one static interval to the next; None of fewer than two.
 
     A limit of K is taken for K: a change beyond it is no walk that the longest stretch allows.
     """
@@ -89,10 +91,10 @@ def between_rests(time_s: FloatArray, rate: FloatArray, segments: Segments, stat
     lasted, apart = np.maximum(ends[:, 1] - ends[:, 0], 1e-9), np.diff(ends.mean(axis=1))
     predicted = static.N.filter_value**2 * (1.0 / lasted[1:] + 1.0 / lasted[:-1]) + static.K.filter_value**2 * apart
     gravity = np.linalg.norm(means, axis=1)
-    return RestCheck(
+    return IntervalCheck(
         n=len(poses),
         longest_s=float(apart.max()),
         bias_change=float(np.sqrt(np.mean(np.diff(bias, axis=0) ** 2))),
         predicted=float(np.sqrt(np.mean(predicted))),
-        gravity_scatter=float(gravity.std() / gravity.mean()),
+        gravity_spread=float(gravity.std() / gravity.mean()),
     )

@@ -1,0 +1,13 @@
+"""Catalogues whose entries are files: what lies in a folder belongs to it, and no list names it again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib import import_module
+from pkgutil import iter_modules
+from types import ModuleType
+
+
+def modules_of(package: str, path: Iterable[str]) -> list[ModuleType]:
+    """Every module of a package (its ``__name__`` and ``__path__``), loaded, by name."""
+    return [import_module(f"{package}.{found.name}") for found in iter_modules(path)]

@@ -1,0 +1,34 @@
+"""Which column became what: as a finding, and as the option that says it."""
+
+from __future__ import annotations
+
+from trihedron.read.columns import Columns, Triad
+from trihedron.read.table import Table
+from trihedron.records import Finding, FindingCode
+
+
+def mapping_of(columns: Columns, gyroscope: Triad | None = None) -> str:
+    """What ``--columns`` would be for time and both sensors; ``gyroscope`` where the columns name none."""
+    triads = (*(columns.accelerometer or ()), *(columns.gyroscope or gyroscope or ()))
+    time = [] if columns.time is None else [f"time={columns.time + 1}"]
+    roles = zip(("ax", "ay", "az", "gx", "gy", "gz"), triads, strict=True)
+    return ",".join([*time, *(f"{role}={column + 1}" for role, column in roles)])
+
+
+def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
+    """Which column became what, and what was kept aside."""
+    roles = []
+    for role in ("time", "accelerometer", "gyroscope", "temperature", "supply"):
+        value = getattr(columns, role)
+        if value is not None:
+            which = value if isinstance(value, tuple) else (value,)
+            roles.append((role, " ".join(table.label(c) for c in which)))
+    rest = [table.label(c) for c in range(len(table.columns)) if c not in columns.used() and len(table.columns[c])]
+    return Finding.of(
+        FindingCode.COLUMNS_RECOGNISED,
+        has_file=bool(file_name),
+        file=file_name,
+        roles=roles,
+        has_rest=bool(rest),
+        rest=rest[:24],
+    )
