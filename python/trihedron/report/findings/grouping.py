@@ -85,7 +85,7 @@ def _axes(parts: Sequence[re.Match[str]], rest: str) -> str:
         sensor, _, axis = part[1].partition(" ")
         groups.setdefault(sensor, []).append(axis)
     words = [f"{sensor} {listed(axes)}".strip() for sensor, axes in groups.items()]
-    return f"{_capital('; '.join(words))}: {rest[:1].lower()}{rest[1:]}"
+    return f"{_capital(', '.join(words))}: {rest[:1].lower()}{rest[1:]}"
 
 
 def _things(parts: Sequence[re.Match[str]], rest: str) -> str:
