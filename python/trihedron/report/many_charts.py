@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import PurePath
 
 import numpy as np
 
@@ -29,6 +30,15 @@ def shown(unit: str) -> tuple[float, str]:
     return SHOWN[unit]
 
 
+def short_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Names of files without the file name and the ending that all of them share: an axis has little room."""
+    paths = [PurePath(name) for name in names]
+    if len(paths) > 1 and len({path.name for path in paths}) == 1 and all(path.parent.name for path in paths):
+        return tuple(str(path.parent) for path in paths)
+    is_shared = len({path.suffix for path in paths}) == 1
+    return tuple(str(path.with_suffix("")) if is_shared else str(path) for path in paths)
+
+
 def compared_variance(sessions: Sequence[Session], k: int) -> FloatArray:
     """(n,) variance of parameter ``k`` by which recordings are compared: of each, and the unit's drift within one."""
     drift = {
@@ -44,7 +54,7 @@ def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int 
     if thermal is not None:
         place = np.array([session.temperature_degc for session in model.sessions])
     step = 0.12 * max(float(np.ptp(place)) / max(len(place) - 1, 1), 1e-9)
-    names = tuple(session.name for session in model.sessions)
+    names = short_names([session.name for session in model.sessions])
     panels = []
     for name in dict.fromkeys(one.parameter.id for one in model.repeated):
         if only and name not in only:
