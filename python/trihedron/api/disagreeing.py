@@ -106,7 +106,7 @@ def disagree(
     write_scenario(improve(given, found).text, better, overwrite=overwrite)
     tell("comparing the improved simulation with the log")
     improved = diagnose(taken, gravity_m_s2=gravity, against=better)
-    write_whole(folder / "disagreement.html", to_html(diagnosis_report(found)), overwrite=overwrite)
+    write_whole(folder / "disagreement.html", to_html(diagnosis_report(found, str(given))), overwrite=overwrite)
     tell("opening the seal")
     opened = json.loads((folder / "sealed.json").read_text(encoding="utf-8"))
     sizes = dict(diagnosed_sizes([e.to_dict() for e in found.own_effects])[0])

@@ -217,13 +217,15 @@ def _norm_findings(error: FloatArray, sigma: FloatArray) -> list[Finding]:
     if probability.chdtrc(len(z2), float(z2.sum())) > FALSE_ALARM:
         return []
     rms = float(np.sqrt(np.mean(error**2)))
-    times = float(np.sqrt(np.mean(z2)))
+    times, worst = float(np.sqrt(np.mean(z2))), int(np.argmax(z2))
     return [
         Finding.of(
             FindingCode.RESIDUAL_ABOVE_NOISE,
             "verify-rest",
             severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
             norm_rms_m_s2=rms,
+            worst_pose=worst + 1,
+            worst_m_s2=error[worst],
             chi2_per_dof=times**2,
         )
     ]
@@ -238,8 +240,7 @@ def _angle_findings(moves: Carriage) -> list[Finding]:
     if probability.chdtrc(2 * len(z2), float(z2.sum())) > FALSE_ALARM:
         return []
     rms = float(np.sqrt(np.mean(angle_deg**2)))
-    worst = int(np.argmax(angle_deg))
-    times = float(np.sqrt(np.mean(z2) / 2.0))
+    times, worst = float(np.sqrt(np.mean(z2) / 2.0)), int(np.argmax(z2))
     return [
         Finding.of(
             FindingCode.HELD_OUT_WORSE,

@@ -32,7 +32,11 @@ def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture
     quality = calibration.accelerometer.quality
     if quality is None:
         return None
-    circles = "; circles: cross-validated, predicted by a fit that did not see that pose" if _is_held(quality) else ""
+    circles = (
+        "; circles: cross-validated, predicted by a fit that did not see that pose, bars: 1 σ"
+        if _is_held(quality)
+        else ""
+    )
     caption = f"Norm of gravity minus its true value in every pose, against 3 σ of noise alone{circles}."
     means = None if segments is None else segments.accelerometer_mean
     chart = partial(residual_chart, quality)

@@ -129,7 +129,8 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     )
     judged, figures = (("with the effects",), ("rms with them", "χ²/dof with them")) if has_effects else ((), ())
     head = ("residual", "linear model", *judged, "rms", "χ²/dof", "p", *figures)
-    caption = "Residuals by domain; χ²/dof is 1 by noise alone"
+    is_fitted = not getattr(diagnosis, "model_is_given", False)
+    caption = f"Residuals by domain{', in sample' if is_fitted else ''}; χ²/dof is 1 by noise alone"
     blocks: list[Block] = [Table(head, rows, caption)]
     # Which parameters differ has a section of its own.
     places = tuple(
@@ -140,7 +141,7 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if places:
         blocks.append(Facts(places))
     own = getattr(diagnosis, "calibration", None)
-    if own is not None and not getattr(diagnosis, "model_is_given", False):
+    if own is not None and is_fitted:
         table = figures_table(own, {MEANING[d.domain]: rms_in_words(d) for d in diagnosis.domains})
         blocks += [table] if table is not None else []
     return tuple(blocks)

@@ -98,6 +98,10 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
 def next_step_in_words(diagnosis: Diagnosis) -> str:
     """What to do with the verdict."""
     if diagnosis.verdict == "consistent":
+        found = getattr(diagnosis, "findings", ())
+        dependent = [f.action for f in found if f.code is FindingCode.REFERENCE_NOT_INDEPENDENT]
+        if dependent:
+            return str(dependent[0])
         return "Nothing is missing: store S and b with trihedron calibrate LOG -o FILE, and use them."
     if diagnosis.verdict == "not-testable":
         return ""
@@ -105,12 +109,18 @@ def next_step_in_words(diagnosis: Diagnosis) -> str:
         experiments = [one.experiment for one in diagnosis.relations if one.experiment]
         again = "Record again: what returns belongs to the sensor, what does not to the session."
         return experiments[0] if experiments else again
+    steps = []
+    if diagnosis.parameters:
+        said = "the parameters that differ" if any(p.significant for p in diagnosis.parameters) else "the effects"
+        steps.append(f"Take over {said}: --improved FILE.toml (simulation) or --updated FILE (calibration).")
     rivals = next((effect for effect in diagnosis.effects if effect.confounded_with), None)
     if rivals is not None and rivals.separating_experiment:
         others = listed(list(rivals.confounded_with))
-        return f"Separate {rivals.id} from {others} first: {rivals.separating_experiment}."
-    if diagnosis.parameters:
-        return "Take over what the recording says: --improved FILE.toml (simulation) or --updated FILE (calibration)."
+        steps.append(
+            f"{'Then separate' if steps else 'Separate'} {rivals.id} from {others}: {rivals.separating_experiment}."
+        )
+    if steps:
+        return " ".join(steps)
     return "Store the effects with the calibration, for trihedron apply: trihedron calibrate LOG --extended -o FILE."
 
 
@@ -209,19 +219,21 @@ def differing_headline(diagnosis: Diagnosis) -> tuple[Headline, ...]:
 
 
 def headlines_of(diagnosis: Diagnosis) -> tuple[Headline, ...]:
-    """The strongest effect by what it gains on unseen poses and moves; else the worst domain."""
+    """What every effect explains, and what the strongest gains on unseen poses and moves; else the worst domain."""
+    shares = tuple(
+        Headline(f"{effect.id} explains", plain_number(100.0 * effect.share, 2), "%", "of the misfit")
+        for effect in diagnosis.effects
+        if effect.share is not None
+    )
     for effect in diagnosis.effects:
         if effect.held_out:
             held = effect.held_out[0]
             after, _, unit = size_in_words(held.rms_after, held.unit).partition(" ")
             before = size_in_words(held.rms_before, held.unit)
-            if effect.share is not None:
-                words = f"{plain_number(100.0 * effect.share, 2)}"
-                return (
-                    Headline(f"{effect.id} explains", words, "%", "of the misfit"),
-                    Headline(quantity(held), after, unit, f"cross-validated, with it; {before} without"),
-                )
-            return (Headline(quantity(held), after, unit, f"cross-validated, with {effect.id}; {before} without"),)
+            return (
+                *shares[:MOST_NAMED],
+                Headline(quantity(held), after, unit, f"cross-validated, with {effect.id}; {before} without"),
+            )
     tests = [d for d in diagnosis.domains if d.dof > 0]
     if not tests:
         return ()

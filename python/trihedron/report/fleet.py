@@ -47,12 +47,11 @@ def fleet_report(summary: FleetSummary) -> Document:
     if summary.changes:
         sections.append(Section("Drift between sessions of one device", tuple(_drift(summary))))
     if n_done:
-        caption = "Every number by device, one point a log with its own error; the line is the median of devices."
+        caption = "Every number by device, one point a log (bars: 1 σ); the line is the median of devices."
         sections.append(Section("Distributions", (Picture("numbers", caption, partial(fleet_chart, summary)),)))
     sections.append(Section("Every log", (_logs(summary),)))
-    verdict = f"{n_done} of {how_many(n, 'log')} of {how_many(len(devices), 'device')} were calibrated."
-    if not bad:
-        verdict = f"All {how_many(n, 'log')} of {how_many(len(devices), 'device')} were calibrated."
+    n_usable = sum(log.status == "done" and log.is_trustworthy for log in summary.logs)
+    verdict = f"{n_usable} of {how_many(n, 'log')} usable, {how_many(len(devices), 'device')}."
     if n_done == 0:
         verdict = "NONE of the logs could be calibrated; the reasons are below."
     for one in summary.mixed:
@@ -67,12 +66,12 @@ def fleet_report(summary: FleetSummary) -> Document:
         title="Fleet",
         subtitle=f"{how_many(n, 'log')}, {how_many(len(devices), 'device')}",
         verdict=verdict,
-        is_trustworthy=n_done > 0 and not mixed,
+        is_trustworthy=n_usable > 0 and not mixed,
         sections=tuple(sections),
         lead=_lead(summary) if n_done else None,
         headlines=_headlines(summary),
-        next_step=_next_step(bad, strays, moved) if n_done and not mixed else "",
-        stated_level="usable" if n_done and not mixed and (bad or strays or moved) else None,
+        next_step=_next_step(bad, strays, moved) if n_usable and not mixed else "",
+        stated_level="usable" if n_usable and not mixed and (n_usable < n or strays or moved) else None,
     )
 
 
@@ -86,7 +85,9 @@ def _next_step(bad: list[FleetLog], strays: list[str], moved: list[str]) -> str:
     steps = ["record the failed logs again"] if bad else []
     steps += ["look at the devices that stand out"] if strays else []
     steps += ["calibrate those that changed anew before use"] if moved else []
-    steps.append("use each device's own calibration, not a common one")
+    steps.append(
+        "use each device's own calibration, not a common one: trihedron apply calibrations/DEVICE_LOG_KEY.json LOG"
+    )
     said = "; ".join(steps)
     return f"{said[0].upper()}{said[1:]}."
 
@@ -113,8 +114,8 @@ def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
 
 
 def _lead(summary: FleetSummary) -> Picture:
-    caption = "The parameters in which devices differ most beside their uncertainties: a point a log, its uncertainty, "
-    caption += "about the median of devices."
+    caption = "The parameters in which devices differ most beside their uncertainties: a point a log, about the "
+    caption += "median of devices; bars: 1 σ."
     return Picture("differ", caption, partial(fleet_chart, summary, MOST_LEADING))
 
 

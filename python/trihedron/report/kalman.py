@@ -66,8 +66,9 @@ def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headl
     seen = _consistencies(outcome)
     name, worst, n = max(seen, key=lambda one: abs(np.log(max(one[1].nis_mean, 1e-12))))
     beside = (
-        f"innovations² over predicted variance; 1 when right, {_limits(worst)} in 99 % of cases; {worst.n} of {n} poses"
+        f"{_meaning(worst)}: innovations² over predicted variance, 1 when right, {_limits(worst)} in 99 % of cases; "
     )
+    beside += f"{worst.n} of {n} poses"
     of = "" if len(seen) == 1 else f", {name.upper()}"
     rms = float(np.sqrt(np.mean(outcome.residual_m_s2**2)))
     what = "residual" if isinstance(outcome, KalmanCalibration) else "gravity error in static poses"
@@ -82,6 +83,15 @@ def _consistencies(outcome: KalmanCalibration | NormKalmanCalibration) -> list[t
     if isinstance(outcome, KalmanCalibration):
         return [(AXES[axis.axis], axis.consistency, outcome.n_poses) for axis in outcome.axes]
     return [("norm", outcome.consistency, len(outcome.residual_m_s2))]
+
+
+def _meaning(seen: Consistency) -> str:
+    """What the ratio says of the noise that the filter was given."""
+    if seen.nis_mean < seen.nis_low:
+        return "the noise given is too large, the uncertainties too wide"
+    if seen.nis_mean > seen.nis_high:
+        return "the noise given is too small, the uncertainties too narrow"
+    return f"as predicted, as far as {how_many(seen.n, 'pose')} can show"
 
 
 def _limits(seen: Consistency) -> str:

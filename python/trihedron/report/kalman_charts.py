@@ -83,7 +83,7 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
     marks: list[Band | Line | Points | Level] = []
     window, n = WINDOW, 2
     for k, result in enumerate(results):
-        pose = np.flatnonzero(result.is_settled).astype(np.float64)
+        pose = 1.0 + np.flatnonzero(result.is_settled)
         nis = result.nis[result.is_settled]
         window = max(1, min(WINDOW, len(pose) // 2))
         n = max(n, len(result.is_settled))
@@ -94,10 +94,12 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
             for p, v in zip(pose, nis, strict=True)
         ]
         marks.append(Points(pose, np.minimum(nis, 12.0), told, None, f"{name}: one pose", AXIS_COLOURS[k], True))
-        marks.append(Line(pose[window - 1 :], mean, f"{name}: mean of {window}", AXIS_COLOURS[k]))
+        marks.append(Line(pose[window - 1 :], mean, f"{name}: running mean", AXIS_COLOURS[k]))
     low, high = (float(stats.chi2.ppf(p, window)) / window for p in (0.005, 0.995))
-    across = np.array([-0.5, n - 0.5])
-    band = Band(across, np.full(2, low), np.full(2, high), f"99 % of means of {window} when the noise model is right")
+    across = np.array([0.3, n + 0.7])
+    band = Band(
+        across, np.full(2, low), np.full(2, high), f"99 % of running means (of {window}) when the noise model is right"
+    )
     y = Scale("innovation² / predicted variance", "", includes=(0.0,))
     return Chart((Panel(Scale("pose", limits=(0.3, n + 0.7), whole=True), y, (band, Level(y=1.0), *marks)),))
 
@@ -109,7 +111,7 @@ def drift_chart(results: Sequence[AxisKalmanResult], raw_unit: str) -> Chart:
         pose = np.arange(1, len(result.drift) + 1, dtype=np.float64)
         smooth, sigma = result.smoothed_drift, result.smoothed_drift_sigma
         marks = (
-            Band(pose, smooth - sigma, smooth + sigma, "1σ"),
+            Band(pose, smooth - sigma, smooth + sigma, "1 σ"),
             Line(pose, result.drift, "filtered", "accent", is_thin=True),
             Line(pose, smooth, "smoothed", "c1"),
         )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import PurePath
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.records.fleet import FleetSummary
-from trihedron.records.sessions import PARAMETERS, SessionsModel
+from trihedron.records.sessions import PARAMETERS, Session, SessionsModel
 from trihedron.report.axes import axis_in_print
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Panel, Points, Scale
 from trihedron.report.drawn import said
@@ -20,11 +22,29 @@ SHOWN: dict[str, tuple[float, str]] = {
     "1": (1e2, "%"),
 }
 """Factor and unit in which people compare numbers of each kind."""
+REPEATS = "repeats to (1 σ)"
 
 
 def shown(unit: str) -> tuple[float, str]:
     """Factor and unit in print."""
     return SHOWN[unit]
+
+
+def short_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Names of files without the file name and the ending that all of them share: an axis has little room."""
+    paths = [PurePath(name) for name in names]
+    if len(paths) > 1 and len({path.name for path in paths}) == 1 and all(path.parent.name for path in paths):
+        return tuple(str(path.parent) for path in paths)
+    is_shared = len({path.suffix for path in paths}) == 1
+    return tuple(str(path.with_suffix("")) if is_shared else str(path) for path in paths)
+
+
+def compared_variance(sessions: Sequence[Session], k: int) -> FloatArray:
+    """(n,) variance of parameter ``k`` by which recordings are compared: of each, and the unit's drift within one."""
+    drift = {
+        group: np.mean([s.drift[k] for s in sessions if s.group == group]) for group in {s.group for s in sessions}
+    }
+    return np.array([max(s.covariance[k, k] + drift[s.group], 0.0) for s in sessions])
 
 
 def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int = 1) -> Chart:
@@ -34,7 +54,7 @@ def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int 
     if thermal is not None:
         place = np.array([session.temperature_degc for session in model.sessions])
     step = 0.12 * max(float(np.ptp(place)) / max(len(place) - 1, 1), 1e-9)
-    names = tuple(session.name for session in model.sessions)
+    names = short_names([session.name for session in model.sessions])
     panels = []
     for name in dict.fromkeys(one.parameter.id for one in model.repeated):
         if only and name not in only:
@@ -52,7 +72,7 @@ def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int 
                 curve = (along - thermal.reference_degc)[:, None] ** np.arange(len(column)) @ column - centre
                 marks.append(Line(along, curve * factor, "", colour, is_thin=True))
             values = np.array([session.numbers[k] - centre for session in model.sessions]) * factor
-            error = np.array([np.sqrt(max(session.covariance[k, k], 0.0)) for session in model.sessions]) * factor
+            error = np.sqrt(compared_variance(model.sessions, k)) * factor
             told = [
                 said(f"{session.name}, {axis_in_print(PARAMETERS[k].name)}", "", v, f"± {e:.2g} {unit}")
                 for session, v, e in zip(model.sessions, values, error, strict=True)
@@ -60,10 +80,14 @@ def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int 
             spread = model.repeated[k].within
             if thermal is None and spread is not None:
                 reach = np.full(2, spread.sd * factor)
-                marks.insert(0, Band(np.array([0.5, len(place) + 0.5]), -reach, reach))
+                marks.insert(0, Band(np.array([0.5, len(place) + 0.5]), -reach, reach, REPEATS))
             axis = axis_in_print(PARAMETERS[k].name)
             marks.append(Points(place + (k - picked[0] - 1) * step, values, told, error, axis, colour))
-        x = Scale("temperature [°C]", "°C") if thermal is not None else Scale("recording", whole=True, names=names)
+        x = (
+            Scale("temperature [°C]", "°C")
+            if thermal is not None
+            else Scale("recording", whole=True, names=names, limits=(0.5, len(place) + 0.5))
+        )
         panels.append(Panel(x, Scale(f"{name}  [{unit}]", unit), tuple(marks), height_px=170))
     return Chart(tuple(panels), columns=columns, is_linked=True)
 

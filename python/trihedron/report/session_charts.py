@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.arrays import XYZ
+from trihedron.arrays import XYZ, BoolArray
 from trihedron.records import Recording, Segments, Truth, Verification
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
-from trihedron.report.chart import AXIS_COLOURS, Band, Bars, Chart, Level, Line, Panel, Points, Scale, Span
+from trihedron.report.chart import AXIS_COLOURS, Band, Bars, Chart, Colour, Level, Line, Panel, Points, Scale, Span
 from trihedron.report.drawn import envelope, said
 from trihedron.report.numbers import unit_in_print
 
-ALLOWED = "3σ of noise and of the calibration's own error"
+ALLOWED = "3 σ of noise and calibration uncertainty"
 LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
 """What the length of two Gaussian errors exceeds as rarely as one exceeds 3σ, over its rms."""
 
@@ -90,7 +90,10 @@ def verification_chart(verification: Verification) -> Chart:
         (
             Band(edge, -limit, limit, ALLOWED),
             Level(y=0.0),
-            Points(pose, error, told, None, "error in the pose", "c1"),
+            *(
+                Points(pose[part], error[part], [told[i] for i in np.flatnonzero(part)], None, name, colour)
+                for part, name, colour in _parted(np.abs(error) > LIMIT_SIGMAS * sigma)
+            ),
         ),
     )
     if not len(v.angle_deg):
@@ -104,8 +107,17 @@ def verification_chart(verification: Verification) -> Chart:
         Scale("tilt error  [°]", "°", includes=(0.0,)),
         (
             Band(edge, 0.0 * limit, limit, ALLOWED),
-            Bars(move, v.angle_deg, 0.7, told, "tilt error", "c3"),
+            *(
+                Bars(move[part], v.angle_deg[part], 0.7, [told[i] for i in np.flatnonzero(part)], name, colour)
+                for part, name, colour in _parted(v.angle_deg > LIMIT_RMS * v.angle_sigma_deg)
+            ),
         ),
         height_px=180,
     )
     return Chart((norm, moves))
+
+
+def _parted(is_beyond: BoolArray) -> list[tuple[BoolArray, str, Colour]]:
+    """What is within the band and what is beyond it, each where there is any."""
+    parts: list[tuple[BoolArray, str, Colour]] = [(~is_beyond, "within 3 σ", "c1"), (is_beyond, "beyond 3 σ", "accent")]
+    return [part for part in parts if part[0].any()]

@@ -23,6 +23,7 @@ HEADLINES = {
     "gyro-scale": "gyroscope scale",
 }
 
+BARS = "bars: 1 σ, the bias drift within a recording included"
 NEXT = "Use the common parameters (-o FILE writes them): their uncertainty is that of the next recording."
 
 
@@ -30,7 +31,9 @@ def sessions_report(model: SessionsModel) -> Document:
     """Lay out what many recordings share, and how far each parameter repeats."""
     n = len(model.sessions)
     changed = [change for change in model.changes if change.significant]
-    good = f"{how_many(n, 'recording')} agree: no parameter changed beyond its uncertainty."
+    good = (
+        f"{how_many(n, 'recording')} agree: no parameter changed beyond its uncertainty and the bias drift within one."
+    )
     if model.thermal is not None:
         good = f"{how_many(n, 'recording')} make one model from {_range(model.thermal)}."
     sections = [
@@ -83,7 +86,7 @@ def _lead(model: SessionsModel) -> Picture:
     """Scales and biases alone: what a user carries from one session to the next."""
     chart = partial(sessions_chart, model, DRIFTING, 2)
     has_band = model.thermal is None and any(one.within is not None for one in model.repeated)
-    caption = "Scale and bias of both sensors in every recording, about the common value"
+    caption = f"Scale and bias of both sensors in every recording, about the common value; {BARS}"
     caption += "; the band: how far they repeat." if has_band else "."
     return Picture("drift", caption, chart)
 
@@ -244,7 +247,7 @@ def _further(model: SessionsModel) -> list[Picture]:
     """What the first picture does not show."""
     others = tuple(name for name in dict.fromkeys(one.parameter.id for one in model.repeated) if name not in DRIFTING)
     chart = partial(sessions_chart, model, others)
-    caption = "The other parameters in every recording with their uncertainty (error bars), about the common value."
+    caption = f"The other parameters in every recording, about the common value; {BARS}."
     return [Picture("sessions", caption, chart)] if others else []
 
 

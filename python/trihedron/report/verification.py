@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.records import FindingCode, Recording, Segments, Verification
+from trihedron.records import Finding, FindingCode, Recording, Segments, Verification
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import how_many, in_mm_s2, plain_number, with_sigma
@@ -43,14 +43,25 @@ def verification_report(
         sections=tuple(sections),
         headlines=headlines_of(verification),
         lead=_errors_picture(verification),
-        next_step=USE if verification.is_passed else "",
+        next_step=_next_step(verification),
     )
 
 
 def _usable(v: Verification) -> str:
     """A warning about the errors themselves takes ``Verified`` away."""
-    is_above = any(finding.code in _ABOVE_NOISE for finding in v.findings)
-    return "Errors exceed noise and uncertainty" if is_above else "Verified"
+    return "Errors exceed noise and uncertainty" if _above_noise(v) else "Verified"
+
+
+def _next_step(v: Verification) -> str:
+    """To use it only where nothing speaks against its errors."""
+    above = _above_noise(v)
+    if above or not v.is_passed:
+        return above[0].action if above else ""
+    return USE
+
+
+def _above_noise(v: Verification) -> list[Finding]:
+    return [finding for finding in v.findings if finding.code in _ABOVE_NOISE]
 
 
 def headlines_of(v: Verification) -> tuple[Headline, ...]:

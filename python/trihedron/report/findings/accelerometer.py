@@ -158,10 +158,10 @@ ENTRIES = (
         Code.RESIDUAL_ABOVE_NOISE,
         "verify-rest",
         WARNING,
-        "The gravity error in static poses, {norm_rms_m_s2:.3g mm/s²} rms, exceeds noise and "
-        "uncertainty: χ²/dof {chi2_per_dof:.2g}, each pose weighed by its own.",
+        "The gravity error in static poses, {norm_rms_m_s2:.3g mm/s²} rms, exceeds noise and uncertainty, most in pose "
+        "{worst_pose} ({worst_m_s2:.3g mm/s²}); χ²/dof {chi2_per_dof:.2g}, each pose weighted by its uncertainty.",
         "The sensor has changed since (temperature, shock, supply), gravity is another here, or poses were not still.",
-        "Calibrate again near the conditions of use; compare the two calibrations.",
+        "Look at pose {worst_pose} first; if it was still, calibrate again near the conditions of use.",
         or_severity=SERIOUS,
     ),
 )

@@ -83,19 +83,19 @@ _VERIFIED = (
         Code.WORSE_THAN_UNCALIBRATED,
         "verify-rest",
         SERIOUS,
-        "The accelerometer's gravity error in static poses is {rms:.3g mm/s²} rms with this calibration and "
-        "{rms_without:.3g mm/s²} without any.",
+        "Worse than no calibration: the gravity error in static poses is {rms:.3g mm/s²} rms with it and "
+        "{rms_without:.3g mm/s²} without.",
         "A wrong file, unit, axis or sign, or a calibration of too few poses.",
-        "Do not use it; calibrate with this log.",
+        "Do not use it: check that file, unit and device belong together.",
     ),
     Entry(
         Code.WORSE_THAN_UNCALIBRATED,
         "verify-moves",
         SERIOUS,
-        "The tilt error after a rotation is {rms:.3g}° rms with this gyro calibration and {rms_without:.3g}° without "
-        "any.",
+        "Worse than no calibration: the tilt error after a rotation is {rms:.3g}° rms with it and {rms_without:.3g}° "
+        "without.",
         "A wrong file, unit, axis or sign, or a calibration of too few rotations.",
-        "Do not use it; calibrate with this log.",
+        "Do not use it: check that file, unit and device belong together.",
     ),
     Entry(
         Code.CALIBRATION_SHIFT,

@@ -6,11 +6,20 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from trihedron.records import Finding, Severity
+from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report.document import FindingList, Paragraph
 from trihedron.report.numbers import MINUS, how_many, listed
 
 _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
+_CONSEQUENCE = (
+    FindingCode.SAME_RECORDING,
+    FindingCode.CALIBRATION_DOUBTED,
+    FindingCode.WORSE_THAN_UNCALIBRATED,
+    FindingCode.GRAVITY_DEFAULTED,
+    FindingCode.RESIDUAL_ABOVE_NOISE,
+    FindingCode.HELD_OUT_WORSE,
+)
+"""What concerns the whole result, the gravest first; it comes before what concerns a part of the recording."""
 # A number that is a value; one that names a thing (pose 3) is recognised by the word before it.
 _NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+−-]?\d+)?")
 _NAMED = re.compile(r"^(Move|Pose|Turn) (\d+)(?: \([^)]*\))?,? (.*)$", re.DOTALL)
@@ -18,19 +27,23 @@ _AXIS = re.compile(r"^((?:gyro|accel)(?:\s\w+)?|ch\d+|\w+ [xyz123]): (.*)$", re.
 
 
 def findings_block(findings: Iterable[Finding]) -> FindingList | Paragraph:
-    """Gravest first; within a severity in the order of the stages; what recurs, once."""
-    ordered = tuple(sorted(map(_sentence, combined(findings)), key=lambda f: _ORDER[f.severity]))
+    """Gravest first; within a severity by consequence, then in the order of the stages; what recurs, once."""
+    ordered = tuple(map(_sentence, sorted(combined(findings), key=_weight)))
     return FindingList(ordered) if ordered else Paragraph("None.")
+
+
+def _weight(finding: Finding) -> tuple[int, int]:
+    is_listed = finding.code in _CONSEQUENCE
+    return _ORDER[finding.severity], _CONSEQUENCE.index(finding.code) if is_listed else len(_CONSEQUENCE)
 
 
 def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) -> str:
     """``bad`` with what the first serious finding says first; ``usable`` with the number of warnings; or ``good``."""
-    found = combined(findings)
+    found = sorted(combined(findings), key=_weight)
     serious = [finding for finding in found if finding.severity is Severity.SERIOUS]
     n_warnings = sum(finding.severity is Severity.WARNING for finding in found)
     if serious:
-        more = f" ({how_many(len(serious) - 1, 'more serious finding')})" if len(serious) > 1 else ""
-        return f"{bad}: {_capital(first_clause(serious[0].seen))}{more}"
+        return f"{bad}: {_capital(first_clause(serious[0].seen))}"
     return f"{usable}, with {how_many(n_warnings, 'warning')}." if n_warnings else good
 
 
@@ -72,7 +85,7 @@ def _axes(parts: Sequence[re.Match[str]], rest: str) -> str:
         sensor, _, axis = part[1].partition(" ")
         groups.setdefault(sensor, []).append(axis)
     words = [f"{sensor} {listed(axes)}".strip() for sensor, axes in groups.items()]
-    return f"{_capital('; '.join(words))}: {rest[:1].lower()}{rest[1:]}"
+    return f"{_capital(', '.join(words))}: {rest[:1].lower()}{rest[1:]}"
 
 
 def _things(parts: Sequence[re.Match[str]], rest: str) -> str:

@@ -186,10 +186,10 @@ _MOVES = (
         Code.HELD_OUT_WORSE,
         "verify-moves",
         WARNING,
-        "The tilt error after rotations, {angle_rms_deg:.3g}° rms (worst move {worst_move}: {worst_deg:.3g}°), exceeds "
-        "noise and uncertainty: χ²/dof {chi2_per_dof:.2g}, each move weighed by its own.",
+        "The tilt error after rotations, {angle_rms_deg:.3g}° rms, exceeds noise and uncertainty, most in move "
+        "{worst_move} ({worst_deg:.3g}°); χ²/dof {chi2_per_dof:.2g}, each move weighted by its uncertainty.",
         "The gyro's scale has changed since, it clipped, samples were lost, or a pose was not still.",
-        "Look at the worst moves; calibrate again near the conditions of use.",
+        "Look at move {worst_move} first; if the poses around it were still, calibrate again near conditions of use.",
         or_severity=SERIOUS,
     ),
 )

@@ -32,10 +32,9 @@ ENTRIES = (
         Code.POSE_UNSTEADY,
         "",
         WARNING,
-        "{poses:# pose} {poses:?stays|stay} noisier than the sensor itself throughout (pose {which:first 8}; first at "
-        "{first_s:.1f} s).",
+        "The sensor moved or vibrated in {poses:# pose}: {which:first 8} (first at {first_s:.1f} s).",
         "The sensor was held in the hand or stood on a support that shakes.",
-        "Such a mean weighs less, by its own scatter; put the case on a firm support for a better result.",
+        "Put the case on a firm support for a better result; the means of these poses count less.",
     ),
     Entry(
         Code.POSE_AT_RANGE_LIMIT,
