@@ -83,7 +83,7 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
     marks: list[Band | Line | Points | Level] = []
     window, n = WINDOW, 2
     for k, result in enumerate(results):
-        pose = 1.0 + np.flatnonzero(result.is_settled)
+        pose = 1.0 + np.flatnonzero(result.is_settled).astype(np.float64)
         nis = result.nis[result.is_settled]
         window = max(1, min(WINDOW, len(pose) // 2))
         n = max(n, len(result.is_settled))
