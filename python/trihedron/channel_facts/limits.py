@@ -49,9 +49,9 @@ BY_CHANCE = 1e-6
 """Chance that readings crowd on the outermost code of a sensor, or repeat there, in a healthy recording."""
 DITHERED = 1.5
 """LSB over the noise (rounding in it) up to which the top of a smooth motion spreads over codes."""
-NEAR, NEIGHBOURS = 3, 40
-"""Codes next to the outermost one: a slow peak reads all of the first few more often than those far below, a quick one
-all alike."""
+REACHES = (1, 3, 40)
+"""Codes next to the outermost one: a stretch that hardly moves reads the first as often as it, a slow peak the first
+few more often than those far below, a quick one all alike."""
 
 
 def is_wall(end: End, *, is_known: bool) -> bool:
@@ -81,15 +81,21 @@ def is_repeated(end: End, *, is_known: bool) -> bool:
     # One stretch alone may be a channel that froze, as above.
     if end.dither <= end.step or np.count_nonzero(lengths > 1) < (1 if is_known else 2):
         return False
-    repeats = int(np.sum(lengths - 1))
+    n, repeats = int(lengths.sum()), int(np.sum(lengths - 1))
     equal = max(EQUAL * end.step / end.dither, LEAST_EQUAL)
-    if equal**repeats > BY_CHANCE:
+    if _at_least(repeats, n, equal) > BY_CHANCE:
         return False
     # Where rows are written again, neighbours are equal everywhere.
-    return (
-        max(equal, float(np.mean(np.concatenate([np.diff(part) for part in end.stretches]) == 0.0))) ** repeats
-        < BY_CHANCE
-    )
+    usual = float(np.mean(np.concatenate([np.diff(part) for part in end.stretches]) == 0.0))
+    return _at_least(repeats, n, max(equal, usual)) < BY_CHANCE
+
+
+def _at_least(k: int, n: int, p: float) -> float:
+    """Chernoff's bound of the chance of k or more of n, each with chance p."""
+    share = k / n
+    if share <= p:
+        return 1.0
+    return math.exp(-n * (share * math.log(share / p) + (1.0 - share) * math.log((1.0 - share) / (1.0 - p))))
 
 
 def is_cut_noise(end: End) -> bool:
@@ -129,9 +135,7 @@ def _chance(ends: list[End]) -> float:
     spare = sum(end.count for end in told) - len(told)
     if spare <= 0:
         return 1.0
-    expected = sum(
-        max(max(end.near((reach + 0.5) * end.step)[0], 1) / reach for reach in (NEAR, NEIGHBOURS)) for end in told
-    )
+    expected = sum(max(max(end.near((reach + 0.5) * end.step)[0], 1) / reach for reach in REACHES) for end in told)
     # At least so many of a Poisson law: a chi-square of twice as many degrees below twice its mean.
     return 1.0 - chdtrc(2.0 * spare, 2.0 * expected)
 
