@@ -85,7 +85,7 @@ def related(model: Hypothesis, limit: float) -> Related:
 def _best(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> Follows | None:
     """The relation that gains most of those that look best at fixed strengths, each family once."""
     context = model.context
-    leading: list[list[tuple[float, Signal, Way, float]]] = []
+    leading: list[list[Leader]] = []
     n_tried = 0
     # One family at a time: the columns of all of them together are larger than the log.
     for whole in _families(context):
@@ -109,9 +109,7 @@ def _best(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> 
     return each[best] if scores[best] > 0.0 else None
 
 
-def _led(
-    leading: list[list[tuple[float, Signal, Way, float]]], signal: Signal, ways: list[Way], gains: list[FloatArray]
-) -> list[list[tuple[float, Signal, Way, float]]]:
+def _led(leading: list[list[Leader]], signal: Signal, ways: list[Way], gains: list[FloatArray]) -> list[list[Leader]]:
     """The leaders under every strength of noise, and of one family more the way that gains most under each.
 
     Quiet noise takes what it leaves for what many columns explain, loud noise for what one does.
@@ -130,6 +128,8 @@ def _led(
 
 Way = tuple[tuple[int, ...], tuple[int, ...]]
 """Numbers of the variables, and of the axes that follow them."""
+Leader = tuple[float, Signal, Way, float]
+"""Gain in log-evidence, what is followed, in which way, and how large beside what is expected."""
 
 
 def _ways(signal: Signal) -> list[Way]:
