@@ -237,7 +237,7 @@ def test_a_hundred_poses_fit_two_hundred_kilobytes(tmp_path):
 def test_a_point_tells_its_value_and_a_figure_zooms_and_returns(folder, browser):
     page = Visit(browser, folder / "calibrate.html", 1280, "light").page
     point_at_the_first_dot(page, "#residuals")
-    assert re.fullmatch(r"(held out, )?pose 1: −?\d+\.\d+ ± \d+\.\d+ mm/s²", page.inner_text("#tip"))
+    assert re.fullmatch(r"(cross-validated, )?pose 1: −?\d+\.\d+ ± \d+\.\d+ mm/s²", page.inner_text("#tip"))
     assert page.locator("#residuals .plot .on").count() == 1
     svg, ticks = "#residuals .plot > svg", "#residuals .xticks"
     whole, before = page.get_attribute(svg, "viewBox"), page.inner_text(ticks)
