@@ -28,6 +28,8 @@ SPREAD = np.log([30.0, 30.0, 30.0, 30.0, 4.0, 30.0, 4.0])
 """A prior σ of a factor of 30 either way; the time constants of a factor of 4."""
 FARTHEST = 4.0
 """Strengths beyond four prior σ are strengths of nothing."""
+LEAST_SPREAD = 0.01
+"""Of the prior's: strengths known better than that are strengths known."""
 STEP = 0.02
 CURVATURE_STEP = 0.25
 """Steps in the logarithm of a strength for the slope, and for the curvature that a walk begins with."""
@@ -134,7 +136,9 @@ class Fitted:
 
     def spread(self) -> FloatArray:
         """(a recording, 7, 7) roots of the covariance of the strengths' logarithms."""
-        return np.array([np.linalg.cholesky(np.cov(one.T)) for one in self.draws.swapaxes(0, 1)])
+        # A walk that hardly moved has draws of fewer directions than there are strengths.
+        least = np.diag((LEAST_SPREAD * SPREAD) ** 2)
+        return np.array([np.linalg.cholesky(np.cov(one.T) + least) for one in self.draws.swapaxes(0, 1)])
 
 
 def most_likely(
