@@ -52,6 +52,8 @@ DITHERED = 1.5
 REACHES = (1, 3, 40)
 """Codes next to the outermost one: a stretch that hardly moves reads the first as often as it, a slow peak the first
 few more often than those far below, a quick one all alike."""
+UNREAD = 1.0 / 3.0
+"""Readings of a code that are expected where none of its neighbours was read."""
 
 
 def is_wall(end: End, *, is_known: bool) -> bool:
@@ -135,7 +137,7 @@ def _chance(ends: list[End]) -> float:
     spare = sum(end.count for end in told) - len(told)
     if spare <= 0:
         return 1.0
-    expected = sum(max(max(end.near((reach + 0.5) * end.step)[0], 1) / reach for reach in REACHES) for end in told)
+    expected = sum(max(UNREAD, *(end.near((reach + 0.5) * end.step)[0] / reach for reach in REACHES)) for end in told)
     # At least so many of a Poisson law: a chi-square of twice as many degrees below twice its mean.
     return 1.0 - chdtrc(2.0 * spare, 2.0 * expected)
 
