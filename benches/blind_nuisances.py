@@ -3,7 +3,7 @@
     python benches/blind_nuisances.py --each 3 --seed 11            # every flaw three times, nuisances on
     python benches/blind_nuisances.py --each 2 --clean              # no nuisances
     python benches/blind_nuisances.py --only none --each 30         # nuisances alone
-    python benches/blind_nuisances.py --only none --each 20 --clean --flicker   # healthy with consumer 1/f noise
+    python benches/blind_nuisances.py --only none --each 20 --clean --stress walk   # a sound part whose bias walks
     python benches/blind_nuisances.py --only none --triples 10 --seed 21        # three units told as one
 
 Each trial writes a log and, apart, the sealed answer; the diagnosis sees the log alone. ``--triples`` gives sessions of
@@ -30,7 +30,7 @@ import polars as pl
 
 import trihedron
 from blind_trial.running import command_line, tried, within
-from nuisance_trial.draw import ALLOWED_BESIDE, ALSO_RIGHT, FLAWS, G, draw
+from nuisance_trial.draw import ALLOWED_BESIDE, ALSO_RIGHT, FLAWS, STRESSES, G, draw
 
 
 def trial(job):
@@ -68,7 +68,7 @@ def judged(answer, said, crash, seconds):
             "z_linear": coverage(answer, said["calibration"]["baseline"]),
             "left": [d["domain"] for d in said["remaining"] if d["disagrees"]],
             "confounded": [e["confounded_with"] for e in effects], "worthless": worthless(effects)}  # fmt: skip
-    beside = set().union(*(ALLOWED_BESIDE[n] for n in answer["nuisances"])) if answer["nuisances"] else set()
+    beside = set().union(STRESSES.get(answer["stress"], ()), *(ALLOWED_BESIDE[n] for n in answer["nuisances"]))
     false = [i for i in ids if i != flaw and i not in beside and i not in ALSO_RIGHT.get(flaw, ())]
     out["false"] = false
     if flaw == "none":
@@ -148,7 +148,7 @@ def main():
     parser.add_argument("--size", type=float, default=1.0)
     parser.add_argument("--clean", action="store_true", help="no nuisances")
     parser.add_argument("--without", action="append", default=[], help="leave this nuisance out, all else the same")
-    parser.add_argument("--flicker", action="store_true", help="1/f noise as consumer parts have it (0.3 mg, 20 deg/h)")
+    parser.add_argument("--stress", choices=STRESSES, help="what strains a sound instrument")
     parser.add_argument("--only", action="append", choices=FLAWS)
     parser.add_argument("--triples", type=int, help="so many times three units as one, for each flaw")
     options = parser.parse_args()
@@ -159,7 +159,7 @@ def main():
         shared, own = (sum(r[key] for r in results) for key in ("shared", "own"))
         print(f"{len(results)} triples: {shared} share an effect, {own} called the instrument's")
         return
-    how = (options.size, not options.clean, options.flicker, options.without)
+    how = (options.size, not options.clean, options.stress, options.without)
     jobs = [(flaw, options.seed * 100_000 + k * 100 + i, *how) for k in range(options.each) for i, flaw in flaws]
     report(tried(trial, [job for job in jobs if options.only_seed in (None, job[1])], options, line))
 

@@ -146,10 +146,10 @@ def against_published(folder: Path) -> None:
 def main() -> None:
     what, folder, words = sys.argv[1], Path(sys.argv[2]), sys.argv[3:]
     if what == "diagnose":
-        print("| set | poses | verdict: effects in order | parameter | held out, χ² per row | remains | CPU |")
+        print("| set | poses | verdict: effects in order | parameter | cross-validated, χ² per row | remains | CPU |")
         print("|---|---|---|---|---|---|---|")
     else:
-        print("recording                     time poses   residual   held out     noise   gravity  verdict")
+        print("recording                     time poses   residual   cross-val.   noise   gravity  verdict")
     for name, arguments, gravity in recordings(folder):
         if words and not any(word in name for word in words):
             continue

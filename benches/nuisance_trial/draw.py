@@ -25,13 +25,21 @@ ALLOWED_BESIDE = {
 ALSO_RIGHT = {"accel-gyro-time-offset": {"sensor-lag"}, "sensor-lag": {"accel-gyro-time-offset"},
               "accel-cubic": {"accel-scale-asymmetry"}}  # fmt: skip
 """Named together with the truth it counts as an answer shared, not as a wrong one."""
+STRESSES = {
+    "walk": {"accel-bias-drift", "gyro-bias-drift", "accel-bias-repeatability", "gyro-bias-repeatability"},
+    "flicker": {"accel-bias-repeatability", "gyro-bias-repeatability"},
+    "soft": {"disturbed-pose"},
+    "temperature": set(),
+}
+"""What strains a sound instrument, with what may be said of it: biases that walk strongly, 1/f noise as consumer parts
+have it (0.3 mg, 20 °/h), soft supports under every pose, a logged temperature that no sensor follows."""
 
 
 def _signed(rng, low, high, size=3):
     return rng.uniform(low, high, size) * rng.choice([-1.0, 1.0], size)
 
 
-def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
+def draw(flaw, seed, size=1.0, nuisances=True, stress=None, without=()):
     """``(columns of the log, answer)`` of one trial."""
     rng = np.random.default_rng(seed)
     rate_hz = float(rng.choice([20.0, 50.0, 62.5, 100.0, 100.0, 200.0, 250.0, 500.0, 1000.0]))
@@ -43,7 +51,7 @@ def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
     pose_s = float(np.clip(most / n_poses - move_s, 1.2, pose_s))
     n_poses = max(10, min(n_poses, int(most / (pose_s + move_s))))
     here = {name: nuisances and bool(rng.random() < 0.65) for name in NUISANCES}
-    here |= dict.fromkeys(without, False)
+    here |= dict.fromkeys(without, False) | ({"soft": True} if stress == "soft" else {})
     how = {
         "soft": rng.uniform(0.0005, 0.003) if here["soft"] else 0.0,
         "jolt": rng.uniform(0.3, 3.0) if here["jolt"] else 0.0,
@@ -104,11 +112,12 @@ def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
         memory = lfilter([1.0 / (tau * fine_hz)], [1.0, -(1.0 - 1.0 / (tau * fine_hz))], force, axis=0)
         force, values = force + a * memory, {"memory": a}
     temperature = None
-    if flaw.endswith("thermal-bias"):
+    if flaw.endswith("thermal-bias") or stress == "temperature":
         span = rng.uniform(6.0, 18.0)
         kind = rng.integers(3)
         u = t / duration
         temperature = 25 + span * (u, 1 - np.exp(-3 * u), 0.5 - 0.5 * np.cos(2 * np.pi * u))[kind]
+    if flaw.endswith("thermal-bias"):
         if flaw[0] == "a":
             c = _signed(rng, 0.002, 0.008) * size
             force = force + (temperature - 25)[:, None] * c
@@ -171,7 +180,12 @@ def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
     gyro_sigma = np.exp(rng.uniform(np.log(0.02), np.log(0.2))) * DEG
     accel = force @ A.T + zero_a + rng.normal(size=(n, 3)) * accel_sigma
     gyro = rate @ W.T + zero_g + rng.normal(size=(n, 3)) * gyro_sigma
-    if weak_1_over_f:
+    if stress == "walk":
+        # Over the session, one σ: 5 to 20 mm/s² and 0.1 to 0.5 °/s.
+        steps = rng.normal(size=(2, n, 3)) / np.sqrt(n)
+        accel += np.cumsum(steps[0], axis=0) * np.exp(rng.uniform(np.log(0.005), np.log(0.02)))
+        gyro += np.cumsum(steps[1], axis=0) * np.exp(rng.uniform(np.log(0.1), np.log(0.5))) * DEG
+    if stress == "flicker":
         accel_sigma, gyro_sigma = (
             rng.uniform(0.8e-3, 2e-3) * rate_hz**0.5,
             rng.uniform(0.004, 0.01) * DEG * rate_hz**0.5,
@@ -220,8 +234,9 @@ def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
     if flaw == "accel-hysteresis":
         # S and b are those of a pose that has lasted: the memory has then followed and is part of the scale.
         A = A @ (np.eye(3) + np.diag(values["memory"]))
-    truth |= {"flaw": flaw, "seed": seed, "values": {k: np.asarray(v).tolist() for k, v in values.items()},
-              "A": A.tolist(), "W": W.tolist(), "zero_a": zero_a.tolist(), "zero_g": zero_g.tolist()}  # fmt: skip
+    said = {k: np.asarray(v).tolist() for k, v in values.items()}
+    truth |= {"flaw": flaw, "stress": stress, "seed": seed, "values": said, "A": A.tolist(),
+              "W": W.tolist(), "zero_a": zero_a.tolist(), "zero_g": zero_g.tolist()}  # fmt: skip
     return columns, truth
 
 
