@@ -10,8 +10,12 @@ the angles of the first half of each from the second as well.
 """
 
 import argparse
+import os
 import sys
 from pathlib import Path
+
+# Threads of the algebra beside one another on small matrices only wait.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 

@@ -22,6 +22,9 @@ quantile is the angle, in right angles, between it and its part in the world: tw
 nothing would have a posterior with a corner. The ratio of the two is then half-Cauchy; with the quantile as the part of
 the *square* that turns with the body, none of it was so unlikely that the whole came out too small."""
 MAY_BE_NOTHING = np.isin(COORDINATES, ("vibration", "bias_walk", "white", "slow"))
+NU = 3.0
+"""Degrees of freedom of its prior, the fewest with a mean square: a predicted covariance is one."""
+HALF = float(np.log(2.0) + gammaln(0.5 * NU + 0.5) - gammaln(0.5 * NU) - 0.5 * np.log(np.pi * NU))
 FARTHEST = 4.0
 """Coordinates beyond four prior σ are those of nothing."""
 STEP = 1e-3
@@ -50,9 +53,9 @@ ABSENT = 30.0
 class Prior:
     """Of the coordinates: ``mean`` (7,), ``sigma`` (7,); ``is_there`` (7,) those that there are.
 
-    A strength that ``may_be_nothing`` (7,) has a half-Cauchy prior about ``mean`` (Gelman 2006): flat towards nothing,
-    so that what a log does not show has an upper limit of the log and not of the prior. ``sigma`` then bounds the
-    search. The others are normal.
+    A strength that ``may_be_nothing`` (7,) has half a Student's distribution of that scale (Gelman 2006): flat towards
+    nothing, so that what a log does not show has an upper limit of the log and not of the prior. ``sigma`` then bounds
+    the search. The others are normal.
     """
 
     mean: FloatArray
@@ -110,9 +113,9 @@ def _slope(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> tuple[F
     """Derivatives (f,) of the log posterior, and its average information (f, f; Gilmour et al. 1995)."""
     free = prior.is_there > 0.0
     far, sigma = x - prior.mean[free], prior.sigma[free]
-    # A hyperbolic secant of the logarithm, of information 1/2 on average.
-    slope = np.where(prior.may_be_nothing[free], -np.tanh(far), -far / sigma**2)
-    information = np.diag(np.where(prior.may_be_nothing[free], 0.5, 1.0 / sigma**2))
+    # Of the logarithm, on average over the prior.
+    slope = np.where(prior.may_be_nothing[free], 1.0 - (NU + 1.0) / (1.0 + NU * np.exp(-2.0 * far)), -far / sigma**2)
+    information = np.diag(np.where(prior.may_be_nothing[free], 2.0 * NU / (NU + 3.0), 1.0 / sigma**2))
     at = whole(prior, x)
     others = [whole(prior, x + STEP * e) for e in np.eye(len(x))]
     for one in stretches:
@@ -137,8 +140,8 @@ def height(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> float:
         return -np.inf
     strengths = whole(prior, x)
     normal = -0.5 * (far / sigma) ** 2 - np.log(np.sqrt(2.0 * np.pi) * sigma)
-    half_cauchy = -np.log(np.pi * np.cosh(far))
-    known = np.sum(np.where(prior.may_be_nothing[free], half_cauchy, normal))
+    half = HALF + far - 0.5 * (NU + 1.0) * np.log1p(np.exp(2.0 * far) / NU)
+    known = np.sum(np.where(prior.may_be_nothing[free], half, normal))
     return float(sum(one.evidence(strengths) for one in stretches) + known)
 
 
