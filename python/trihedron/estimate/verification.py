@@ -10,9 +10,9 @@ import numpy as np
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import RefusedError
-from trihedron.estimate.gyroscope.aligned_moves import denies_cut
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.session.carried import Carried, carried
+from trihedron.estimate.session.start import denies_cut
 from trihedron.estimate.verified_parameters import judge_parameters, shift_findings, uncalibrated
 from trihedron.records import (
     Calibration,
@@ -192,10 +192,9 @@ def _carried(
     def seen_in(measured: MoveMeasurements) -> Carried:
         if calibration.averaging:
             rate = sharpened(measured.rate, measured.time_s, calibration.averaging)
-            measured = measured.of_rate(segments, rate, measured.reading_variance)
+            measured = replace(measured, rate=rate)
         return carried(
-            measured, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b,
-            gyroscope.S, gyroscope.covariance[:9, :9],
+            measured, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b, gyroscope.S
         )  # fmt: skip
 
     measured = measure_moves(recording, segments, accelerometer)
@@ -207,7 +206,8 @@ def _carried(
             measured, seen = plain, as_read
     told = np.flatnonzero(~measured.is_lost)
     g = calibration.gravity_m_s2
-    noise, total = np.sqrt(seen.floor2[told]) / g, np.sqrt((seen.floor2 + seen.model2)[told]) / g
+    by_scale2 = seen.by_scale2(gyroscope.covariance[:9, :9])
+    noise, total = np.sqrt(seen.floor2[told]) / g, np.sqrt((seen.floor2 + by_scale2)[told]) / g
     left_out = tuple(np.flatnonzero(measured.is_lost).tolist())
     return Carriage(seen.angle_deg[told], np.degrees(noise), np.degrees(total), told, left_out)
 

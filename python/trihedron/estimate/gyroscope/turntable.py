@@ -63,7 +63,7 @@ def _of_moves(
     measured = measure_moves(recording, segments, accelerometer)
     if calibration.averaging:
         rate = sharpened(measured.rate, measured.time_s, calibration.averaging)
-        measured = measured.of_rate(segments, rate, measured.reading_variance)
+        measured = replace(measured, rate=rate)
     anchors_s = segments.time_mid_s[measured.links]
     seen = carried(measured, anchors_s, accelerometer.S, accelerometer.b, gyro.S)
     known = np.ones(len(seen.angle_deg), dtype=bool) if quality.weights is None else quality.weights > 0.0
