@@ -10,8 +10,8 @@ import numpy as np
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import RefusedError
-from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
-from trihedron.estimate.session.carried import Carried, carried
+from trihedron.estimate.gyroscope.measurements import measure_moves
+from trihedron.estimate.session.carried import carried_by
 from trihedron.estimate.session.start import denies_cut
 from trihedron.estimate.verified_parameters import judge_parameters, shift_findings, uncalibrated
 from trihedron.records import (
@@ -24,7 +24,6 @@ from trihedron.records import (
     Severity,
     Verification,
 )
-from trihedron.session.averaging import sharpened
 
 FALSE_ALARM = 1e-3
 """Chance that a calibration that holds is said to be exceeded."""
@@ -188,20 +187,11 @@ def _carried(
     """The figure that a calibration publishes of its own session (docs/model-session.md), with a bias per pose, here
     with S and b held at the calibration's; of the same moves: not of those that were at the gyro's limit for long."""
     accelerometer = calibration.accelerometer
-
-    def seen_in(measured: MoveMeasurements) -> Carried:
-        if calibration.averaging:
-            rate = sharpened(measured.rate, measured.time_s, calibration.averaging)
-            measured = replace(measured, rate=rate)
-        return carried(
-            measured, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b, gyroscope.S
-        )  # fmt: skip
-
     measured = measure_moves(recording, segments, accelerometer)
-    seen = seen_in(measured)
+    seen = carried_by(calibration, gyroscope.S, measured, segments)
     if np.any(measured.is_lost) and not any(limit.is_word for limit in recording.facts.of("gyroscope").limits):
         plain = measure_moves(recording, segments, accelerometer, is_bridged=False)
-        as_read = seen_in(plain)
+        as_read = carried_by(calibration, gyroscope.S, plain, segments)
         if denies_cut(gyroscope.S, as_read.angle_deg, measured, plain):
             measured, seen = plain, as_read
     told = np.flatnonzero(~measured.is_lost)

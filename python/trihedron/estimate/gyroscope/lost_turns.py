@@ -87,11 +87,6 @@ def could_be_remade(time_s: FloatArray, nominal_step_s: float) -> bool:
     return float(np.ptp(late)) <= max(OWN_CLOCK * float(np.ptp(each)), EVEN * nominal_step_s)
 
 
-def asks_for_losses(chi2: float, dof: float, n_left_out: int) -> bool:
-    """Whether misses of the moves in use are beyond noise, a little being enough where other moves were excluded."""
-    return dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < (DOUBTFUL if n_left_out else CERTAIN)
-
-
 def left_out_as_by_losses(
     time_s: FloatArray, measured: MoveMeasurements, outliers: tuple[int, ...], solution: SessionSolution, seen: Carried
 ) -> bool:
@@ -204,6 +199,8 @@ def losses_that_fit(
 def is_asked_for_losses(
     time_s: FloatArray, measured: MoveMeasurements, outliers: tuple[int, ...], solution: SessionSolution, seen: Carried
 ) -> bool:
-    """Whether losses may be behind what moves miss: those in use beyond noise, or those left out by whole samples."""
-    asks = asks_for_losses(solution.moves_chi2, solution.moves_dof, len(outliers))
-    return asks or left_out_as_by_losses(time_s, measured, outliers, solution, seen)
+    """Whether losses may be behind what moves miss: those in use beyond noise, a little being enough where others were
+    excluded, or those left out by whole samples."""
+    dof, chance = solution.moves_dof, DOUBTFUL if outliers else CERTAIN
+    is_beyond_noise = dof >= 1.0 and fdtrc(dof, NOISE_DOF, solution.moves_chi2 / dof) < chance
+    return is_beyond_noise or left_out_as_by_losses(time_s, measured, outliers, solution, seen)

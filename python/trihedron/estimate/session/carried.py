@@ -16,7 +16,9 @@ from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.fit import DYNAMICS, MOVES, STATIC_FORCE, SessionSolution
 from trihedron.estimate.session.observed import Observed
-from trihedron.records.calibration import FitQuality
+from trihedron.records.calibration import Calibration, FitQuality
+from trihedron.records.segments import Segments
+from trihedron.session.averaging import sharpened
 from trihedron.session.noise import along_gradient
 
 N_ACCELEROMETER, N_GYROSCOPE = 9, 9
@@ -202,6 +204,13 @@ def carried(
     """
     model = Linear(np.arange(len(measured.links)), S_a, b_a, S_w)
     return carried_each(measured, anchors_s, [model])
+
+
+def carried_by(calibration: Calibration, S_w: FloatArray, measured: MoveMeasurements, segments: Segments) -> Carried:
+    """:func:`carried` by a calibration, its gyro's scale ``S_w``, of readings as it reads them."""
+    accelerometer = calibration.accelerometer
+    read = replace(measured, rate=sharpened(measured.rate, measured.time_s, calibration.averaging))
+    return carried(read, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b, S_w)
 
 
 @dataclass(frozen=True, eq=False)
