@@ -75,10 +75,7 @@ impl<'a> Samples<'a> {
     /// Time between the anchors, of a range that can be integrated.
     fn span_s(&self) -> Result<f64> {
         let Self {
-            time_s,
-            raw,
-                range,
-            ..
+            time_s, raw, range, ..
         } = self;
         if range.start >= range.stop || range.stop > time_s.len() || time_s.len() != raw.len() {
             return Err(Error::bad_input(format!(

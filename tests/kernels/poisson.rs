@@ -40,7 +40,7 @@ fn range(time: &[f64]) -> MoveRange {
 }
 
 fn prepared(time: &[f64], raw: &[Vector3<f64>], model: RateModel) -> PreparedMove {
-    prepare(time, raw, None, &range(time), model).expect("a valid move")
+    prepare(time, raw, &range(time), model).expect("a valid move")
 }
 
 fn run(p: &PreparedMove, s: &Matrix3<f64>, b0: &Vector3<f64>, b1: &Vector3<f64>) -> Turn {

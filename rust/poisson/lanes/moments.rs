@@ -89,12 +89,7 @@ fn samples(of: &Whole<'_>, n_rows: usize, at: usize) -> Samples {
 
 /// Everything of a row but the moments; beyond the end of the move steps have no duration.
 #[inline(always)]
-fn ends(
-    out: &mut StepRow,
-    of: &Whole<'_>,
-    from: &Samples,
-    to: &Samples,
-) {
+fn ends(out: &mut StepRow, of: &Whole<'_>, from: &Samples, to: &Samples) {
     for l in 0..LANES {
         out.h[l] = to.time_s[l] - from.time_s[l];
         let middle = 0.5 * (from.time_s[l] + to.time_s[l]);
