@@ -86,10 +86,6 @@ class MoveMeasurements:
     is_hidden: FloatArray
     shared_errors: FloatArray
 
-    def coarse(self, recording: Recording, segments: Segments) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-        """Readings (n, 3), their LSB (3,), those at rest (3,), and the axes (3,) that their noise does not dither."""
-        return _coarse(recording, segments, self.is_undithered)
-
     @property
     def is_lost(self) -> BoolArray:
         """Moves (m,) in which the gyro was at its limit too long to be bridged."""
@@ -174,7 +170,7 @@ def measure_moves(
         mean = np.where(undithered, bias.mean(axis=0), mean)
     hidden, shared = np.zeros(rate.shape), [np.zeros((len(rate), 3, 0))]
     if np.any(undithered):
-        coarse = _coarse(recording, segments, undithered)
+        coarse = gyroscope, quantum, medians(gyroscope_mean), undithered
         hidden[(resting_ends(*coarse, in_log) | resting_axes(*coarse))[rows]] = 1.0
         shared += [error[rows][:, :, None] for error in shared_errors(*coarse)]
     seen = rate_noise_density(recording, segments)
@@ -208,14 +204,6 @@ def measure_moves(
         is_hidden=hidden,
         shared_errors=np.concatenate(shared, axis=2),
     )
-
-
-def _coarse(
-    recording: Recording, segments: Segments, undithered: BoolArray
-) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    assert recording.gyroscope is not None
-    assert segments.gyroscope_mean is not None
-    return recording.gyroscope, recording.facts.of("gyroscope").step, medians(segments.gyroscope_mean), undithered
 
 
 def _moves_of(recording: Recording, segments: Segments) -> list[Move]:

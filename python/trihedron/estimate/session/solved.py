@@ -26,7 +26,6 @@ from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-from trihedron.session.rounding import plateau_variance
 
 
 def calibrate_moves(
@@ -184,26 +183,16 @@ def _with_hidden_turns(log: Log, plain: _Fit, near: Near) -> _Fit:
     if not np.any(measured.is_undithered) or _is_asked_for_losses(log, plain):
         return plain
     known = np.zeros(measured.rate.shape) if measured.reading_variance is None else measured.reading_variance
-    shared = plateau_variance(*measured.coarse(log.recording, log.segments))
-    if shared is not None:
-        # Moves agree among themselves: what they share where their rate stands still inside a step.
-        known = np.maximum(known, shared[measured.rows])
-        measured = replace(measured, reading_variance=known)
-
-    def log_marginal(tried: MoveMeasurements) -> float:
-        return solve_session(log.observed(tried, plain.used, near), *near).core.log_marginal
-
-    best = measured
-    likeliest = plain.solution.core.log_marginal if shared is None else log_marginal(measured)
+    best, likeliest = measured, plain.solution.core.log_marginal
     for hidden_s in HIDDEN_S:
         variance = known.copy()
         variance[measured.edges[:, 1] - 2] += (hidden_s / measured.nominal_step_s * measured.quantum.max()) ** 2
         tried = replace(measured, reading_variance=variance)
-        found = log_marginal(tried)
+        found = solve_session(log.observed(tried, plain.used, near), *near).core.log_marginal
         if found <= likeliest:
             break
         best, likeliest = tried, found
-    return plain if best is plain.measured else _fitted(log, best, near)
+    return plain if best is measured else _fitted(log, best, near)
 
 
 def in_frame_of(accelerometer: SensorCalibration, found: SolvedSession) -> SensorCalibration:
