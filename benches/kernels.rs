@@ -90,9 +90,9 @@ fn poisson(c: &mut Criterion) {
     let scale = Matrix3::identity() * 1.01;
     let bias = Vector3::new(0.01, 0.0, -0.01);
     c.bench_function("poisson::prepare 10k coning", |b| {
-        b.iter(|| prepare(black_box(&time), &raw, None, &range, RateModel::Coning));
+        b.iter(|| prepare(black_box(&time), &raw, &range, RateModel::Coning));
     });
-    if let Ok(prepared) = prepare(&time, &raw, None, &range, RateModel::Coning) {
+    if let Ok(prepared) = prepare(&time, &raw, &range, RateModel::Coning) {
         c.bench_function("poisson::integrate 10k with sensitivities", |b| {
             b.iter(|| prepared.integrate(black_box(&scale), &bias, &bias, &noise));
         });

@@ -4,8 +4,6 @@
 mod ellipsoid;
 #[path = "kernels/gauss_newton.rs"]
 mod gauss_newton;
-#[path = "kernels/gyro_alignment.rs"]
-mod gyro_alignment;
 #[path = "kernels/norm_invariant.rs"]
 mod norm_invariant;
 #[path = "kernels/poisson.rs"]

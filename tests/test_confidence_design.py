@@ -9,7 +9,7 @@ from confidence.sensor import lower
 from confidence.sessions import table
 from trihedron import calibrate
 from trihedron.records import Recording
-from trihedron.session.averaging import Averaging, averaging_of, sharpened
+from trihedron.session.averaging import sharpened
 from trihedron.simulate import scenario_by_name, simulate
 
 
@@ -71,12 +71,7 @@ def test_quick_moves_of_a_sensor_that_averages_are_told_from_those_of_one_that_s
         assert np.abs(scores).max() < 4.0
 
 
-def test_the_averaging_of_a_sensor_is_told_by_its_fit_and_else_by_its_prior():
-    parabola = tuple(50.0 * (share - 1.0) ** 2 + 3.0 for share in (0.0, 0.5, 1.0))
-    told = averaging_of(parabola)
-    assert abs(told.share - 1.0) < 0.05
-    assert told.sigma < 0.15
-    assert averaging_of((3.0, 3.0, 3.0)) == Averaging(0.5, 0.5)
+def test_a_mean_over_the_interval_gives_the_value_in_its_middle_back():
     t = np.arange(200) * 0.01
     value, mean = np.sin(9.0 * t), np.sin(9.0 * t) * np.sin(0.045) / 0.045
     back = sharpened(np.repeat(mean[:, None], 3, axis=1), t, 1.0)

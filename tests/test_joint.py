@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from trihedron.estimate.accelerometer.norm import calibrate_norm
-from trihedron.estimate.gyroscope.alignment import MoveOptions
-from trihedron.estimate.joint import calibrate_joint, free_directions
+from trihedron.estimate.gyroscope.starts import MoveOptions
+from trihedron.estimate.joint import calibrate_joint
 from trihedron.estimate.session.solved import calibrate_moves
 from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
 from true_segments import segments_from_truth
@@ -25,14 +25,13 @@ def session(seed, n_poses=20):
     )
 
 
-def solve(recording, truth, frame="lower"):
+def solve(recording, truth):
     segments = segments_from_truth(recording, truth)
     alone, _ = calibrate_norm(
         segments.accelerometer_mean,
         segments.accelerometer_sigma_mean,
         truth.gravity_m_s2,
         raw_unit=recording.accelerometer_unit,
-        frame=frame,
     )
     options = MoveOptions(n_folds=0)
     return segments, alone, calibrate_joint(recording, segments, alone, truth.gravity_m_s2, "given", options)
@@ -84,39 +83,3 @@ def test_the_gyro_sharpens_the_accelerometer():
     # Estimated scatter of the two noise figures: a few per cent.
     assert ratio.max() < 1.1
     assert ratio.min() < 0.8
-
-
-def test_the_frame_of_the_accelerometer_is_kept():
-    recording, truth = session(3)
-    _, _, lower = solve(recording, truth, "lower")
-    assert lower.frame == "lower"
-    assert np.all(np.triu(lower.accelerometer.S, 1) == 0.0)
-    _, _, symmetric = solve(recording, truth, "symmetric")
-    assert symmetric.frame == "symmetric"
-    # The same physics in another frame: S → U S, so SᵀS is the same; both converged to 1e-10.
-    for one, other in (
-        (lower.accelerometer.S, symmetric.accelerometer.S),
-        (lower.gyroscope.S, symmetric.gyroscope.S),
-    ):
-        np.testing.assert_allclose(one.T @ one, other.T @ other, atol=2e-6)
-
-
-@pytest.mark.parametrize("kind", ["lower", "symmetric", "case"])
-def test_free_directions_do_not_turn_the_frame(kind):
-    rng = np.random.default_rng(1)
-    S = np.array(S_F)
-    if kind != "lower":
-        values, vectors = np.linalg.eigh(S.T @ S)
-        S = vectors @ np.diag(np.sqrt(values)) @ vectors.T
-    if kind == "case":
-        S = np.linalg.qr(rng.normal(size=(3, 3)))[0] @ S
-    basis, frame = free_directions(S)
-    assert frame == kind
-    assert np.linalg.matrix_rank(basis) == 9
-    # A turn of the frame is δS = [θ]× S: it is no combination of the free directions, whatever θ.
-    turns = []
-    for i in range(3):
-        cross = np.cross(np.eye(3)[i], np.eye(3)).T
-        turns.append(np.concatenate([(cross @ S).ravel(), np.zeros(3)]))
-    together = np.column_stack([basis / np.linalg.norm(basis, axis=0), *turns])
-    assert np.linalg.matrix_rank(together, tol=1e-6) == 12

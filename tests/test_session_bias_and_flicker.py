@@ -7,7 +7,7 @@ from confidence.motion import G
 from confidence.sessions import hand
 from trihedron import _core, diagnose
 from trihedron.estimate.accelerometer.norm import calibrate_norm
-from trihedron.estimate.gyroscope.alignment import MoveOptions
+from trihedron.estimate.gyroscope.starts import MoveOptions
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.records import Recording
 from trihedron.session.noise import expected_scatter

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from confidence.sensor import Truth as ConfidenceTruth
 from confidence.sensor import lower
 from trihedron import calibrate, diagnose, segment, verify
-from trihedron.estimate.gyroscope.alignment import usual_deg
 from trihedron.estimate.gyroscope.turntable import with_own_residuals
+from trihedron.estimate.session.start import usual_deg
 from trihedron.records import Recording
 
 G, RATE_HZ, DEG = 9.81, 100.0, np.pi / 180.0

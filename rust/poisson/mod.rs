@@ -5,7 +5,7 @@
 //! middles of the still poses before and after. Over one step the rate is a polynomial through the neighbouring
 //! samples; with its zeroth and first moments `φ₀ = ∫ω dτ`, `φ₁ = (1/h)∫τω dτ` about the middle of the step the rotation
 //! vector is `φ = φ₀ + φ₀ × φ₁` (fourth-order Magnus), and the step is the exact exponential `B ← exp(−[φ]×) B`.
-//! Equations (5.1)-(5.6) of docs/model-gyroscope.md.
+//! Equations (5.1)-(5.5) of docs/model-gyroscope.md.
 
 mod lanes;
 mod prepared;
@@ -101,23 +101,6 @@ impl Turn {
     }
 }
 
-/// Prepares every move, in parallel.
-///
-/// # Errors
-/// As [`prepare`], for the first move that fails.
-pub fn prepare_all(
-    time_s: &[f64],
-    raw: &[Vector3<f64>],
-    var_extra: Option<&[Vector3<f64>]>,
-    ranges: &[MoveRange],
-    model: RateModel,
-) -> Result<Vec<PreparedMove>> {
-    ranges
-        .par_iter()
-        .map(|range| prepare(time_s, raw, var_extra, range, model))
-        .collect()
-}
-
 /// Prepares and integrates every move, in parallel; for an integration that is not repeated: nothing is kept in between.
 ///
 /// # Errors
@@ -152,21 +135,5 @@ pub fn integrate_once(
                 noise.beside(scale, before, after, span_s)
             })
         })
-        .collect()
-}
-
-/// Integrates every move, in parallel; biases are per move.
-#[must_use]
-pub fn integrate_all(
-    moves: &[PreparedMove],
-    scale: &Matrix3<f64>,
-    bias_before: &[Vector3<f64>],
-    bias_after: &[Vector3<f64>],
-    noise: &RateNoise,
-) -> Vec<Turn> {
-    moves
-        .par_iter()
-        .zip(bias_before.par_iter().zip(bias_after))
-        .map(|(prepared, (before, after))| prepared.integrate(scale, before, after, noise))
         .collect()
 }

@@ -16,22 +16,17 @@ pub struct PreparedMove {
 
 /// Reduces the samples of a move to moments; non-finite rows and repeated timestamps are bridged.
 ///
-/// `var_extra`, as long as `raw` where given, is the variance of single readings beyond the rate noise: readings that
-/// were reconstructed where the gyro met its limit.
-///
 /// # Errors
 /// When the range leaves the record, the anchors coincide or time runs backward.
 pub fn prepare(
     time_s: &[f64],
     raw: &[Vector3<f64>],
-    var_extra: Option<&[Vector3<f64>]>,
     range: &MoveRange,
     model: RateModel,
 ) -> Result<PreparedMove> {
     let samples = Samples {
         time_s,
         raw,
-        var_extra,
         range,
         model,
     };
@@ -55,7 +50,6 @@ pub(super) fn integrate_once(
     let samples = Samples {
         time_s,
         raw,
-        var_extra: None,
         range,
         model,
     };
@@ -73,7 +67,6 @@ pub(super) fn integrate_once(
 struct Samples<'a> {
     time_s: &'a [f64],
     raw: &'a [Vector3<f64>],
-    var_extra: Option<&'a [Vector3<f64>]>,
     range: &'a MoveRange,
     model: RateModel,
 }
@@ -82,17 +75,8 @@ impl<'a> Samples<'a> {
     /// Time between the anchors, of a range that can be integrated.
     fn span_s(&self) -> Result<f64> {
         let Self {
-            time_s,
-            raw,
-            var_extra,
-            range,
-            ..
+            time_s, raw, range, ..
         } = self;
-        if var_extra.is_some_and(|var| var.len() != raw.len()) {
-            return Err(Error::bad_input(
-                "the extra variance must have one row per reading",
-            ));
-        }
         if range.start >= range.stop || range.stop > time_s.len() || time_s.len() != raw.len() {
             return Err(Error::bad_input(format!(
                 "a move covers samples {}..{} of {}: it must hold at least one sample and stay inside the record",
@@ -125,7 +109,6 @@ impl<'a> Samples<'a> {
         is_whole.then(|| Whole {
             time_s,
             raw: &self.raw[start..stop],
-            var_extra: self.var_extra.map(|var| &var[start..stop]),
             anchor_before_s: self.range.anchor_before_s,
             span_s,
         })
@@ -174,7 +157,6 @@ impl<'a> Samples<'a> {
             change: raw[q] - raw[p],
             h: step.h,
             fraction: (middle_s - self.range.anchor_before_s) / span_s,
-            var_extra: self.var_extra.map_or_else(Vector3::zeros, |var| var[p]),
         }
     }
 }

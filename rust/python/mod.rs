@@ -18,7 +18,6 @@ mod block_motion;
 mod chi_square;
 mod doorway;
 mod first_look;
-mod gyro_alignment;
 mod joints;
 mod kalman;
 mod kalman_norm;
@@ -54,7 +53,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     block_motion::register(module)?;
     chi_square::register(module)?;
     first_look::register(module)?;
-    gyro_alignment::register(module)?;
     joints::register(module)?;
     mean_noise::register(module)?;
     move_signals::register(module)?;

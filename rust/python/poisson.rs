@@ -152,7 +152,7 @@ fn integrate_raw_rate<'py>(
         ranges
             .par_iter()
             .map(|range| {
-                let one = poisson::prepare(&time_s, as_vectors(&raw), None, range, model)?;
+                let one = poisson::prepare(&time_s, as_vectors(&raw), range, model)?;
                 Ok((one.raw_angle(), one.duration_s()))
             })
             .collect::<KernelResult<Vec<_>>>()

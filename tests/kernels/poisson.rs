@@ -40,7 +40,7 @@ fn range(time: &[f64]) -> MoveRange {
 }
 
 fn prepared(time: &[f64], raw: &[Vector3<f64>], model: RateModel) -> PreparedMove {
-    prepare(time, raw, None, &range(time), model).expect("a valid move")
+    prepare(time, raw, &range(time), model).expect("a valid move")
 }
 
 fn run(p: &PreparedMove, s: &Matrix3<f64>, b0: &Vector3<f64>, b1: &Vector3<f64>) -> Turn {
@@ -206,13 +206,13 @@ fn a_range_outside_the_record_is_refused() {
     let raw = vec![Vector3::zeros(); 10];
     let mut wrong = range(&time);
     wrong.stop = 11;
-    assert!(prepare(&time, &raw, None, &wrong, RateModel::Linear).is_err());
+    assert!(prepare(&time, &raw, &wrong, RateModel::Linear).is_err());
     let mut backward = time.clone();
     backward.swap(3, 4);
-    assert!(prepare(&backward, &raw, None, &range(&time), RateModel::Linear).is_err());
+    assert!(prepare(&backward, &raw, &range(&time), RateModel::Linear).is_err());
     let mut merged = range(&time);
     merged.anchor_after_s = merged.anchor_before_s;
-    assert!(prepare(&time, &raw, None, &merged, RateModel::Linear).is_err());
+    assert!(prepare(&time, &raw, &merged, RateModel::Linear).is_err());
 }
 
 /// The sums of equation (5.4), one step and one matrix product after the other.

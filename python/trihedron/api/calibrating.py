@@ -19,10 +19,10 @@ from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.estimate.accelerometer.few_faces import calibrate_few_faces
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.accelerometer.shapes import with_shapes
-from trihedron.estimate.gyroscope.alignment import MoveOptions
 from trihedron.estimate.gyroscope.findings import scale_findings
 from trihedron.estimate.gyroscope.gravity_scale import scale_by_gravity
 from trihedron.estimate.gyroscope.missing_samples import missing_samples, unless_seen
+from trihedron.estimate.gyroscope.starts import MoveOptions
 from trihedron.estimate.gyroscope.turn_angles import AMBIGUOUS, SCALE_TOLERANCE
 from trihedron.estimate.gyroscope.turn_axes import shared_errors, stated_turns
 from trihedron.estimate.gyroscope.turns import calibrate_turns

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from trihedron import probability
-from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.verdict import covariance_scale
-from trihedron.estimate.gyroscope.alignment import AccelerometerPart, MoveOptions
+from trihedron.estimate.gyroscope.starts import MoveOptions
 from trihedron.estimate.session.carried import norm_quality
 from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.solved import solved
-from trihedron.records.calibration import Calibration, FitQuality, Frame, SensorCalibration
+from trihedron.estimate.session.start import Log
+from trihedron.records.calibration import Calibration, FitQuality, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-from trihedron.sensor_model import in_frame
 
 FALSE_ALARM = 1e-3
 """Chance that a sound recording is taken for one whose moves contradict its poses."""
@@ -49,10 +46,10 @@ def calibrate_joint(
     gravity_source: str,
     options: MoveOptions | None = None,
 ) -> Calibration:
-    """Fit ``S_f, b_f, S_ω`` to the norm of every pose and the rotation of every move at once (equations 5.7, 5.8).
+    """Fit ``S_f, b_f, S_ω`` to the norm of every pose and the rotation of every move at once (equation 5.7).
 
-    The noise of a pose's mean enters its norm and both neighbouring moves, with its full covariance. The frame is that
-    of ``accelerometer``, which is also the start: nothing in the data turns the trihedron as a whole.
+    The noise of a pose's mean enters its norm and both neighbouring moves, with its full covariance. The frame is
+    the lower one: nothing in the data turns the trihedron as a whole. ``accelerometer`` is the start.
 
     Parameters
     ----------
@@ -70,9 +67,8 @@ def calibrate_joint(
     ValueError
         As :func:`trihedron.estimate.gyroscope.calibrate_moves`.
     """
-    basis, frame = free_directions(accelerometer.S)
-    part = AccelerometerPart(accelerometer, basis, is_given=False)
-    found = solved(recording, segments, part, gravity_m_s2, options or MoveOptions())
+    log = Log(recording, segments, accelerometer, gravity_m_s2, is_given=False)
+    found = solved(log, options or MoveOptions())
     solution, left_out, alone = found.solution, found.held_out, accelerometer.quality
     held = (None, None) if left_out is None else (left_out.norm, left_out.norm_sigma)
     quality = norm_quality(found.observed, solution, *held)
@@ -80,7 +76,7 @@ def calibrate_joint(
         quality = replace(
             quality, held_out=alone.held_out, held_out_sigma=alone.held_out_sigma, held_out_rms=alone.held_out_rms
         )
-    both = Calibration(
+    return Calibration(
         accelerometer=SensorCalibration(
             S=solution.S_a,
             b=solution.b_a,
@@ -99,9 +95,8 @@ def calibrate_joint(
         recording_source=recording.source,
         recording_sha256=recording.sha256,
         findings=(*_poses_above_noise(quality, solution), *found.findings),
-        averaging=found.averaging,
+        averaging=solution.averaging,
     )
-    return in_frame(both, frame)
 
 
 def _poses_above_noise(quality: FitQuality, solution: SessionSolution) -> tuple[Finding, ...]:
@@ -119,35 +114,3 @@ def _poses_above_noise(quality: FitQuality, solution: SessionSolution) -> tuple[
             bias_repeatability_m_s2=solution.accel_bias_rms,
         ),
     )
-
-
-def free_directions(S: FloatArray) -> tuple[FloatArray, Frame]:
-    """Directions (12, 9) in ``(S row by row, b)`` that do not turn the frame of ``S``, and that frame.
-
-    Lower triangular: its six elements. Otherwise ``S = U P`` with ``P`` symmetric (polar factors) keeps ``U``, and
-    ``δS = U δP``: with ``U = 1`` that is the symmetric frame, with any other the case frame as it was given.
-    """
-    size = float(np.linalg.norm(S, 2))
-    directions = []
-    frame: Frame
-    if np.abs(np.triu(S, 1)).max() <= 1e-12 * size:
-        frame = "lower"
-        for i in range(3):
-            for j in range(i + 1):
-                direction = np.zeros((3, 3))
-                direction[i, j] = 1.0
-                directions.append(direction)
-    else:
-        left, _, right = np.linalg.svd(S)
-        U = left @ right
-        frame = "symmetric" if np.abs(S - S.T).max() <= 1e-9 * size else "case"
-        for i in range(3):
-            for j in range(i + 1):
-                direction = np.zeros((3, 3))
-                direction[i, j] = direction[j, i] = 1.0
-                directions.append(U @ direction)
-    basis = np.zeros((12, 9))
-    for column, direction in enumerate(directions):
-        basis[:9, column] = direction.ravel()
-    basis[9:, 6:] = np.eye(3)
-    return basis, frame

@@ -10,7 +10,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
-from trihedron.estimate.session.carried import carried
+from trihedron.estimate.session.carried import carried_by
 from trihedron.estimate.verification import norm_error
 from trihedron.gravity import normal_gravity
 from trihedron.records import Calibration, Recording, Segments, SensorCalibration, Verification
@@ -111,13 +111,12 @@ class _Tilt:
     """Gravity carried through the moves of one log, by any S of the gyro."""
 
     def __init__(self, segments: Segments, measured: MoveMeasurements) -> None:
-        self._anchors_s = segments.time_mid_s[measured.links]
-        self._measured = measured
+        self._segments, self._measured = segments, measured
 
     def rms_deg(self, calibration: Calibration, S: FloatArray) -> float:
         """Root mean square of the tilt errors [deg]."""
-        accel = calibration.accelerometer
-        return _rms(carried(self._measured, self._anchors_s, accel.S, accel.b, S).angle_deg[~self._measured.is_lost])
+        seen = carried_by(calibration, S, self._measured, self._segments)
+        return _rms(seen.angle_deg[~self._measured.is_lost])
 
 
 def _rms(values: FloatArray) -> float:

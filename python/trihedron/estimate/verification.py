@@ -10,9 +10,9 @@ import numpy as np
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import RefusedError
-from trihedron.estimate.gyroscope.aligned_moves import denies_cut
-from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
-from trihedron.estimate.session.carried import Carried, carried
+from trihedron.estimate.gyroscope.measurements import measure_moves
+from trihedron.estimate.session.carried import carried_by
+from trihedron.estimate.session.start import denies_cut
 from trihedron.estimate.verified_parameters import judge_parameters, shift_findings, uncalibrated
 from trihedron.records import (
     Calibration,
@@ -24,7 +24,6 @@ from trihedron.records import (
     Severity,
     Verification,
 )
-from trihedron.session.averaging import sharpened
 
 FALSE_ALARM = 1e-3
 """Chance that a calibration that holds is said to be exceeded."""
@@ -188,26 +187,17 @@ def _carried(
     """The figure that a calibration publishes of its own session (docs/model-session.md), with a bias per pose, here
     with S and b held at the calibration's; of the same moves: not of those that were at the gyro's limit for long."""
     accelerometer = calibration.accelerometer
-
-    def seen_in(measured: MoveMeasurements) -> Carried:
-        if calibration.averaging:
-            rate = sharpened(measured.rate, measured.time_s, calibration.averaging)
-            measured = measured.of_rate(segments, rate, measured.reading_variance)
-        return carried(
-            measured, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b,
-            gyroscope.S, gyroscope.covariance[:9, :9],
-        )  # fmt: skip
-
     measured = measure_moves(recording, segments, accelerometer)
-    seen = seen_in(measured)
+    seen = carried_by(calibration, gyroscope.S, measured, segments)
     if np.any(measured.is_lost) and not any(limit.is_word for limit in recording.facts.of("gyroscope").limits):
         plain = measure_moves(recording, segments, accelerometer, is_bridged=False)
-        as_read = seen_in(plain)
+        as_read = carried_by(calibration, gyroscope.S, plain, segments)
         if denies_cut(gyroscope.S, as_read.angle_deg, measured, plain):
             measured, seen = plain, as_read
     told = np.flatnonzero(~measured.is_lost)
     g = calibration.gravity_m_s2
-    noise, total = np.sqrt(seen.floor2[told]) / g, np.sqrt((seen.floor2 + seen.model2)[told]) / g
+    by_scale2 = seen.by_scale2(gyroscope.covariance[:9, :9])
+    noise, total = np.sqrt(seen.floor2[told]) / g, np.sqrt((seen.floor2 + by_scale2)[told]) / g
     left_out = tuple(np.flatnonzero(measured.is_lost).tolist())
     return Carriage(seen.angle_deg[told], np.degrees(noise), np.degrees(total), told, left_out)
 

@@ -7,29 +7,16 @@ difference; rotations that do not commute do. Which sensor it is, moves show as 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 
 from trihedron.arrays import FloatArray
 
 EITHER = 0.5
 """Prior mean and standard deviation of ``a``: a sensor of either kind is one standard deviation off."""
-TRIED = (0.0, 0.5, 1.0)
-"""Values of ``a`` through which the parabola of χ² is laid."""
 BLOCK = 1 << 16
 """Rows sharpened together: what is needed in between never takes the memory of a long log again."""
 GAP = 1.5
 """A step longer than this many usual ones has lost samples: there is no second difference across."""
-
-
-@dataclass(frozen=True)
-class Averaging:
-    """Share ``a`` of the interval's broadening in the readings, and its standard error."""
-
-    share: float = 0.0
-    sigma: float = 0.0
 
 
 def sharpened(readings: FloatArray, time_s: FloatArray, share: float) -> FloatArray:
@@ -45,11 +32,3 @@ def sharpened(readings: FloatArray, time_s: FloatArray, share: float) -> FloatAr
         is_known = (is_whole[start:stop] & is_whole[start - 1 : stop - 1])[:, None] & np.isfinite(second)
         out[start:stop] -= share * np.where(is_known, second / 24.0, 0.0)
     return out
-
-
-def averaging_of(chi2: Sequence[float]) -> Averaging:
-    """Posterior of ``a`` from χ² at ``TRIED`` and the prior."""
-    at0, at_half, at1 = chi2
-    curvature, slope = max(2.0 * (at0 + at1 - 2.0 * at_half), 0.0), 4.0 * at_half - 3.0 * at0 - at1
-    precision = curvature + EITHER**-2
-    return Averaging((1.0 / EITHER - 0.5 * slope) / precision, precision**-0.5)

@@ -26,8 +26,6 @@ TURNED = 1.0 / 3.0
 step for a turn at ``h`` of it, in the mean over ``h`` of readings, which are as ``√h``."""
 CHATTER = 9
 """Readings whose median is free of toggling between neighbouring codes."""
-QUIETEST = 0.2
-"""Quantile of the variances of steady stretches that is their noise's."""
 LEAST_WHITE = 1e-2
 """Part of the rounding's variance that an undithered axis is given as white noise: it shows none of its own."""
 
@@ -74,18 +72,6 @@ def rounding_of_moves(
     return np.array([np.zeros(3) if of_move is None else of_move.sum(axis=0) for of_move in found]).reshape(-1, 3)
 
 
-def plateau_variance(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> FloatArray | None:
-    """The same of readings that toggle between two codes about a steady rate; ``None`` where none do.
-
-    It makes moves at one speed uncertain in common, and is excluded where they are held against each other: what single
-    moves miss by a knock or by lost samples would be lost in it.
-    """
-    out = np.zeros(readings.shape)
-    for axis in np.flatnonzero(axes):
-        out[:, axis] = _of_plateaus(*_steady(readings[:, axis]), float(quantum[axis]), float(rest[axis]))
-    return out if np.any(out) else None
-
-
 def _steady(readings: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Codes (n,), missing ones infinite, and their running median.
 
@@ -93,61 +79,6 @@ def _steady(readings: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     codes = np.where(np.isfinite(readings), readings, np.inf)
     return codes, _core.running_median(codes, CHATTER)
-
-
-def _of_plateaus(codes: FloatArray, steady: FloatArray, quantum: float, rest: float) -> FloatArray:
-    """Variance (n,) of readings that toggle between two codes about a steady rate, and go back where they came from.
-
-    Toggling cuts such a stretch into short runs, but its readings share the error of one rate. Noise σ leaves of its
-    variance ``exp(-4π²σ²/q²)`` (the first harmonic of the rounding's error); σ is read off the quietest fifth of all
-    steady stretches, for those whose rate lies between two codes toggle most with the least noise.
-    """
-    begins = np.concatenate([[0], np.flatnonzero(steady[1:] != steady[:-1]) + 1, [len(codes)]])
-    at_once = _turns_at_once(np.diff(begins))
-    level = steady[begins[:-1]].tolist()
-    plateaus, scatters = [], []
-    first = 0
-    while first < len(level):
-        low = high = level[first]
-        last = first
-        while last + 1 < len(level) and max(high, level[last + 1]) - min(low, level[last + 1]) < 1.5 * quantum:
-            last += 1
-            low, high = min(low, level[last]), max(high, level[last])
-        first, last = _turned_back(level, first, last)
-        a, b = int(begins[first]), int(begins[last + 1])
-        is_short = first == last and at_once[first]
-        if b - a >= 2 * CHATTER and not is_short and math.isfinite(low):
-            inside = codes[a + CHATTER // 2 : b - CHATTER // 2]
-            scatters.append(float(np.var(inside[np.isfinite(inside)])))
-            is_zero = low < rest + 0.75 * quantum and high > rest - 0.75 * quantum
-            if not is_zero and _goes_back(level, first, last, low, high):
-                plateaus.append((a, b))
-        first = last + 1
-    out = np.zeros(len(codes))
-    if plateaus:
-        white2 = max(float(np.quantile(scatters, QUIETEST)) - quantum**2 / 12.0, 0.0)
-        hidden = math.exp(-4.0 * math.pi**2 * white2 / quantum**2)
-        for a, b in plateaus:
-            out[a:b] = (b - a) * hidden
-    return out * quantum**2 / 12.0
-
-
-def _turned_back(level: list[float], first: int, last: int) -> tuple[int, int]:
-    """Of runs that pass from one code to the other at most twice, the one in which the rate turns back: no toggling."""
-    if last - first not in (1, 2) or first == 0:
-        return first, last
-    far = first + int(np.argmax(np.abs(np.array(level[first : last + 1]) - level[first - 1])))
-    return far, far
-
-
-def _goes_back(level: list[float], first: int, last: int, low: float, high: float) -> bool:
-    """Whether what stands within ``low`` and ``high`` came from the side to which it leaves."""
-    before, behind = first - 1, last + 1
-    while before >= 0 and low <= level[before] <= high:
-        before -= 1
-    while behind < len(level) and low <= level[behind] <= high:
-        behind += 1
-    return before >= 0 and behind < len(level) and (level[before] < low) == (level[behind] < low)
 
 
 def _of_runs(codes: FloatArray, steady: FloatArray, quantum: float, rest: float) -> FloatArray:

@@ -32,8 +32,6 @@ pub(super) struct Step {
     pub h: f64,
     /// Where the middle of the step lies between the anchors: 0 before, 1 after.
     pub fraction: f64,
-    /// Variance of the reading over this step beyond the rate noise, raw unit².
-    pub var_extra: Vector3<f64>,
 }
 
 /// One step of every stretch.
@@ -45,7 +43,6 @@ struct StepRow {
     change: [Row; 3],
     h: Row,
     fraction: Row,
-    var_extra: [Row; 3],
 }
 
 const EMPTY: StepRow = StepRow {
@@ -54,7 +51,6 @@ const EMPTY: StepRow = StepRow {
     change: [ZERO; 3],
     h: ZERO,
     fraction: ZERO,
-    var_extra: [ZERO; 3],
 };
 
 /// The steps of a move: step `i` is row `i % rows` of lane `i / rows`; the last lane is filled up with steps of no
@@ -190,7 +186,6 @@ fn set(row: &mut StepRow, lane: usize, step: &Step) {
         row.moment0[k][lane] = step.moment0[k];
         row.moment1[k][lane] = step.moment1[k];
         row.change[k][lane] = step.change[k];
-        row.var_extra[k][lane] = step.var_extra[k];
     }
     row.h[lane] = step.h;
     row.fraction[lane] = step.fraction;

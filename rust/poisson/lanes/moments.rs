@@ -20,8 +20,6 @@ use crate::simd::{Instructions, fma, for_each_instruction_set};
 pub(in crate::poisson) struct Whole<'a> {
     pub time_s: &'a [f64],
     pub raw: &'a [Vector3<f64>],
-    /// Variance of single readings beyond the rate noise.
-    pub var_extra: Option<&'a [Vector3<f64>]>,
     pub anchor_before_s: f64,
     pub span_s: f64,
 }
@@ -91,29 +89,13 @@ fn samples(of: &Whole<'_>, n_rows: usize, at: usize) -> Samples {
 
 /// Everything of a row but the moments; beyond the end of the move steps have no duration.
 #[inline(always)]
-fn ends(
-    out: &mut StepRow,
-    row: usize,
-    n_rows: usize,
-    of: &Whole<'_>,
-    from: &Samples,
-    to: &Samples,
-) {
+fn ends(out: &mut StepRow, of: &Whole<'_>, from: &Samples, to: &Samples) {
     for l in 0..LANES {
         out.h[l] = to.time_s[l] - from.time_s[l];
         let middle = 0.5 * (from.time_s[l] + to.time_s[l]);
         out.fraction[l] = (middle - of.anchor_before_s) / of.span_s;
         for c in 0..3 {
             out.change[c][l] = to.raw[c][l] - from.raw[c][l];
-        }
-    }
-    out.var_extra = [ZERO; 3];
-    if let Some(var) = of.var_extra {
-        for l in 0..LANES {
-            let k = (l * n_rows + row).min(of.time_s.len() - 1);
-            for c in 0..3 {
-                out.var_extra[c][l] = var[k][c];
-            }
         }
     }
 }
@@ -130,7 +112,7 @@ fn fill_constant_body<const FUSED: bool>(
             samples(of, n_rows, first + k),
             samples(of, n_rows, first + k + 1),
         );
-        ends(out, first + k, n_rows, of, &from, &to);
+        ends(out, of, &from, &to);
         for c in 0..3 {
             for l in 0..LANES {
                 out.moment0[c][l] = from.raw[c][l] * out.h[l];
@@ -152,7 +134,7 @@ fn fill_lines_body<const FUSED: bool>(
             samples(of, n_rows, first + k),
             samples(of, n_rows, first + k + 1),
         );
-        ends(out, first + k, n_rows, of, &from, &to);
+        ends(out, of, &from, &to);
         for c in 0..3 {
             for l in 0..LANES {
                 out.moment0[c][l] = 0.5 * out.h[l] * (from.raw[c][l] + to.raw[c][l]);
@@ -175,7 +157,7 @@ fn fill_cubics_body<const FUSED: bool>(
         let row = first + k;
         // The first step of all has no sample before it, and is odd below: nothing lies between two equal ones.
         let seen = [row.saturating_sub(1), row, row + 1, row + 2].map(|at| samples(of, n_rows, at));
-        ends(out, row, n_rows, of, &seen[1], &seen[2]);
+        ends(out, of, &seen[1], &seen[2]);
         let mut tau = [ZERO; 4];
         for l in 0..LANES {
             let middle = 0.5 * (seen[1].time_s[l] + seen[2].time_s[l]);

@@ -167,7 +167,7 @@ fn sensitivities<const FUSED: bool>(
         let m1 = [row.moment1[0][l], row.moment1[1][l], row.moment1[2][l]];
         let mut var = [0.0; 3];
         for k in 0..3 {
-            var[k] = h * fma::<FUSED>(row.var_extra[k][l], h, rate.variance[k]);
+            var[k] = h * rate.variance[k];
         }
         let mut of_raw = [[0.0; 3]; 3];
         for i in 0..3 {

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.accelerometer.poses import ENTRIES, design_rows
+from trihedron.estimate.accelerometer.poses import design_rows, wrt_relative_errors
 from trihedron.estimate.accelerometer.shapes import SHAPES, verticals
 from trihedron.estimate.accelerometer.verdict import covariance_scale
 from trihedron.records.calibration import Calibration
@@ -90,7 +90,7 @@ def with_bending(calibration: Calibration, segments: Segments) -> Calibration:
     frame, calibration = calibration.frame, in_frame(calibration, "lower")
     fitted = calibration.accelerometer
     added = covariance_by_bends(verticals(fitted, reading), seen.residual, seen.sigma, calibration.gravity_m_s2)
-    wrt = _wrt_relative_errors(fitted.S, fitted.b, calibration.gravity_m_s2)
+    wrt = wrt_relative_errors(fitted.S, fitted.b, calibration.gravity_m_s2)
     if calibration.gyroscope is not None:
         # The gyro's frame is the accelerometer's: it follows as far as the fit ties it to S and b.
         to_relative = np.linalg.pinv(wrt)
@@ -112,13 +112,3 @@ def with_bending(calibration: Calibration, segments: Segments) -> Calibration:
         findings=(*calibration.findings, said) if most > SAID else calibration.findings,
     )
     return in_frame(widened, frame)
-
-
-def _wrt_relative_errors(S: FloatArray, b: FloatArray, gravity_m_s2: float) -> FloatArray:
-    """(12, 9) of S, row by row, and b by the relative errors of ``f``: δf = M f + z gives δS = M S, δb = M b + z."""
-    out = np.zeros((12, 9))
-    for i, (j, k) in enumerate(ENTRIES):
-        out[3 * j : 3 * j + 3, i] = S[k]
-        out[9 + j, i] = b[k]
-    out[9:, 6:] = gravity_m_s2 * np.eye(3)
-    return out

@@ -12,7 +12,7 @@ from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.accelerometer import inputs, verdict
 from trihedron.estimate.accelerometer.face_poses import are_six_faces
-from trihedron.estimate.accelerometer.poses import ENTRIES, PoseDesign
+from trihedron.estimate.accelerometer.poses import PoseDesign, wrt_relative_errors
 from trihedron.records.calibration import FitQuality, Frame, SensorCalibration
 from trihedron.records.finding import Finding
 from trihedron.records.words import words
@@ -263,14 +263,6 @@ def _anchored_covariance(information: FloatArray, S: FloatArray, b: FloatArray, 
     physical = np.linalg.inv(information + np.eye(9) / _core.ANCHOR**2)
     to_lower = reframing(S, b, "lower")
     L, low = to_lower.rotation @ S, to_lower.rotation @ b
-    # δf = M f + z with f = L a' + b: δL = M L, δb = M b + z.
-    jacobian = np.zeros((12, 9))
-    for column, (j, k) in enumerate(ENTRIES):
-        M = np.zeros((3, 3))
-        M[j, k] = 1.0
-        jacobian[:9, column] = (M @ L).ravel()
-        jacobian[9:, column] = M @ low
-    jacobian[9:, 6:] = g * np.eye(3)
     back = reframing(L, low, frame)
-    jacobian = back.jacobian @ jacobian
+    jacobian = back.jacobian @ wrt_relative_errors(L, low, g)
     return jacobian @ physical @ jacobian.T

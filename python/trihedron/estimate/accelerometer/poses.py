@@ -50,6 +50,16 @@ def design_rows(directions: FloatArray) -> FloatArray:
     return np.column_stack([u[:, j] * u[:, k] for j, k in ENTRIES] + [u[:, j] for j in range(3)])
 
 
+def wrt_relative_errors(S: FloatArray, b: FloatArray, gravity_m_s2: float) -> FloatArray:
+    """(12, 9) of S, row by row, and b by the relative errors of ``f``: δf = M f + z gives δS = M S, δb = M b + z."""
+    out = np.zeros((12, 9))
+    for i, (j, k) in enumerate(ENTRIES):
+        out[3 * j : 3 * j + 3, i] = S[k]
+        out[9 + j, i] = b[k]
+    out[9:, 6:] = gravity_m_s2 * np.eye(3)
+    return out
+
+
 def pose_in_words(direction: FloatArray) -> Words:
     """How to hold the sensor so that a unit vector (3,) of it points up.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.probability import chdtri, fdtrc
+from trihedron.probability import MEDIAN_CHI2, fdtrc
 
 FALSE_ALARM = 1e-4
 """Chance that a sensor without it is treated for it: the price of removing nothing is small, but it is a decision."""
@@ -81,37 +81,15 @@ def pool_biases(bias: FloatArray, var_bias: FloatArray) -> tuple[FloatArray, Flo
     return (weight * bias).sum(axis=0), chi2, spread
 
 
-def excess_variance(values: FloatArray, noise: FloatArray) -> FloatArray:
-    """Variance (3,) beyond ``noise`` (n, 3) in ``values`` (n, 3) about zero, from the median: deaf to single bad poses.
-
-    Solves ``median(x²/(v + τ²)) = median of χ²(1)`` for τ² of each column; zero where noise alone explains the median.
-    """
-    target = float(chdtri(1, 0.5))
-    out = np.zeros(values.shape[1])
-    for axis, (x2, v) in enumerate(zip((values**2).T, noise.T, strict=True)):
-        low, high = 0.0, float(np.max(x2)) / target
-        if _median(x2 / np.maximum(v, 1e-300)) <= target:
-            continue
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if _median(x2 / (v + middle)) > target else (low, middle)
-        out[axis] = high
-    return out
-
-
-def _median(values: FloatArray) -> float:
-    """As ``np.median`` of numbers; for some tens of them it takes six times as long as the sorting."""
-    ordered, n = np.sort(values), len(values)
-    return float(0.5 * (ordered[(n - 1) // 2] + ordered[n // 2]))
-
-
 def shrink(bias: FloatArray, var_bias: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Biases of the poses drawn to the session's by their noise: ``(z/v + z̄/τ²)/(1/v + 1/τ²)`` and its variance.
 
     With a bias that changes (τ² ≫ v) each pose keeps its own; with a steady one a short pose borrows from the others.
     """
     n = len(bias)
-    tau2 = excess_variance((bias - mean) * np.sqrt(n / max(n - 1, 1)), var_bias)
+    # By medians, which single bad poses do not move.
+    square = np.median((bias - mean) ** 2, axis=0) * n / max(n - 1, 1) / MEDIAN_CHI2[1]
+    tau2 = np.maximum(square - np.median(var_bias, axis=0), 0.0)
     gain = tau2 / np.maximum(tau2 + var_bias, 1e-300)
     pooled = 1.0 / np.sum(1.0 / np.maximum(var_bias + tau2, 1e-300), axis=0)
     variance = gain * var_bias + (1.0 - gain) ** 2 * pooled

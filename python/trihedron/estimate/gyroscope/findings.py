@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.gyroscope.alignment import ASTRAY_DEG, FALSE_ALARM, Aligned, usual_deg
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.gyroscope.observability import observability_findings
 from trihedron.estimate.session.carried import Carried
-from trihedron.estimate.session.fit import SessionSolution
+from trihedron.estimate.session.fit import FALSE_ALARM, SessionSolution
+from trihedron.estimate.session.start import ASTRAY_DEG, usual_deg
 from trihedron.probability import chdtrc
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode, Severity
@@ -20,7 +20,7 @@ MAX_SCALE_RATIO = 1.5
 
 
 def findings_of(
-    aligned: Aligned,
+    outliers: tuple[int, ...],
     measured: MoveMeasurements,
     solution: SessionSolution,
     gyroscope: SensorCalibration,
@@ -34,7 +34,7 @@ def findings_of(
     found += observability_findings(observability, gyroscope.covariance[:9, :9], S)
     if not solution.is_converged:
         found.append(Finding.of(FindingCode.NOT_CONVERGED, "session", stopped_because=solution.stopped_because))
-    found += _outlier_findings(aligned, measured)
+    found += _outlier_findings(outliers, measured, seen)
     if solution.inflation[0] > 1.0:
         # Bars that are widened in proportion say nothing about a minimum elsewhere.
         is_astray = usual_deg(seen.angle_deg, measured, solution.S_a, solution.b_a) > ASTRAY_DEG
@@ -91,12 +91,12 @@ def handedness(S: FloatArray, S_accelerometer: FloatArray) -> list[Finding]:
     return found
 
 
-def _outlier_findings(aligned: Aligned, measured: MoveMeasurements) -> list[Finding]:
+def _outlier_findings(outliers: tuple[int, ...], measured: MoveMeasurements, seen: Carried) -> list[Finding]:
     found = []
-    for index in aligned.outliers:
+    for index in outliers:
         before, after = (int(k) for k in measured.links[index])
-        sigma = float(np.sqrt(np.asarray(aligned.fit.cov_residuals)[index].trace() / 2.0))
-        size = float(np.linalg.norm(np.asarray(aligned.fit.residuals)[index]))
+        sigma = float(np.sqrt(seen.covariance[index].trace() / 2.0))
+        size = float(np.linalg.norm(seen.residual[index]))
         found.append(
             Finding.of(
                 FindingCode.OUTLIER_MOVE,

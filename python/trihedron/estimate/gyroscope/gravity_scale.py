@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import REFUSALS
-from trihedron.estimate.gyroscope.alignment import MoveOptions
+from trihedron.estimate.gyroscope.starts import MoveOptions
 from trihedron.estimate.session.solved import calibrate_moves
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording

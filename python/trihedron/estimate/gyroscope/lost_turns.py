@@ -8,8 +8,9 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.estimate.gyroscope.alignment import Aligned
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+from trihedron.estimate.session.carried import Carried
+from trihedron.estimate.session.fit import SessionSolution
 from trihedron.probability import fdtrc
 from trihedron.records.finding import Finding, FindingCode
 
@@ -86,34 +87,31 @@ def could_be_remade(time_s: FloatArray, nominal_step_s: float) -> bool:
     return float(np.ptp(late)) <= max(OWN_CLOCK * float(np.ptp(each)), EVEN * nominal_step_s)
 
 
-def asks_for_losses(chi2: float, dof: float, n_left_out: int) -> bool:
-    """Whether misses of the moves in use are beyond noise, a little being enough where other moves were excluded."""
-    return dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < (DOUBTFUL if n_left_out else CERTAIN)
-
-
-def left_out_as_by_losses(time_s: FloatArray, measured: MoveMeasurements, aligned: Aligned) -> bool:
+def left_out_as_by_losses(
+    time_s: FloatArray, measured: MoveMeasurements, outliers: tuple[int, ...], solution: SessionSolution, seen: Carried
+) -> bool:
     """Whether moves that were excluded miss gravity rather by a sample or two that are lost than by a knock.
 
     A sample lost at ``t`` leaves ``h ω(t)`` out of the turn, and gravity behind the move off by ``h R(t) (ω × f)(t)``,
     carried from ``t`` to the end. The density of the miss, over all instants at which one sample or two may have been
     lost, is held against that of a knock of unknown direction and just this size.
     """
-    S, step_s = np.asarray(aligned.fit.gyroscope_scale), measured.nominal_step_s
-    if not aligned.outliers or not could_be_remade(time_s, step_s):
+    S, step_s = solution.S_w, measured.nominal_step_s
+    if not outliers or not could_be_remade(time_s, step_s):
         return False
-    f = measured.reading @ np.asarray(aligned.fit.accelerometer_scale).T + np.asarray(aligned.fit.accelerometer_bias)
+    f = measured.reading @ solution.S_a.T + solution.b_a
     log_odds = 0.0
-    for move in aligned.outliers:
+    for move in outliers:
         begin, end = measured.edges[move]
         before, after = measured.links[move]
         rate = np.nan_to_num(measured.rate[begin : end + 1] - measured.bias_mean) @ S.T
         off = _lost_at_each_instant(rate, f[before], step_s)
         _, _, axes = np.linalg.svd(f[after][None])
         across = axes[1:]
-        off, missed = off @ across.T, across @ np.asarray(aligned.fit.residuals)[move]
+        off, missed = off @ across.T, across @ seen.residual[move]
         # What the other moves lost the scale has taken up, and hides as much here: a sample a move is allowed for.
         short = off.mean(axis=0)
-        noise = across @ np.asarray(aligned.fit.cov_residuals)[move] @ across.T + np.outer(short, short)
+        noise = across @ seen.covariance[move] @ across.T + np.outer(short, short)
         inverse, size = np.linalg.inv(noise), 2.0 * np.pi * np.sqrt(np.linalg.det(noise))
         some = off[:: max(len(off) // POINTS, 1)]
         density = [
@@ -199,7 +197,10 @@ def losses_that_fit(
 
 
 def is_asked_for_losses(
-    time_s: FloatArray, measured: MoveMeasurements, aligned: Aligned, chi2: float, dof: float
+    time_s: FloatArray, measured: MoveMeasurements, outliers: tuple[int, ...], solution: SessionSolution, seen: Carried
 ) -> bool:
-    """Whether losses may be behind what moves miss: those in use beyond noise, or those left out by whole samples."""
-    return asks_for_losses(chi2, dof, len(aligned.outliers)) or left_out_as_by_losses(time_s, measured, aligned)
+    """Whether losses may be behind what moves miss: those in use beyond noise, a little being enough where others were
+    excluded, or those left out by whole samples."""
+    dof, chance = solution.moves_dof, DOUBTFUL if outliers else CERTAIN
+    is_beyond_noise = dof >= 1.0 and fdtrc(dof, NOISE_DOF, solution.moves_chi2 / dof) < chance
+    return is_beyond_noise or left_out_as_by_losses(time_s, measured, outliers, solution, seen)

@@ -1,20 +1,18 @@
-"""What a recording says about its moves: arrays for the alignment, and the noise behind each of them."""
+"""What a recording says about its moves: arrays for the fit of a session, and the noise behind each of them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from trihedron import _core
-from trihedron._core import Moves
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.biases import (
     AttitudeDependence,
     attitude_dependence,
-    excess_variance,
     pool_biases,
     shrink,
 )
@@ -26,19 +24,17 @@ from trihedron.ranges import rows_beside
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
-from trihedron.session.averaging import Averaging
 from trihedron.session.rounding import (
     common_bias,
     density_without_rounding,
     resting_axes,
     rounding_variance,
+    shared_errors,
     undithered_axes,
 )
 
 GAP_STEPS = 5.0
 """A step of time so much longer than the usual one is a gap: the rate in it is unknown."""
-RATE_DEGREE = 3
-"""Of the rate's polynomial over a sample: corrected for coning."""
 BESIDE = 2
 """Samples kept on either side of a move: one that brackets it, and that one's neighbour."""
 BLOCK_S = 0.5
@@ -48,23 +44,21 @@ the correlation that an anti-alias filter leaves between samples."""
 
 @dataclass(frozen=True, eq=False)
 class MoveMeasurements:
-    """Everything the alignment needs, in raw units of each sensor.
+    """Everything the fit of a session needs, in raw units of each sensor.
 
     ``reading``, ``bias`` (n, 3) are the pose means of accelerometer and gyro, ``var_reading``, ``var_bias`` (n, 3) the
     variances of these means; ``links`` (m, 2) the poses each move joins. ``rows`` (samples,) are the recording's rows
     in and beside moves, move after move, ``time_s`` (samples,) their times, ``edges`` (m, 2) each move among them;
-    ``noise_density`` (3,) the angle random walk in raw unit · √s; ``var_bias_walk`` (3,) the variance by which the
-    true bias changes from pose to pose; ``clipped_s`` (m,) is the time in each move that the gyro spent at
-    its limit. ``attitude`` is the dependence of the bias on specific force where it was removed: ``rate``
-    (samples, 3) are the raw gyro readings without it, and so are the biases, whose mean over the
-    session is ``bias_mean`` (3,). ``is_undithered`` (3,) are the axes whose bias lies hidden inside an LSB, ``quantum``
+    ``noise_density`` (3,) the angle random walk in raw unit · √s; ``clipped_s`` (m,) is the time in each move that the
+    gyro spent at its limit. ``attitude`` is the dependence of the bias on specific force where it was removed: ``rate``
+    (samples, 3) are the raw gyro readings without it, and so are the biases, whose mean over the session is
+    ``bias_mean`` (3,). ``is_undithered`` (3,) are the axes whose bias lies hidden inside an LSB, ``quantum``
     (3,) the LSB, ``is_hidden`` (samples, 3) where a reading of such an axis stands in the LSB of its bias.
     ``bias_read``, ``var_bias_read`` (n, 3) are the biases as each pose alone shows them, ``var_reading_noise`` (n, 3)
     the variance of the pose means by noise alone, ``reading_variance`` (samples, 3) that of gyro readings which were
-    bridged or rounded, ``averaging`` by how much ``rate`` was sharpened, the readings being means over their interval.
+    bridged or rounded, ``shared_errors`` (samples, 3, k) one standard error of each of k that all moves share.
     """
 
-    moves: Moves
     links: IntArray
     rows: IntArray
     time_s: FloatArray
@@ -75,7 +69,6 @@ class MoveMeasurements:
     bias: FloatArray
     var_bias: FloatArray
     bias_mean: FloatArray
-    var_bias_walk: FloatArray
     noise_density: FloatArray
     sigma_time_s: float
     nominal_step_s: float
@@ -91,17 +84,7 @@ class MoveMeasurements:
     reading_variance: FloatArray | None
     quantum: FloatArray
     is_hidden: FloatArray
-    averaging: Averaging = field(default_factory=Averaging)
-
-    def of_rate(self, segments: Segments, rate: FloatArray, variance: FloatArray | None) -> MoveMeasurements:
-        """The same moves with other gyro readings (samples, 3), and what is uncertain of each (samples, 3)."""
-        mid_s = np.ascontiguousarray(segments.time_mid_s[self.links])
-        moves = Moves(self.time_s, np.ascontiguousarray(rate), self.edges, mid_s, self.links, RATE_DEGREE, variance)
-        return replace(self, moves=moves, rate=rate, reading_variance=variance)
-
-    def coarse(self, recording: Recording, segments: Segments) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-        """Readings (n, 3), their LSB (3,), those at rest (3,), and the axes (3,) that their noise does not dither."""
-        return _coarse(recording, segments, self.is_undithered)
+    shared_errors: FloatArray
 
     @property
     def is_lost(self) -> BoolArray:
@@ -178,36 +161,32 @@ def measure_moves(
     if clipped is not None:
         rate, extra = _bridged(rate, extra, clipped, gyroscope, rows)
     time_s = recording.time_s[rows]
-    mid_s = np.ascontiguousarray(segments.time_mid_s[links])
-    prepared = Moves(time_s, rate, edges, mid_s, links, RATE_DEGREE, extra)
     var_reading = _mean_variance(segments.accelerometer_sigma_mean)
     bias_read, var_bias_read = bias, var_bias
-    walk = excess_variance(bias[links[:, 1]] - bias[links[:, 0]], var_bias[links[:, 1]] + var_bias[links[:, 0]])
     mean, excess, _ = pool_biases(bias, var_bias)
     bias, var_bias = shrink(bias, var_bias, mean)
     if np.any(undithered):
         bias, var_bias = _with_hidden_bias(bias, var_bias, segments, quantum, undithered)
         mean = np.where(undithered, bias.mean(axis=0), mean)
-    hidden = np.zeros(rate.shape)
+    hidden, shared = np.zeros(rate.shape), [np.zeros((len(rate), 3, 0))]
     if np.any(undithered):
-        coarse = _coarse(recording, segments, undithered)
+        coarse = gyroscope, quantum, medians(gyroscope_mean), undithered
         hidden[(resting_ends(*coarse, in_log) | resting_axes(*coarse))[rows]] = 1.0
+        shared += [error[rows][:, :, None] for error in shared_errors(*coarse)]
     seen = rate_noise_density(recording, segments)
     density = density_without_rounding(seen, quantum, 1.0 / recording.rate_hz, undithered)
     steps, nominal, jitter = _steps_of(recording)
     return MoveMeasurements(
-        moves=prepared,
         links=links,
         rows=rows,
         time_s=time_s,
         edges=edges,
-        durations_s=prepared.durations_s(),
+        durations_s=time_s[edges[:, 1] - 1] - time_s[edges[:, 0]],
         reading=reading,
         var_reading=var_reading + _unexplained_reading_variance(accelerometer),
         bias=bias,
         var_bias=var_bias,
         bias_mean=mean,
-        var_bias_walk=walk,
         noise_density=density,
         sigma_time_s=jitter,
         nominal_step_s=nominal,
@@ -223,15 +202,8 @@ def measure_moves(
         reading_variance=extra,
         quantum=quantum,
         is_hidden=hidden,
+        shared_errors=np.concatenate(shared, axis=2),
     )
-
-
-def _coarse(
-    recording: Recording, segments: Segments, undithered: BoolArray
-) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    assert recording.gyroscope is not None
-    assert segments.gyroscope_mean is not None
-    return recording.gyroscope, recording.facts.of("gyroscope").step, medians(segments.gyroscope_mean), undithered
 
 
 def _moves_of(recording: Recording, segments: Segments) -> list[Move]:

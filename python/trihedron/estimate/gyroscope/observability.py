@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron._core import AlignmentFit
 from trihedron.arrays import FloatArray
 from trihedron.records.calibration import PARAMETER_NAMES, Observability
 from trihedron.records.finding import Finding, FindingCode
@@ -16,8 +15,8 @@ HARDLY_SEEN = 10.0 * WEAK
 """Beyond it the direction is known no better than its data sheet's nominal value."""
 
 
-def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray, n_gyroscope: int) -> Observability:
-    """Turn the SVD of the whitened Jacobian and the covariance (9, 9) of ``S_ω`` into words.
+def describe(covariance: FloatArray, S: FloatArray) -> Observability:
+    """Turn the covariance (9, 9) of ``S_ω`` into words.
 
     A move shows ``δS_ω ∫w' dt`` across the vertical only, so the element ``S_ij`` needs a turn about body axis ``j``
     during which axis ``i`` is not vertical, and, for ``i ≠ j``, by an angle that is not a whole turn.
@@ -26,9 +25,6 @@ def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray, n_gyrosco
     share = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3) / scale
     rate, axis = (int(k) for k in np.unravel_index(np.argmax(share), (3, 3)))
     weakest = words("gyro-scale" if rate == axis else "gyro-share", axis=axis + 1, rate=rate + 1)
-    advice: tuple[Words, ...] = ()
-    if fit.rank < len(fit.singular_values) or _worst(covariance, S) > WEAK:
-        advice = tuple(_advice(fit, covariance, float(np.linalg.norm(S, 2))))
     sigma = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     correlation = covariance / np.outer(sigma, sigma)
     pairs = tuple(
@@ -37,13 +33,14 @@ def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray, n_gyrosco
         for j in range(i + 1, 9)
         if abs(correlation[i, j]) > 0.9
     )
-    singular = np.asarray(fit.singular_values)
-    condition = float(singular[0] / singular[-1]) if fit.rank == len(singular) else float("inf")
-    # Directions that the moves leave open, as far as they concern the gyro; its nine parameters are counted.
-    k = len(singular) - n_gyroscope
-    unseen = np.asarray(fit.directions)[k:, fit.rank :]
-    n_unseen = int(np.count_nonzero(np.linalg.norm(unseen, axis=0) > 0.5))
-    return Observability(n_gyroscope - n_unseen, n_gyroscope, condition, singular, weakest, advice, pairs)
+    size = max(float(np.linalg.norm(S, 2)), np.finfo(float).tiny)
+    singular = size / np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), 1e-300))
+    # The fit itself begins from a scale that is as large as it looks: beyond that the moves say less than this.
+    rank = int(np.count_nonzero(singular > np.sqrt(2.0)))
+    condition = float(singular[0] / singular[-1]) if rank == 9 else float("inf")
+    is_weak = rank < 9 or _worst(covariance, S) > WEAK
+    advice = tuple(_advice(covariance, size, rank)) if is_weak else ()
+    return Observability(rank, 9, condition, singular, weakest, advice, pairs)
 
 
 def _worst(covariance: FloatArray, S: FloatArray) -> float:
@@ -52,7 +49,7 @@ def _worst(covariance: FloatArray, S: FloatArray) -> float:
     return float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0))) / size if size > 0 else float("inf")
 
 
-def _advice(fit: AlignmentFit, covariance: FloatArray, size: float) -> list[Words]:
+def _advice(covariance: FloatArray, size: float, rank: int) -> list[Words]:
     lines = []
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3) / size
     for axis in range(3):
@@ -70,7 +67,7 @@ def _advice(fit: AlignmentFit, covariance: FloatArray, size: float) -> list[Word
                 is_twice=len(weak) == 3,
             )
         )
-    if not lines and fit.rank < len(fit.singular_values):
+    if not lines and rank < 9:
         lines.append(words("moves-about-all"))
     return lines
 

@@ -14,7 +14,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.measurements import measure_moves
-from trihedron.estimate.session.carried import carried
+from trihedron.estimate.session.carried import carried_by
 from trihedron.probability import fdtrc
 from trihedron.ranges import ranges_of
 from trihedron.records.calibration import Calibration, FitQuality, SensorCalibration
@@ -22,7 +22,6 @@ from trihedron.records.checked import number_of
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-from trihedron.session.averaging import sharpened
 from trihedron.session.rounding import undithered_axes
 
 
@@ -59,13 +58,8 @@ def _of_poses(sensor: SensorCalibration, quality: FitQuality, segments: Segments
 def _of_moves(
     calibration: Calibration, gyro: SensorCalibration, quality: FitQuality, recording: Recording, segments: Segments
 ) -> FitQuality:
-    accelerometer = calibration.accelerometer
-    measured = measure_moves(recording, segments, accelerometer)
-    if calibration.averaging:
-        rate = sharpened(measured.rate, measured.time_s, calibration.averaging)
-        measured = measured.of_rate(segments, rate, measured.reading_variance)
-    anchors_s = segments.time_mid_s[measured.links]
-    seen = carried(measured, anchors_s, accelerometer.S, accelerometer.b, gyro.S)
+    measured = measure_moves(recording, segments, calibration.accelerometer)
+    seen = carried_by(calibration, gyro.S, measured, segments)
     known = np.ones(len(seen.angle_deg), dtype=bool) if quality.weights is None else quality.weights > 0.0
     total = float(np.sum((calibration.gravity_m_s2 * np.radians(seen.angle_deg[known])) ** 2))
     return replace(

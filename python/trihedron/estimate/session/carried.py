@@ -7,7 +7,7 @@ Norm of gravity at rest with one bias for the session; gravity carried through e
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -16,7 +16,9 @@ from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.fit import DYNAMICS, MOVES, STATIC_FORCE, SessionSolution
 from trihedron.estimate.session.observed import Observed
-from trihedron.records.calibration import FitQuality
+from trihedron.records.calibration import Calibration, FitQuality
+from trihedron.records.segments import Segments
+from trihedron.session.averaging import sharpened
 from trihedron.session.noise import along_gradient
 
 N_ACCELEROMETER, N_GYROSCOPE = 9, 9
@@ -149,17 +151,24 @@ def move_quality(
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """Gravity carried through moves: ``residual``, ``sigma`` (m, 3) m/s², ``angle_deg`` (m,).
+    """Gravity carried through moves: ``residual`` (m, 3) m/s² with its ``covariance`` (m, 3, 3), ``angle_deg`` (m,).
 
-    ``floor2`` (m,) is the variance across the vertical by noise of poses and samples, (m/s²)², ``model2`` (m,) that by
-    a covariance of the gyro's S, where one was given.
+    ``floor2`` (m,) is the variance across the vertical by noise of poses and samples, (m/s²)²; ``up`` (m, 3) the
+    vertical after a move, ``wrt_scale`` (m, 3, 9) the derivative of the residual by the gyro's S row by row.
     """
 
     residual: FloatArray
-    sigma: FloatArray
+    covariance: FloatArray
     angle_deg: FloatArray
     floor2: FloatArray
-    model2: FloatArray
+    up: FloatArray
+    wrt_scale: FloatArray
+
+    @property
+    def sigma(self) -> FloatArray:
+        """(m, 3) standard errors of the residual, m/s²."""
+        out: FloatArray = np.sqrt(np.einsum("mii->mi", self.covariance))
+        return out
 
     def spread(self, which: IntArray, n_moves: int) -> Carried:
         """The same as those ``which`` (m,) of more moves; the others are NaN."""
@@ -169,7 +178,17 @@ class Carried:
             out[which] = values
             return out
 
-        return Carried(*map(filled, (self.residual, self.sigma, self.angle_deg, self.floor2, self.model2)))
+        return Carried(*(filled(getattr(self, one.name)) for one in fields(self)))
+
+    def by_scale2(self, covariance: FloatArray) -> FloatArray:
+        """(m,) variance across the vertical by a covariance (9, 9) of the gyro's S, (m/s²)²."""
+        return _across2(self.up, self.wrt_scale @ _root(covariance))
+
+    def in_plane(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Residual (m, 2), its covariance (m, 2, 2) and derivatives (m, 2, 9) in the plane across the vertical."""
+        plane = np.linalg.svd(self.up[:, None, :])[2][:, 1:]
+        residual = np.einsum("mij,mj->mi", plane, self.residual)
+        return residual, plane @ self.covariance @ np.swapaxes(plane, 1, 2), plane @ self.wrt_scale
 
 
 def carried(
@@ -178,15 +197,20 @@ def carried(
     S_a: FloatArray,
     b_a: FloatArray,
     S_w: FloatArray,
-    covariance_S_w: FloatArray | None = None,
 ) -> Carried:
     """``B f_i - f_j`` of every move with the pose means at both ends, each pose with a bias of its own.
 
     The one definition of gravity after moves: in sample, held out, and of a calibration held against another session.
-    ``covariance_S_w`` (9, 9) is that of S_w row by row.
     """
     model = Linear(np.arange(len(measured.links)), S_a, b_a, S_w)
-    return carried_each(measured, anchors_s, [model], covariance_S_w)
+    return carried_each(measured, anchors_s, [model])
+
+
+def carried_by(calibration: Calibration, S_w: FloatArray, measured: MoveMeasurements, segments: Segments) -> Carried:
+    """:func:`carried` by a calibration, its gyro's scale ``S_w``, of readings as it reads them."""
+    accelerometer = calibration.accelerometer
+    read = replace(measured, rate=sharpened(measured.rate, measured.time_s, calibration.averaging))
+    return carried(read, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b, S_w)
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,12 +223,7 @@ class Linear:
     S_w: FloatArray
 
 
-def carried_each(
-    measured: MoveMeasurements,
-    anchors_s: FloatArray,
-    models: list[Linear],
-    covariance_S_w: FloatArray | None = None,
-) -> Carried:
+def carried_each(measured: MoveMeasurements, anchors_s: FloatArray, models: list[Linear]) -> Carried:
     """:func:`carried` of every move by the model that names it."""
     before, after = measured.links[:, 0], measured.links[:, 1]
     m = len(before)
@@ -237,19 +256,22 @@ def carried_each(
     roots = [turn @ _root(cov_rate), rotation @ (S_a * sigma_force[before]), S_a * sigma_force[after],
              turn @ wrt_before @ (S_w * sigma_bias[before]), turn @ wrt_after @ (S_w * sigma_bias[after])]  # fmt: skip
     root = np.concatenate(roots, axis=2)
-    across = np.eye(3) - unit_end[:, :, None] * unit_end[:, None, :]
-    floor2 = np.sum((across @ root) ** 2, axis=(1, 2))
-    model2 = np.zeros(len(angle))
-    if covariance_S_w is not None:
-        # Zero readings are subtracted: S enters through the rate and through the biases -S z.
-        wrt_S = wrt_scale.copy()
-        for i in range(3):
-            wrt_S[:, :, 3 * i : 3 * i + 3] -= (
-                wrt_before[:, :, i : i + 1] * measured.bias[before][:, None, :]
-                + wrt_after[:, :, i : i + 1] * measured.bias[after][:, None, :]
-            )
-        model2 = np.sum((across @ turn @ wrt_S @ _root(covariance_S_w)) ** 2, axis=(1, 2))
-    return Carried(residual, np.sqrt(np.sum(root**2, axis=2)), angle, floor2, model2)
+    # Zero readings are subtracted: S enters through the rate and through the biases -S z.
+    wrt_S = wrt_scale.copy()
+    for i in range(3):
+        wrt_S[:, :, 3 * i : 3 * i + 3] -= (
+            wrt_before[:, :, i : i + 1] * measured.bias[before][:, None, :]
+            + wrt_after[:, :, i : i + 1] * measured.bias[after][:, None, :]
+        )
+    covariance = root @ np.swapaxes(root, 1, 2)
+    return Carried(residual, covariance, angle, _across2(unit_end, root), unit_end, turn @ wrt_S)
+
+
+def _across2(up: FloatArray, root: FloatArray) -> FloatArray:
+    """(m,) variance across verticals (m, 3) of errors with roots (m, 3, k) of their covariance."""
+    across = np.eye(3) - up[:, :, None] * up[:, None, :]
+    out: FloatArray = np.sum((across @ root) ** 2, axis=(1, 2))
+    return out
 
 
 def _root(covariance: FloatArray) -> FloatArray:

@@ -8,12 +8,13 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.estimate.gyroscope.alignment import are_far
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.observed import Observed
-from trihedron.probability import fdtrc
+from trihedron.probability import MEDIAN_CHI2, chdtri, fdtrc
+from trihedron.quantiles import median
 from trihedron.records.words import words
-from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, START_STRENGTHS, Strengths
+from trihedron.session.averaging import EITHER, sharpened
+from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, START_STRENGTHS, Bounds, Strengths
 
 FALSE_ALARM = 1e-3
 """Chance that the moves of a sound session are taken for noisier than their samples."""
@@ -21,9 +22,11 @@ NOISE_DOF = 100.0
 """The predicted noise is itself measured in the recording: to about 7 %, as 100 degrees of freedom give."""
 DEAF = 1e3
 """Widening at which a row no longer says anything beside the others."""
-DELAY_S = 0.005
-"""By how much one sensor's filter delays it more than the other's, beforehand, or one is read out later: parts of
-their data sheets differ by up to some ms."""
+LOOSE = 100.0
+"""Widening of moves on the way from a start that may be tens of degrees off: to some degrees, so that it is the gyro's
+scale that follows, and no pose."""
+LEAST_SHRINK = 0.1
+"""Of residuals by what was fitted to them: hardly any freedom is left, and a ratio of noise says no more."""
 STATIC_FORCE, MOVES, DYNAMICS = 0, 2, 3
 """Labels of rows: accelerometer at rest, gravity after a move, velocity over it."""
 
@@ -47,6 +50,7 @@ class SessionSolution:
     moves_dof: float
     inflation: tuple[float, float]
     accel_bias_rms: float
+    averaging: float
     is_converged: bool
     stopped_because: str
     iterations: int
@@ -58,12 +62,14 @@ class SessionSolution:
         return self.core.strengths[0][0] < NOISE_CORNER_S
 
     def as_read(self, measured: MoveMeasurements) -> MoveMeasurements:
-        """The moves as this solution reads them: a bias that its LSB hides in its place, at rest and where readings
-        stand there."""
-        axes = np.flatnonzero(measured.is_undithered)
+        """The moves as this solution reads them: sharpened as far as their means are found to be, a bias that its LSB
+        hides in its place, at rest and where readings stand there, and without the errors that they share."""
+        effect, hidden = self.core.effect, np.flatnonzero(measured.is_undithered)
         place = np.zeros(3)
-        place[axes] = self.core.effect[: len(axes)]
-        return replace(measured, rate=measured.rate - measured.is_hidden * place, bias=measured.bias - place)
+        place[hidden] = effect[: len(hidden)]
+        rate = sharpened(measured.rate, measured.time_s, self.averaging) - measured.is_hidden * place
+        shared = effect[len(hidden) + 1 : -1]
+        return replace(measured, rate=rate - measured.shared_errors @ shared, bias=measured.bias - place)
 
     @property
     def parameters(self) -> FloatArray:
@@ -80,23 +86,26 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     accelerometers) follows the motion and is no noise. Widened to its size it still pulled a real accelerometer by five
     of its standard errors.
     """
-    core = fitted(observed, S_a, b_a + S_a @ observed.force_origin, S_w)
+    core = _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (1.0, DEAF)), ANYTHING)
     corner, scatter, between, (gravity, _) = core.strengths
-    heard = _again(observed, core, (corner, scatter, between, (gravity, 1.0)), np.append(core.effect, 0.0))
+    heard = _again(observed, core, (corner, scatter, between, (gravity, 1.0)))
     chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in _misfits(heard))
     is_expected = dof < 1.0 or fdtrc(dof, NOISE_DOF, chi2 / dof) >= FALSE_ALARM
     return _solution(observed, heard if is_expected else core)
 
 
+def approached(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray) -> _core.SessionFit:
+    """The fit from a start that may be far off: moves count little beside the poses."""
+    return _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (LOOSE, DEAF)), None)
+
+
 def refitted(observed: Observed, solution: SessionSolution) -> SessionSolution:
-    """The solution with other readings of the moves, from where it stands, at the same strengths of all noise."""
-    core = solution.core
-    return _solution(observed, _again(observed, core, core.strengths, np.asarray(core.effect)))
+    """The solution with another prior, from where it stands, at the same strengths of all noise."""
+    return _solution(observed, _again(observed, solution.core, solution.core.strengths))
 
 
-def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths, effect: FloatArray) -> _core.SessionFit:
-    """The fit of a session from where another one stands, strengths of all noise given; ``effect`` begins with the
-    places of the bias inside its LSB, and ends with the delay [s] of the accelerometer where it is free."""
+def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths) -> _core.SessionFit:
+    """The fit of a session from where another one stands, strengths of all noise given."""
     state = _core.SessionState(
         force_scale=core.force_scale,
         force_bias=core.force_bias,
@@ -104,23 +113,9 @@ def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths, eff
         up=core.up,
         pose_rate_bias=core.pose_rate_bias,
         pose_force_bias=core.pose_force_bias,
-        effect=effect,
+        effect=np.asarray(core.effect),
     )
-    delayed = len(effect) - len(observed.hidden_sigma)
-    slope = np.repeat((observed.force_slope @ np.asarray(core.force_scale).T)[:, :, None], delayed, axis=2)
-    hidden = _hidden_rate(observed, np.asarray(core.rate_scale))
-    return observed.model().fit(
-        state=state,
-        strengths=strengths,
-        force_effect=np.concatenate([np.zeros(hidden.shape), slope], axis=2) if delayed else None,
-        rate_effect=np.concatenate([hidden, np.zeros(slope.shape)], axis=2) if hidden.size else None,
-        sizes=[*observed.hidden_sigma, DELAY_S][: len(effect)] if len(effect) else None,
-    )
-
-
-def _hidden_rate(observed: Observed, S_w: FloatArray) -> FloatArray:
-    """Effect (poses, then samples of moves, 3, axes) by which readings in the LSB of their bias are off, rad/s."""
-    return np.ascontiguousarray(np.einsum("ij,njk->nik", S_w, observed.rate_hidden))
+    return _fit(observed, state, (np.asarray(core.force_scale), np.asarray(core.rate_scale)), strengths, None)
 
 
 def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
@@ -139,6 +134,7 @@ def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
         moves_dof=dof,
         inflation=inflation,
         accel_bias_rms=float(np.sqrt(np.mean(away**2))),
+        averaging=EITHER + float(core.effect[observed.n_hidden]),
         is_converged=core.is_converged,
         stopped_because=words(core.stopped_because),
         iterations=core.iterations,
@@ -147,7 +143,7 @@ def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
 
 
 def far_moves(solution: SessionSolution, n_moves: int) -> BoolArray:
-    """Moves (m,) whose gravity misses as none of so many does by chance: the rule of the moves alone, at this fit."""
+    """Moves (m,) that miss far more than the others."""
     labels = solution.core.labels
     of_gravity = labels[:, 0] == MOVES
     squared = (solution.core.residual[of_gravity] * solution.inflation[0]) ** 2
@@ -155,13 +151,25 @@ def far_moves(solution: SessionSolution, n_moves: int) -> BoolArray:
     return are_far(distance, solution.moves_dof)
 
 
-def fitted(
-    observed: Observed,
-    S_a: FloatArray,
-    b_a: FloatArray,
-    S_w: FloatArray,
+def are_far(distance: FloatArray, dof: float) -> BoolArray:
+    """Of moves that miss by squared Mahalanobis distances (n,) of two components each, with ``dof`` in all, those that
+    none of so many does by chance, in units of the usual miss where that is above the noise of the samples."""
+    return distance > chdtri(2, FALSE_ALARM / len(distance)) * usual_miss(distance, dof)
+
+
+def usual_miss(distance: FloatArray, dof: float) -> float:
+    """What is usual among such distances, of a component, where that is above the noise of the samples; else one."""
+    # Residuals of fitted parameters are smaller.
+    shrink = max(dof / (2.0 * len(distance)), LEAST_SHRINK)
+    return max(1.0, median(distance) / (MEDIAN_CHI2[2] * shrink))
+
+
+def _fitted(
+    observed: Observed, near: tuple[FloatArray, FloatArray, FloatArray], strengths: Strengths, within: Bounds | None
 ) -> _core.SessionFit:
-    """One fit on centred readings, its strengths chosen; velocities are not heard."""
+    """One fit from a start on raw readings, its strengths chosen ``within`` bounds where these are given."""
+    S_a, b_a, S_w = near
+    b_a = b_a + S_a @ observed.force_origin
     force = observed.pose_force @ S_a.T + b_a
     state = _core.SessionState(
         force_scale=np.ascontiguousarray(S_a),
@@ -170,16 +178,30 @@ def fitted(
         up=np.ascontiguousarray(force / np.linalg.norm(force, axis=1, keepdims=True)),
         pose_rate_bias=np.ascontiguousarray(observed.pose_rate),
         pose_force_bias=np.zeros((len(force), 3)),
-        effect=np.zeros(len(observed.hidden_sigma)),
+        effect=np.zeros(len(observed.effect_sigma)),
     )
-    hidden = _hidden_rate(observed, S_w)
+    return _fit(observed, state, (S_a, S_w), strengths, within)
+
+
+def _fit(
+    observed: Observed,
+    state: _core.SessionState,
+    scales: tuple[FloatArray, FloatArray],
+    strengths: Strengths,
+    within: Bounds | None,
+) -> _core.SessionFit:
+    """One fit; effects on the readings are taken to SI by the ``scales`` of the sensors (3, 3)."""
+    force, rate = (
+        np.ascontiguousarray(np.einsum("ij,njk->nik", S, effect))
+        for S, effect in zip(scales, (observed.force_effect, observed.rate_effect), strict=True)
+    )
     return observed.model().fit(
         state=state,
-        strengths=(*START_STRENGTHS[:3], (1.0, DEAF)),
-        force_effect=None,
-        rate_effect=hidden if hidden.size else None,
-        within=ANYTHING,
-        sizes=list(observed.hidden_sigma) if hidden.size else None,
+        strengths=strengths,
+        force_effect=force,
+        rate_effect=rate,
+        within=within,
+        sizes=observed.effect_sigma.tolist(),
     )
 
 

@@ -12,11 +12,14 @@ from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-from trihedron.session.averaging import sharpened
+from trihedron.session.averaging import EITHER, sharpened
 from trihedron.session.noise import Along, measure_noise, scatter_unit
 
 LOWER = np.tril_indices(3)
 """Elements of a lower triangular scale, row by row."""
+DELAY_S = 0.005
+"""By how much one sensor's filter delays it more than the other's, beforehand, or one is read out later: parts of
+their data sheets differ by up to some ms."""
 HELD = 1e-10
 """Relative standard error of what is given: far below any noise, and above what rounding does to the rows."""
 
@@ -26,11 +29,12 @@ class Observed:
     """One session for the core, readings minus ``force_origin``, ``rate_origin`` (3,).
 
     Pose means and standard errors (n, 3), densities (3,) raw · √s, the samples of the ``moves`` with the poses
-    ``before`` (m,) they begin in; ``force_slope`` (poses, then samples of moves, 3) raw/s, nothing in poses;
-    ``force_up``, ``force_scatter`` as in :class:`SessionNoise`. ``rate_hidden`` (like ``force_slope``, one column an
-    axis whose noise does not dither its LSB): where readings stand in the LSB of their bias, off by its place inside,
-    of standard deviation ``hidden_sigma`` (columns,) raw. ``prior``: mean (18,) and covariance (18, 18) of both linear
-    models on centred readings.
+    ``before`` (m,) they begin in; ``force_up``, ``force_scatter`` as in :class:`SessionNoise`. ``force_effect``,
+    ``rate_effect`` (poses, then samples of moves, 3, k), raw, are what k unknowns of standard deviation
+    ``effect_sigma`` (k,) add to the readings: the place of the bias inside its LSB, of the ``n_hidden`` axes whose
+    noise does not dither it; how far readings are means over their interval, from ``EITHER`` on; errors that all moves
+    share; the delay of the accelerometer. ``prior``: mean (18,) and covariance (18, 18) of both linear models on
+    centred readings.
     """
 
     gravity_m_s2: float
@@ -47,9 +51,10 @@ class Observed:
     before: npt.NDArray[np.int64]
     sigma_time_s: float
     nominal_step_s: float
-    force_slope: FloatArray
-    rate_hidden: FloatArray
-    hidden_sigma: FloatArray
+    force_effect: FloatArray
+    rate_effect: FloatArray
+    effect_sigma: FloatArray
+    n_hidden: int
     force_up: Along | None = None
     force_scatter: float = 0.0
     prior: tuple[FloatArray, FloatArray] | None = None
@@ -97,7 +102,7 @@ def arranged(
         ranges.append((a, b))
         before.append(pose)
     noise = measure_noise(recording, segments, [(int(rows[a]), int(rows[b - 1]) + 1) for a, b in ranges])
-    force = sharpened(readings, measured.time_s, measured.averaging.share)
+    force, rate = (sharpened(values, measured.time_s, EITHER) for values in (readings, measured.rate))
     assert noise.rate_sigma is not None
     assert noise.rate_density is not None
     unresolved = noise.unresolved
@@ -110,7 +115,7 @@ def arranged(
     is_coarse, coarse = measured.is_undithered, np.flatnonzero(measured.is_undithered)
     lasts_s = np.array([pose.stop - pose.start for pose in segments.poses]) * measured.nominal_step_s
     of_coarse = np.sqrt(measured.var_bias + measured.noise_density**2 / lasts_s[:, None])
-    is_hidden = np.vstack([np.ones((len(pose_time_s), 3)), _samples_of(ranges, measured.is_hidden)])
+    effects = _effects(recording, measured, readings, ranges)
     return Observed(
         gravity_m_s2=gravity_m_s2,
         force_origin=force_origin,
@@ -127,7 +132,7 @@ def arranged(
             pose_time_s=pose_time_s,
             time_s=_samples_of(ranges, measured.time_s),
             force=_samples_of(ranges, force) - force_origin,
-            rate=_samples_of(ranges, measured.rate) - rate_origin,
+            rate=_samples_of(ranges, rate) - rate_origin,
             ranges=_in_turn(ranges),
             before=np.array(before, dtype=np.int64),
             unresolved=unresolved,
@@ -135,14 +140,36 @@ def arranged(
         before=np.array(before, dtype=np.int64),
         sigma_time_s=measured.sigma_time_s,
         nominal_step_s=measured.nominal_step_s,
-        force_slope=np.vstack(
-            [np.zeros((len(pose_time_s), 3)), _slopes(recording.with_distinct_timestamps().time_s[rows], force, ranges)]
+        force_effect=effects[0],
+        rate_effect=effects[1],
+        effect_sigma=np.array(
+            [*measured.quantum[coarse] / np.sqrt(12.0), EITHER, *np.ones(measured.shared_errors.shape[2]), DELAY_S]
         ),
-        rate_hidden=np.ascontiguousarray(is_hidden[:, :, None] * np.eye(3)[:, coarse]),
-        hidden_sigma=measured.quantum[coarse] / np.sqrt(12.0),
+        n_hidden=len(coarse),
         force_up=noise.force_up,
         force_scatter=noise.force_scatter,
     )
+
+
+def _effects(
+    recording: Recording, measured: MoveMeasurements, readings: FloatArray, ranges: list[tuple[int, int]]
+) -> tuple[FloatArray, FloatArray]:
+    """What a unit of each unknown adds to force and rate, see :class:`Observed`; ``readings`` are the force's."""
+    n_poses = len(measured.reading)
+    places = np.eye(3)[:, measured.is_undithered]
+    force, rate = (
+        _samples_of(ranges, values - sharpened(values, measured.time_s, 1.0)) for values in (readings, measured.rate)
+    )
+    time_s = recording.with_distinct_timestamps().time_s[measured.rows]
+    none = np.zeros((*force.shape, places.shape[1]))
+    shared = _samples_of(ranges, measured.shared_errors)
+    slope = _slopes(time_s, readings, ranges)
+    of_force = np.concatenate([none, force[:, :, None], np.zeros(shared.shape), slope[:, :, None]], axis=2)
+    hidden = _samples_of(ranges, measured.is_hidden)[:, :, None] * places
+    of_rate = np.concatenate([hidden, rate[:, :, None], shared, np.zeros((*rate.shape, 1))], axis=2)
+    at_rest = np.zeros((2, n_poses, *of_rate.shape[1:]))
+    at_rest[1, :, :, : places.shape[1]] = places
+    return np.concatenate([at_rest[0], of_force]), np.concatenate([at_rest[1], of_rate])
 
 
 def with_prior(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray, *, is_given: bool) -> Observed:
