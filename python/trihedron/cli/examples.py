@@ -59,7 +59,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "noise": (
         (
-            "N and K beside a tracker's attitudes, the sensor at rest known:",
+            "N and K beside a tracker's attitudes and a static log:",
             "trihedron noise flight.csv --static rest.csv --reference truth.csv --report noise.html",
         ),
         (

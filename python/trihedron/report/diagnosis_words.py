@@ -99,10 +99,8 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
 def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = "") -> str:
     """What to do with the verdict; ``improved`` is the scenario that has taken over what differs already."""
     if diagnosis.verdict == "consistent":
-        return (
-            _dependent(diagnosis)
-            or "Nothing is missing: store S and b with trihedron calibrate LOG -o FILE, and use them."
-        )
+        store = "Nothing is missing: store S and b with trihedron calibrate LOG -o FILE, and use them."
+        return _dependent(diagnosis) or store
     if diagnosis.verdict == "not-testable":
         return ""
     if diagnosis.verdict == "unexplained":
