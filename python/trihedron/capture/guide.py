@@ -144,7 +144,7 @@ class Guide:
             return
         self._remark = ""
         if before and self._is_repeat(examination):
-            self._remark = "The board lies almost as in an earlier pose: follow the arrow to learn more."
+            self._remark = "The board lies almost as in an earlier pose: turn it to the marked one to learn more."
         self._accepted()
         if examination.is_good_enough:
             self.cut_s = self._time_s

@@ -10,8 +10,10 @@ from __future__ import annotations
 import errno
 import io
 import os
+import re
 import sys
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import typer
@@ -256,6 +258,11 @@ def _usage_sentence(error: Exception, words: Sequence[str]) -> str:
             f"{command} takes one log, and more were named. Where each sensor has its own, say which is which: "
             "--accel F --gyro F; otherwise run it once for each log."
         )
+    wrong = re.match(r"Invalid value for '([^']+)': Input should be a valid (number|integer)", message)
+    if wrong:
+        given = next((word for option, word in pairwise(words) if option == wrong[1]), "")
+        kind = "a number" if wrong[2] == "number" else "a whole number"
+        message = f"{wrong[1]} takes {kind}{f', not {given!r}' if given else ''}"
     stop = "" if message.endswith(("?", ".")) else "."
     return f"{message}{stop} `{where}` lists what there is."
 

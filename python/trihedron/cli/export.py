@@ -105,7 +105,7 @@ def _put(made: dict[str, str], place: Path | None, to: str, force: bool, inputs:
         return
     check_outputs(*placed(made, place), force=force, inputs=inputs)
     for target in placed(made, place, write=True, overwrite=force):
-        say(f"{to}: {target}")
+        say(f"written for {to}: {target}")
 
 
 def _list() -> None:

@@ -16,7 +16,7 @@ from trihedron.sensor_model import other_form, other_form_jacobian
 
 LETTERS = 2
 """Of a name that is made of axes alone."""
-BIAS = "the reading at zero input, −S⁻¹ b over the sensitivity (sign opposite to b)"
+BIAS = "the reading at zero input (sign opposite to b)"
 """What a bias is in every report; b is what a corrected reading adds."""
 
 

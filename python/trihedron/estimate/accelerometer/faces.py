@@ -21,7 +21,7 @@ from trihedron.records.words import words
 from trihedron.sensor_model import other_form, other_form_jacobian
 from trihedron.units import AccelerationUnit, degrees_from_radians
 
-METHOD = "method 1: faces of the case on a level table"
+METHOD = "faces of the case on a level table"
 
 
 @dataclass(frozen=True, eq=False)

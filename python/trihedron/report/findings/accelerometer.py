@@ -141,7 +141,7 @@ ENTRIES = (
         "",
         NOTE,
         "{n_left_out} of {n_poses} poses have no axis within {largest_tilt_deg:.0f}° of the vertical and are not "
-        "used by method 1 (poses {poses:&, }).",
+        "used by --method faces (poses {poses:&, }).",
         "They are edges, corners or leaning poses.",
         "--method joint uses them all.",
     ),
