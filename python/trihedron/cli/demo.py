@@ -19,11 +19,11 @@ FOLDER = "trihedron-demo"
 def demo(
     folder: Annotated[
         Path | None,
-        typer.Argument(metavar="FOLDER", help=f"Where to write; {FOLDER} when not said, or the next free name."),
+        typer.Argument(metavar="FOLDER", help=f"Where to write; default: {FOLDER}, or the next free name."),
     ] = None,
     seed: Annotated[
         int | None,
-        typer.Option("--seed", metavar="N", min=0, help="Unit and flaw of the second act; drawn if not said."),
+        typer.Option("--seed", metavar="N", min=0, help="Unit and effect of the second act; default: random."),
     ] = None,
     force: Force = False,
 ) -> None:

@@ -21,8 +21,9 @@ BIAS = "the reading at zero input (sign opposite to b)"
 
 
 def axis_in_print(name: str) -> str:
-    """Axes as on the silkscreen, ``x`` and ``xy`` as ``X`` and ``XY``; a longer name as it is."""
-    return name.upper() if len(name) <= LETTERS else name
+    """Axes as on the silkscreen: ``xy`` and ``gyro x`` as ``XY`` and ``gyro X``; other names as they are."""
+    sensor, gap, axis = name.rpartition(" ")
+    return f"{sensor}{gap}{axis.upper()}" if len(axis) <= LETTERS else name
 
 
 def channel_in_print(channel: str) -> str:
