@@ -37,7 +37,7 @@ def disagreement_report(
         answer = "The drawn effect is confounded with the first one named in this recording, and the report says so."
     return Document(
         title="A simulation and a log that disagree",
-        subtitle=f"One effect, drawn at random (--seed {seed} repeats it), was sealed in sealed.json before the diagnosis.",
+        subtitle=f"One effect, drawn at random (--seed {seed} repeats it), was sealed before the diagnosis.",
         verdict=verdict_in_words(found),
         is_trustworthy=True,
         sections=(

@@ -95,7 +95,7 @@ def _headlines(one: SensorFilterNoise) -> list[Headline]:
 
 
 def _beside(value: Bounded, static: Bounded | None) -> str:
-    said = [] if value.is_limit else [f"95 % interval {_interval(value)}"]
+    said = ["95 % upper limit" if value.is_limit else f"95 % interval {_interval(value)}"]
     return "; ".join([*said, *([] if static is None else [f"static {_number(static)}"])])
 
 
