@@ -111,9 +111,7 @@ def build_app() -> typer.Typer:
 
 
 def trihedron(
-    version: bool = typer.Option(
-        False, "--version", help="Say which version this is.", is_eager=True, callback=_version
-    ),
+    version: bool = typer.Option(False, "--version", help="Print the version.", is_eager=True, callback=_version),
     man: bool = typer.Option(
         False, "--man", help="Print the manual page (trihedron --man | man -l -).", is_eager=True, callback=_manual
     ),
@@ -255,7 +253,7 @@ def _usage_sentence(error: Exception, words: Sequence[str]) -> str:
     where = f"trihedron {command} --help" if command else "trihedron --help"
     if message.startswith("Got unexpected extra argument") and command in _OF_ONE_LOG:
         message = (
-            f"{command} takes one log, and more were named. Where each sensor has its own, say which is which: "
+            f"{command} takes one log, and more were named. Where each sensor has its own, name them by "
             "--accel F --gyro F; otherwise run it once for each log."
         )
     wrong = re.match(r"Invalid value for '([^']+)': Input should be a valid (number|integer)", message)

@@ -57,7 +57,7 @@ def diagnose(
     full: Full = False,
     results: Results,
 ) -> None:
-    """Where a log and its model differ, which effects are missing, and does adding it help. Status 0 if it ran.
+    """Where a log and its model differ, which effects are missing, and what adding them gains. Status 0 if it ran.
 
     With several logs of one unit: which effects all of them share.
     """

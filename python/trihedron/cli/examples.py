@@ -4,7 +4,7 @@ from __future__ import annotations
 
 EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "": (
-        ("two acts on a simulated sensor, with reports", "trihedron demo"),
+        ("two examples on a simulated sensor, with reports", "trihedron demo"),
         ("is this log fit for a calibration?", "trihedron check LOG"),
         ("calibrate, with a report", "trihedron calibrate LOG --latitude 50 -o cal.json --report cal.html"),
         ("what a command does, its options, examples", "trihedron COMMAND --help"),

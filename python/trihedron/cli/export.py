@@ -32,7 +32,7 @@ def export(
     ] = None,
     rate: Annotated[
         float | None,
-        typer.Option("--rate", metavar="HZ", help="Rate of the samples; that of the static log when not said."),
+        typer.Option("--rate", metavar="HZ", help="Rate of the samples; default: that of the static log."),
     ] = None,
     topic: Annotated[str, typer.Option("--topic", metavar="NAME", help="Where the samples are published.")] = "/imu0",
     accel_lsb: Annotated[

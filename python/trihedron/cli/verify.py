@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,9 +17,19 @@ if TYPE_CHECKING:
 FIRST_SCREEN = 2
 
 
-@with_options(source=LogsSource, place=GravitySource, results=Results)
+@dataclass(frozen=True)
+class Tested(LogsSource):
+    """Calibrations and the log that they are tested on."""
+
+    log: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="CALIBRATION LOG", help="A calibration file and a log; or a log and several of them."),
+    ] = None
+
+
+@with_options(source=Tested, place=GravitySource, results=Results)
 def verify(
-    source: LogsSource,
+    source: Tested,
     place: GravitySource,
     *,
     limit_mg: Annotated[
@@ -71,7 +81,7 @@ def verify(
     leave(result.findings)
 
 
-def _parted(source: LogsSource) -> tuple[list[Path], LogSource]:
+def _parted(source: Tested) -> tuple[list[Path], LogSource]:
     """Calibrations and the one log among the files that were named, told by content."""
     from trihedron.files.formats import is_calibration
 

@@ -142,7 +142,7 @@ _RATES = (
         Code.RATE_STATED,
         "",
         NOTE,
-        "No time column; the rate is {rate_hz:.6g} Hz {is_given:?as you said|as the file states above its data or "
+        "No time column; the rate is {rate_hz:.6g} Hz {is_given:?as given|as the file states above its data or "
         "beside them}.",
     ),
     Entry(

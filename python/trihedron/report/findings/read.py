@@ -12,7 +12,7 @@ NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 _SAY_ACCEL_UNIT = "Give --accel-unit m/s^2, g, mg, ..., or counts, if this is wrong."
 _SAY_GYRO_UNIT = "Give --gyro-unit rad/s, deg/s, ..., or counts, if this is wrong."
 _ALIKE = "Both look alike. The calibration differs only in its name of the raw unit."
-_SOURCE = "{is_given:?as you said|by its column names}"
+_SOURCE = "{is_given:?as given|by its column names}"
 _TURNING = (
     "gravity rotates by {factor:.3g} (± {percent:.1g} %) times the gyro's angle in {unit} (1 where the unit is right; "
     "correlation {correlation:.2f})"
