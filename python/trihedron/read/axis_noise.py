@@ -28,8 +28,8 @@ def read_axis_noise(path: str | os.PathLike[str]) -> tuple[AxisNoise, AxisNoise,
     unknown = sorted(set(said) - set(TERMS))
     if unknown:
         raise ReadError(
-            f"{file}: {unknown[0]!r} is no noise term; give the static log itself (--noise static.csv), or an object "
-            f"with some of {', '.join(TERMS)} in the raw unit of the log."
+            f"{file}: there is no noise term {unknown[0]!r}; give the static log itself (--noise static.csv) or an "
+            f"object with some of {', '.join(TERMS)} in the raw unit of the log."
         )
     axes: list[dict[str, float]] = [{}, {}, {}]
     for name, value in said.items():
