@@ -70,7 +70,7 @@ def test_a_pose_has_its_position_in_metres(tmp_path):
 @pytest.mark.parametrize(
     ("columns", "header", "said", "complaint"),
     [
-        ((T, Q), "", None, "no names; say what they are"),
+        ((T, Q), "", None, "no names; name them in file order"),
         ((T, A, B, C), "t,wx,wy,wz", None, "unit of the reference's rate is not stated"),
         ((T, A, B, C), "t,roll,pitch,yaw", None, "unit of the angles is not stated"),
         ((T, Q[:, :3]), "t,qw,qx,qy", None, "needs one column each of qw, qx, qy, qz"),
