@@ -30,7 +30,7 @@ ON_A_PHONE = ("calibrate", "diagnose")
 
 
 def logs(folder: Path) -> list[str]:
-    """Three sessions of one unit, and an hour of rest."""
+    """Three sessions of one unit, and a static hour."""
     made = []
     for name, n_poses, seed in (("monday", 24, 3), ("tuesday", 18, 9), ("friday", 18, 12)):
         motion = hand_session(n_poses=n_poses, pose_s=3.0, move_s=2.5, first_pose_s=5.0)
@@ -43,7 +43,7 @@ def logs(folder: Path) -> list[str]:
 
 
 def beside_a_tracker(folder: Path) -> tuple[str, str]:
-    """A log of a body that rocks for two minutes, and a tracker whose room wanders by a tenth of a degree."""
+    """A log of a body that rocks for two minutes, and a tracker whose world frame drifts by a tenth of a degree."""
     rng = np.random.default_rng(7)
     time = np.arange(0.0, 120.0, 1.0 / TRACKED_HZ)
     gate = np.clip(np.minimum(time - 5.0, 115.0 - time) / 2.0, 0.0, 1.0)
@@ -75,13 +75,15 @@ def pages(folder: Path) -> dict[str, Path]:
         "allan": ["allan", str(folder / "rest.npz"), "--accel-lsb", "0.061 mg", "--gyro-lsb", "0.00763 deg/s"],
         "kalman": ["kalman", first, *GRAVITY],
     }
-    found = {"diagnose": folder / "demo" / "disagreement.html"}
+    found = {"diagnose": folder / "demo" / "disagreement.html", "verify": folder / "demo" / "verification.html"}
     for name, line in lines.items():
         found[name] = folder / f"{name}.html"
         main([*line, "--report", str(found[name])])
     log, truth = beside_a_tracker(folder)
     found["reference"] = folder / "reference.html"
     main(["diagnose", log, "--reference", truth, *GRAVITY, "--report", str(found["reference"])])
+    found["noise"] = folder / "noise.html"
+    main(["noise", log, "--reference", truth, *GRAVITY, "--report", str(found["noise"])])
     main(["fleet", str(folder / "*" / "log.csv"), "-o", str(folder / "fleet"), "--workers", "0", *GRAVITY])
     return {**found, "fleet": folder / "fleet" / "fleet.html"}
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from trihedron.estimate.accelerometer.faces import calibrate_faces
-from trihedron.records import FindingCode
+from trihedron.records import FindingCode, Severity
 from trihedron.sensor_model import other_form, other_form_jacobian
 
 G = 9.81
@@ -93,6 +93,12 @@ def test_a_level_table_raises_no_alarm_and_half_a_degree_always_does():
     # miss is rare: eight standard errors leave less than 1 %.
     assert false_alarms <= 5
     assert caught >= 0.99 * n
+
+
+def test_faces_that_lean_beyond_what_a_face_may_are_not_to_be_trusted():
+    # Poses by hand: as if each leant by half a radian.
+    _, findings = calibrate_faces(face_readings(SIX, 1e-2, 1, tilt_deg=40.0), 1e-2, G, raw_unit="m/s^2", up=SIX)
+    assert next(f for f in findings if f.code is FindingCode.TABLE_TILT).severity is Severity.SERIOUS
 
 
 def test_the_error_bars_of_tilted_faces_cover_the_truth():

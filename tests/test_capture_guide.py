@@ -21,7 +21,7 @@ from trihedron.capture.guide import Guide, Stillness
 from trihedron.cli import main
 from trihedron.cli.page import Page
 from trihedron.cli.screen import as_text
-from trihedron.records.guiding import Accuracy, Phase
+from trihedron.records.guiding import Accuracy, Examination, Phase
 from trihedron.simulate import scenario_by_name
 
 ACCURACY = Accuracy.parse("accel 0.1 %, gyro 0.2 %")
@@ -82,6 +82,21 @@ def test_the_guide_waits_holds_moves_checks_and_ends_in_this_order(led):
     assert all(view.instruction for view in views)
     # Every pose rings once: poses of the calibration and of the check.
     assert views[-1].n_events == views[-1].n_poses + 3
+
+
+def test_time_that_a_pose_lacked_is_not_requested_of_the_next():
+    up = np.array([[0.0, 0.0, 1.0]])
+    # Nothing after the first pose counts.
+    seen = Examination(up, (), np.inf, np.array([1.0, 0.0, 0.0]), "+X up", "", pose_s=3.0)
+    guide, rng, now, asked = Guide(ACCURACY, lambda: seen), np.random.default_rng(1), 0.0, []
+    for still_s, towards in ((8.0, [0.0, 0.0, 9.8]), (4.0, [9.8, 0.0, 0.0]), (1.0, [0.0, 9.8, 0.0])):
+        time = now + np.arange(0.0, still_s + 1.0, 0.01)
+        force = towards + 0.01 * rng.normal(size=(len(time), 3))
+        force[time > now + still_s] += rng.normal(size=3) * 5.0 * np.sin(9.0 * time[time > now + still_s])[:, None]
+        asked += [guide.advance(time[i : i + 25], force[i : i + 25]).pose_s for i in range(0, len(time), 25)]
+        now = time[-1] + 0.01
+    assert max(asked) > 4.0
+    assert asked[-1] == seen.pose_s
 
 
 def test_the_accuracy_is_never_said_to_be_reached_before_the_poses_tell_it():

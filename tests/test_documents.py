@@ -93,7 +93,7 @@ def test_on_a_package_index_every_link_of_the_readme_is_absolute_and_the_package
     links = LINK.findall(page)
     assert len(links) == len(LINK.findall(text))
     assert all(link.startswith("https://host.example/owner/trihedron/") for link in links)
-    assert "](https://host.example/owner/trihedron/raw/v0.1.0/docs/figures/overview.png)" in page
+    assert "](https://host.example/owner/trihedron/raw/v0.1.0/docs/figures/page_calibrate.png)" in page
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8") + made.urls("https://host.example/o/t", "v1"))
     assert set(project["project"]["urls"]) == {"Source", "Documentation", "Changelog"}
     assert "name" in project["project"]

@@ -195,6 +195,16 @@ def test_an_explicit_mapping_takes_names_numbers_or_roles_in_order(tmp_path, map
     assert_same(read_recording(write(tmp_path / "log.csv", table, "t,acc1,acc2,acc3,u,v,w\n"), columns=mapping), table)
 
 
+def test_a_time_in_brackets_with_its_unit_is_the_time_of_the_line(tmp_path):
+    table = readings()
+    lines = [f"[{1e6 * row[0]:.0f} us] a: {row[1]} {row[2]} {row[3]} g: {row[4]} {row[5]} {row[6]}\n" for row in table]
+    path = tmp_path / "log.txt"
+    path.write_text("".join(lines))
+    recording = read_recording(path)
+    np.testing.assert_allclose(recording.time_s, table[:, 0] - table[0, 0], atol=1e-6)
+    np.testing.assert_array_equal(recording.accelerometer, table[:, 1:4])
+
+
 @pytest.mark.parametrize(
     ("mapping", "complaint"),
     [

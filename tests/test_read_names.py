@@ -40,6 +40,8 @@ SENSORS = [
     ("GYRO_ZOUT", "gyroscope", "z", ""),
     ("gyro_z (mrad/s)", "gyroscope", "z", "mrad/s"),
     ("fy", "accelerometer", "y", ""),
+    ("AcX", "accelerometer", "x", ""),
+    ("GyX", "gyroscope", "x", ""),
 ]
 
 

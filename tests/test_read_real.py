@@ -191,9 +191,9 @@ def test_kim_is_even_behind_stamps_of_5_ms_ticks(real_data, run):
     even = finding(recording, FindingCode.EVEN_CLOCK)
     assert even.numbers["period_s"] == pytest.approx(0.0100001, abs=5e-8)
     assert recording.sampling.n_lost == 0
-    assert set(recording.auxiliary) == {"qx", "qy", "qz", "qw", "mx", "my", "mz", "timestamps as logged [s]"}
+    assert set(recording.auxiliary) == {"qx", "qy", "qz", "qw", "mx", "my", "mz", "logged time after the first [s]"}
     np.testing.assert_allclose(
-        recording.auxiliary["timestamps as logged [s]"], written[:, 0] - written[0, 0], rtol=0, atol=1e-6
+        recording.auxiliary["logged time after the first [s]"], written[:, 0] - written[0, 0], rtol=0, atol=1e-6
     )
 
 

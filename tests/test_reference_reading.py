@@ -70,9 +70,9 @@ def test_a_pose_has_its_position_in_metres(tmp_path):
 @pytest.mark.parametrize(
     ("columns", "header", "said", "complaint"),
     [
-        ((T, Q), "", None, "no names; say what they are"),
-        ((T, A, B, C), "t,wx,wy,wz", None, "unit of the reference's rate is not said"),
-        ((T, A, B, C), "t,roll,pitch,yaw", None, "unit of the angles is not said"),
+        ((T, Q), "", None, "no names; name them in file order"),
+        ((T, A, B, C), "t,wx,wy,wz", None, "unit of the reference's rate is not stated"),
+        ((T, A, B, C), "t,roll,pitch,yaw", None, "unit of the angles is not stated"),
         ((T, Q[:, :3]), "t,qw,qx,qy", None, "needs one column each of qw, qx, qy, qz"),
         ((T, 2.0 * Q), "t,qw,qx,qy,qz", None, "length 2, not 1"),
         ((T, (TRUE * [1, -1, 1]).reshape(-1, 9)), "t,r00,r01,r02,r10,r11,r12,r20,r21,r22", None, "mirrored"),

@@ -32,7 +32,7 @@ from trihedron.units import (
     STANDARD_GRAVITY_M_S2,
     acceleration_to_si,
     degrees_from_radians,
-    mg_from_m_s2,
+    mm_s2_from_m_s2,
     rate_to_si,
 )
 
@@ -314,11 +314,11 @@ def _noise(recording: Recording, segments: Segments, matrix: FloatArray, calibra
     scale = acceleration_to_si(recording.accelerometer_unit) or (1.0 if _is_determined(calibration) else 0.0)
     if sigma is not None and scale:
         size = float(np.mean(np.abs(np.diag(matrix)) * sigma)) * (1.0 if _is_determined(calibration) else scale)
-        parts.append(f"accel {mg_from_m_s2(size):.2g} mg")
+        parts.append(f"{mm_s2_from_m_s2(size):.2g} mm/s²")
     if segments.gyroscope_sigma is not None:
         rate = rate_to_si(recording.gyroscope_unit)
         if calibration is not None and calibration.gyroscope is not None:
             rate = float(np.mean(np.abs(np.diag(calibration.gyroscope.S))))
         if rate:
-            parts.append(f"gyro {degrees_from_radians(rate * float(np.mean(segments.gyroscope_sigma))):.2g} deg/s")
+            parts.append(f"{degrees_from_radians(rate * float(np.mean(segments.gyroscope_sigma))):.2g} °/s")
     return ", ".join(parts)

@@ -109,6 +109,7 @@ class Guide:
             self._is_taken = False
             if self.phase is Phase.POSE:
                 self.phase = Phase.MOVE
+                self._asked_s = self._usual_s()  # what a pose that was left asked for is not asked of the next
             return
         if self._is_taken:
             if not self._has_moved():
@@ -143,7 +144,7 @@ class Guide:
             return
         self._remark = ""
         if before and self._is_repeat(examination):
-            self._remark = "The board lies almost as in an earlier pose: follow the arrow to learn more."
+            self._remark = "The board lies almost as in an earlier pose: turn it to the marked one to learn more."
         self._accepted()
         if examination.is_good_enough:
             self.cut_s = self._time_s
@@ -172,11 +173,14 @@ class Guide:
         if up is not None:
             self._checks.append(up)
         self._accepted()
-        self._asked_s = self.examination.pose_s if self.examination else FIRST_POSE_S
+        self._asked_s = self._usual_s()
         if len(self._checks) >= self._n_checks:
             self.phase, self._target = Phase.DONE, None
         else:
             self._target = self._far_from_all()
+
+    def _usual_s(self) -> float:
+        return FIRST_POSE_S if self.examination is None else self.examination.pose_s
 
     def _far_from_all(self) -> FloatArray:
         """The direction farthest from every pose: where a calibration has most to prove."""

@@ -10,8 +10,10 @@ from __future__ import annotations
 import errno
 import io
 import os
+import re
 import sys
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import typer
@@ -109,9 +111,7 @@ def build_app() -> typer.Typer:
 
 
 def trihedron(
-    version: bool = typer.Option(
-        False, "--version", help="Say which version this is.", is_eager=True, callback=_version
-    ),
+    version: bool = typer.Option(False, "--version", help="Print the version.", is_eager=True, callback=_version),
     man: bool = typer.Option(
         False, "--man", help="Print the manual page (trihedron --man | man -l -).", is_eager=True, callback=_manual
     ),
@@ -253,9 +253,14 @@ def _usage_sentence(error: Exception, words: Sequence[str]) -> str:
     where = f"trihedron {command} --help" if command else "trihedron --help"
     if message.startswith("Got unexpected extra argument") and command in _OF_ONE_LOG:
         message = (
-            f"{command} takes one log, and more were named. Where each sensor has its own, say which is which: "
+            f"{command} takes one log, and more were named. Where each sensor has its own, name them by "
             "--accel F --gyro F; otherwise run it once for each log."
         )
+    wrong = re.match(r"Invalid value for '([^']+)': Input should be a valid (number|integer)", message)
+    if wrong:
+        given = next((word for option, word in pairwise(words) if option == wrong[1]), "")
+        kind = "a number" if wrong[2] == "number" else "a whole number"
+        message = f"{wrong[1]} takes {kind}{f', not {given!r}' if given else ''}"
     stop = "" if message.endswith(("?", ".")) else "."
     return f"{message}{stop} `{where}` lists what there is."
 

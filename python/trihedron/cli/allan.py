@@ -63,7 +63,7 @@ Stream = Annotated[
     typer.Option(
         "--stream",
         help="Read a .npy, Parquet or CSV log in pieces, in at most 1.5 GB and without audit: --columns, "
-        "--rate and the units say what it holds.",
+        "--rate and the units state what it holds.",
     ),
 ]
 Full = Annotated[

@@ -106,7 +106,7 @@ def calibrate(
     if sources.are_many(by):
         if extended or gyro_nominal is not None or {k for k, v in choices.items() if v} - {"method", "loss", "frame"}:
             raise typer.BadParameter(
-                "several logs are calibrated with the options of method 2 only, without --extended"
+                "several logs are calibrated without --method faces, --turns and --turntable, without --extended"
             )
         if method != "joint" or loss != "linear":
             raise typer.BadParameter("several logs are calibrated with --method joint and --loss linear")

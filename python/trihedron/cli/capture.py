@@ -87,9 +87,9 @@ def capture(
             typer.echo(f"{name:20s}{sentence}")
         return
     if port is None:
-        raise typer.BadParameter("say what to read: a port (`trihedron ports` lists them), tcp://host:port or a file")
+        raise typer.BadParameter("name what to read: a port (`trihedron ports` lists them), tcp://host:port or a file")
     if output is None:
-        raise typer.BadParameter("say where the log goes with -o LOG")
+        raise typer.BadParameter("name the log to write: -o LOG")
     from trihedron.api.capturing import open_device
     from trihedron.files.output import check_free
 

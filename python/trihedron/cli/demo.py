@@ -19,15 +19,15 @@ FOLDER = "trihedron-demo"
 def demo(
     folder: Annotated[
         Path | None,
-        typer.Argument(metavar="FOLDER", help=f"Where to write; {FOLDER} when not said, or the next free name."),
+        typer.Argument(metavar="FOLDER", help=f"Where to write; default: {FOLDER}, or the next free name."),
     ] = None,
     seed: Annotated[
         int | None,
-        typer.Option("--seed", metavar="N", min=0, help="Unit and flaw of the second act; drawn if not said."),
+        typer.Option("--seed", metavar="N", min=0, help="Unit and effect of the second example; default: random."),
     ] = None,
     force: Force = False,
 ) -> None:
-    """Two acts, simulated: calibrate and compare with the truth; then a simulation that a log contradicts."""
+    """Two simulated examples: a calibration compared with the truth; a simulation that a log contradicts."""
     target = _free_folder() if folder is None and not force else folder or Path(FOLDER)
     if folder is not None and folder.exists() and not force:
         raise RefusedError(f"{folder}: this exists and was left alone; choose another name or add --force.")

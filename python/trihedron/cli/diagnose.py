@@ -57,7 +57,7 @@ def diagnose(
     full: Full = False,
     results: Results,
 ) -> None:
-    """Where a log and its model differ, which effects are missing, and does adding it help. Status 0 if it ran.
+    """Where a log and its model differ, which effects are missing, and what adding them gains. Status 0 if it ran.
 
     With several logs of one unit: which effects all of them share.
     """
@@ -100,7 +100,7 @@ def diagnose(
             alpha=alpha,
             progress=tell,
         )
-    document = diagnosis_report(result, str(against or calibration or ""))
+    document = diagnosis_report(result, str(against or calibration or ""), str(improved or ""))
     machine = diagnosis_document(result)
     results.tell(document, machine, None if full else first_screen(result))
     if improved is not None and against is not None:
@@ -111,7 +111,7 @@ def diagnose(
         else:
             write_calibration(result.updated, updated, overwrite=results.force)
             say(f"calibration of this log: {updated}")
-    elif result.updated is not None and any(p.significant for p in result.parameters):
+    elif known is not None and result.updated is not None and any(p.significant for p in result.parameters):
         say("The calibration that this log itself gives: --updated FILE.")
     if not full and results.report is None:
         _point_to_more(result)

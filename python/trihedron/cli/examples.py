@@ -4,12 +4,12 @@ from __future__ import annotations
 
 EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "": (
-        ("two acts on a simulated sensor, with reports", "trihedron demo"),
+        ("two examples on a simulated sensor, with reports", "trihedron demo"),
         ("is this log fit for a calibration?", "trihedron check LOG"),
         ("calibrate, with a report", "trihedron calibrate LOG --latitude 50 -o cal.json --report cal.html"),
         ("what a command does, its options, examples", "trihedron COMMAND --help"),
     ),
-    "demo": (("Into a folder of that name; the same flaw every time:", "trihedron demo tour --seed 3"),),
+    "demo": (("Into a folder of that name; the same effect every time:", "trihedron demo tour --seed 3"),),
     "plan": (
         ("Turns of 90° on a table against a wall that gives the angle to 0.1°:", "trihedron plan --turn-error 0.1"),
         ("With the noise of your own sensor:", "trihedron plan --gyro-noise 0.01 --accel-noise 200"),
@@ -59,7 +59,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "noise": (
         (
-            "N and K beside a tracker's attitudes, the sensor at rest known:",
+            "N and K beside a tracker's attitudes and a static log:",
             "trihedron noise flight.csv --static rest.csv --reference truth.csv --report noise.html",
         ),
         (

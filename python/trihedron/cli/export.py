@@ -32,7 +32,7 @@ def export(
     ] = None,
     rate: Annotated[
         float | None,
-        typer.Option("--rate", metavar="HZ", help="Rate of the samples; that of the static log when not said."),
+        typer.Option("--rate", metavar="HZ", help="Rate of the samples; default: that of the static log."),
     ] = None,
     topic: Annotated[str, typer.Option("--topic", metavar="NAME", help="Where the samples are published.")] = "/imu0",
     accel_lsb: Annotated[
@@ -105,7 +105,7 @@ def _put(made: dict[str, str], place: Path | None, to: str, force: bool, inputs:
         return
     check_outputs(*placed(made, place), force=force, inputs=inputs)
     for target in placed(made, place, write=True, overwrite=force):
-        say(f"{to}: {target}")
+        say(f"written for {to}: {target}")
 
 
 def _list() -> None:

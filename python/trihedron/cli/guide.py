@@ -39,7 +39,7 @@ def guide(
     output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="Calibration to write.")] = None,
     force: Force = False,
 ) -> None:
-    """Replay a log through the guide: what it would have said pose by pose, then calibrate and verify."""
+    """Replay a log through the guide of capture, which names the next pose after each, then calibrate and verify."""
     from trihedron.api.replaying import replay
     from trihedron.cli.output import check_outputs, put
     from trihedron.cli.screen import as_text
@@ -74,9 +74,9 @@ def _line(view: GuideView) -> str:
     known = view.examination
     if known is None:
         return ""
-    far = f"{known.shortfall:.2f}" if math.isfinite(known.shortfall) else "unknown"
-    left = "reached" if known.is_good_enough else far
-    return f"{view.time_s:7.1f} s  pose {view.n_poses:2d}  shortfall {left:8s} {view.instruction}"
+    far = f"{known.shortfall:.2g} x goal" if math.isfinite(known.shortfall) else "unknown"
+    left = "goal reached" if known.is_good_enough else far
+    return f"{view.time_s:7.1f} s  pose {view.n_poses:2d}  worst uncertainty {left:13s} {view.instruction}"
 
 
 def finish(

@@ -33,7 +33,7 @@ def kalman(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="A static log to identify the noise from, or its terms (JSON).",
+            help="A static log to identify the noise from, or a JSON of Allan coefficients.",
         ),
     ] = None,
     frame: Annotated[str, typer.Option(help="Body frame without a pose table: lower or symmetric.")] = "lower",

@@ -24,11 +24,11 @@ Reference = Annotated[
 Band = Annotated[
     float | None,
     typer.Option(
-        "--band", metavar="HZ", help="Look for vibration above this; a quarter of the sampling rate if not said."
+        "--band", metavar="HZ", help="Look for vibration above this; default: a quarter of the sampling rate."
     ),
 ]
 Horizon = Annotated[
-    str, typer.Option("--horizon", metavar="LIST", help="Seconds over which the filter carries on alone: '1,10,60'.")
+    str, typer.Option("--horizon", metavar="LIST", help="Seconds without updates of the filter: '1,10,60'.")
 ]
 To = Annotated[
     str | None,
@@ -39,9 +39,9 @@ To = Annotated[
     ),
 ]
 Output = Annotated[
-    Path, typer.Option("-o", "--output", metavar="FILE", help="Where --to writes; '-' is stdout, the report left out.")
+    Path, typer.Option("-o", "--output", metavar="FILE", help="Where --to writes; '-' is stdout, without the report.")
 ]
-Full = Annotated[bool, typer.Option("--full", help="Print the test on the other half and all findings as well.")]
+Full = Annotated[bool, typer.Option("--full", help="Print the cross-validation and all findings as well.")]
 
 
 @with_options(source=LogSource, place=GravitySource, results=Results)

@@ -26,7 +26,7 @@ def plan(
     turn_error: Annotated[float, typer.Option(metavar="DEG", help="Standard error of a turn's angle (wall).")] = 0.0,
     results: Results,
 ) -> None:
-    """Before an experiment: how certain would turns, poses and moves make the answer, and which are worth what?"""
+    """Before an experiment: expected uncertainties from turns, poses and moves, and which of them matter most."""
     results.check()
     from trihedron import units
     from trihedron.api.planning import plan as make_plan

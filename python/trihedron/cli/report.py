@@ -24,7 +24,7 @@ def report(
     report: Report = None,
     force: Force = False,
 ) -> None:
-    """Lay out a saved result again: text here, a page with --report FILE.html."""
+    """Print a saved result again; --report FILE.html writes its page."""
     check_outputs(force=force, report=report, inputs=[result])
     document, saved = _read(result)
     show(document, None, sections=None)

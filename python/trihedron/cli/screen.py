@@ -13,6 +13,7 @@ from rich.text import Text
 
 from trihedron.arrays import FloatArray
 from trihedron.records.guiding import Examination, GuideView, Phase, Uncertain
+from trihedron.report.numbers import how_many
 
 # Names of the sixteen ANSI colours: the terminal's own theme decides what is readable on its background.
 GOOD, BAD, DIM, STRONG = "green", "red", "dim", "bold"
@@ -81,17 +82,16 @@ def screen(view: GuideView, width: int = 80, height: int = 24, *, lost: int = 0,
     legend = f"{POSE} taken  {HERE} now  {TARGET} next"
     body.add_row(Text("\n".join([*sphere, legend])), _parameters(view.examination, tall=tall))
     known = view.examination
-    facts = [f"{view.n_poses} poses"]
+    # What has no room is left out whole, the last first.
+    facts = [how_many(view.n_poses, "pose"), *([] if known is None else [_to_go(known)]), f"{lost} lost"]
+    facts += [] if seconds is None else [f"{seconds:.0f} s"]
     if known is not None:
-        facts.append(f"{known.rate_hz:.4g} Hz")
-        facts += [known.noise] if known.noise else []
-        facts.append(_to_go(known))
-    facts.append(f"{lost} lost")
-    if seconds is not None:
-        facts.append(f"{seconds:.0f} s")
+        facts += [f"{known.rate_hz:.4g} Hz", *([f"noise {known.noise}"] if known.noise else [])]
+    while len(" | ".join(facts)) > inner:
+        facts.pop()
     room = max(height - 21, 1)
     warned = [Text(line, style=BAD, no_wrap=True) for line in _in_lines(view.warnings, inner - 1, room)]
-    foot = Text(" | ".join(facts)[:inner], style=DIM, no_wrap=True)
+    foot = Text(" | ".join(facts), style=DIM, no_wrap=True)
     title = f"trihedron guide: {view.accuracy.sentence()}"
     return Group(Panel(Group(*lines, Text(""), body, Text(""), *warned, foot), title=title, width=width))
 
@@ -120,7 +120,7 @@ def _parameters(known: Examination | None, *, tall: bool) -> Text:
     out = Text(f"{'uncertainty, %':{room}s}{'now':>6}{'next':>7}{'goal':>6}\n", style=DIM)
     rows = list(known.uncertain) if tall else _groups(known.uncertain)
     for one in rows:
-        name = f"{'acc' if one.sensor == 'accelerometer' else 'gyro'} {one.name}"[: room - 1]
+        name = f"{'accel' if one.sensor == 'accelerometer' else 'gyro'} {one.name}"[: room - 1]
         good = one.now is not None and one.now <= one.wanted
         numbers = f"{percent(one.now):>6}{percent(one.after_next):>7}{percent(one.wanted):>6}"
         out.append(f"{name:{room}s}{numbers} {'ok' if good else ''}\n", style=GOOD if good else "")

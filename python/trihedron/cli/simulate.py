@@ -65,7 +65,7 @@ Output = Annotated[
 TruthFile = Annotated[
     Path | None, typer.Option("--truth", metavar="FILE", help="Truth to write: .npz, or .json without the samples.")
 ]
-Seed = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Which accident of noise.")]
+Seed = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of everything random.")]
 Like = Annotated[
     Path | None, typer.Option("--like", metavar="LOG", help="Digital twin: repeat this recording, with --calibration.")
 ]
@@ -78,10 +78,10 @@ WithEffects = Annotated[
 ]
 Serve = Annotated[
     str | None,
-    typer.Option("--serve", metavar="PTY|TCP", help="Send it as a board would; prints what to open. TCP:PORT too."),
+    typer.Option("--serve", metavar="PTY|TCP", help="Send it as a board does; prints the port to open. TCP:PORT too."),
 ]
 Protocol = Annotated[
-    str, typer.Option("--protocol", metavar="NAME", help="With --serve: what the board speaks, or a .toml.")
+    str, typer.Option("--protocol", metavar="NAME", help="With --serve: protocol of the board, or a .toml.")
 ]
 Faults = Annotated[
     str, typer.Option("--faults", metavar="LIST", help="With --serve: '1%' or 'cut=1%,drift=50ppm,disconnect=20'.")
@@ -90,10 +90,14 @@ Speed = Annotated[
     float, typer.Option("--speed", metavar="X", min=0.0, help="With --serve: times real time; 0 is at once.")
 ]
 Baud = Annotated[
-    int, typer.Option("--baud", metavar="N", min=0, help="With --serve PTY: garbage for readers at another baud.")
+    int,
+    typer.Option("--baud", metavar="N", min=0, help="With --serve PTY: baud rate; readers at another one get garbage."),
 ]
 Link = Annotated[
-    Path | None, typer.Option("--link", metavar="PATH", help="With --serve PTY: a name that outlives disconnections.")
+    Path | None,
+    typer.Option(
+        "--link", metavar="PATH", help="With --serve PTY: a name that stays the same when the port is reopened."
+    ),
 ]
 ListThem = Annotated[bool, typer.Option("--list", help="List the ready-made scenarios.")]
 Template = Annotated[
@@ -139,7 +143,7 @@ def simulate(
     if with_effects is not None and scenario is None:
         raise typer.BadParameter("--with-effects belongs to a SCENARIO; a digital twin repeats its recording as it is")
     if output is None and serve is None:
-        raise typer.BadParameter("say where the log goes with -o LOG, or send it with --serve PTY")
+        raise typer.BadParameter("name the log to write with -o LOG, or send it with --serve PTY")
     from trihedron.api.simulating import simulate as run
     from trihedron.api.simulating import twin
     from trihedron.files.log import write_recording
@@ -159,6 +163,7 @@ def simulate(
         write_recording(recording, output, overwrite=force)
     if truth is not None:
         write_truth(known, truth, overwrite=force)
+        say(f"truth: {truth}")
     if report is not None:
         from trihedron.files.truth import truth_document
         from trihedron.report.simulation import simulation_report

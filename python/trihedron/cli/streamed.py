@@ -18,7 +18,7 @@ Stream = Annotated[
     typer.Option(
         "--stream",
         help="A .npy, Parquet or CSV log larger than memory, in pieces and without audit: --columns, --rate and the "
-        "units say what it holds. Memory: apply 0.2 GB, segment 0.5 GB and 15 MB an hour, calibrate what its fit "
+        "units state what it holds. Memory: apply 0.2 GB, segment 0.5 GB and 15 MB an hour, calibrate what its fit "
         "takes.",
     ),
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,9 +17,19 @@ if TYPE_CHECKING:
 FIRST_SCREEN = 2
 
 
-@with_options(source=LogsSource, place=GravitySource, results=Results)
+@dataclass(frozen=True)
+class Tested(LogsSource):
+    """Calibrations and the log that they are tested on."""
+
+    log: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="CALIBRATION LOG", help="A calibration file and a log; or a log and several of them."),
+    ] = None
+
+
+@with_options(source=Tested, place=GravitySource, results=Results)
 def verify(
-    source: LogsSource,
+    source: Tested,
     place: GravitySource,
     *,
     limit_mg: Annotated[
@@ -38,8 +48,8 @@ def verify(
     """Test calibrations on a recording that they were not made from: CALIBRATION LOG, or LOG A B C ...
 
     Calibrations may be files of other programs (Kalibr, PX4, ArduPilot, ...); several are ranked. Exit status 2 when a
-    limit is exceeded, or, without one, when the miss is more than ten times what was expected; of several, when the
-    best does not fit.
+    limit is exceeded, or, without one, when an error is more than ten times the expected one; of several, when the
+    best is.
     """
     results.check(inputs=source.files)
     from trihedron.api import verifying
@@ -71,7 +81,7 @@ def verify(
     leave(result.findings)
 
 
-def _parted(source: LogsSource) -> tuple[list[Path], LogSource]:
+def _parted(source: Tested) -> tuple[list[Path], LogSource]:
     """Calibrations and the one log among the files that were named, told by content."""
     from trihedron.files.formats import is_calibration
 

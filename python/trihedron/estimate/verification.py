@@ -71,6 +71,7 @@ def verify_calibration(
     return Verification(
         source=recording.source,
         sha256=recording.sha256,
+        calibration_source=calibration.recording_source,
         gravity_m_s2=gravity_m_s2,
         gravity_source=gravity_source,
         norm_error=error,

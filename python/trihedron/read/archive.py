@@ -128,7 +128,7 @@ def _pick_device(path: Path, name: str, block: npt.NDArray[np.generic], device: 
     if device is None:
         raise ReadError(
             f"{path}: array '{name}' holds {n_units} devices (shape {block.shape}); "
-            f"say which one with --device, 1 to {n_units}."
+            f"choose one with --device, 1 to {n_units}."
         )
     if not 1 <= device <= n_units:
         raise ReadError(f"{path}: there is no device {device}; array '{name}' holds devices 1 to {n_units}.")

@@ -27,7 +27,10 @@ def read_axis_noise(path: str | os.PathLike[str]) -> tuple[AxisNoise, AxisNoise,
         raise ReadError(f'{file}: write the noise terms as one object, such as {{"white": 0.002, "walk": 1e-5}}.')
     unknown = sorted(set(said) - set(TERMS))
     if unknown:
-        raise ReadError(f"{file}: there is no noise term {unknown[0]!r}; there are {', '.join(TERMS)}.")
+        raise ReadError(
+            f"{file}: there is no noise term {unknown[0]!r}; give the static log itself (--noise static.csv) or an "
+            f"object with some of {', '.join(TERMS)} in the raw unit of the log."
+        )
     axes: list[dict[str, float]] = [{}, {}, {}]
     for name, value in said.items():
         values = value if isinstance(value, list) else [value] * 3

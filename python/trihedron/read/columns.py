@@ -199,7 +199,7 @@ def _positional(table: Table, sensor: Sensor | None) -> Columns:
         return Columns(time=filled[0] if at else None, accelerometer=first, gyroscope=second, positional=True)
     raise ReadError(
         f"{table.path}: {n} columns without names could mean anything; "
-        "say which is which, for example --columns time=1,ax=2,ay=3,az=4,gx=5,gy=6,gz=7."
+        "name them, for example --columns time=1,ax=2,ay=3,az=4,gx=5,gy=6,gz=7."
     )
 
 

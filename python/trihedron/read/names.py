@@ -190,6 +190,8 @@ def parse_name(name: str) -> ColumnName:
         return ColumnName("accelerometer", text[-1], "gf", "g", rank=1)
     # An aircraft's load factors, beside p q r.
     text = re.sub(r"^N(?=[xyz](?![A-Za-z]))", "acc ", text)
+    # The sketch that most MPU-6050 boards run: AcX, GyX.
+    text = re.sub(r"^(Ac|Gy)(?=[XYZ](?![A-Za-z]))", lambda m: {"Ac": "acc", "Gy": "gyr"}[m[1]], text)
     # GnssLogger joins axis and unit: UncalAccelXMps2, UncalGyroZRadPerSec.
     text = re.sub(r"([XYZ])(Mps2|RadPerSec|MicroT)\b", lambda m: f" {m[1]} {m[2].lower()}", text)
     bracket = ""

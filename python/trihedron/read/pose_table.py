@@ -96,7 +96,7 @@ def _attitudes(
         length = np.linalg.norm(v, axis=1)
         if np.any(length == 0):
             row = int(np.argmin(length))
-            raise ReadError(f"{file}, {table.place(row)}: the direction has no length; say where up is in the body.")
+            raise ReadError(f"{file}, {table.place(row)}: the direction has no length; give where up is in the body.")
         sigma = gravity_m_s2 * radians_from_degrees(sigma_angle_deg)
         return PoseTable(gravity_m_s2 * v / length[:, None], sigma_m_s2=sigma, source=str(file))
     if not {"pitch", "roll"} & set(found):

@@ -37,7 +37,7 @@ from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
 
-TIMESTAMPS = "timestamps as logged [s]"
+TIMESTAMPS = "logged time after the first [s]"
 """Name under which timestamps that gave way to an even clock are kept."""
 
 

@@ -38,7 +38,7 @@ class JudgedParameter:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Verification(Presented):
-    """What a calibration says about another recording, with what it should have said.
+    """What the calibration of ``calibration_source`` says about another recording, with what it should have said.
 
     ``norm_error`` (n,) is ``|S a' + b| - |g|`` of every pose [m/s²], ``norm_noise`` (n,) what the noise of the
     mean allows, ``norm_sigma`` (n,) that and the calibration's own uncertainty. ``angle_deg`` (m,) is the angle between
@@ -51,6 +51,7 @@ class Verification(Presented):
 
     source: str
     sha256: str
+    calibration_source: str
     gravity_m_s2: float
     gravity_source: str
     norm_error: FloatArray
@@ -64,6 +65,16 @@ class Verification(Presented):
     moves_left_out: tuple[int, ...]
     parameters: tuple[JudgedParameter, ...] = ()
     findings: tuple[Finding, ...] = ()
+
+    @property
+    def norm_chi2_per_dof(self) -> float:
+        """Mean square of the norm error in its standard uncertainty: 1 where the calibration holds."""
+        return float(np.mean((self.norm_error / self.norm_sigma) ** 2))
+
+    @property
+    def angle_chi2_per_dof(self) -> float:
+        """The same of the tilt errors; NaN without moves."""
+        return float(np.mean((self.angle_deg / self.angle_sigma_deg) ** 2)) if len(self.angle_deg) else float("nan")
 
     @property
     def norm_rms(self) -> float:

@@ -16,13 +16,14 @@ from trihedron.sensor_model import other_form, other_form_jacobian
 
 LETTERS = 2
 """Of a name that is made of axes alone."""
-BIAS = "the reading at zero input, −S⁻¹ b over the sensitivity (sign opposite to b)"
+BIAS = "the reading at zero input (sign opposite to b)"
 """What a bias is in every report; b is what a corrected reading adds."""
 
 
 def axis_in_print(name: str) -> str:
-    """Axes as on the silkscreen, ``x`` and ``xy`` as ``X`` and ``XY``; a longer name as it is."""
-    return name.upper() if len(name) <= LETTERS else name
+    """Axes as on the silkscreen: ``xy`` and ``gyro x`` as ``XY`` and ``gyro X``; other names as they are."""
+    sensor, gap, axis = name.rpartition(" ")
+    return f"{sensor}{gap}{axis.upper()}" if len(axis) <= LETTERS else name
 
 
 def channel_in_print(channel: str) -> str:

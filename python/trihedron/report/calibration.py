@@ -84,7 +84,7 @@ def _headlines(calibration: Calibration) -> list[Headline]:
         rms, kind = (
             (quality.rms, "in sample") if quality.held_out_rms is None else (quality.held_out_rms, "cross-validated")
         )
-        beside = f"rms, {kind}, {AT_REST}; noise alone {plain_number(mm_s2_from_m_s2(quality.floor))}"
+        beside = f"rms, {kind}, {AT_REST}; noise alone {in_mm_s2(quality.floor)}"
         out.append(Headline("gravity error in static poses", plain_number(mm_s2_from_m_s2(rms)), "mm/s²", beside))
     gyroscope = calibration.gyroscope
     if gyroscope is not None and gyroscope.quality is not None:

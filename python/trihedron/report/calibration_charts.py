@@ -33,7 +33,7 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
     limit = LIMIT_SIGMAS * np.abs(sigma)
     edge = np.concatenate([pose - 0.5, pose + 0.5]).reshape(2, -1).T.ravel()
     marks: list[Band | Level | Points] = [
-        Band(edge, -np.repeat(limit, 2), np.repeat(limit, 2), "3σ of noise alone"),
+        Band(edge, -np.repeat(limit, 2), np.repeat(limit, 2), "3 σ of noise alone"),
         Level(y=0.0),
     ]
     has_held = quality.held_out is not None and bool(np.any(np.isfinite(quality.held_out)))

@@ -45,7 +45,11 @@ def _bias(sensor: SensorCalibration) -> list[tuple[str, str]]:
         return []
     factor, unit = shown(sensor.si_unit)
     values = zip(XYZ, factor * axes.bias, factor * axes.sigma_bias, strict=True)
-    return [("bias", ", ".join(f"{axis} {with_sigma(v, s)}" for axis, v, s in values) + f" {unit}; {BIAS}")]
+    said = ", ".join(f"{axis} {with_sigma(v, s)}" for axis, v, s in values) + f" {unit}"
+    if sensor.raw_unit == "counts":
+        raw = (with_sigma(v, s) for v, s in zip(axes.at_zero, axes.sigma_at_zero, strict=True))
+        said += f" ({', '.join(raw)} counts)"
+    return [("bias", f"{said}; {BIAS}")]
 
 
 def _norm_words(quality: FitQuality) -> str:

@@ -198,7 +198,7 @@ def _over_time(
     """Dots at ``time_s`` (n,) of ``residual`` (n, k), a stroke of ± 3 ``sigma`` (n,) behind them, SI."""
     limit, gap = LIMIT_SIGMAS * mm_s2(np.abs(sigma)), np.full(len(time_s), np.nan)
     x, y = (np.column_stack(columns).ravel() for columns in ((time_s, time_s, gap), (-limit, limit, gap)))
-    marks: list[Mark] = [Level(y=0.0), Line(x, y, "3σ of noise alone", "shade")]
+    marks: list[Mark] = [Level(y=0.0), Line(x, y, "3 σ of noise alone", "shade")]
     for k, name in enumerate(names):
         values = mm_s2(residual[:, k])
         told = [

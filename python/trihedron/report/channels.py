@@ -30,7 +30,7 @@ def channels_table(recording: Recording) -> Table:
         if len(set(cells)) == 1:
             rows.append((name, *cells[0]))
         else:
-            rows += [(f"{name} {axis}", *cell) for axis, cell in zip(AXES, cells, strict=True)]
+            rows += [(f"{name} {axis.upper()}", *cell) for axis, cell in zip(AXES, cells, strict=True)]
     return Table(("", "resolution (LSB)", "range limits met", "-3 dB bandwidth"), tuple(rows), "The channels")
 
 

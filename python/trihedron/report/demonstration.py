@@ -46,7 +46,7 @@ def _verdict(comparison: Comparison, verification: Verification, before: float) 
     return (
         f"Gravity error in static poses of a session that the calibration has not seen: {in_mm_s2(before)} rms "
         f"before, {in_mm_s2(verification.norm_rms)} after. {within} of {len(comparison.names)} parameters lie "
-        "within 2σ of the truth."
+        "within 2 σ of the truth."
     )
 
 
@@ -113,10 +113,9 @@ def _coverage(comparison: Comparison) -> str:
     z = np.abs(comparison.z)
     n = len(z)
     return (
-        f"Within 1σ: {int(np.sum(z < 1.0))} of {n} (expected: {round(0.683 * n)}); within 2σ: "
+        f"Within 1 σ: {int(np.sum(z < 1.0))} of {n} (expected: {round(0.683 * n)}); within 2 σ: "
         f"{int(np.sum(z < 2.0))} of {n} (about {round(0.954 * n)}). With all correlations χ² is "
-        f"{plain_number(comparison.chi2)} for {n} parameters. One session proves little: the same count over 200 "
-        "sessions is benches/confidence. (The biases of a sensor drift; the truth is their mean in this session.)"
+        f"{plain_number(comparison.chi2)} for {n} parameters. The truth of a bias is its mean in this session."
     )
 
 

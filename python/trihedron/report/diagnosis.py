@@ -28,10 +28,10 @@ from trihedron.report.diagnosis_overview_charts import (
     traces_picture,
 )
 from trihedron.report.diagnosis_words import (
-    LEVELS,
     MEANING,
     differing_headline,
     headlines_of,
+    level_of,
     next_step_in_words,
     p_in_words,
     parameter_unit,
@@ -67,8 +67,9 @@ def first_screen(diagnosis: Diagnosis) -> int:
     return 4 if diagnosis.parameters else 3
 
 
-def diagnosis_report(diagnosis: Diagnosis, model: str = "") -> Document:
-    """Lay out a diagnosis; the first sections fit one screen. ``model`` names the file held against the log."""
+def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") -> Document:
+    """Lay out a diagnosis; the first sections fit one screen. ``model`` names the file held against the log,
+    ``improved`` the one that the parameters of the log are written to."""
     sections = [Section("Result", _located(diagnosis))]
     if diagnosis.parameters:
         about = (*forest_pictures(diagnosis), *differing_blocks(diagnosis), *_traces(diagnosis))
@@ -105,8 +106,8 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "") -> Document:
         sections=tuple(sections),
         headlines=(*differing_headline(diagnosis), *headlines_of(diagnosis)),
         lead=strengths,
-        next_step=next_step_in_words(diagnosis),
-        stated_level=LEVELS[diagnosis.verdict],
+        next_step=next_step_in_words(diagnosis, model, improved),
+        stated_level=level_of(diagnosis),
     )
     return beside_reference(document, found)
 

@@ -91,4 +91,4 @@ def _bars_of_noise(time_s: FloatArray, sigma: FloatArray, *, is_angle: bool) -> 
     low = np.zeros(len(sigma)) if is_angle else -2.0 * sigma
     x = np.column_stack([time_s, time_s, np.full(len(time_s), np.nan)]).ravel()
     y = np.column_stack([low, 2.0 * sigma, np.full(len(time_s), np.nan)]).ravel()
-    return Line(x, y, "2σ of noise", "shade")
+    return Line(x, y, "2 σ of noise", "shade")

@@ -8,7 +8,7 @@ from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDif
 from trihedron.report.axes import BIAS
 from trihedron.report.document import Block, Facts, Paragraph, Table
 from trihedron.report.findings import ranged
-from trihedron.report.numbers import MINUS, decimals_of, plain_number, unit_in_print, with_sigma, with_unit
+from trihedron.report.numbers import MINUS, decimals_of, how_many, plain_number, unit_in_print, with_sigma, with_unit
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 NAMED_SIGMAS = 3.0
@@ -96,9 +96,12 @@ def differing_in_short(diagnosis: Diagnosis) -> list[str]:
     numbers = [word for word in differing_numbers(diagnosis) if word not in _remarks(diagnosis)]
     if len(numbers) > MOST_NUMBERS:
         numbers = _groups_in_short(diagnosis)
-    left = max(len(numbers) - MOST_NUMBERS, 0) + max(len(noise) - MOST_NOISE, 0)
-    more = [f"{left} more {'difference' if left == 1 else 'differences'}"] if left else []
-    return [*numbers[:MOST_NUMBERS], *noise[:MOST_NOISE], *more]
+    # Beside parameters, noise is named only where every reading of a sensor is wrong.
+    named = (whole if numbers else noise)[:MOST_NOISE]
+    left, quieter = len(numbers) - MOST_NUMBERS, len(noise) - len(named)
+    more = [f"{left} more"] if left > 0 else []
+    more += [f"noise and sampling in {how_many(quieter, 'figure')}"] if quieter else []
+    return [*numbers[:MOST_NUMBERS], *named, *more]
 
 
 def _as_clause(sentence: str) -> str:

@@ -44,7 +44,8 @@ def strengths_picture(diagnosis: Diagnosis) -> Picture | None:
         return None
     caption = "How far the recording and the model disagree, domain by domain. χ² per degree of freedom is about 1 by "
     caption += "noise alone; inside the shade the domain agrees (a healthy recording leaves one of them in "
-    caption += f"{100.0 * diagnosis.alpha:g} % of cases). Without a shade the loudest pose, line or time decides."
+    caption += f"{100.0 * diagnosis.alpha:g} % of cases). Domains without a shade are judged by their worst "
+    caption += "pose, line or time."
     return Picture("strengths", caption, partial(strengths_chart, diagnosis))
 
 

@@ -54,8 +54,9 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     left: list[str] = [MEANING[d.domain] for d in diagnosis.remaining if d.disagrees]
     numbers = differing_in_short(diagnosis)
     if diagnosis.verdict == "consistent":
+        beside = " with a reference that is not independent of this gyro" if _dependent(diagnosis) else ""
         return (
-            "CONSISTENT: the model and its noise explain this recording; no missing effect is detectable"
+            f"CONSISTENT{beside}: the model and its noise explain this recording; no missing effect is detectable"
             f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}."
         )
     if diagnosis.verdict == "unexplained":
@@ -95,14 +96,11 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     return f"MISSING PHYSICS: {'; '.join(said)}{tail}"
 
 
-def next_step_in_words(diagnosis: Diagnosis) -> str:
-    """What to do with the verdict."""
+def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = "") -> str:
+    """What to do with the verdict; ``improved`` is the scenario that has taken over what differs already."""
     if diagnosis.verdict == "consistent":
-        found = getattr(diagnosis, "findings", ())
-        dependent = [f.action for f in found if f.code is FindingCode.REFERENCE_NOT_INDEPENDENT]
-        if dependent:
-            return str(dependent[0])
-        return "Nothing is missing: store S and b with trihedron calibrate LOG -o FILE, and use them."
+        store = "Nothing is missing: store S and b with trihedron calibrate LOG -o FILE, and use them."
+        return _dependent(diagnosis) or store
     if diagnosis.verdict == "not-testable":
         return ""
     if diagnosis.verdict == "unexplained":
@@ -112,7 +110,7 @@ def next_step_in_words(diagnosis: Diagnosis) -> str:
     steps = []
     if diagnosis.parameters:
         said = "the parameters that differ" if any(p.significant for p in diagnosis.parameters) else "the effects"
-        steps.append(f"Take over {said}: --improved FILE.toml (simulation) or --updated FILE (calibration).")
+        steps.append(f"Compare again: --against {improved}." if improved else f"Take over {said}: {_taken_by(model)}.")
     rivals = next((effect for effect in diagnosis.effects if effect.confounded_with), None)
     if rivals is not None and rivals.separating_experiment:
         others = listed(list(rivals.confounded_with))
@@ -122,6 +120,26 @@ def next_step_in_words(diagnosis: Diagnosis) -> str:
     if steps:
         return " ".join(steps)
     return "Store the effects with the calibration, for trihedron apply: trihedron calibrate LOG --extended -o FILE."
+
+
+def _taken_by(model: str) -> str:
+    """The option that writes the model anew; a log's simulation is not ours to write."""
+    if model.endswith(".toml"):
+        return "--improved FILE.toml writes your scenario with them"
+    if model.endswith(".json"):
+        return "--updated FILE writes the calibration of this log"
+    return "set them in your simulation (a scenario, --against SCENARIO.toml, is rewritten by --improved FILE.toml)"
+
+
+def level_of(diagnosis: Diagnosis) -> Level:
+    """The colour of the verdict: agreement with a reference that was made from these readings proves nothing."""
+    return "usable" if diagnosis.verdict == "consistent" and _dependent(diagnosis) else LEVELS[diagnosis.verdict]
+
+
+def _dependent(diagnosis: Diagnosis) -> str:
+    """What to do about a reference that is not independent; empty where none is."""
+    found = getattr(diagnosis, "findings", ())
+    return next((str(f.action) for f in found if f.code is FindingCode.REFERENCE_NOT_INDEPENDENT), "")
 
 
 def _not_compared(diagnosis: Diagnosis) -> str:

@@ -32,12 +32,12 @@ def disagreement_report(
     told = tuple(("", word) for word in numbers[:_MOST_NUMBERS]) + ((("", f"and {more} more"),) if more > 0 else ())
     is_right = [e.id for e in found.effects][:1] == [sealed["effect"]]
     beside = any(sealed["effect"] in e.confounded_with for e in found.effects[:1])
-    answer = "The first answer is right." if is_right else "The first answer is not what was drawn."
+    answer = "Found: it is the first effect named." if is_right else "Not found: another effect is named first."
     if beside:
-        answer = "The drawn effect is confounded with the first answer in this recording, and the report says so."
+        answer = "The drawn effect is confounded with the first one named in this recording, and the report says so."
     return Document(
         title="A simulation and a log that disagree",
-        subtitle=f"One flaw was drawn (--seed {seed} repeats it) and written to sealed.json before the diagnosis.",
+        subtitle=f"One effect, drawn at random (--seed {seed} repeats it), was sealed before the diagnosis.",
         verdict=verdict_in_words(found),
         is_trustworthy=True,
         sections=(
@@ -45,7 +45,7 @@ def disagreement_report(
             Section("Physics: effects missing from the simulation", effects_blocks(found)),
             Section("Stage by stage", stages_blocks(found, MEANING)),
             Section("The improved simulation, compared with the same log", (Paragraph(verdict_in_words(improved)),)),
-            Section("The drawn flaw", (*_opened(sealed, sizes), Paragraph(answer))),
+            Section("The drawn effect", (*_opened(sealed, sizes), Paragraph(answer))),
             Section("Files", (_files(folder),)),
         ),
     )

@@ -6,24 +6,24 @@ from functools import partial
 from typing import Any
 
 from trihedron.arrays import XYZ
-from trihedron.records.filter_noise import Bounded, FilterNoise, IntervalCheck, SensorFilterNoise, StaticNoise
+from trihedron.records.filter_noise import Bounded, FilterNoise, IntervalCheck, SensorFilterNoise, Share, StaticNoise
 from trihedron.records.finding import FindingCode
 from trihedron.records.plain import as_plain
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.filter_noise_charts import OF_SENSOR, horizon_chart
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.frames import Columns, of_rows
-from trihedron.report.numbers import how_many, plain_number, unit_in_print
+from trihedron.report.numbers import how_many, listed, plain_number, unit_in_print
 from trihedron.sanitise import printable
 from trihedron.units import degrees_from_radians
 
-NEXT = "Put these values into your filter: --to TARGET writes them for the common ones."
+NEXT = "Put these values into your filter: --to kalibr -o imu.yaml (other targets: --help)."
 CAUSE_WORDS = {
-    "rest": ("noise as at rest", "a better sensor; nothing else"),
+    "rest": ("static noise", "a better sensor; nothing else"),
     "vibration": ("vibration", "dampers at the mount, a low-pass filter on the sensor, a higher rate"),
     "bias": ("bias random walk", "warm up; log the temperature and calibrate it"),
     "temperature": ("temperature", "trihedron calibrate with a logged temperature: none of it goes into N or K"),
-    "calibration": ("calibration left over", "trihedron calibrate: none of it goes into N or K"),
+    "calibration": ("residual calibration error", "trihedron calibrate: none of it goes into N or K"),
     "g-sensitivity": ("g-sensitivity", "trihedron calibrate with known motion: none of it goes into N or K"),
     "reference": ("error of the reference", "a better reference: none of it goes into N or K"),
 }
@@ -40,25 +40,38 @@ def filter_noise_report(found: FilterNoise) -> Document:
         sections.append(Section("What the error is made of", tuple(shares)))
     tested = [one for one in found.sensors if one.consistency]
     if tested:
-        sections.append(Section("On the half that the fit did not see", tuple(_tested(one) for one in tested)))
+        sections.append(
+            Section("Cross-validation: the second half predicted from the first", tuple(_tested(one) for one in tested))
+        )
     sections.append(Section("Findings", (findings_block(found.findings),)))
     chart = partial(horizon_chart, found)
     picture = Picture(
         "horizon",
-        "Error of a filter that carries on alone for a horizon: predicted by its N and K, and actual.",
+        "Error of a filter without updates over a horizon: predicted by its N and K, and actual; cross-validated.",
         chart,
     )
     is_trustworthy = not any(f.severity.value == "serious" for f in found.findings)
     return Document(
         title="Noise for your filter",
         subtitle=printable(found.source),
-        verdict=verdict_of(found.findings, "OK: no problems found.", "Usable", "NOT TO BE TRUSTED"),
+        verdict=verdict_of(found.findings, _good(found), "Usable", "NOT TO BE TRUSTED"),
         is_trustworthy=is_trustworthy,
         sections=tuple(sections),
         headlines=tuple(headline for one in found.sensors for headline in _headlines(one)),
         lead=picture if tested else None,
         next_step=_next_step(found) if is_trustworthy else "",
     )
+
+
+def _good(found: FilterNoise) -> str:
+    """What most of each sensor's error is, where no problem was found."""
+    largest = [
+        f"{CAUSE_WORDS[share.cause][0]} is {plain_number(100.0 * share.share.value, 2)} % of the {one.sensor}'s error "
+        f"over {share.horizon_s:g} s"
+        for one in found.sensors
+        if one.shares and not (share := _ranked(one)[0]).share.is_limit
+    ]
+    return f"OK: no problems found; {listed(largest)}." if largest else "OK: no problems found."
 
 
 def _next_step(found: FilterNoise) -> str:
@@ -75,10 +88,15 @@ def _headlines(one: SensorFilterNoise) -> list[Headline]:
             f"{one.sensor} {name}",
             _number(value),
             f"{unit_in_print(one.unit)}/{per}",
-            "" if at_rest is None else f"static {_number(at_rest)}",
+            _beside(value, at_rest),
         )
         for name, value, at_rest, per in (("N", one.N, static[0], "√Hz"), ("K", one.K, static[1], "√s"))
     ]
+
+
+def _beside(value: Bounded, static: Bounded | None) -> str:
+    said = ["95 % upper limit" if value.is_limit else f"95 % interval {_interval(value)}"]
+    return "; ".join([*said, *([] if static is None else [f"static {_number(static)}"])])
 
 
 def values_table(found: FilterNoise) -> Table:
@@ -129,8 +147,8 @@ def _facts(found: FilterNoise) -> tuple[tuple[str, str], ...]:
         if one.reference is not None:
             slow = degrees_from_radians(one.reference.slow.filter_value)
             word = "below " if one.reference.slow.is_limit else ""
-            said = f"slow error {word}{plain_number(slow, 2)}° in {plain_number(one.reference.slow_s, 2)} s"
-            facts.append((f"reference, by the {one.sensor}", said))
+            said = f"drifts by {word}{plain_number(slow, 2)}° within {plain_number(one.reference.slow_s, 2)} s"
+            facts.append((f"its error, seen by the {one.sensor}", said))
     if found.tilt is not None:
         actual, predicted = (
             plain_number(degrees_from_radians(v), 2) for v in (found.tilt.actual, found.tilt.predicted)
@@ -138,8 +156,8 @@ def _facts(found: FilterNoise) -> tuple[tuple[str, str], ...]:
         facts.append(
             (
                 "tilt error after a rotation",
-                f"{actual}° rms over {how_many(found.tilt.n, 'move')}; N at rest predicts {predicted}° (calibration "
-                "left over, vibration and bias are in the difference; the heading is not seen)",
+                f"{actual}° rms over {how_many(found.tilt.n, 'move')}; static N predicts {predicted}° (residual "
+                "calibration error, vibration and bias are in the difference; the heading is not seen)",
             )
         )
     if found.intervals is not None:
@@ -152,13 +170,13 @@ def _of_intervals(intervals: IntervalCheck) -> list[tuple[str, str]]:
     return [
         (
             "bias between static intervals",
-            f"changes by {change} °/s rms; N and K at rest predict {predicted} °/s (temperature and g-sensitivity are "
+            f"changes by {change} °/s rms; static N and K predict {predicted} °/s (temperature and g-sensitivity are "
             "in the difference)",
         ),
         (
             "gravity in static intervals",
-            f"differs by {plain_number(100.0 * intervals.gravity_spread, 2)} % rms over {intervals.n} (accelerometer "
-            "calibration left over)",
+            f"differs by {plain_number(100.0 * intervals.gravity_spread, 2)} % rms over {intervals.n} (residual "
+            "calibration error of the accelerometer)",
         ),
     ]
 
@@ -183,9 +201,12 @@ def _percent(one: Bounded) -> str:
 
 def _advice(one: SensorFilterNoise) -> Facts:
     """What would lower the shares, the largest at ten seconds (or the nearest horizon) first."""
+    return Facts(tuple((CAUSE_WORDS[s.cause][0], CAUSE_WORDS[s.cause][1]) for s in _ranked(one)[:3]))
+
+
+def _ranked(one: SensorFilterNoise) -> list[Share]:
     near = min({share.horizon_s for share in one.shares}, key=lambda h: abs(h - 10.0))
-    ranked = sorted((s for s in one.shares if s.horizon_s == near), key=lambda s: -s.share.value)
-    return Facts(tuple((CAUSE_WORDS[s.cause][0], CAUSE_WORDS[s.cause][1]) for s in ranked[:3]))
+    return sorted((s for s in one.shares if s.horizon_s == near), key=lambda s: -s.share.value)
 
 
 def _tested(one: SensorFilterNoise) -> Block:
@@ -209,7 +230,7 @@ def _tested(one: SensorFilterNoise) -> Block:
         f"static [{unit}]",
     )
     return Table(
-        head, rows, f"{what[0].upper()}{what[1:]}; NEES 3 is right; static: N and K at rest, reference taken as exact"
+        head, rows, f"{what[0].upper()}{what[1:]}; NEES 3 is right; static: static N and K, reference taken as exact"
     )
 
 

@@ -41,13 +41,15 @@ def fleet_report(summary: FleetSummary) -> Document:
     if summary.n_diagnosed:
         sections.append(Section("Physics that devices share", tuple(_physics(summary))))
     if summary.repeated:
-        sections.append(Section("How devices differ", tuple(_spread(summary))))
+        sections.append(
+            Section("How devices differ" if len(devices) > 1 else "How the logs differ", tuple(_spread(summary)))
+        )
     if summary.outliers or summary.repeated:
         sections.append(Section("Outliers", tuple(_outliers(summary))))
     if summary.changes:
         sections.append(Section("Drift between sessions of one device", tuple(_drift(summary))))
     if n_done:
-        caption = "Every number by device, one point a log (bars: 1 σ); the line is the median of devices."
+        caption = "Every parameter by device, a point for each log (bars: 1 σ); the line is the median of devices."
         sections.append(Section("Distributions", (Picture("numbers", caption, partial(fleet_chart, summary)),)))
     sections.append(Section("Every log", (_logs(summary),)))
     n_usable = sum(log.status == "done" and log.is_trustworthy for log in summary.logs)
@@ -70,7 +72,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         sections=tuple(sections),
         lead=_lead(summary) if n_done else None,
         headlines=_headlines(summary),
-        next_step=_next_step(bad, strays, moved) if n_usable and not mixed else "",
+        next_step=_next_step(summary, strays, moved) if n_usable and not mixed else "",
         stated_level="usable" if n_usable and not mixed and (n_usable < n or strays or moved) else None,
     )
 
@@ -81,24 +83,28 @@ def _named(devices: list[str]) -> str:
     return f"{how_many(len(devices), 'device')} ({', '.join(devices[:MOST_NAMED])}{more})"
 
 
-def _next_step(bad: list[FleetLog], strays: list[str], moved: list[str]) -> str:
-    steps = ["record the failed logs again"] if bad else []
+def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> str:
+    again = [log.name for log in summary.logs if not (log.status == "done" and log.is_trustworthy)]
+    more = f" and {len(again) - MOST_NAMED} more" if len(again) > MOST_NAMED else ""
+    steps = (
+        [f"record again {', '.join(again[:MOST_NAMED])}{more} (trihedron check LOG says what was wrong)"]
+        if again
+        else []
+    )
     steps += ["look at the devices that stand out"] if strays else []
     steps += ["calibrate those that changed anew before use"] if moved else []
-    steps.append(
-        "use each device's own calibration, not a common one: trihedron apply calibrations/DEVICE_LOG_KEY.json LOG"
-    )
+    steps.append("use each device's own calibration: trihedron apply calibrations/DEVICE_LOG_KEY.json LOG")
     said = "; ".join(steps)
     return f"{said[0].upper()}{said[1:]}."
 
 
 def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
     """How good the calibrations are, and how far devices are apart."""
-    held = [log.held_out_rms_m_s2 for log in summary.logs if log.held_out_rms_m_s2 is not None]
+    held = [log.held_out_rms_m_s2 for log in summary.logs if log.held_out_rms_m_s2 is not None and log.is_trustworthy]
     factor, unit = shown("m/s^2")
     out = []
     if held:
-        beside = f"median log, cross-validated; worst {plain_number(max(held) * factor, 3)}"
+        beside = f"median of usable logs, cross-validated; worst {plain_number(max(held) * factor, 3)} {unit}"
         typical = plain_number(statistics.median(held) * factor, 3)
         out.append(Headline("gravity error in static poses", typical, unit, beside))
     for name, words in (("accel-bias", "accelerometer bias"), ("gyro-bias", "gyroscope bias")):
@@ -114,8 +120,8 @@ def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
 
 
 def _lead(summary: FleetSummary) -> Picture:
-    caption = "The parameters in which devices differ most beside their uncertainties: a point a log, about the "
-    caption += "median of devices; bars: 1 σ."
+    caption = "The parameters that differ most beside their uncertainties: a point for each log, about the median of "
+    caption += "devices; bars: 1 σ."
     return Picture("differ", caption, partial(fleet_chart, summary, MOST_LEADING))
 
 
@@ -124,7 +130,7 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
     doubtful = sum(log.status == "done" and not log.is_trustworthy for log in summary.logs)
     facts = [("calibrated", how_many(status["done"], "log"))]
     if doubtful:
-        facts.append(("of these", f"{doubtful} not to be trusted by their own findings"))
+        facts.append(("not to be trusted", f"{how_many(doubtful, 'log')} by their own findings"))
     if status["refused"]:
         facts.append(("not calibrated", f"{how_many(status['refused'], 'log')}: they do not allow a calibration"))
     if status["crashed"]:
@@ -138,7 +144,7 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
         facts.append(
             (
                 "work",
-                f"{plain_number(sum(seconds), 3)} s of one worker, {plain_number(max(seconds), 2)} s the longest log",
+                f"{plain_number(sum(seconds), 3)} s in all, {plain_number(max(seconds), 2)} s the longest log",
             )
         )
     return tuple(facts)
@@ -185,10 +191,11 @@ def _spread(summary: FleetSummary) -> list[Block]:
     head = ["parameter", "mean ± σ", "device to device" if is_grouped else "from log to log", "95 %"]
     head += ["session to session", "95 %"] if is_grouped else []
     rows = [tuple(_spread_row(one, is_grouped)) for one in summary.repeated]
-    said = "Standard deviations beyond each log's uncertainty. Scales are relative; misalignments differ from 90°."
+    said = "Standard deviations beyond each log's uncertainty. Scales are relative to their mean; misalignments are "
+    said += "departures from 90°."
     if summary.passed_over:
         said += f" Not counted: {summary.passed_over}."
-    return [Paragraph(said), Table(tuple(head), tuple(rows), "Scatter between devices, and of one device")]
+    return [Paragraph(said), Table(tuple(head), tuple(rows), "Scatter between devices and of one device")]
 
 
 def _spread_row(one: Repeated, is_grouped: bool) -> list[str]:
@@ -201,7 +208,7 @@ def _spread_row(one: Repeated, is_grouped: bool) -> list[str]:
         if spread is None:
             cells += ["–", "–"]
             continue
-        sd = "not seen" if spread.sd == 0.0 else plain_number(spread.sd * factor, 2)
+        sd = "not detectable" if spread.sd == 0.0 else plain_number(spread.sd * factor, 2)
         cells += [sd, f"{plain_number(spread.low * factor, 2)} to {plain_number(spread.high * factor, 2)}"]
     return cells
 
@@ -258,7 +265,7 @@ def _logs(summary: FleetSummary) -> Table:
         (
             log.name,
             log.serial,
-            log.status if log.is_trustworthy or log.status != "done" else "done, doubtful",
+            log.status if log.is_trustworthy or log.status != "done" else "done, not to be trusted",
             log.verdict or "–",
             ", ".join(log.effects) or "–",
             "–" if log.n_poses is None else str(log.n_poses),

@@ -65,10 +65,7 @@ def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headl
     """Innovations against what the filter predicted, and what is left of the poses."""
     seen = _consistencies(outcome)
     name, worst, n = max(seen, key=lambda one: abs(np.log(max(one[1].nis_mean, 1e-12))))
-    beside = (
-        f"{_meaning(worst)}: innovations² over predicted variance, 1 when right, {_limits(worst)} in 99 % of cases; "
-    )
-    beside += f"{worst.n} of {n} poses"
+    beside = f"{_meaning(worst)}; 99 % limits {_limits(worst)}, {worst.n} of {n} poses"
     of = "" if len(seen) == 1 else f", {name.upper()}"
     rms = float(np.sqrt(np.mean(outcome.residual_m_s2**2)))
     what = "residual" if isinstance(outcome, KalmanCalibration) else "gravity error in static poses"
@@ -91,7 +88,7 @@ def _meaning(seen: Consistency) -> str:
         return "the noise given is too large, the uncertainties too wide"
     if seen.nis_mean > seen.nis_high:
         return "the noise given is too small, the uncertainties too narrow"
-    return f"as predicted, as far as {how_many(seen.n, 'pose')} can show"
+    return "as predicted (1)"
 
 
 def _limits(seen: Consistency) -> str:
@@ -112,7 +109,7 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
     pictures: list[Block] = [
         Picture(
             f"convergence-{AXES[axis.axis]}",
-            f"Constants of {AXES[axis.axis].upper()} after every pose by every method, with the filter's 3σ band "
+            f"Constants of {AXES[axis.axis].upper()} after every pose by every method, with the filter's 3 σ band "
             "around its last value.",
             partial(convergence_chart, axis, outcome.accelerometer.raw_unit),
         )
@@ -122,7 +119,7 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
         Picture("innovations", _INNOVATIONS, partial(innovations_chart, outcome.axes)),
         Picture(
             "drift",
-            "Slow noise that the filter saw: while it ran, and smoothed with all readings, with 1σ bands.",
+            "Bias drift that the filter saw: while it ran, and smoothed with all readings, with 1 σ bands.",
             partial(drift_chart, outcome.axes, outcome.accelerometer.raw_unit),
         ),
         Picture(
@@ -152,7 +149,7 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
     pictures: tuple[Block, ...] = (
         Picture(
             "convergence",
-            "S and b after every pose, with the 3σ band around their last values.",
+            "S and b after every pose, with the 3 σ band around their last values.",
             partial(norm_convergence_chart, outcome),
         ),
         Picture("innovations", _INNOVATIONS, partial(innovations_chart, (outcome,))),

@@ -39,7 +39,7 @@ def convergence_chart(axis: AxisKalmanResult, raw_unit: str) -> Chart:
         batch = [Level(y=float(c[k]), colour="ink", is_dashed=True, name="batch") for c, _ in axis.batch.values()]
         of = unit if name == "U0" else f"{unit}/(m/s²)"
         y = Scale(f"{name} [{of}]", of, limits=_frame([t.constants[:, k] for t in axis.tracks], sigma, last))
-        band = Band(pose, last - 3 * sigma, last + 3 * sigma, "3σ of the filter")
+        band = Band(pose, last - 3 * sigma, last + 3 * sigma, "3 σ of the filter")
         panels.append(
             Panel(Scale("poses", whole=True, limits=(1, max(2, len(pose)))), y, (band, *batch, *lines), height_px=150)
         )
@@ -61,7 +61,7 @@ def norm_convergence_chart(outcome: NormKalmanCalibration) -> Chart:
         unit = "m/s²" if k >= 9 else "" if raw == "m/s^2" else f"m/s² per {one_of(raw)}"
         y = Scale(f"{name} [{unit}]" if unit else name, unit, limits=_frame([value], sigma, last))
         marks = (
-            Band(pose, last - 3 * sigma, last + 3 * sigma, "3σ about the last value"),
+            Band(pose, last - 3 * sigma, last + 3 * sigma, "3 σ about the last value"),
             Line(pose, value, "after so many poses", "c1"),
         )
         panels.append(Panel(Scale("poses", whole=True, limits=(1, max(2, n))), y, marks, height_px=110))

@@ -22,7 +22,7 @@ SHOWN: dict[str, tuple[float, str]] = {
     "1": (1e2, "%"),
 }
 """Factor and unit in which people compare numbers of each kind."""
-REPEATS = "repeats to (1 σ)"
+REPEATS = "session to session (1 σ)"
 
 
 def shown(unit: str) -> tuple[float, str]:

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from trihedron.records import Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
+from trihedron.report.axes import axis_in_print
 from trihedron.report.document import Block, Code, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.noise_charts import allan_chart, every_axis_chart, sensors_chart
@@ -17,7 +18,7 @@ from trihedron.report.numbers import duration, how_many, plain_number, unit_in_p
 from trihedron.units import degrees_from_radians, micro_g_from_m_s2
 
 _NO_UNIT = (
-    "The unit of the log is not known: say it with --gyro-unit and --accel-unit, or the size of a count with "
+    "The unit of the log is not known: give --gyro-unit and --accel-unit, or the size of a count with "
     "--gyro-lsb and --accel-lsb."
 )
 NEXT = "Take N, B, K into a filter (trihedron export --noise); average for no longer than the best averaging time."
@@ -36,7 +37,7 @@ def noise_report(
     ]
     if noise.excluded_s:
         total = sum(stop - start for start, stop in noise.excluded_s)
-        facts.append(("excluded", f"{how_many(len(noise.excluded_s), 'piece')}, {duration(total)}"))
+        facts.append(("excluded", f"{how_many(len(noise.excluded_s), 'interval')}, {duration(total)}"))
     facts += _coloured(noise)
     groups = _groups(noise)
     tables: list[Block] = [Facts(tuple(facts))]
@@ -114,7 +115,7 @@ def _kalibr(noise: Noise) -> tuple[Block, ...]:
 def all_findings(noise: Noise) -> tuple[Finding, ...]:
     """Findings of the log, then those of each axis with its name."""
     named = [
-        Finding(f.code, f.severity, f"{axis.name}: {f.seen}", f.cause, f.action, f.numbers)
+        Finding(f.code, f.severity, f"{axis_in_print(axis.name)}: {f.seen}", f.cause, f.action, f.numbers)
         for axis in noise.axes
         for f in axis.findings
     ]
@@ -124,7 +125,7 @@ def all_findings(noise: Noise) -> tuple[Finding, ...]:
 def _coloured(noise: Noise) -> list[tuple[str, str]]:
     """Up to where the spectrum is that of noise terms, said before any term is."""
     limits = [
-        f"{axis.name} {plain_number(axis.highest_hz, 3)} Hz"
+        f"{axis_in_print(axis.name)} {plain_number(axis.highest_hz, 3)} Hz"
         for axis in noise.axes
         for finding in axis.findings
         if finding.code is FindingCode.SPECTRUM_COLOURED
@@ -157,7 +158,7 @@ def _terms_table(axes: list[NoiseAxis], unit: str) -> Table:
         rows.append((f"   Gauss-Markov σ [{unit_in_print(unit)}]", *(_gauss_markov(axis) for axis in axes)))
         rows.append(("   … correlation time [s]", *(_correlation(axis) for axis in axes)))
     return Table(
-        ("", *(axis.name for axis in axes)),
+        ("", *(axis_in_print(axis.name) for axis in axes)),
         tuple(rows),
         "Noise terms ± standard uncertainty (1 σ); < is the upper end of the 95 % interval",
     )
@@ -182,7 +183,7 @@ def _intervals_table(axes: list[NoiseAxis], unit: str) -> Table:
         words = ("not both zero" if axis.is_slow_noise_unresolved else "" for axis in axes)
         rows.append(("   B and K together", *words))
     caption = "95 % intervals with every other term free; they are valid whether a term is named or not"
-    return Table(("", *(axis.name for axis in axes)), tuple(rows), caption)
+    return Table(("", *(axis_in_print(axis.name) for axis in axes)), tuple(rows), caption)
 
 
 def _gauss_markov(axis: NoiseAxis) -> str:
@@ -227,7 +228,7 @@ def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
             *(f"{plain_number(a.lowest_hz, 2)} … {plain_number(a.highest_hz, 3)}" for a in axes),
         ),
     )
-    return Table(("", *(axis.name for axis in axes)), rows, "How long to average")
+    return Table(("", *(axis_in_print(axis.name) for axis in axes)), rows, "How long to average")
 
 
 def _lengths_table(noise: Noise, lengths: Mapping[str, Mapping[TermName, float | None]], accuracy: float) -> Table:
@@ -243,7 +244,7 @@ def _lengths_table(noise: Noise, lengths: Mapping[str, Mapping[TermName, float |
         if any(axis.terms[term].is_present for axis in noise.axes)
     )
     caption = f"Recording length for an uncertainty of {100 * accuracy:g} % (1 σ)"
-    return Table(("", *(axis.name for axis in noise.axes)), rows, caption)
+    return Table(("", *(axis_in_print(axis.name) for axis in noise.axes)), rows, caption)
 
 
 def _customary(axes: list[NoiseAxis], unit: str) -> list[Block]:
@@ -266,7 +267,7 @@ def _customary(axes: list[NoiseAxis], unit: str) -> list[Block]:
             rows.append((f"   lowest deviation / 0.664 [{printed}]", *lowest))
     return [
         Table(
-            ("", *(axis.name for axis in axes)),
+            ("", *(axis_in_print(axis.name) for axis in axes)),
             tuple(rows),
             f"{axes[0].name.rsplit(' ', 1)[0]}: IEEE 952 names, units of data sheets",
         )

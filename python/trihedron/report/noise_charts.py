@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.records import AllanCurve, NoiseAxis, TermName
+from trihedron.report.axes import axis_in_print
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Line, Mark, Note, Panel, Points, Scale, Span
 from trihedron.report.noise_units import unit_of
 from trihedron.report.numbers import plain_number, unit_in_print, with_sigma_and_power
@@ -111,7 +112,7 @@ def allan_chart(curve: AllanCurve, unit: str, axes: Sequence[NoiseAxis]) -> Char
             Scale("averaging time τ [s]", "s", is_log=True, limits=x_limits),
             Scale(f"Allan deviation [{printed}]", printed, is_log=True, limits=y_limits),
             _marks(curve, c, axis, k, x_limits[1]),
-            title=axis.name,
+            title=axis_in_print(axis.name),
             height_px=270,
         )
         for k, (axis, c) in enumerate(zip(axes, chosen, strict=True))
@@ -153,7 +154,8 @@ def sensors_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseA
             marks.append(Line(tau, curve.deviation[good, c], axis.name.split()[-1].upper(), colour))
             best = axis.optimal_averaging()
             if best is not None:
-                told = f"{axis.name}: best averaging time {plain_number(best[0])} s, {plain_number(best[1])} {printed}"
+                told = f"{axis_in_print(axis.name)}: best averaging time {plain_number(best[0])} s, "
+                told += f"{plain_number(best[1])} {printed}"
                 # On the curve as measured: the least of the sum of terms may lie beside it.
                 found = np.exp(np.interp(np.log(best[0]), np.log(tau), np.log(curve.deviation[good, c])))
                 marks.append(Points(np.array([best[0]]), np.array([found]), [told], None, BEST, "accent"))

@@ -18,7 +18,7 @@ def plain_number(value: float, digits: int = 3) -> str:
         return "0"
     # Rounding may carry: 9.996 is 10.0 with three digits.
     exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
-    if -5 <= exponent < max(digits, 6):
+    if -4 <= exponent < max(digits, 6):
         text = f"{value:.{max(digits - 1 - exponent, 0)}f}"
     else:
         text = f"{value:.{digits - 1}e}"

@@ -84,8 +84,8 @@ def _noticed(document: Document) -> tuple[Markup, list[tuple[str, str]], str]:
 
 
 def unbroken(text: str) -> Markup:
-    """Options (``--extended``) and directions (``-X/+Y``) kept on one line, numbers on that of their %."""
-    text = str(escape(text)).replace(" %", "\u00a0%")
+    """Options (``--extended``) and directions (``-X/+Y``) kept on one line, numbers on that of their %; code marked."""
+    text = re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text)).replace(" %", "\u00a0%"))
     return Markup(_DASHED.sub(r'<span class="whole">\g<0></span>', text))
 
 

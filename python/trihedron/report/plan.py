@@ -38,16 +38,16 @@ def plan_report(plan: ExperimentPlan) -> Document:
         lead=_picture(plan.poses),
         next_step="Choose a set of poses below and record it: trihedron capture PORT -o LOG --guide leads through it.",
         sections=(
-            Section("Known turns (method 1)", (_turns(plan),)),
+            Section("Known turns", (_turns(plan),)),
             Section(
-                "Poses (method 2)",
+                "Poses",
                 (
                     _poses(plan.poses),
                     Facts(tuple((pose.name, _worth(pose)) for pose in plan.poses if pose.worth)),
                 ),
             ),
             Section(
-                "Moves between poses (method 2)",
+                "Moves between poses",
                 (
                     Table(
                         ("moves", "number", "of 9", "σ of scale"),

@@ -149,7 +149,7 @@ def _error(found: AgainstReference) -> str:
     """What the reference itself gets wrong."""
     error = found.error
     size, low, high = (plain_number(degrees_from_radians(v), 2) for v in error.slow_rad)
-    where = "with the body" if error.is_of_body else "in the room"
+    where = "in the body frame" if error.is_of_body else "in the world frame"
     text = f"drifts by {size}° ({low} to {high}) within {plain_number(error.slow_s, 2)} s, mostly {where}"
     text += f"; {plain_number(degrees_from_radians(error.white_rad), 2)}° white (means of a second)"
     if error.gaps_s:

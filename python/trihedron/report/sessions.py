@@ -31,11 +31,11 @@ def sessions_report(model: SessionsModel) -> Document:
     """Lay out what many recordings share, and how far each parameter repeats."""
     n = len(model.sessions)
     changed = [change for change in model.changes if change.significant]
-    good = (
-        f"{how_many(n, 'recording')} agree: no parameter changed beyond its uncertainty and the bias drift within one."
-    )
+    agree = f"{how_many(n, 'recording')} agree"
+    good = f"{agree}: no parameter changed beyond its uncertainty and the bias drift within one."
     if model.thermal is not None:
-        good = f"{how_many(n, 'recording')} make one model from {_range(model.thermal)}."
+        agree = f"{how_many(n, 'recording')} make one model from {_range(model.thermal)}"
+        good = f"{agree}."
     sections = [
         Section("Result", (Facts(_facts(model)), *_repeatability(model))),
         Section("Findings", (findings_block(model.findings),)),
@@ -49,7 +49,7 @@ def sessions_report(model: SessionsModel) -> Document:
         # Names alone stand in the title already.
         sections.append(Section("Recordings", (recordings,)))
     sections += [Section("Figures", (picture,)) for picture in _further(model)]
-    usable = f"{how_many(n, 'recording')} were put into one model"
+    usable = agree
     if changed:
         usable = f"{how_many(n, 'recording')} of which {_and([change.id for change in changed])} changed"
     return Document(
@@ -75,8 +75,8 @@ def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
         repeats = [one.within.sd * factor for one in axes if one.within is not None]
         beside = "1 σ, worst axis"
         if repeats:
-            spread = f"repeats to {plain_number(max(repeats), 2)} {unit}"
-            beside += f"; {spread}" if max(repeats) > 0.0 else "; repeats within it"
+            spread = f"session to session {plain_number(max(repeats), 2)} {unit}"
+            beside += f"; {spread}" if max(repeats) > 0.0 else "; no change between sessions beyond it"
         worst = max(one.std * factor for one in axes)
         out.append(Headline(f"{words} uncertainty", plain_number(worst, 2), unit, beside))
     return tuple(out)
@@ -87,7 +87,7 @@ def _lead(model: SessionsModel) -> Picture:
     chart = partial(sessions_chart, model, DRIFTING, 2)
     has_band = model.thermal is None and any(one.within is not None for one in model.repeated)
     caption = f"Scale and bias of both sensors in every recording, about the common value; {BARS}"
-    caption += "; the band: how far they repeat." if has_band else "."
+    caption += "; band: session to session (1 σ)." if has_band else "."
     return Picture("drift", caption, chart)
 
 
@@ -128,7 +128,7 @@ def _repeatability(model: SessionsModel) -> list[Block]:
         return []
     grouped = any(one.between is not None for one in model.repeated)
     between = {"date": "day to day", "device": "device to device"}.get(model.by, "between")
-    head = ["parameter", "common ± σ", "turn-on to turn-on" if grouped else "repeats to", "95 %"]
+    head = ["parameter", "common ± σ", "session to session", "95 %"]
     head += [between, "95 %"] if grouped else []
     head += ["median σ of one"]
     rows = [tuple(_row(one, grouped)) for one in model.repeated]
@@ -166,7 +166,7 @@ def _spread_cells(spread: Spread | None, factor: float) -> list[str]:
     if spread is None:
         return ["–", "–"]
     low, high = (plain_number(value * factor, 2) for value in (spread.low, spread.high))
-    return ["not seen" if spread.sd == 0.0 else plain_number(spread.sd * factor, 2), f"{low} to {high}"]
+    return ["not detectable" if spread.sd == 0.0 else plain_number(spread.sd * factor, 2), f"{low} to {high}"]
 
 
 def _changes(model: SessionsModel) -> list[Block]:

@@ -32,7 +32,7 @@ def verification_report(
         sections.append(Section("Figures", (signals_picture(recording, segments),)))
     return Document(
         title="Verification",
-        subtitle=verification.source,
+        subtitle=_subtitle(verification),
         verdict=verdict_of(
             verification.findings,
             "Verified: errors are within noise and uncertainty.",
@@ -45,6 +45,16 @@ def verification_report(
         lead=_errors_picture(verification),
         next_step=_next_step(verification),
     )
+
+
+def _subtitle(v: Verification) -> str:
+    made_from = f"calibration of {v.calibration_source}" if v.calibration_source else "calibration of another program"
+    return f"{made_from}, tested on {v.source}"
+
+
+def _expected(size: str, chi2_per_dof: float) -> str:
+    """What noise and the calibration's uncertainty allow; the weighted error decides, so it stands beside."""
+    return f"expected {size}, χ²/dof {plain_number(chi2_per_dof, 2)}"
 
 
 def _usable(v: Verification) -> str:
@@ -66,13 +76,13 @@ def _above_noise(v: Verification) -> list[Finding]:
 
 def headlines_of(v: Verification) -> tuple[Headline, ...]:
     """Errors beside what was to be expected."""
-    expected = plain_number(mm_s2_from_m_s2(float(np.sqrt(np.mean(v.norm_sigma**2)))))
+    expected = _expected(in_mm_s2(float(np.sqrt(np.mean(v.norm_sigma**2)))), v.norm_chi2_per_dof)
     norm = plain_number(mm_s2_from_m_s2(v.norm_rms))
-    beside = f"rms over {how_many(len(v.norm_error), 'pose')}; expected {expected}"
+    beside = f"rms over {how_many(len(v.norm_error), 'pose')}; {expected}"
     out = [Headline("gravity error in static poses", norm, "mm/s²", beside)]
     if len(v.angle_deg):
-        expected = plain_number(v.angle_expected_deg)
-        beside = f"rms over {how_many(len(v.angle_deg), 'move')}; expected {expected}"
+        expected = _expected(f"{plain_number(v.angle_expected_deg)}°", v.angle_chi2_per_dof)
+        beside = f"rms over {how_many(len(v.angle_deg), 'move')}; {expected}"
         out.append(Headline("tilt error after a rotation", plain_number(v.angle_rms_deg), "°", beside))
     return tuple(out)
 
@@ -81,6 +91,7 @@ def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
     """Errors in poses and after rotations beside what was to be expected, and how far the gyro's bias changed."""
     worst = int(np.argmax(np.abs(v.norm_error)))
     expected = float(np.sqrt(np.mean(v.norm_sigma**2)))
+    allowed = "rms from noise and calibration uncertainty, χ²/dof"
     facts = [
         ("gravity", f"{v.gravity_m_s2:.5f} m/s², {v.gravity_source}"),
         (
@@ -88,7 +99,7 @@ def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
             f"{in_mm_s2(v.norm_rms)} rms over {len(v.norm_error)} poses, worst "
             f"{in_mm_s2(float(v.norm_error[worst]))} in pose {worst + 1}",
         ),
-        ("  expected", f"{in_mm_s2(expected)} rms from noise and the calibration's uncertainty"),
+        ("  expected", f"{in_mm_s2(expected)} {allowed} {plain_number(v.norm_chi2_per_dof, 2)}"),
     ]
     if len(v.angle_deg):
         worst = int(np.argmax(v.angle_deg))
@@ -98,7 +109,7 @@ def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
                 f"{plain_number(v.angle_rms_deg)}° rms over {how_many(len(v.angle_deg), 'move')}, worst "
                 f"{plain_number(float(v.angle_deg[worst]))}° in move {v.moves[worst] + 1}{_without(v)}",
             ),
-            ("  expected", f"{plain_number(v.angle_expected_deg)}° rms from noise and the calibration's uncertainty"),
+            ("  expected", f"{plain_number(v.angle_expected_deg)}° {allowed} {plain_number(v.angle_chi2_per_dof, 2)}"),
         ]
     biases = [one for one in v.parameters if one.id == "gyro-bias"]
     if biases:

@@ -142,7 +142,7 @@ def identify(means: FloatArray, raw_unit: AccelerationUnit) -> IntArray:
     if acceleration_to_si(raw_unit) is not None:
         return _nearest(means)
     raise RefusedError(
-        f"{len(means)} poses in counts are too few to identify the faces: record all six faces, or say which "
+        f"{len(means)} poses in counts are too few to identify the faces: record all six faces, or state which "
         "face is up in each pose"
     )
 

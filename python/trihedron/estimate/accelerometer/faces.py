@@ -16,12 +16,12 @@ from trihedron.estimate.accelerometer.face_poses import placements
 from trihedron.estimate.accelerometer.norm import norm_residual
 from trihedron.estimate.accelerometer.whole_turns import OppositeHeadings, with_opposite
 from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
-from trihedron.records.finding import Finding, FindingCode
+from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.words import words
 from trihedron.sensor_model import other_form, other_form_jacobian
 from trihedron.units import AccelerationUnit, degrees_from_radians
 
-METHOD = "method 1: faces of the case on a level table"
+METHOD = "faces of the case on a level table"
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,11 +278,13 @@ def _tilt_findings(estimate: _Estimate, S: FloatArray, faces: IntArray, used: In
     horizontal = estimate.residual @ S.T
     horizontal[np.arange(len(faces)), np.abs(faces) - 1] = 0.0
     worst = int(np.argmax(np.linalg.norm(horizontal, axis=1)))
+    tilt_deg = degrees_from_radians(estimate.tilt_rad)
     return [
         Finding.of(
             FindingCode.TABLE_TILT,
             chi2_per_dof=estimate.chi2_noise / estimate.dof,
-            tilt_deg=degrees_from_radians(estimate.tilt_rad),
+            severity=Severity.SERIOUS if tilt_deg > face_poses.LARGEST_TILT_DEG else None,
+            tilt_deg=tilt_deg,
             pose=int(used[worst]) + 1,
             face=face_poses.face_in_words(int(faces[worst])),
         )

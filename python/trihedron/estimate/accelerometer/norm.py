@@ -73,7 +73,7 @@ _LOSSES: dict[str, tuple[int, float]] = {
     "cauchy": (3, 2.385),
 }
 
-METHOD = "method 2: norm of gravity in static poses"
+METHOD = "norm of gravity in static poses"
 
 LEAVE_ONE_OUT_LIMIT = 200
 """Up to this many poses each is held out alone; beyond, poses are held out in this many folds of neighbours in time."""

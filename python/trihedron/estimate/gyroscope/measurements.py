@@ -259,13 +259,13 @@ def _undithered(quantum: FloatArray, sigma: FloatArray | None) -> BoolArray:
 
 def _both_means(segments: Segments) -> tuple[FloatArray, FloatArray]:
     if segments.accelerometer_mean is None or segments.gyroscope_mean is None:
-        raise RefusedError("method 2 needs the pose means of both sensors: segment a recording that has both")
+        raise RefusedError("moves need the pose means of both sensors: segment a recording that has both")
     return segments.accelerometer_mean, segments.gyroscope_mean
 
 
 def _required(readings: FloatArray | None, name: str) -> FloatArray:
     if readings is None:
-        raise RefusedError(f"the recording has no {name}: method 2 needs both sensors")
+        raise RefusedError(f"the recording has no {name}: moves need both sensors")
     return readings
 
 

@@ -127,9 +127,9 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], static: Sequence[
     if recording.gyroscope is None:
         raise RefusedError("the recording has no gyroscope")
     if not turns:
-        raise RefusedError("method 1 needs turns: none were given and none were found")
+        raise RefusedError("--method faces needs turns: none were given and none were found")
     if not static:
-        raise RefusedError("method 1 needs a stretch without rotation: keep the sensor still for some seconds")
+        raise RefusedError("--method faces needs a stretch without rotation: keep the sensor still for some seconds")
     gyroscope = recording.gyroscope
     edges = np.array([[turn.start, turn.stop] for turn in turns], dtype=np.int64)
     raw_angle, duration = integrate_raw_rate(recording.time_s, gyroscope, edges, 3)

@@ -70,7 +70,7 @@ def roles_of(table: Table, said: str | None) -> list[Role]:
     if said is None:
         if table.names is None:
             raise ReadError(
-                f"{table.path}: the columns of this reference have no names; say what they are in file order with "
+                f"{table.path}: the columns of this reference have no names; name them in file order with "
                 f"--reference-columns: {WAYS}."
             )
         names = list(table.names)
@@ -198,7 +198,7 @@ def _triad(table: Table, roles: list[Role], what: str, rows: npt.NDArray[np.int6
         raise ReadError(f"{table.path}: the reference's {name} needs columns of x, y and z; found {', '.join(part)}.")
     if what == "w" and any(not role.unit for role in part.values()):
         raise ReadError(
-            f"{table.path}: the unit of the reference's rate is not said; name its columns 'wx [deg/s]' or "
+            f"{table.path}: the unit of the reference's rate is not stated; name its columns 'wx [deg/s]' or "
             "'wx [rad/s]', in the file or with --reference-columns."
         )
     return np.column_stack([part[axis].to_si * table.columns[part[axis].column][rows] for axis in "xyz"])
@@ -317,7 +317,7 @@ def _angles(table: Table, turns: list[Role], named: list[Role], rows: npt.NDArra
     if any(not role.unit for role in parts):
         if float(np.nanmax(np.abs(angles))) <= 2.0 * np.pi:
             raise ReadError(
-                f"{table.path}: the unit of the angles is not said and both rad and deg are possible; name the columns "
+                f"{table.path}: the unit of the angles is not stated, and rad and deg are both possible; name them "
                 "'roll [deg]' or 'roll [rad]', in the file or with --reference-columns."
             )
         angles = np.radians(angles)

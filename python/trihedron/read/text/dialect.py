@@ -21,12 +21,13 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _CLOCK = r"\d{1,2}:\d\d:\d\d[.,]\d{1,6}"
 _DATE = r"(?:\d{4}[-/]\d\d?[-/]\d\d?|\d\d?[-/.]\d\d?[-/.]\d{4})[T ]"
 # Arduino IDE and PlatformIO's time filter; dated timestamps of CoolTerm and others; minicom's and Tera Term's in
-# brackets.
+# brackets; a time with its unit in brackets, as boards write it.
 _PREFIXES = (
     re.compile(rf"({_CLOCK}) ?(?:->|>)[ \t]*"),
     re.compile(rf"({_DATE}{_CLOCK})(?: ?(?:->|>|:))[ \t]*"),
     re.compile(rf"\[({_DATE}{_CLOCK})\][ \t]*"),
     re.compile(rf"\[({_CLOCK})\][ \t]*"),
+    re.compile(rf"\[\s*({_NUMBER})\s*(?P<unit>(?:[mnuµ]?s|m?sec))\s*\][ \t]*"),
 )
 _VALUE = rf"{_DATE}{_CLOCK}|{_CLOCK}|{_NUMBER}"
 _PAIR = re.compile(
@@ -55,16 +56,19 @@ def rewrite(text: str) -> Rewritten | None:
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     prefix = _prefix_of(lines)
     timestamps: list[str] | None = None
+    name = "arrival time"
     rests = lines
     if prefix is not None:
         found = [prefix.match(line) for line in lines]
         timestamps = [m.group(1) if m else "" for m in found]
+        unit = next((m["unit"] for m in found if m and "unit" in m.re.groupindex), "")
+        name = f"time [{unit}]" if unit else name
         rests = [line[m.end() :] if m else line for line, m in zip(lines, found, strict=True)]
     labelled = _labelled(rests)
     if labelled is not None:
         preamble, names, rows, numbers = labelled
         if timestamps is not None:
-            names = ["arrival time", *names]
+            names = [name, *names]
             rows = [
                 f"{timestamps[i - 1]},{row}" if timestamps[i - 1] else row for i, row in zip(numbers, rows, strict=True)
             ]
@@ -78,7 +82,7 @@ def rewrite(text: str) -> Rewritten | None:
     for timestamp, rest in zip(timestamps, rests, strict=True):
         if timestamp and rest.strip():
             is_row = re.match(r"\s*[-+.\d]", rest) is not None
-            rows.append(f"{timestamp if is_row else 'arrival time'}{glue}{rest}")
+            rows.append(f"{timestamp if is_row else name}{glue}{rest}")
         else:
             rows.append(rest)
     return _joined(rows, list(range(1, len(rows) + 1)))

@@ -141,9 +141,9 @@ ENTRIES = (
         "",
         NOTE,
         "{n_left_out} of {n_poses} poses have no axis within {largest_tilt_deg:.0f}° of the vertical and are not "
-        "used by method 1 (poses {poses:&, }).",
+        "used by --method faces (poses {poses:&, }).",
         "They are edges, corners or leaning poses.",
-        "Method 2 uses them all.",
+        "--method joint uses them all.",
     ),
     Entry(
         Code.TABLE_TILT,
@@ -152,7 +152,8 @@ ENTRIES = (
         "The faces contradict each other (χ² per degree of freedom {chi2_per_dof:.3g}) as if each pose were tilted by "
         "{tilt_deg:.2g}° rms; most in pose {pose} ({face}). The standard uncertainties include this tilt.",
         "The table is not level, the case is not square or did not lie flat; bias drift looks the same.",
-        "Level the table, press the case flat, or use method 2, which needs neither.",
+        "Level the table, press the case flat, or use --method joint, which needs neither.",
+        or_severity=SERIOUS,
     ),
     Entry(
         Code.RESIDUAL_ABOVE_NOISE,

@@ -290,7 +290,7 @@ _MANY_RECORDINGS = (
         WARNING,
         "Recording {name} was excluded: {why}.",
         "This recording alone does not determine a calibration; the others are used.",
-        "See `trihedron check {path}`.",
+        "Run `trihedron check {path}`.",
     ),
     Entry(
         Code.FEW_SESSIONS,

@@ -85,18 +85,16 @@ _TIMESTAMPS = (
         Code.TIME_UNIT_DETECTED,
         "",
         NOTE,
-        "The time column steps by {step:.6g}, so its unit is {unit}{has_others:?; {others:&, } would be "
-        "possible too|}.",
+        "The time is in {unit}, by its steps of {step:.6g}{has_others:?; {others:&, } would be possible too|}.",
         numbers=("rate_hz",),
     ),
     Entry(
         Code.TIME_UNIT_DETECTED,
         "unsure",
         WARNING,
-        "The time column steps by {step:.6g}, so its unit is {unit}{has_others:?; {others:&, } would be "
-        "possible too|}.",
+        "The time is in {unit}, by its steps of {step:.6g}{has_others:?; {others:&, } would be possible too|}.",
         "The step alone does not determine the unit; every rate and every noise density depends on it.",
-        "Say it with --time-unit s, ms, us or ns if this is wrong.",
+        "Give --time-unit s, ms, us or ns if this is wrong.",
         numbers=("rate_hz",),
     ),
     Entry(
@@ -117,7 +115,7 @@ _TIMESTAMPS = (
         "sample-time-100us",
         NOTE,
         "SampleTimeFine steps by {step:.6g}, so it counts 100 µs, as Xsens MTi does.",
-        action="Say it with --time-unit us if this is wrong.",
+        action="Give --time-unit us if this is wrong.",
     ),
 )
 
@@ -144,7 +142,7 @@ _RATES = (
         Code.RATE_STATED,
         "",
         NOTE,
-        "No time column; the rate is {rate_hz:.6g} Hz {is_given:?as you said|as the file states above its data or "
+        "No time column; the rate is {rate_hz:.6g} Hz {is_given:?as given|as the file states above its data or "
         "beside them}.",
     ),
     Entry(
@@ -171,8 +169,8 @@ _HOW = (
     "samples are timestamped on arrival|off by {timestamp_error_s:.2g ms} rms}}"
 )
 _BY_MOTION = (
-    "{motion_tells:?readings in motion show {followed:.2g %} ± {sigma_followed:.2g %} of this scatter "
-    "(0 %: sampled evenly, 100 %: sampled at the timestamps)|no motion shows when samples were taken}"
+    "{motion_tells:?readings in motion follow {followed:.2g %} ± {sigma_followed:.2g %} of that error "
+    "(0 %: sampled evenly, 100 %: sampled as timestamped)|no motion shows when samples were taken}"
 )
 _WITH_THEM = (
     "period_s", "sigma_period_s", "timestamp_error_s", "shared_fraction", "followed", "sigma_followed", "grid_s",
@@ -185,7 +183,7 @@ _CLOCKS = (
         Code.EVEN_CLOCK,
         "",
         NOTE,
-        f"The timestamps are those of an even clock {_EVEN}, {_HOW}. The even clock was used: {_BY_MOTION}.",
+        f"The timestamps are {_HOW} about an even clock {_EVEN}, which was used: {_BY_MOTION}.",
         numbers=_WITH_THEM,
     ),
     Entry(

@@ -21,8 +21,7 @@ ENTRIES = (
         Code.FILTER_NOISE_NO_STATIC,
         "",
         NOTE,
-        "Nothing is known of the {sensor} at rest: noise at rest and vibration are separable only where the vibration "
-        "changes.",
+        "The static noise of the {sensor} is not known, and separable from vibration only where vibration changes.",
         "No static log was given, and the sensor is not static for 20 s in this log.",
         "Give a static log of the unit with --static STATIC.",
     ),
@@ -39,8 +38,8 @@ ENTRIES = (
         Code.FILTER_NOISE_FOLLOWED,
         "",
         WARNING,
-        "The reference follows the {sensor}'s own noise: the difference is less than noise at rest allows. N is that "
-        "at rest; what motion adds to it is hidden.",
+        "The reference follows the {sensor}'s own noise: the difference is less than static noise allows. N is the "
+        "static one; what motion adds to it is hidden.",
         "An attitude or path computed with this unit's own readings (a filter or smoother over camera, tracker and "
         "IMU).",
         "Take the tracker's own poses as reference.",
@@ -49,7 +48,7 @@ ENTRIES = (
         Code.FILTER_NOISE_INCONSISTENT,
         "",
         WARNING,
-        "On the half that the fit did not see the {sensor}'s errors over {horizon_s:.3g} s have a NEES of {nees:.2g} "
+        "Cross-validated on the second half, the {sensor}'s errors over {horizon_s:.3g} s have a NEES of {nees:.2g} "
         "instead of 3.",
         "The two halves differ in noise, vibration or the reference's error.",
         "Treat N and K as those of the whole log only; estimate them from a log of the same kind of motion.",

@@ -18,6 +18,9 @@ _CONSEQUENCE = (
     FindingCode.GRAVITY_DEFAULTED,
     FindingCode.RESIDUAL_ABOVE_NOISE,
     FindingCode.HELD_OUT_WORSE,
+    FindingCode.NOT_OBSERVABLE,
+    FindingCode.WEAKLY_OBSERVABLE,
+    FindingCode.GYRO_G_SENSITIVITY,
 )
 """What concerns the whole result, the gravest first; it comes before what concerns a part of the recording."""
 # A number that is a value; one that names a thing (pose 3) is recognised by the word before it.

@@ -12,7 +12,7 @@ _LOOK_AT_MOVES = "Look at the residual per move; give the nominal scale."
 _OUTSIDE_THE_MODEL = (
     "an effect outside the linear model: g-sensitivity, a time offset between the sensors, nonlinearity."
 )
-_BIAS_CHANGES = "warm-up, slow noise, or a bias that depends on attitude (g-sensitivity)."
+_BIAS_CHANGES = "warm-up, bias drift, or a bias that depends on attitude (g-sensitivity)."
 _SAME_GRAVITY = "turns about the vertical leave gravity where it was, and a whole turn brings it back."
 
 _MOVES = (

@@ -49,7 +49,7 @@ _LOG = (
         Code.LOG_MOTION,
         "throughout",
         SERIOUS,
-        "Events cover {share:.0f %} of the log: it is disturbed throughout, and nothing was excluded.",
+        "Events cover {share:.0f %} of the log, too much to exclude: it is disturbed throughout.",
         "the sensor was not static.",
         "The terms describe the disturbance as much as the sensor; record a static log.",
     ),

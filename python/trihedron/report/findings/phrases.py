@@ -28,7 +28,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "face": "{is_up:?+|-}{axis:axis} up",
         "pose": "{is_up:?+|-}{axis:axis}{towards:run} {is_edge:?edge|corner} up",
         "poses-unseen": "{names:together}, not observable ({rank} of 9 parameters are determined)",
-        "poses-weakest": "{names:together}, {times:.3g} times worse determined than the best combination",
+        "poses-weakest": "{names:together} ({times:.3g} times the uncertainty of the best determined combination)",
         "faces-all": "all faces present",
         "faces-missing": "scale and bias cannot be separated without {faces:&, }",
         # moves and turns of a gyro
@@ -67,10 +67,10 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         # empirical relations of what stays unexplained
         "relation-follows": "The {sensor}'s {is_at_rest:?bias|reading in motion} ({axes:axes}) follows {depends:and}: "
         "{share:.0f %} of the cross-validated misfit.",
-        "relation-follows-room": "The gyro's bias follows a vector fixed in the room, {inclination_deg:.0f}° ± "
+        "relation-follows-room": "The gyro's bias follows a vector fixed in the world frame, {inclination_deg:.0f}° ± "
         "{inclination_sigma_deg:.0f}° from the vertical: {share:.0f %} of the cross-validated misfit.",
         "relation-form": "reading of {axes:axes} grows by {terms:& + }",
-        "relation-form-room": "bias = K Rᵀ m, m a unit vector fixed in the room",
+        "relation-form-room": "bias = K Rᵀ m, m a unit vector fixed in the world frame",
         "angle-to-vertical": "angle to the vertical",
         # places in a file, amounts
         "line": "line {line}",

@@ -9,10 +9,10 @@ from trihedron.records.finding import Severity
 from trihedron.report.findings.entry import Entry
 
 NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
-_SAY_ACCEL_UNIT = "Say it with --accel-unit m/s^2, g, mg, ..., or counts, if this is wrong."
-_SAY_GYRO_UNIT = "Say it with --gyro-unit rad/s, deg/s, ..., or counts, if this is wrong."
+_SAY_ACCEL_UNIT = "Give --accel-unit m/s^2, g, mg, ..., or counts, if this is wrong."
+_SAY_GYRO_UNIT = "Give --gyro-unit rad/s, deg/s, ..., or counts, if this is wrong."
 _ALIKE = "Both look alike. The calibration differs only in its name of the raw unit."
-_SOURCE = "{is_given:?as you said|by its column names}"
+_SOURCE = "{is_given:?as given|by its column names}"
 _TURNING = (
     "gravity rotates by {factor:.3g} (± {percent:.1g} %) times the gyro's angle in {unit} (1 where the unit is right; "
     "correlation {correlation:.2f})"
@@ -85,7 +85,7 @@ _UNITS = (
         f"The accelerometer is in {{unit}} {_SOURCE}, but at rest it reads {{rest_norm:.4g}} {{unit}}, "
         "{gravities:.3g} times gravity.",
         "A wrong unit, wrong columns, or a log without static poses.",
-        _SAY_ACCEL_UNIT,
+        "Correct --accel-unit (m/s^2, g, mg, ..., or counts) or --columns.",
     ),
     Entry(Code.UNIT_DETECTED, "stated", NOTE, f"The {{sensor}} is in {{unit}} {_SOURCE}."),
     Entry(
@@ -122,7 +122,7 @@ _WHY_FIRST = {
     "level": "its steady reading stands far above its noise, as gravity does",
 }
 _WHY_UNKNOWN = {"short": "the log is too short", "alike": "both triads look alike"}
-_NAME_THEM = "If that is right, say it: --columns {mapping}; else give their order."
+_NAME_THEM = "If that is right, confirm it with --columns {mapping}; else give their order."
 _COLUMNS = (
     Entry(
         Code.CORRECTED_ON_BOARD,
@@ -141,7 +141,7 @@ _COLUMNS = (
         Code.COLUMNS_RECOGNISED,
         "",
         NOTE,
-        "Columns{has_file:? of {file}|}: {roles:each}{has_rest:?; kept aside: {rest:& }|}.",
+        "Columns{has_file:? of {file}|}: {roles:each}{has_rest:?; not used: {rest:& }|}.",
         lines=MappingProxyType({"roles": "{v0} from {v1}"}),
     ),
     Entry(
@@ -164,7 +164,7 @@ _COLUMNS = (
         Code.COLUMNS_ASSUMED,
         "one-of-several",
         WARNING,
-        "More than one triad could be the {sensor}: {taken} was taken, {others:&; } kept aside.",
+        "More than one triad could be the {sensor}: {taken} was taken, {others:&; } not used.",
         "The log holds raw and corrected readings, or several devices.",
         "A calibration wants the uncorrected ones; choose with --columns if this is wrong.",
     ),

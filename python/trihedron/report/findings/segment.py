@@ -13,10 +13,11 @@ ENTRIES = (
         Code.POSE_SETTLING,
         "",
         WARNING,
-        "{poses:# pose} {poses:?drifts|drift} while still: in pose {worst_pose} at {worst_s:.1f} s the second half "
-        "differs by {worst_sigmas:.1f} σ from the first (pose {which:first 8}).",
+        "The mean drifts in {poses:# pose} (pose {which:first 8}): the second half differs from the first by up to "
+        "{worst_sigmas:.1f} σ (at {worst_s:.1f} s).",
         "The support gives way, the case settles after being let go, or the sensor warms up.",
         "Wait until the case has settled, hold for less time, or put it on a firmer support.",
+        numbers=("worst_pose",),
         or_severity=SERIOUS,
     ),
     Entry(

@@ -9,7 +9,7 @@ A place is a name and, after the colon, how its value becomes words:
 ``?drifts|drift``        the first words where the value is 1 or true, else the second; they may hold places
 ``<below|above``         the first words where the value is negative, else the second; they may hold places
 ``&, the ``              several words, joined by what stands after the ``&``; ``and``: ``x, y and z``
-``together``             ``x, y together with z``
+``together``             ``x, y + z``
 ``sentences``            ``X. Y.``
 ``clause``               a sentence without its stop
 ``unit``                 ``m/s²`` for ``m/s^2``
@@ -108,7 +108,7 @@ def _in_words(value: Any, how: str, line: str) -> str:
     if how == "and":
         return listed([str(word) for word in value])
     if how == "together":
-        return " together with ".join([", ".join(value[:-1]), value[-1]] if len(value) > 1 else value)
+        return " + ".join([", ".join(value[:-1]), value[-1]] if len(value) > 1 else value)
     if how == "sentences":
         return " ".join(f"{word[:1].upper()}{word[1:]}." for word in value)
     if how == "unit":
