@@ -38,6 +38,8 @@ MEANING = {
     "parameters": "parameters of the model",
     "noise": "noise and sampling",
 }
+LEAST_SHARE = 0.005
+"""Of the misfit, that is not 0 % in print."""
 MOST_NAMED = 4
 
 
@@ -241,7 +243,7 @@ def headlines_of(diagnosis: Diagnosis) -> tuple[Headline, ...]:
     shares = tuple(
         Headline(f"{effect.id} explains", plain_number(100.0 * effect.share, 2), "%", "of the misfit")
         for effect in diagnosis.effects
-        if effect.share is not None
+        if effect.share is not None and effect.share > LEAST_SHARE
     )
     for effect in diagnosis.effects:
         if effect.held_out:

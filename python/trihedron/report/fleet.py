@@ -24,6 +24,8 @@ VERDICTS = {
     "not-testable": "cannot be tested",
     "parameters-differ": "other parameters",
 }
+OPEN = ("missing-physics", "unexplained")
+"""Verdicts that leave something out of the calibration."""
 
 
 def fleet_report(summary: FleetSummary) -> Document:
@@ -58,6 +60,9 @@ def fleet_report(summary: FleetSummary) -> Document:
         verdict = "NONE of the logs could be calibrated; the reasons are below."
     for one in summary.mixed:
         verdict += f" The {how_many(one.n_logs, 'log')} of {one.serial} are of SEVERAL devices."
+    n_open = sum(log.verdict in OPEN for log in summary.logs)
+    if n_open:
+        verdict += f" The diagnosis of {how_many(n_open, 'log')} finds more than the model."
     strays = list(dict.fromkeys(one.serial for one in summary.outliers))
     moved = list(dict.fromkeys(change.group for change in summary.changes if change.significant))
     if strays:
@@ -73,7 +78,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         lead=_lead(summary) if n_done else None,
         headlines=_headlines(summary),
         next_step=_next_step(summary, strays, moved) if n_usable and not mixed else "",
-        stated_level="usable" if n_usable and not mixed and (n_usable < n or strays or moved) else None,
+        stated_level="usable" if n_usable and not mixed and (n_usable < n or n_open or strays or moved) else None,
     )
 
 
@@ -92,7 +97,8 @@ def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> st
         else []
     )
     steps += ["look at the devices that stand out"] if strays else []
-    steps += ["calibrate those that changed anew before use"] if moved else []
+    doubt = ", or state the devices (--serial) where their logs are of several"
+    steps += [f"calibrate those that changed anew before use{doubt}"] if moved else []
     steps.append("use each device's own calibration: trihedron apply calibrations/DEVICE_LOG_KEY.json LOG")
     said = "; ".join(steps)
     return f"{said[0].upper()}{said[1:]}."

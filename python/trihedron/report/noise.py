@@ -22,8 +22,8 @@ _NO_UNIT = (
     "--gyro-lsb and --accel-lsb."
 )
 NEXT = "Take N, B, K into a filter (trihedron export --noise); average for no longer than the best averaging time."
-SAY_COUNTS = """State the size of a count, for terms in SI: --gyro-lsb and --accel-lsb of the data sheet, for example \
---gyro-lsb "0.00763 deg/s" --accel-lsb "0.061 mg", or --calibration FILE."""
+SAY_COUNTS = """State the size of a count, for terms in SI: --gyro-lsb "X deg/s" and --accel-lsb "Y mg", X and Y from \
+the data sheet of this part at its range, or --calibration FILE."""
 
 
 def noise_report(

@@ -10,12 +10,15 @@ import numpy as np
 from trihedron.records import Finding, FindingCode, Recording, Segments, Verification
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.numbers import how_many, in_mm_s2, plain_number, with_sigma
+from trihedron.report.numbers import how_many, in_mm_s2, listed, plain_number, with_sigma
 from trihedron.report.segments import signals_picture
 from trihedron.report.session_charts import verification_chart
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
-_ABOVE_NOISE = (FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.HELD_OUT_WORSE)
+_ABOVE_NOISE = {
+    FindingCode.RESIDUAL_ABOVE_NOISE: "gravity error in static poses",
+    FindingCode.HELD_OUT_WORSE: "tilt error after rotations",
+}
 
 
 def verification_report(
@@ -59,7 +62,8 @@ def _expected(size: str, chi2_per_dof: float) -> str:
 
 def _usable(v: Verification) -> str:
     """A warning about the errors themselves takes ``Verified`` away."""
-    return "Errors exceed noise and uncertainty" if _above_noise(v) else "Verified"
+    above = {finding.code: _ABOVE_NOISE[finding.code] for finding in _above_noise(v)}
+    return f"{listed(list(above.values())).capitalize()} above noise and uncertainty" if above else "Verified"
 
 
 def _next_step(v: Verification) -> str:

@@ -48,8 +48,8 @@ ENTRIES = (
         Code.FILTER_NOISE_INCONSISTENT,
         "",
         WARNING,
-        "Cross-validated on the second half, the {sensor}'s errors over {horizon_s:.3g} s have a NEES of {nees:.2g} "
-        "instead of 3.",
+        "Cross-validated on the second half, the {sensor}'s errors over {horizon_s:.3g} s have a mean "
+        "normalised square (NEES) of {nees:.2g} instead of 3; below 3 the filter is too cautious, above too sure.",
         "The two halves differ in noise, vibration or the reference's error.",
         "Treat N and K as those of the whole log only; estimate them from a log of the same kind of motion.",
     ),
