@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.special import gammaln, logsumexp, ndtr, ndtri
+from scipy.special import gammaln, logsumexp, ndtr, ndtri, stdtrit
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
@@ -24,6 +24,8 @@ the *square* that turns with the body, none of it was so unlikely that the whole
 MAY_BE_NOTHING = np.isin(COORDINATES, ("vibration", "bias_walk", "white", "slow"))
 NU = 3.0
 """Degrees of freedom of its prior, the fewest with a mean square: a predicted covariance is one."""
+MEDIAN = float(np.log(stdtrit(NU, 0.75)))
+"""Logarithm of its median for scale one: that is where the usual size stands."""
 HALF = float(np.log(2.0) + gammaln(0.5 * NU + 0.5) - gammaln(0.5 * NU) - 0.5 * np.log(np.pi * NU))
 FARTHEST = 4.0
 """Coordinates beyond four prior σ are those of nothing."""
@@ -53,7 +55,7 @@ ABSENT = 30.0
 class Prior:
     """Of the coordinates: ``mean`` (7,), ``sigma`` (7,); ``is_there`` (7,) those that there are.
 
-    A strength that ``may_be_nothing`` (7,) has half a Student's distribution of that scale (Gelman 2006): flat towards
+    A strength that ``may_be_nothing`` (7,) has half a Student's distribution of that median (Gelman 2006): flat towards
     nothing, so that what a log does not show has an upper limit of the log and not of the prior. ``sigma`` then bounds
     the search. The others are normal.
     """
@@ -114,7 +116,7 @@ def _slope(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> tuple[F
     free = prior.is_there > 0.0
     far, sigma = x - prior.mean[free], prior.sigma[free]
     # Of the logarithm, on average over the prior.
-    slope = np.where(prior.may_be_nothing[free], 1.0 - (NU + 1.0) / (1.0 + NU * np.exp(-2.0 * far)), -far / sigma**2)
+    slope = np.where(prior.may_be_nothing[free], _half_slope(far), -far / sigma**2)
     information = np.diag(np.where(prior.may_be_nothing[free], 2.0 * NU / (NU + 3.0), 1.0 / sigma**2))
     at = whole(prior, x)
     others = [whole(prior, x + STEP * e) for e in np.eye(len(x))]
@@ -132,6 +134,11 @@ def _slope(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> tuple[F
     return slope, information
 
 
+def _half_slope(far: FloatArray) -> FloatArray:
+    """Derivative of the logarithm of half a Student's density."""
+    return np.asarray(1.0 - (NU + 1.0) / (1.0 + NU * np.exp(-2.0 * (far + MEDIAN))))
+
+
 def height(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> float:
     """Log evidence and prior of coordinates (f,) that the model has."""
     free = prior.is_there > 0.0
@@ -140,7 +147,7 @@ def height(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> float:
         return -np.inf
     strengths = whole(prior, x)
     normal = -0.5 * (far / sigma) ** 2 - np.log(np.sqrt(2.0 * np.pi) * sigma)
-    half = HALF + far - 0.5 * (NU + 1.0) * np.log1p(np.exp(2.0 * far) / NU)
+    half = HALF + far + MEDIAN - 0.5 * (NU + 1.0) * np.log1p(np.exp(2.0 * (far + MEDIAN)) / NU)
     known = np.sum(np.where(prior.may_be_nothing[free], half, normal))
     return float(sum(one.evidence(strengths) for one in stretches) + known)
 
