@@ -240,7 +240,7 @@ REFUSALS = [
     (["capture", "NOISE", "--protocol", "none.toml", "-o", "LOG"], "there is no such file"),
     (["capture", "NOISE", "-o", "EXISTS"], "the file exists and was left alone"),
     (["capture", "NOISE", "-o", "missing/log.csv"], "there is no folder"),
-    (["capture", "NOISE"], "say where the log goes"),
+    (["capture", "NOISE"], "name the log to write"),
     (["capture", "FOLDER", "-o", "LOG"], "this is a directory"),
 ]
 

@@ -283,7 +283,7 @@ def _tilt_findings(estimate: _Estimate, S: FloatArray, faces: IntArray, used: In
         Finding.of(
             FindingCode.TABLE_TILT,
             chi2_per_dof=estimate.chi2_noise / estimate.dof,
-            severity=Severity.SERIOUS if tilt_deg > face_poses.LARGEST_TILT_DEG else None,
+            severity=Severity.SERIOUS if tilt_deg > face_poses.LARGEST_TILT_DEG else Severity.WARNING,
             tilt_deg=tilt_deg,
             pose=int(used[worst]) + 1,
             face=face_poses.face_in_words(int(faces[worst])),
