@@ -22,7 +22,6 @@ from trihedron.records.recording import distinct_names
 from trihedron.records.results import CalibrationResult, SessionsResult
 from trihedron.records.sessions import By, Session
 from trihedron.records.words import Words, words
-from trihedron.report.findings.grouping import first_clause
 from trihedron.sensor_model import in_frame
 
 BYS: tuple[By, ...] = get_args(By)
@@ -122,7 +121,7 @@ def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Wo
     """Why a calibration does not go with the others; None where it does."""
     if not result.is_trustworthy:
         serious = next(finding for finding in result.findings if finding.severity.value == "serious")
-        return words("not-trusted", seen=first_clause(serious.seen))
+        return words("not-trusted", seen=serious.seen)
     if others:
         first, own = others[0].calibration, result.calibration
         for name in ("accelerometer", "gyroscope"):

@@ -206,8 +206,8 @@ def leave(findings: Iterable[Finding]) -> None:
     """End with status 2, and the reason on stderr, when a serious finding says that the answer is not to be trusted."""
     reasons = [finding.seen for finding in findings if finding.severity.value == "serious"]
     if reasons:
-        from trihedron.report.findings.grouping import first_clause
+        from trihedron.report.findings.wording import opening
 
         more = f" ({len(reasons) - 1} more)" if len(reasons) > 1 else ""
-        say(f"trihedron: not to be trusted: {first_clause(reasons[0])}{more}")
+        say(f"trihedron: not to be trusted: {opening(reasons[0])}.{more}")
         raise typer.Exit(NOT_TO_BE_TRUSTED)

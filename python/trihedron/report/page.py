@@ -18,7 +18,7 @@ from markupsafe import Markup, escape
 from trihedron.records import Severity
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 from trihedron.report.drawn import drawn
-from trihedron.report.findings.grouping import first_clause
+from trihedron.report.findings.wording import opening
 from trihedron.sanitise import one_line, printable
 
 KINDS: dict[type, str] = {
@@ -72,10 +72,10 @@ def _noticed(document: Document) -> tuple[Markup, list[tuple[str, str]], str]:
     if first is None:
         return Markup(""), [], ""
     graver = [f for f in document.findings if f.severity is not Severity.NOTE and f is not first]
-    others = [(f.severity.value, first_clause(_ASIDE.sub("", f.seen)).rstrip(".")) for f in graver[:MOST_OTHERS]]
+    others = [(f.severity.value, opening(_ASIDE.sub("", f.seen))) for f in graver[:MOST_OTHERS]]
     others += [("", f"{len(graver) - MOST_OTHERS} more")] if len(graver) > MOST_OTHERS else []
     listing = (any(isinstance(block, FindingList) for block in section.blocks) for section in document.sections)
-    clause = first_clause(first.seen).rstrip(".")
+    clause = opening(first.seen)
     rest = first.seen[len(clause) :].lstrip(" .;")
     seen = rest[:1].upper() + rest[1:] if clause.lower() in document.verdict.lower() else first.seen
     is_said = not first.action or first.action[1:] == document.what_next[1:]

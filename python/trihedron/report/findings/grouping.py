@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report.document import FindingList, Paragraph
+from trihedron.report.findings.wording import opening
 from trihedron.report.numbers import MINUS, how_many, listed
 
 _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
@@ -48,13 +49,8 @@ def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) ->
     serious = [finding for finding in found if finding.severity is Severity.SERIOUS]
     n_warnings = sum(finding.severity is Severity.WARNING for finding in found)
     if serious:
-        return f"{bad}: {_capital(first_clause(serious[0].seen))}"
+        return f"{bad}: {_capital(opening(serious[0].seen))}."
     return f"{usable}, with {how_many(n_warnings, 'warning')}." if n_warnings else good
-
-
-def first_clause(seen: str) -> str:
-    """What a finding says first: the whole of it stands once, among the findings."""
-    return re.split(r"(?<=\D)\. (?=[A-Z])|; ", seen, maxsplit=1)[0].rstrip(".") + "."
 
 
 def combined(findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -95,7 +95,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "effect-of-session": "it belongs to that session, not to the sensor",
         # why a recording does not go with the others
         "another-correction": "its readings were corrected on board by other parameters than those of the first",
-        "not-trusted": "its own calibration is not to be trusted: {seen}",
+        "not-trusted": "its own calibration is not to be trusted: {seen:opening}",
         "sensor-not-calibrated": "its {sensor} was not calibrated",
         "first-lacks-sensor": "the first recording has no {sensor}",
         "another-unit": "its {sensor} is in {unit}, that of the first recording in {first_unit}",

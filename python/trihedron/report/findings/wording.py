@@ -12,6 +12,7 @@ A place is a name and, after the colon, how its value becomes words:
 ``together``             ``x, y + z``
 ``sentences``            ``X. Y.``
 ``clause``               a sentence without its stop
+``opening``              its first clause alone
 ``unit``                 ``m/s²`` for ``m/s^2``
 ``first 8``              ``3, 5, 6``, with ``...`` behind the eighth
 ``numbered``             several words as ``(1) ...; (2) ...``
@@ -24,6 +25,7 @@ A place is a name and, after the colon, how its value becomes words:
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from string import Formatter
 from typing import Any
@@ -115,6 +117,8 @@ def _in_words(value: Any, how: str, line: str) -> str:
         return unit_in_print(value)
     if how == "clause":
         return str(value).rstrip(".")
+    if how == "opening":
+        return opening(str(value))
     if how == "numbered":
         return "; ".join(f"({i + 1}) {word}" for i, word in enumerate(value))
     if how.startswith("&"):
@@ -152,3 +156,8 @@ def _digits(value: float, digits: str) -> str:
 
 def _plural(noun: str) -> str:
     return f"{noun}es" if noun.endswith(("ch", "s", "x")) else f"{noun}s"
+
+
+def opening(text: str) -> str:
+    """What a text says first, without a stop: the whole of it stands elsewhere."""
+    return re.split(r"(?<=\D)\. (?=[A-Z])|; ", text, maxsplit=1)[0].rstrip(".")
