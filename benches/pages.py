@@ -24,6 +24,7 @@ from trihedron.simulate import hand_session, scenario_by_name, simulate
 FIGURES = Path(__file__).parents[1] / "docs" / "figures"
 GRAVITY = ("--gravity", "9.80665")
 VIEWS = ((1280, 860, "light"), (390, 844, "dark"))
+ALLAN = ("allan", "--accel-lsb", "0.061 mg", "--gyro-lsb", "0.00763 deg/s")
 TRACKED_HZ = 100.0
 ON_A_PHONE = ("calibrate", "diagnose")
 """Pages that are also shown as a phone in the dark shows them."""
@@ -42,8 +43,12 @@ def logs(folder: Path) -> list[str]:
     return made
 
 
-def beside_a_tracker(folder: Path) -> tuple[str, str]:
-    """A log of a body that rocks for two minutes, and a tracker whose world frame drifts by a tenth of a degree."""
+def beside_a_tracker(folder: Path, gain: float, shaken: float) -> tuple[str, str]:
+    """A log of a body that rocks for two minutes, and a tracker whose world frame drifts by a tenth of a degree.
+
+    The noise at rest is that of the static hour; ``gain`` is the gyro's, ``shaken`` the noise that vibration adds in
+    motion, as a part of the angular rate.
+    """
     rng = np.random.default_rng(7)
     time = np.arange(0.0, 120.0, 1.0 / TRACKED_HZ)
     gate = np.clip(np.minimum(time - 5.0, 115.0 - time) / 2.0, 0.0, 1.0)
@@ -52,11 +57,13 @@ def beside_a_tracker(folder: Path) -> tuple[str, str]:
     rate = np.zeros((len(time), 3))
     rate[1:-1] = (attitude[:-2].inv() * attitude[2:]).as_rotvec() * TRACKED_HZ / 2.0
     force = attitude.inv().apply([0.0, 0.0, 9.80665])
-    gyro = rate * 1.01 + 0.004 + 2e-3 * rng.normal(size=rate.shape)
-    accelerometer = force * 1.005 + 0.1 + 0.02 * rng.normal(size=force.shape)
+    fast = np.linalg.norm(rate, axis=1)[:, None]
+    gyro = rate * gain + 0.004 + (8.75e-4 + shaken * fast) * rng.normal(size=rate.shape)
+    accelerometer = force * 1.005 + 0.1 + 0.04 * rng.normal(size=force.shape)
     drift = np.radians(0.1) * np.column_stack([np.sin(time / 5.0), np.cos(time / 7.0), 0.0 * time])
     mounted = Rotation.from_rotvec([0.02, -0.03, 0.05])
     seen = (Rotation.from_rotvec(drift) * attitude * mounted).as_quat()[:, [3, 0, 1, 2]]
+    folder.mkdir()
     names = (folder / "rocked.csv", folder / "tracker.csv")
     log = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
     np.savetxt(names[0], np.column_stack([time, accelerometer, gyro]), "%.7g", ",", header=log, comments="")
@@ -72,18 +79,20 @@ def pages(folder: Path) -> dict[str, Path]:
         "calibrate": ["calibrate", first, *GRAVITY],
         "many-recordings": ["calibrate", first, *others, *GRAVITY],
         "plan": ["plan"],
-        "allan": ["allan", str(folder / "rest.npz"), "--accel-lsb", "0.061 mg", "--gyro-lsb", "0.00763 deg/s"],
+        "allan": [*ALLAN, str(folder / "rest.npz"), "--json", str(folder / "allan.json")],
         "kalman": ["kalman", first, *GRAVITY],
     }
     found = {"diagnose": folder / "demo" / "disagreement.html", "verify": folder / "demo" / "verification.html"}
     for name, line in lines.items():
         found[name] = folder / f"{name}.html"
         main([*line, "--report", str(found[name])])
-    log, truth = beside_a_tracker(folder)
+    log, truth = beside_a_tracker(folder / "raw", 1.01, 0.0)
     found["reference"] = folder / "reference.html"
     main(["diagnose", log, "--reference", truth, *GRAVITY, "--report", str(found["reference"])])
     found["noise"] = folder / "noise.html"
-    main(["noise", log, "--reference", truth, *GRAVITY, "--report", str(found["noise"])])
+    log, truth = beside_a_tracker(folder / "flown", 1.0002, 0.01)
+    rest = ["--static", str(folder / "allan.json")]
+    main(["noise", log, "--reference", truth, *rest, *GRAVITY, "--report", str(found["noise"])])
     main(["fleet", str(folder / "*" / "log.csv"), "-o", str(folder / "fleet"), "--workers", "0", *GRAVITY])
     return {**found, "fleet": folder / "fleet" / "fleet.html"}
 

@@ -99,6 +99,7 @@ def _log(row: dict[str, Any]) -> FleetLog:
         row.get("reason", ""),
         diagnosis.get("verdict", ""),
         tuple(effect["id"] for effect in diagnosis.get("effects", ())),
+        tuple(row.get("serious", ())),
         bool(row.get("is_trustworthy", False)),
         row.get("n_poses"),
         row.get("static_rms_m_s2"),

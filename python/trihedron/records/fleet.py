@@ -11,8 +11,8 @@ from trihedron.records.sessions import Change, Parameter, Repeated
 
 @dataclass(frozen=True, eq=False)
 class FleetLog:
-    """One log: ``status`` with its ``reason``, the diagnosis' ``verdict`` and effects, its numbers (9,) or (21,) with
-    their errors; ``None`` where it was not calibrated."""
+    """One log: ``status`` with its ``reason``, the diagnosis' ``verdict`` and effects, the codes of the ``serious``
+    findings, its numbers (9,) or (21,) with their errors; ``None`` where it was not calibrated."""
 
     name: str
     serial: str
@@ -20,6 +20,7 @@ class FleetLog:
     reason: str
     verdict: str
     effects: tuple[str, ...]
+    serious: tuple[str, ...]
     is_trustworthy: bool
     n_poses: int | None
     static_rms_m_s2: float | None

@@ -54,7 +54,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         caption = "Every parameter by device, a point for each log (bars: 1 σ); the line is the median of devices."
         sections.append(Section("Distributions", (Picture("numbers", caption, partial(fleet_chart, summary)),)))
     sections.append(Section("Every log", (_logs(summary),)))
-    n_usable = sum(log.status == "done" and log.is_trustworthy for log in summary.logs)
+    n_usable = sum(map(_is_usable, summary.logs))
     verdict = f"{n_usable} of {how_many(n, 'log')} usable, {how_many(len(devices), 'device')}."
     if n_done == 0:
         verdict = "NONE of the logs could be calibrated; the reasons are below."
@@ -77,7 +77,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         sections=tuple(sections),
         lead=_lead(summary) if n_done else None,
         headlines=_headlines(summary),
-        next_step=_next_step(summary, strays, moved) if n_usable and not mixed else "",
+        next_step="" if mixed else _next_step(summary, strays, moved),
         stated_level="usable" if n_usable and not mixed and (n_usable < n or n_open or strays or moved) else None,
     )
 
@@ -89,19 +89,28 @@ def _named(devices: list[str]) -> str:
 
 
 def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> str:
-    again = [log.name for log in summary.logs if not (log.status == "done" and log.is_trustworthy)]
-    more = f" and {len(again) - MOST_NAMED} more" if len(again) > MOST_NAMED else ""
-    steps = (
-        [f"record again {', '.join(again[:MOST_NAMED])}{more} (trihedron check LOG says what was wrong)"]
-        if again
-        else []
-    )
+    usable = [log for log in summary.logs if _is_usable(log)]
+    again = [log.name for log in summary.logs if not _is_usable(log)]
+    opened = [log.name for log in usable if log.verdict in OPEN]
+    steps = [f"mend or record again {_first(again)} (trihedron check LOG says what was wrong)"] if again else []
+    steps += [f"read what the model leaves out of {_first(opened)} (trihedron diagnose LOG)"] if opened else []
     steps += ["look at the devices that stand out"] if strays else []
     doubt = ", or state the devices (--serial) where their logs are of several"
     steps += [f"calibrate those that changed anew before use{doubt}"] if moved else []
-    steps.append("use each device's own calibration: trihedron apply calibrations/DEVICE_LOG_KEY.json LOG")
+    if usable:
+        steps.append("use each device's own calibration (a file of calibrations/): trihedron apply FILE LOG")
     said = "; ".join(steps)
     return f"{said[0].upper()}{said[1:]}."
+
+
+def _is_usable(log: FleetLog) -> bool:
+    return log.status == "done" and log.is_trustworthy
+
+
+def _first(names: list[str]) -> str:
+    """``a, b and 7 more``."""
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + more
 
 
 def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
@@ -133,10 +142,12 @@ def _lead(summary: FleetSummary) -> Picture:
 
 def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
     status = Counter(log.status for log in summary.logs)
-    doubtful = sum(log.status == "done" and not log.is_trustworthy for log in summary.logs)
+    doubtful = [log for log in summary.logs if log.status == "done" and not log.is_trustworthy]
     facts = [("calibrated", how_many(status["done"], "log"))]
     if doubtful:
-        facts.append(("not to be trusted", f"{how_many(doubtful, 'log')} by their own findings"))
+        codes = Counter(code for log in doubtful for code in log.serious).most_common()
+        why = ", ".join(f"{code} ({count})" for code, count in codes)
+        facts.append(("not to be trusted", f"{how_many(len(doubtful), 'log')}: {why}"))
     if status["refused"]:
         facts.append(("not calibrated", f"{how_many(status['refused'], 'log')}: they do not allow a calibration"))
     if status["crashed"]:

@@ -17,13 +17,12 @@ from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2,
 
 ALL_NUMBERS = 9
 """Scale, angles and biases of a triad."""
-USUAL_POSES = 18
 FEWEST_SETS = 2
 
 
 def plan_report(plan: ExperimentPlan) -> Document:
     """Lay out the plan: turns by both routes, sets of poses, moves."""
-    turns = plan.turns
+    turns, best = plan.turns, _enough(plan.poses)
     angles = ", ".join(f"{angle:g}°" for angle in turns.angles_deg).replace("-", MINUS)
     return Document(
         title="Plan of an experiment",
@@ -32,13 +31,15 @@ def plan_report(plan: ExperimentPlan) -> Document:
             f"{plain_number(1e3 * mg_from_m_s2(plan.accelerometer_density), 2)} µg/√Hz, poses of {plan.pose_s:g} s"
         ),
         verdict=f"Turns of {angles} in {turns.duration_s:g} s about each axis give the gyro's scale to "
-        f"{_percent(turns.scale)}.",
+        f"{_percent(turns.scale)}."
+        if best is None
+        else f"{best.name} are enough for the accelerometer (scale {_percent(best.scale)}, 1 σ): no single pose is "
+        "indispensable.",
         is_trustworthy=True,
-        headlines=tuple(_headlines(plan)),
+        headlines=tuple(_headlines(plan, best)),
         lead=_picture(plan.poses),
-        next_step="Choose a set of poses below and record it: trihedron capture PORT -o LOG --guide leads through it.",
+        next_step="Record them: trihedron capture PORT -o LOG --guide leads through the poses.",
         sections=(
-            Section("Known turns", (_turns(plan),)),
             Section(
                 "Poses",
                 (
@@ -62,17 +63,23 @@ def plan_report(plan: ExperimentPlan) -> Document:
                     ),
                 ),
             ),
+            Section("Known turns", (_turns(plan),)),
         ),
     )
 
 
-def _headlines(plan: ExperimentPlan) -> list[Headline]:
-    """What the usual set of poses and the turns would lead to."""
-    usual = next((p for p in plan.poses if p.n_poses == USUAL_POSES and p.rank == ALL_NUMBERS), None)
+def _enough(poses: tuple[PosePlan, ...]) -> PosePlan | None:
+    """The smallest set that determines all parameters without any one of its poses."""
+    enough = [one for one in poses if one.rank == ALL_NUMBERS and not any(math.isinf(w.loss) for w in one.worth)]
+    return min(enough, key=lambda one: one.n_poses, default=None)
+
+
+def _headlines(plan: ExperimentPlan, best: PosePlan | None) -> list[Headline]:
+    """What that set of poses and the turns would lead to."""
     out = [Headline("gyro scale by turns", plain_number(100.0 * plan.turns.scale, 2), "%", "1 σ, worst axis")]
-    if usual is not None:
-        beside = f"1 σ, worst axis, {usual.n_poses} poses"
-        out.insert(0, Headline("accelerometer scale", plain_number(100.0 * usual.scale, 2), "%", beside))
+    if best is not None:
+        beside = f"1 σ, worst axis, {best.n_poses} poses"
+        out.insert(0, Headline("accelerometer scale", plain_number(100.0 * best.scale, 2), "%", beside))
     return out
 
 

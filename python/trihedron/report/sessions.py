@@ -31,8 +31,8 @@ def sessions_report(model: SessionsModel) -> Document:
     """Lay out what many recordings share, and how far each parameter repeats."""
     n = len(model.sessions)
     changed = [change for change in model.changes if change.significant]
-    agree = f"{how_many(n, 'recording')} agree"
-    good = f"{agree}: no parameter changed beyond its uncertainty and the bias drift within one."
+    agree = f"{how_many(n, 'recording')} differ by no more than their uncertainty"
+    good = f"{agree} and the bias drift within one."
     if model.thermal is not None:
         agree = f"{how_many(n, 'recording')} make one model from {_range(model.thermal)}"
         good = f"{agree}."

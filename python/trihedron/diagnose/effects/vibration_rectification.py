@@ -9,7 +9,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
 from trihedron.records.words import why_not
 
-ACCEL_PER_POWER, GYRO_PER_POWER = 0.02, 1e-3
+ACCEL_PER_POWER, GYRO_PER_POWER = 2e-3, 1e-3
 """1/(m/s²), 20 mg/g², and (rad/s)/(m/s²)²: what vibrating consumer parts show."""
 STANDS_OUT = 1.5
 """Power of a pose over the median pose: the variance of 300 white readings is known to 8 %; the most in 48

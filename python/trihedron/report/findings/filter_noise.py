@@ -57,7 +57,7 @@ ENTRIES = (
         Code.FILTER_NOISE_UNCALIBRATED,
         "",
         WARNING,
-        "At least {share:.0f %} of the {sensor}'s error over {horizon_s:.3g} s is what a calibration would remove "
+        "A calibration would remove {share:.0f %} or more of the {sensor}'s error over {horizon_s:.3g} s "
         "(scale and misalignment, g-sensitivity, temperature): more than all noise that N and K represent.",
         "The log was not corrected, or by parameters that no longer hold. Such errors follow the motion: no noise of a "
         "filter represents them.",
