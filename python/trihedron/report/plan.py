@@ -1,4 +1,4 @@
-"""An experiment before it is made: what it would tell, and how certainly."""
+"""Report of a planned experiment: uncertainties to expect."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from trihedron.report.numbers import MINUS, plain_number
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
 
 ALL_NUMBERS = 9
-"""Scale, angles and biases of a triad."""
+"""Number of parameters of a triad: scales, angles and biases."""
 USUAL_POSES = 18
 FEWEST_SETS = 2
 
@@ -67,7 +67,7 @@ def plan_report(plan: ExperimentPlan) -> Document:
 
 
 def _headlines(plan: ExperimentPlan) -> list[Headline]:
-    """What the usual set of poses and the turns would lead to."""
+    """Uncertainties to expect from the usual set of poses and from the turns."""
     usual = next((p for p in plan.poses if p.n_poses == USUAL_POSES and p.rank == ALL_NUMBERS), None)
     out = [Headline("gyro scale by turns", plain_number(100.0 * plan.turns.scale, 2), "%", "1 σ, worst axis")]
     if usual is not None:
@@ -86,7 +86,7 @@ def _picture(poses: tuple[PosePlan, ...]) -> Picture | None:
 
 
 def poses_chart(poses: tuple[PosePlan, ...]) -> Chart:
-    """Uncertainty of scale, angle and bias against how many poses there are."""
+    """Uncertainty of scale, angle and bias over the number of poses."""
     known = [pose for pose in poses if pose.rank == ALL_NUMBERS]
     n = np.array([pose.n_poses for pose in known], dtype=np.float64)
     panels = []
@@ -104,7 +104,7 @@ def poses_chart(poses: tuple[PosePlan, ...]) -> Chart:
 
 
 def plan_record(plan: ExperimentPlan) -> dict[str, Any]:
-    """As plain JSON types; what is not determined is null."""
+    """As plain JSON types; undetermined values are null."""
     record: dict[str, Any] = _plain(asdict(plan))
     return record
 
@@ -160,7 +160,7 @@ def _worth(pose: PosePlan) -> str:
         n = sum(math.isinf(one.loss) for one in pose.worth)
         which = "every pose is" if n == pose.n_poses else f"{n} of the {pose.n_poses} poses are"
         return f"{which} necessary: without it a parameter is not determined"
-    # To a thousandth of a per cent: beyond that only rounding of the arithmetic is left.
+    # Rounded to 0.001 %: smaller differences are rounding errors.
     share, least = (round(100.0 * (loss - 1.0), 3) for loss in (best.loss, pose.worth[-1].loss))
     return (
         f"most useful pose: {best.pose}, +{plain_number(share, 2)} % uncertainty without it; least useful pose: "
