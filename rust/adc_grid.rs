@@ -1,37 +1,37 @@
-//! The grid on which the values of a converter lie, from the gaps between those that occur.
+//! Resolution (LSB) of an ADC, from the gaps between the distinct values of its readings.
 
-/// Values that differ by less, as a part of the largest, are one: so far the arithmetic of a conversion rounds.
+/// Difference, relative to the largest value, below which two values are equal: rounding error of a unit conversion.
 const ARITHMETIC: f64 = 1e-9;
-/// Values closer than this part of a step are one code whose last digit was written in two ways.
+/// Gap, in steps, below which two values are one code whose last digit was written in two ways.
 const WRITTEN: f64 = 0.02;
-/// Part of a step that the spellings of a code may span on average: more, and they are codes of their own.
+/// Largest sum of such gaps, in steps per larger gap; above it the values are codes of their own.
 const MOST_WRITTEN: f64 = 0.05;
-/// Gaps between neighbouring values that are tried as the step, coarse before fine: most neighbours are one step apart
-/// where all codes were visited, the smallest gap is two spellings of one code where digits were written.
+/// Quantiles of the gaps that are tried as the step, coarse before fine: most neighbours are one step apart where all
+/// codes occur; the smallest gap is two spellings of one code where readings were written as text.
 const QUANTILES: [f64; 8] = [0.9, 0.75, 0.5, 0.25, 0.1, 0.05, 0.01, 0.0];
-/// Part of a step by which a gap may miss a whole number of steps: a third of it where text has cut three digits in a
-/// step (half a digit at either end), and a margin. Gaps of continuous readings are so near by chance in 36 of 100.
+/// Distance from a whole number of steps, in steps, up to which a gap counts as whole: a third of a step in all for
+/// text with three digits to a step (rounding by half a digit at either end), and a margin. 36 % of continuous gaps do.
 const OFF_GRID: f64 = 0.18;
-/// Part of the gaps that must be whole.
+/// Share of the gaps that must be whole.
 const ON_GRID: f64 = 0.95;
-/// Steps of a gap beyond which its being whole says nothing: the error of the step itself has grown to its size.
+/// Longest gap tested, in steps: beyond it the error of the step times their number reaches a whole step.
 const REACH: f64 = 20.0;
-/// Levels of the densest stretch, where the refinement of the step begins.
+/// Number of neighbouring levels in the densest window, where the refinement of the step begins.
 const DENSE: usize = 32;
-/// The step is refined over levels ever further apart: each reach tells it well enough for one so much wider.
+/// Factor between ranges of the refinement: the step from one range is accurate enough for the next.
 const WIDER: f64 = 4.0;
-/// Gaps within reach, of many, that are evidence: all of them are whole by chance once in 0.36⁻⁷ = 1300 logs.
+/// Fewest gaps within reach for a test by themselves: all of them are whole by chance in one of 0.36⁻⁷ = 1300 logs.
 pub const TESTABLE: usize = 8;
-/// Fewer gaps must be whole by so much that chance does it as seldom, or all be one step.
+/// With fewer gaps the allowed distance is reduced until chance has this probability, unless all gaps are one step.
 const BY_CHANCE: f64 = 1e-3;
-/// And the readings must repeat then, so many times a value.
+/// Readings per distinct value that fewer gaps require.
 pub const REPEATS: usize = 2;
-/// Part by which what all gaps say of the step may differ from the gap that was tried: more, and it was another.
+/// Largest relative difference between the step from all gaps and the gap tried; above it the gap was not the step.
 const DRIFT: f64 = 0.3;
-/// Gaps that are looked at, evenly spread where there are more.
+/// Gaps that are tested, evenly spaced where there are more.
 const MOST_GAPS: usize = 4096;
 
-/// The step of a grid on which all `levels` (ascending, different) of `n` readings lie; `None` where they lie on none.
+/// The step (LSB) of the grid on which `levels` (ascending, distinct) of `n` readings lie; `None` without a grid.
 #[must_use]
 pub fn step(levels: &[f64], n: usize) -> Option<f64> {
     let (&lowest, &highest) = (levels.first()?, levels.last()?);
@@ -47,7 +47,7 @@ pub fn step(levels: &[f64], n: usize) -> Option<f64> {
         .into_iter()
         .find_map(|near| spacing(&gaps, near))?;
     let found = refined(levels, found);
-    // Counts are whole to the last bit.
+    // Integer counts have an integer step.
     let is_counts = found > 0.5 && levels.iter().all(|v| v.fract().to_bits() << 1 == 0);
     Some(if is_counts {
         found.round_ties_even()
@@ -56,7 +56,7 @@ pub fn step(levels: &[f64], n: usize) -> Option<f64> {
     })
 }
 
-/// Gaps that may be the step, and what is left of one after whole ones: two and three steps, never one, leave a step too.
+/// Candidate steps: quantiles of the gaps, and the smallest remainder by the smallest gap (gaps of 2 and 3 steps: 1).
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -82,15 +82,15 @@ fn tried(gaps: &[f64]) -> Vec<f64> {
     out
 }
 
-/// 1.5 · 2⁵²: added and taken away again it leaves the whole number next to one below 2⁵¹, of two the even one.
+/// 1.5 · 2⁵²: adding and subtracting it rounds a number below 2⁵¹ to the nearest integer, ties to even.
 const WHOLE: f64 = 6_755_399_441_055_744.0;
 
-/// The nearest whole number; a call of the library on processors that are not asked for SSE 4.1.
+/// The nearest integer; `round_ties_even` is a library call where the target lacks SSE 4.1.
 fn nearest(value: f64) -> f64 {
     (value + WHOLE) - WHOLE
 }
 
-/// The step by all levels: what digits have cut off a gap is the less, the further apart two levels are.
+/// The step by least squares over all levels: rounding of digits matters less the further apart two levels are.
 fn refined(levels: &[f64], mut step: f64) -> f64 {
     let wide = DENSE.min(levels.len() - 1);
     let spans = levels.windows(wide + 1).map(|few| few[wide] - few[0]);
@@ -109,7 +109,7 @@ fn refined(levels: &[f64], mut step: f64) -> f64 {
             .filter(|&v| (v / step - place(v)).abs() < OFF_GRID)
             .count();
         if on as f64 / n < ON_GRID {
-            return step; // further out the error of the step has grown to its size
+            return step; // beyond this reach the error of the step adds up to a step
         }
         let mean = near.clone().map(place).sum::<f64>() / n;
         let (squares, product) = near.fold((0.0, 0.0), |(squares, product), v| {
@@ -126,7 +126,7 @@ fn refined(levels: &[f64], mut step: f64) -> f64 {
     }
 }
 
-/// The step close to `near` of which gaps are whole multiples.
+/// The step close to `near` of which the gaps are whole multiples; `None` where too few are.
 fn spacing(gaps: &[f64], near: f64) -> Option<f64> {
     let (apart, written): (Vec<f64>, Vec<f64>) =
         gaps.iter().partition(|&&gap| gap > WRITTEN * near);
@@ -144,7 +144,7 @@ fn spacing(gaps: &[f64], near: f64) -> Option<f64> {
             }
         }
         if steps > 0.0 {
-            // Written digits cut neighbouring gaps the other way: in the sum they cancel.
+            // Rounding of written digits has opposite signs in neighbouring gaps and cancels in the sum.
             step = length / steps;
         }
     }

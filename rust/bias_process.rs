@@ -1,55 +1,55 @@
-//! The zero of a sensor from pose to pose: scatter, walk and drift as one Gaussian process, whitened in one pass.
+//! Bias from pose to pose: scatter, random walk and drift as one Gaussian process, whitened in one pass.
 //!
-//! A reading is `y_k = x_kᵀθ + s(pose) + w(t_k) + d(t_k) + ε_k`: `s` is drawn anew in every pose, `w` a random walk, `d` an
-//! integrated walk whose initial slope is random too, ε the error of the mean. Of a norm, which sees the zeros of three axes
-//! along the vertical only, w and d are three independent processes each, seen along a direction of every reading. A
-//! sequential filter gives `V^{-1/2}` of any columns in time linear in the readings: a likelihood costs microseconds.
+//! A reading is `y_k = x_kᵀθ + s(pose) + w(t_k) + d(t_k) + ε_k`: `s` (bias repeatability) is drawn anew per pose, `w`
+//! is a random walk, `d` an integrated walk with a random initial slope, ε the error of the mean. A norm contains only
+//! the biases along the vertical: w and d are then three independent processes each, along a direction given per
+//! reading. A sequential filter applies `V^{-1/2}` in time linear in the readings: a likelihood costs microseconds.
 
 use crate::error::{Error, Result};
 use crate::simd::{Instructions, for_each_instruction_set};
 
-/// Hidden states of one direction: walk, drift, slope of the drift, walk at the start of the stretch averaged.
+/// States per direction: walk, drift, slope of the drift, walk at the start of the averaging interval.
 const PART: usize = 4;
 const WALK: usize = 0;
 const DRIFT: usize = 1;
 const SLOPE: usize = 2;
 const START: usize = 3;
 
-/// Readings in the order of time, with the columns that explain their mean.
+/// Readings in time order, with the regressors of their mean.
 #[derive(Debug, Clone)]
 pub struct Readings {
     /// `n` rows of `columns` numbers: the reading, then its design row.
     pub rows: Vec<f64>,
     /// Numbers per row.
     pub columns: usize,
-    /// Variance of every reading's own error.
+    /// Variance of the error of every reading.
     pub variance: Vec<f64>,
     /// Time of the middle of every reading, non-decreasing.
     pub time: Vec<f64>,
-    /// How long every reading was averaged; what would overlap the reading before is left out.
+    /// Averaging time of every reading; the part that would overlap the reading before is not counted.
     pub length: Vec<f64>,
-    /// Directions, as many numbers a reading as there are independent walks and drifts (1 of a gyro's axis).
+    /// Directions: one number per reading and independent walk and drift (1 for one axis of a gyro).
     pub direction: Vec<f64>,
-    /// Pose of every reading; neighbours of one pose share its scatter.
+    /// Pose of every reading; consecutive readings of one pose share its scatter.
     pub pose: Vec<i64>,
 }
 
-/// Strengths of the process.
+/// Noise strengths of the process.
 #[derive(Debug, Clone, Copy)]
 pub struct Strengths {
-    /// Variance of the zero from pose to pose.
+    /// Variance of the bias from pose to pose.
     pub scatter: f64,
-    /// Variance that a walk gains per unit of time.
+    /// Variance that the random walk gains per unit of time.
     pub walk: f64,
     /// Variance that the slope of the drift gains per unit of time.
     pub drift: f64,
     /// Variance of the slope at time zero.
     pub slope: f64,
-    /// Factor on the variances of the readings' own errors.
+    /// Factor on the error variances of the readings.
     pub noise: f64,
 }
 
-/// What one choice of strengths makes of the readings.
+/// Terms of the likelihood at given strengths.
 #[derive(Debug, Clone)]
 pub struct Whitened {
     /// Log-determinant of the covariance V.
@@ -112,11 +112,11 @@ impl Readings {
         Ok(())
     }
 
-    /// `V^{-1/2}[y X]` summed into its Gram matrix (sequential Kalman filter; every column is filtered with the same gains).
+    /// Gram matrix of `V^{-1/2}[y X]` by a sequential Kalman filter; every column is filtered with the same gains.
     #[must_use]
     pub fn whitened(&self, strengths: Strengths) -> Whitened {
         let instructions = Instructions::detect();
-        // Sizes known to the compiler: the loops over states are what it costs.
+        // Sizes known to the compiler: most of the cost is in the loops over states.
         match self.direction.len() / self.time.len().max(1) {
             1 => along_one(instructions, self, strengths),
             2 => along_two(instructions, self, strengths),
@@ -143,7 +143,7 @@ impl Readings {
         let mut log_det = 0.0;
         let mut last = 0.0;
         for k in 0..self.time.len() {
-            // A mean over a stretch of a walk is the mean of its ends, and less sure by a twelfth of what it walks there.
+            // The mean of a walk over an interval: the mean of its ends, plus a twelfth of the variance gained there.
             let half = 0.5 * self.length[k];
             let before = if k > 0 {
                 self.time[k] - self.time[k - 1] - 0.5 * last
@@ -162,7 +162,7 @@ impl Readings {
             step(&mut covariance, &mut state, c, 2.0 * half, strengths);
             last = 2.0 * half;
             let direction = &self.direction[k * parts..(k + 1) * parts];
-            // The reading is the scatter and, along every direction, walk and drift.
+            // The reading is the scatter plus walk and drift along every direction.
             let gain: [f64; S] = std::array::from_fn(|s| seen(direction, half, &covariance[s]));
             let along: f64 = direction.iter().map(|d| d * d).sum();
             let variance = seen(direction, half, &gain)
@@ -249,7 +249,7 @@ fn filtered_along_three<const FUSED: bool>(readings: &Readings, strengths: Stren
     readings.filtered::<{ 1 + 3 * PART }>(strengths)
 }
 
-/// Lets time pass: d ← d + slope·dt, then the noise of walk and integrated walk over dt.
+/// Propagates by dt: d ← d + slope·dt, then the noise of walk and integrated walk over dt.
 #[inline(always)]
 #[expect(
     clippy::inline_always,
@@ -281,7 +281,7 @@ fn step<const S: usize>(
     }
 }
 
-/// Scatter plus, along every direction, the walk's mean over the stretch and the drift in its middle.
+/// Scatter plus, along every direction, the walk's mean over the averaging interval and the drift at its middle.
 #[inline(always)]
 #[expect(
     clippy::inline_always,
@@ -298,7 +298,7 @@ fn seen<const S: usize>(direction: &[f64], half: f64, states: &[f64; S]) -> f64 
             .sum::<f64>()
 }
 
-/// The walk as it is now becomes the start of the stretch.
+/// Copies the walk to the state that holds it at the start of the averaging interval.
 #[inline(always)]
 #[expect(
     clippy::inline_always,

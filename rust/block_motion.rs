@@ -1,11 +1,11 @@
-//! Motion in the means of blocks of a log: where a pose begins, and which part of a change the gyro foretells.
+//! Motion in block means of a log: where a pose begins, and which part of a change the gyro predicts.
 
 use nalgebra::{SMatrix, SVector};
 
-/// First row from which on no stretch of the sizes departs from zero; `None` where every one of the first `most` does.
+/// The first of the rows 0 to `most` at which no deviating stretch of any of the `sizes` begins; `None` without one.
 ///
-/// `off` are rows of `channels` differences from the level; a stretch of `sizes[k]` rows departs where the squares of its
-/// means over `variances[k]` (channels of zero variance left out) add up to more than `limit`.
+/// `off` are rows of `channels` deviations from the level; a stretch of `sizes[k]` rows deviates where the squares of
+/// its means over `variances[k]` (channels of zero variance excluded) sum to more than `limit`.
 #[must_use]
 pub fn first_clean(
     off: &[f64],
@@ -38,27 +38,27 @@ pub fn first_clean(
     })
 }
 
-/// What the ends of a pose are compared by; one number a channel, or a row a channel wide.
+/// Noise by which the ends of a pose are tested; one number per channel, or rows of one number per channel.
 #[derive(Debug, Clone, Copy)]
 pub struct Edges<'a> {
     /// Variance of a mean over T seconds is `white / T + flicker + walk T / 3`: three rows.
     pub noise: &'a [f64],
-    /// Variance of rounding to the converter's step.
+    /// Variance of rounding to the resolution (LSB).
     pub rounding: &'a [f64],
     /// Seconds in a block.
     pub step_s: f64,
     /// Variance of the mean of 1, 2, 4 ... blocks: a row each.
     pub variances: &'a [f64],
-    /// Channels that show noise.
+    /// Channels that have noise.
     pub is_live: &'a [bool],
-    /// Of the squares of a stretch's distances over their variances.
+    /// Largest sum of the squares of a stretch's deviations over their variances.
     pub limit: f64,
 }
 
-/// Blocks to take off both ends of a pose until no stretch at an end departs from its middle half; at most a third each.
+/// Blocks to trim from either end of a pose until no stretch there deviates from its middle half; at most a third each.
 ///
-/// `rows` are its blocks, `bumps` ranges of them that are left out. Nothing is taken off where hardly a middle is left:
-/// such a pose creeps throughout, which is said instead.
+/// `rows` are its block means, `bumps` ranges of blocks to exclude. `(0, 0)` where less than half would remain: such a
+/// pose settles throughout, which is reported instead.
 #[must_use]
 pub fn ends_to_trim(rows: &[f64], bumps: &[[usize; 2]], edges: &Edges) -> (usize, usize) {
     let channels = edges.rounding.len().max(1);
@@ -106,8 +106,8 @@ pub fn ends_to_trim(rows: &[f64], bumps: &[[usize; 2]], edges: &Edges) -> (usize
     let variances = &edges.variances[..sizes.len() * channels];
     let variances: Vec<f64> = variances.iter().enumerate().map(known).collect();
     let clean = |off: &[f64]| {
-        // A soft beginning goes on below what can be seen: as much again is given away; and one block, which may be
-        // the one the motion begins in.
+        // The onset of a motion is below the detection limit: twice the length detected is trimmed, and one block, in
+        // which the motion may begin.
         first_clean(off, channels, most, &sizes, &variances, edges.limit)
             .map_or(most, |clean| (2 * clean + 1).min(most))
     };
@@ -118,8 +118,8 @@ pub fn ends_to_trim(rows: &[f64], bumps: &[[usize; 2]], edges: &Edges) -> (usize
     }
 }
 
-/// Sums of the squared output of a filter of five taps over ranges of rows, two less at either end; missing readings
-/// count as zero.
+/// Sums of the squared output of a five-tap filter over ranges of rows, without two rows at either end; missing
+/// readings count as zero.
 #[must_use]
 pub fn band_power(rows: &[[f64; 3]], taps: [f64; 5], ranges: &[[usize; 2]]) -> Vec<[f64; 3]> {
     let scale = taps.iter().map(|t| t * t).sum::<f64>();
@@ -143,28 +143,28 @@ pub fn band_power(rows: &[[f64; 3]], taps: [f64; 5], ranges: &[[usize; 2]]) -> V
         .collect()
 }
 
-/// Unknowns of what the gyro foretells: nine of scale, three of zero.
+/// Unknowns of a change predicted from the gyro: nine of scale, three of bias.
 pub const UNKNOWNS: usize = 12;
 
-/// Windows over which a reading changed: by noise, and by `mean × (W rate + z)` where the body turned.
+/// Windows over which a reading changed: by noise, and by `mean × (W rate + z)` where the body rotated.
 #[derive(Debug, Clone, Copy)]
 pub struct Windows<'a> {
-    /// Change from half to half.
+    /// Change of the mean from the first half to the second.
     pub change: &'a [[f64; 3]],
     /// Mean reading.
     pub mean: &'a [[f64; 3]],
-    /// Rate as the change weighs it.
+    /// Mean rate with the weights of the change.
     pub rate: &'a [[f64; 3]],
 }
 
-/// Descents to the least absolute deviations.
+/// Iterations of reweighted least squares for the least absolute deviations.
 const REWEIGHTED: usize = 6;
-/// Part of the largest eigenvalue of normal equations below which rounding could have made the eigenvalue.
+/// Eigenvalues of normal equations below this part of the largest may be rounding errors.
 const FREE: f64 = 1e-13;
 
 impl Windows<'_> {
-    /// `W` (row by row) and `z` that foretell the changes best, with least absolute deviations in units of `scale`:
-    /// pushes and settling are not rotation.
+    /// `W` (row by row) and `z` that best predict the changes, by least absolute deviations in units of `scale`:
+    /// disturbances and settling are not rotation.
     #[must_use]
     pub fn share(&self, scale: [f64; 3]) -> [f64; UNKNOWNS] {
         let mut solution = None;
@@ -175,7 +175,7 @@ impl Windows<'_> {
         solution.unwrap_or_default()
     }
 
-    /// What `W` (row by row) and `z` do not foretell of every change, in units of `scale`: its length.
+    /// Length of the part of every change that `W` (row by row) and `z` do not predict, in units of `scale`.
     fn left(&self, solution: &[f64; UNKNOWNS], scale: [f64; 3]) -> Vec<f64> {
         let windows = self.change.iter().zip(self.mean).zip(self.rate);
         windows
@@ -193,8 +193,8 @@ impl Windows<'_> {
             .collect()
     }
 
-    /// Normal equations `(12, 12)` and `(12,)`, changes in units of `scale`, weighed to least absolute deviations from
-    /// `solution` (all alike without one).
+    /// Normal equations `(12, 12)` and `(12,)`, changes in units of `scale`, weighted for least absolute deviations
+    /// from `solution` (equal weights without one).
     fn equations(
         &self,
         scale: [f64; 3],
@@ -208,7 +208,7 @@ impl Windows<'_> {
                 .collect::<Vec<f64>>()
         });
         let (mut gram, mut side) = (vec![0.0; UNKNOWNS * UNKNOWNS], vec![0.0; UNKNOWNS]);
-        // Where (row j of `W`, column k; k = 3 is `z`) stands among the unknowns.
+        // Index of (row j of `W`, column k; k = 3 is `z`) among the unknowns.
         let place = |j: usize, k: usize| if k < 3 { 3 * j + k } else { 9 + j };
         for (w, ((change, mean), rate)) in
             self.change.iter().zip(self.mean).zip(self.rate).enumerate()
@@ -245,9 +245,9 @@ impl Windows<'_> {
     }
 }
 
-/// Solution of normal equations in unit columns, the shortest where the rows leave some free: a dead or unturned axis.
+/// Solution of normal equations scaled to unit columns, of minimum norm (an axis may be dead or never turned).
 ///
-/// Half the digits are enough for what readings with a noise of 10⁻⁴ say.
+/// Half of the digits suffice for readings with a noise of 10⁻⁴.
 fn least_squares(gram: &[f64], side: &[f64]) -> [f64; UNKNOWNS] {
     type Square = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
     let gram = Square::from_column_slice(gram);
@@ -268,7 +268,7 @@ fn least_squares(gram: &[f64], side: &[f64]) -> [f64; UNKNOWNS] {
 mod tests {
     use super::{UNKNOWNS, Windows};
 
-    /// Changes made of a known turn: what is found foretells them, though one axis of the gyro is dead.
+    /// Changes computed from a known rotation: the estimate predicts them although one axis of the gyro is dead.
     #[test]
     fn the_share_of_a_gyro_foretells_the_changes_that_it_made() {
         let number = |k: usize, s: f64| (12.9898 * k as f64 + s).sin();
@@ -294,7 +294,7 @@ mod tests {
             rate: &rate,
         };
         let found = windows.share([1.0; 3]);
-        // Half the digits are kept; of the dead axis nothing is said.
+        // Half of the digits remain; the dead axis is undetermined.
         assert!(
             windows
                 .left(&found, [1.0; 3])

@@ -1,24 +1,24 @@
-//! What a kernel can refuse, in the words of the person who asked.
+//! Errors of the kernels.
 
 use std::fmt;
 
-/// A question a kernel cannot answer as asked. The text is one sentence: what, where, remedy.
+/// Why a kernel gives no result. The text is one sentence: what, where, remedy.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Error {
-    /// The input is malformed (shape, order, range): the caller can mend it.
+    /// The input is malformed (shape, order, range): the caller can correct it.
     BadInput(String),
     /// The input is well formed but does not determine the answer.
     NotDetermined(String),
 }
 
 impl Error {
-    /// A malformed question.
+    /// Error of a malformed input.
     #[must_use]
     pub fn bad_input(message: impl Into<String>) -> Self {
         Self::BadInput(message.into())
     }
 
-    /// A well-formed question whose answer the data does not determine.
+    /// Error of a well-formed input that does not determine the answer.
     #[must_use]
     pub fn not_determined(message: impl Into<String>) -> Self {
         Self::NotDetermined(message.into())

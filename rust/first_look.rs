@@ -1,4 +1,4 @@
-//! A first look at readings: how quiet short windows are, and in how few rows gravity turned.
+//! First statistics of a log: noise of short windows, and the fewest rows in which gravity turns.
 
 use rayon::prelude::*;
 
@@ -11,12 +11,12 @@ pub struct Windows {
     pub mean: Vec<[f64; 3]>,
     /// Standard deviation of the first difference over √2.
     pub noise: Vec<[f64; 3]>,
-    /// Length of the three standard deviations.
+    /// Root of the sum of the three variances.
     pub spread: Vec<f64>,
 }
 
-/// Statistics of windows `[start, start + length)`; `None` where a reading in one of them is no number, a window does
-/// not lie in the readings, or is shorter than two rows.
+/// Statistics of windows `[start, start + length)`; `None` where a reading in one of them is not finite, a window is
+/// not inside the readings, or it is shorter than two rows.
 #[must_use]
 pub fn windows(rows: &[[f64; 3]], starts: &[usize], length: usize) -> Option<Windows> {
     if length < 2 {
@@ -46,8 +46,8 @@ pub fn windows(rows: &[[f64; 3]], starts: &[usize], length: usize) -> Option<Win
     Some(out)
 }
 
-/// Median length of the readings in windows `[start, start + length)`, those that are no numbers left out; NaN of none.
-/// `None` where a window does not lie in the readings.
+/// Median length of the readings (vectors) in windows `[start, start + length)`, NaN excluded; NaN where there are
+/// none. `None` where a window is not inside the readings.
 #[must_use]
 pub fn median_length(rows: &[[f64; 3]], starts: &[usize], length: usize) -> Option<f64> {
     let of_one = |&start: &usize| Some(rows.get(start..start.checked_add(length)?)?.iter());
@@ -57,7 +57,7 @@ pub fn median_length(rows: &[[f64; 3]], starts: &[usize], length: usize) -> Opti
     Some(median(&mut lengths))
 }
 
-/// Means of the first `count` blocks of `length` rows; `None` where there are fewer rows, or none in a block.
+/// Means of the first `count` blocks of `length` rows; `None` where there are fewer rows, or `length` is zero.
 #[must_use]
 pub fn block_means(rows: &[[f64; 3]], length: usize, count: usize) -> Option<Vec<[f64; 3]>> {
     let rows = rows.get(..length.checked_mul(count)?)?;
@@ -95,10 +95,10 @@ fn moments(rows: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
     (mean, squares.map(|s| s / n))
 }
 
-/// Rows in which a direction at its quickest turned by `turn` [rad]: between two stretches at rest, and at all.
+/// Fewest rows in which a direction turns by `turn` [rad]: between two static stretches, and between any two.
 ///
-/// A stretch is `side` rows; at rest it turns ten times slower than between the two. Readings that are no numbers are
-/// left out; none where a reading is zero or there are fewer than four stretches.
+/// A stretch is `side` rows; a static one turns ten times slower than the direction between the two. Readings that are
+/// not finite are excluded; `None` where a reading is zero or there are fewer than four stretches.
 #[must_use]
 pub fn quickest_turns(rows: &[[f64; 3]], side: usize, turn: f64) -> (Option<usize>, Option<usize>) {
     let mut total = vec![[0.0; 3]];
@@ -118,7 +118,7 @@ pub fn quickest_turns(rows: &[[f64; 3]], side: usize, turn: f64) -> (Option<usiz
     for pair in total.windows(side + 1) {
         let sum: [f64; 3] = std::array::from_fn(|k| (pair[side][k] - pair[0][k]) / side as f64);
         let length = (sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]).sqrt();
-        // Unit vectors spread evenly over an angle a have a mean shorter by a²/24.
+        // Unit vectors spread evenly over an angle a have a mean of length 1 − a²/24.
         spread.push((24.0 * (1.0 - length).max(0.0)).sqrt());
         mean.push(sum.map(|v| v / length.max(1e-12)));
     }

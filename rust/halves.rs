@@ -1,19 +1,19 @@
-//! Stretches halved again and again: how the means of two halves differ (an unbalanced Haar transform).
+//! Stretches halved repeatedly, and the differences between the means of two halves (an unbalanced Haar transform).
 
-/// Differences of halves, every stretch as a whole first, then all halves, and so on to one block.
+/// Differences of halves: every stretch as a whole first, then all its halves, and so on to one block.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Halves {
-    /// `(k, channels)` halved squared difference of the means of two halves, row by row.
+    /// `(k, channels)` half the squared difference of the means of two halves, row by row.
     pub square: Vec<f64>,
     /// Blocks in a half: the harmonic mean where the halves differ by one.
     pub size: Vec<f64>,
-    /// 0 for a stretch as a whole.
+    /// Number of halvings before: 0 for a stretch as a whole.
     pub depth: Vec<i64>,
-    /// Which stretch each came from.
+    /// Index of the stretch of each difference.
     pub stretch: Vec<i64>,
 }
 
-/// Of `blocks` `(m, channels)` row by row, in stretches from a first block to the one behind the last.
+/// Halves of `blocks` `(m, channels)`, row by row, in stretches `(first, stop)` of blocks.
 #[must_use]
 pub fn halves(blocks: &[f64], channels: usize, stretches: &[(usize, usize)]) -> Halves {
     let total = running_total(blocks, channels);
@@ -60,7 +60,7 @@ pub fn halves(blocks: &[f64], channels: usize, stretches: &[(usize, usize)]) -> 
     out
 }
 
-/// `(m + 1, channels)` sums of the blocks before each, about their mean: long logs with a large offset lose no digits.
+/// `(m + 1, channels)` sums of the blocks before each, about their mean: a large offset costs no precision.
 fn running_total(blocks: &[f64], channels: usize) -> Vec<f64> {
     let n = blocks.len() / channels.max(1);
     let mut mean = vec![0.0; channels];

@@ -1,6 +1,6 @@
-//! A person's wish that a long computation end: kernels look between blocks of work and stop early.
+//! Interruption of a long computation by the user: kernels check between blocks of work and stop early.
 //!
-//! What a stopped kernel returns is worthless; whoever called [`request`] must not use it.
+//! The result of a stopped kernel is invalid; the caller of [`request`] must not use it.
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -8,13 +8,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 static REQUESTS: AtomicUsize = AtomicUsize::new(0);
 static PENDING: AtomicUsize = AtomicUsize::new(0);
 
-/// How many requests there were so far: a kernel during which this number grew was stopped.
+/// Number of requests so far: a kernel during which it grew was stopped.
 #[must_use]
 pub fn requests() -> usize {
     REQUESTS.load(Ordering::SeqCst)
 }
 
-/// Ask every running kernel to stop, until the answer is dropped.
+/// Asks every running kernel to stop, until the returned value is dropped.
 #[must_use]
 pub fn request() -> Request {
     PENDING.fetch_add(1, Ordering::SeqCst);
@@ -26,20 +26,20 @@ thread_local! {
     static WATCH: Cell<Option<fn() -> bool>> = const { Cell::new(None) };
 }
 
-/// Whether somebody waits for the running kernels to stop.
+/// Whether a request to stop the running kernels is pending.
 #[inline]
 #[must_use]
 pub fn is_requested() -> bool {
     PENDING.load(Ordering::Relaxed) > 0 || WATCH.get().is_some_and(|look| look())
 }
 
-/// Have this thread's kernels look for such a wish themselves, until the answer is dropped: nobody else does.
+/// Makes the kernels of this thread, and of no other, poll `look` until the returned value is dropped.
 #[must_use]
 pub fn watch(look: fn() -> bool) -> Watch {
     Watch(WATCH.replace(Some(look)))
 }
 
-/// A thread that looks for itself as long as this lives.
+/// Polling on this thread, for as long as this lives.
 #[derive(Debug)]
 pub struct Watch(Option<fn() -> bool>);
 
@@ -49,7 +49,7 @@ impl Drop for Watch {
     }
 }
 
-/// A request that stands as long as this lives.
+/// A request, pending for as long as this lives.
 #[derive(Debug)]
 pub struct Request(());
 

@@ -1,38 +1,38 @@
-//! Steps of a motion that are longer than the motion around them by one sample: joints of the curves on either side.
+//! Sample intervals of a move across which one sample is lost or too many, by how the curves on either side join.
 
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::running::{running_maximum, running_median};
 
-/// Samples on either side through which one curve is laid.
+/// Samples on either side of an interval that one curve is fitted to.
 pub const HALF: usize = 4;
-/// What one curve through both sides leaves: numbers a channel.
+/// Contrasts per channel that the fit of one curve to both sides leaves.
 pub const FREE: usize = 2;
-/// Weights by which samples on both sides of a step contradict one curve.
+/// Weights of the contrasts, which are zero where the samples on both sides of an interval lie on one curve.
 pub type Contrasts = [[f64; 2 * HALF]; FREE];
 
-/// What tells a step that is one sample off from the motion around it.
+/// Limits for the detection of an interval that is one sample too long or too short.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Steps over which an ordinary joint is the median.
+    /// Window, in intervals, of the median that is the ordinary misfit.
     pub nearby: usize,
-    /// What one lost sample would add, in ordinary joints, from where a step counts.
+    /// Misfit expected of one lost sample, in ordinary misfits, from which an interval is tested.
     pub sharp: f64,
-    /// Of that, the least and most that is gained by a sample put between.
+    /// Least and greatest part of the expected misfit that a sample inserted or removed must explain.
     pub part: (f64, f64),
-    /// Least and greatest shortfall of a step that is too short, in steps.
+    /// Least and greatest shortfall of an interval that is too short, in intervals.
     pub whole: (f64, f64),
-    /// What may be left, in ordinary joints.
+    /// Largest misfit that may remain, in ordinary misfits.
     pub left: f64,
-    /// What may be left of a step that falls short, as a part of what there was.
+    /// Largest misfit that may remain at a short interval, as a part of the misfit before.
     pub mirrored: f64,
 }
 
-/// Of the inner steps of one move: which would show a lost sample, which are one sample too long, which too short.
+/// The inner intervals of one move: where a lost sample is detectable, which are one sample too long, which too short.
 #[derive(Debug, Clone, Default)]
 pub struct Joints {
-    /// A lost sample would show.
+    /// A lost sample is detectable.
     pub is_sharp: Vec<bool>,
     /// One sample too long.
     pub is_long: Vec<bool>,
@@ -40,8 +40,8 @@ pub struct Joints {
     pub is_short: Vec<bool>,
 }
 
-/// Joints of readings `(n, channels)`, in noises, row by row; `contrasts` as they stand, with one sample put between and
-/// one taken out. `n - 2 HALF - 1` steps.
+/// Joints of the readings `(n, channels)` of a move in units of their noise, row by row; `contrasts` are for the
+/// samples unchanged, with one inserted and with one removed. `n - 2 HALF - 1` intervals.
 ///
 /// # Errors
 /// `BadInput` when the numbers do not make rows.
@@ -94,8 +94,8 @@ pub fn joints(
                 && gain < limits.part.1 * expected
                 && s.zero - gain < limits.left * dof * ordinary[at]
         };
-        // A short step is also one whose jump falls short of the slope beside it, the mirror image of a long one: a bend
-        // is as often the one as the other.
+        // An interval is too short also where its jump is less than the slope beside it, the mirror image of a long
+        // one: a bend resembles either equally often.
         let short_by = -s.extra();
         let is_mirrored = s.power() > limits.sharp * ordinary[at]
             && s.explained() >= explained[at]
@@ -109,8 +109,8 @@ pub fn joints(
     Ok(out)
 }
 
-/// Joints of all steps of moves `[first, last)` one after the other, readings `(n, channels)` in noises `(channels,)` of
-/// their own; what is no number counts as nothing.
+/// Joints of all intervals of the moves `[first, last)`, one after the other; readings `(n, channels)` with noise
+/// `(channels,)`; a reading that is not finite counts as zero.
 ///
 /// # Errors
 /// `BadInput` when the numbers do not make rows, or samples on either side of a move are missing.
@@ -145,16 +145,16 @@ pub fn joints_of_moves(
     Ok(out)
 }
 
-/// Sums over the channels at one step.
+/// Sums over the channels at one interval.
 #[derive(Clone, Copy, Default)]
 struct Seen {
-    /// Squares left over as the readings stand.
+    /// Squared misfit of the readings unchanged.
     zero: f64,
-    /// What a sample put between, and one taken out, takes off them.
+    /// Decrease of that misfit by one sample inserted, and by one removed.
     gain: [f64; 2],
-    /// Squared slope across the step.
+    /// Squared slope across the interval.
     across2: f64,
-    /// Squares of a jump by the slope beside the step, its product with what is left, and what is left with it.
+    /// Squares of a jump by the slope beside the interval, its product with the misfit, and the misfit with it.
     shape2: f64,
     product: f64,
     with_jump: f64,

@@ -1,14 +1,14 @@
-//! Which different values readings take: a converter's codes, however they were scaled.
+//! Distinct values of readings: the codes of an ADC, in any scaling.
 
 use rayon::prelude::*;
 
-/// Different values up to which a table finds them; more are no converter's codes, and sorting is as fast.
+/// Number of distinct values up to which a hash table finds them; more are no ADC codes, and sorting is as fast.
 const MOST_IN_TABLE: usize = 1 << 16;
 
-/// Span of whole numbers up to which a bit each finds them: the codes of 24-bit converters in two megabytes.
+/// Span of integers up to which a bit field finds them: the codes of 24-bit ADCs in two megabytes.
 const MOST_CODES: f64 = (1 << 24) as f64;
 
-/// Different values that are numbers, in ascending order, and how many readings are numbers.
+/// Distinct finite values in ascending order, and the number of finite readings.
 #[must_use]
 #[allow(clippy::float_cmp)] // a code is a whole number to the last bit
 pub fn levels(readings: &[f64]) -> (Vec<f64>, usize) {
@@ -30,7 +30,7 @@ pub fn levels(readings: &[f64]) -> (Vec<f64>, usize) {
     (different(numbers), finite)
 }
 
-/// Whole numbers from `low` to `high` that occur.
+/// Integers from `low` to `high` that occur.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

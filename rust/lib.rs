@@ -1,7 +1,7 @@
 //! The mathematics of `trihedron`: slices and nalgebra in, plain structs out.
 //!
-//! No module here reads files, prints, or knows Python; `python` (feature `python`) is the only seam.
-//! Vocabulary: `S`, `b` are the direct form `f = S a' + b` (raw to SI), `Mz` is the instrument trihedron.
+//! No module here reads files, prints, or depends on Python; `python` (feature `python`) is the only binding.
+//! Vocabulary: `S`, `b` are the direct form `f = S a' + b` (raw to SI), `Mz` is the body frame (instrument frame).
 
 pub mod adc_grid;
 pub mod allan;

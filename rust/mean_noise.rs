@@ -1,15 +1,15 @@
-//! How the variance of a mean falls with its length: three terms, from variances at several lengths.
+//! Variance of a mean against its length: three terms, fitted to variances at several lengths.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::{Error, Result};
 
-/// Rounds in which weights follow the model.
+/// Iterations of reweighting by the model.
 const ROUNDS: usize = 5;
-/// Variance, as a part of the largest, below which the first term stands for what is not there.
+/// Lower bound of the model variance, as a part of the largest variance; it scales with length as the first term.
 const LEAST: f64 = 1e-3;
 
-/// Deviance and terms of one choice of columns.
+/// Deviance and terms for one choice of columns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Terms {
     /// `Σ n (s/v - 1 - ln(s/v))`.
@@ -18,12 +18,12 @@ pub struct Terms {
     pub terms: [f64; 3],
 }
 
-/// Non-negative terms of the chosen columns that fit variances `seen` of `n` degrees of freedom each.
+/// Non-negative terms of the chosen columns, fitted to variances `seen` with `n` degrees of freedom each.
 ///
-/// Least squares weighted by the model of the round before (five rounds), which is scoring for the deviance.
+/// Least squares weighted by the model of the iteration before (five iterations): Fisher scoring for the deviance.
 ///
 /// # Errors
-/// `BadInput` when lengths differ, or fewer variances than columns leave the terms open.
+/// `BadInput` when lengths differ, or there are fewer variances than chosen columns.
 pub fn terms(design: &[[f64; 3]], seen: &[f64], n: &[f64], chosen: &[usize]) -> Result<Terms> {
     if design.len() != seen.len() || n.len() != seen.len() || seen.len() < chosen.len() {
         return Err(Error::bad_input(
@@ -65,7 +65,7 @@ pub fn terms(design: &[[f64; 3]], seen: &[f64], n: &[f64], chosen: &[usize]) -> 
 }
 
 /// Non-negative weighted least squares of at most three columns: the best of all sets of columns whose free solution
-/// has no negative term. Only one set fulfils the conditions of the optimum, so that it is that optimum.
+/// has no negative term. Only one set fulfils the conditions of the optimum, so that the best one is that optimum.
 fn non_negative(design: &[[f64; 3]], seen: &[f64], weight: &[f64], chosen: &[usize]) -> [f64; 3] {
     let side = DVector::from_iterator(seen.len(), seen.iter().zip(weight).map(|(s, w)| s * w));
     let mut best = (side.norm_squared(), [0.0; 3]);

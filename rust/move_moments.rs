@@ -1,9 +1,9 @@
-//! What a rate with unknown scale and axes turns a force by over a move: first moments of the two.
+//! First moments of a force and a rate over a move: the rotation of the force by a rate of unknown scale and axes.
 
 use nalgebra::{Matrix3, Vector3};
 
 /// `∫ f wᵀ dt` by trapezoids over every move, `f = S a + b` of the readings `a`, `w` the rate less the move's `bias`.
-/// Rows that are no numbers are passed over; `None` where fewer than two are left.
+/// Rows that are not finite are skipped; `None` where fewer than two remain.
 #[must_use]
 pub fn moments(
     time: &[f64],

@@ -1,11 +1,11 @@
-//! Signals that effects are made of, along the samples of a session: play, time derivatives and shifts inside moves.
+//! Regressors of effects along the samples of a session: play, time derivatives and time shifts inside moves.
 
 use rayon::prelude::*;
 
 /// Half-open range of the samples of a move.
 type Edges = [usize; 2];
 
-/// Play operator: how far a path leads a follower that it drags with slack, in half-widths: within -1 and 1.
+/// Play (backlash): distance of a path from a follower that it drags with slack, in half-widths, within -1 and 1.
 ///
 /// `path` has rows of `columns` numbers.
 #[must_use]
@@ -21,7 +21,7 @@ pub fn play(path: &[f64], columns: usize, half_width: f64) -> Vec<f64> {
     out
 }
 
-/// Time derivative inside moves, nothing outside: by the parabola through three samples, at ends by two.
+/// Time derivative inside moves, zero outside: by the parabola through three samples, at ends by two.
 #[must_use]
 pub fn derivative(time: &[f64], values: &[[f64; 3]], moves: &[Edges]) -> Vec<[f64; 3]> {
     let mut out = vec![[0.0; 3]; values.len()];
@@ -53,8 +53,8 @@ pub fn derivative(time: &[f64], values: &[[f64; 3]], moves: &[Edges]) -> Vec<[f6
     out
 }
 
-/// Values read `ahead` later inside moves, their ends held, by the cubic spline of every move with level ends; unchanged
-/// outside.
+/// Values at a time `ahead` seconds later inside moves, constant beyond their ends, by the cubic spline of every move
+/// with zero slope at both ends; unchanged outside.
 #[must_use]
 pub fn shifted(time: &[f64], values: &[[f64; 3]], moves: &[Edges], ahead: f64) -> Vec<[f64; 3]> {
     let each: Vec<Vec<[f64; 3]>> = moves
@@ -99,11 +99,11 @@ fn shifted_move(t: &[f64], y: &[[f64; 3]], ahead: f64) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// Slopes of the spline at its knots: continuous curvature inside, level ends.
+/// Slopes of the spline at its knots: continuous curvature inside, zero slope at both ends.
 fn spline_slopes(t: &[f64], y: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let n = t.len();
     let mut slope = vec![[0.0; 3]; n];
-    // Forward elimination of the tridiagonal system; `upper` is what couples a knot to the next one.
+    // Forward elimination of the tridiagonal system; `upper` couples a knot to the next one.
     let mut upper = vec![0.0; n];
     for k in 1..n.saturating_sub(1) {
         let (before, after) = (t[k] - t[k - 1], t[k + 1] - t[k]);

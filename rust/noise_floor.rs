@@ -1,71 +1,71 @@
-//! The noise floor of a log: grown from its quietest windows until it holds every window that the same noise explains
-//! (docs/segmentation.md, sections 1 and 2).
+//! The noise floor of a log: grown from its quietest windows until it includes every window that the same noise
+//! explains (docs/segmentation.md, sections 1 and 2).
 
 use crate::order_statistics::{median, quantile};
 use crate::running::rolling_mean;
 
-/// The quietest part of a log that is taken for still to begin with, where that is more than the least said.
+/// Quietest part of a log that is taken as static at the start, where it exceeds the given minimum.
 const SEED_FRACTION: f64 = 0.02;
-/// Quantile of a log's windows that stands for stillness before it is found.
+/// Quantile of a log's windows that represents static windows before these are found.
 const USUALLY_STILL: f64 = 0.1;
-/// Of a channel's rms, squared: running sums round at a tenth of this root; no noise is so small beside its motion.
+/// Least power relative to a channel's mean square: running sums round at a tenth of its root; noise is larger.
 const ROUNDING_POWER: f64 = 1e-14;
-/// Of a channel's usual power: a window without any would have a logarithm without end.
+/// Least power relative to a channel's usual power: the logarithm of a window without any would be infinite.
 const LEAST_POWER: f64 = 1e-12;
-/// Sets that still change after as many rounds go to and fro between two of no consequence.
+/// Most iterations: sets that still change then alternate between two that hardly differ.
 const MOST_ROUNDS: usize = 60;
 
 /// Blocks of a log, row by row `(m, channels)`.
 #[derive(Debug, Clone, Copy)]
 pub struct Blocks<'a> {
-    /// Of a row.
+    /// Number of channels.
     pub channels: usize,
     /// Readings in a block.
     pub length: usize,
     /// Mean reading of each block and channel.
     pub mean: &'a [f64],
-    /// Variance of a reading in it.
+    /// Variance of a reading in each block and channel.
     pub variance: &'a [f64],
     /// `(m,)` false where readings are missing.
     pub is_valid: &'a [bool],
-    /// Whether a channel's scatter is the sensor's own in the window about a block.
+    /// Whether a channel's scatter is the sensor's own noise in the window about a block.
     pub tells: &'a [bool],
-    /// `(channels,)` variance of rounding to the converter's step.
+    /// `(channels,)` variance of rounding to the resolution (LSB).
     pub rounding: &'a [f64],
 }
 
-/// What is asked of the blocks.
+/// Options of the search.
 #[derive(Debug, Clone, Copy)]
 pub struct Question {
     /// Blocks in a window.
     pub width: usize,
-    /// Windows taken for still to begin with, at least.
+    /// Least number of windows taken as static at the start.
     pub seed: usize,
-    /// Of still windows.
+    /// Tails of static windows.
     pub tails: Tails,
-    /// Median of the variance of block means in a window over the variance itself.
+    /// Median of the variance of block means in a window, over the variance itself.
     pub median_ratio: f64,
 }
 
-/// Of the activity of a sensor at rest, about its median.
+/// Distribution of the activity of a static sensor about its median.
 #[derive(Debug, Clone, Copy)]
 pub struct Tails {
-    /// Part of still windows one deviation and more below.
+    /// Part of static windows that lie one deviation or more below.
     pub lower: f64,
-    /// Deviations above, up to which a window is still.
+    /// Deviations above the median up to which a window is static.
     pub deviations: f64,
 }
 
-/// The floor, and how far every window lies above it.
+/// The noise floor, and the level of every window above it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Floor {
-    /// `(m,)` logarithm of the scatter inside the blocks of a window over the floor's.
+    /// `(m,)` logarithm of the variance inside the blocks of a window over the floor's.
     pub fast: Vec<f64>,
     /// `(m,)` the same of block means.
     pub slow: Vec<f64>,
-    /// Of the two in a sensor at rest.
+    /// Limits of the two for a static sensor.
     pub limits: [f64; 2],
-    /// `(m,)` at the floor in both.
+    /// `(m,)` below both limits.
     pub is_quiet: Vec<bool>,
     /// `(channels,)` variance of a reading inside a quiet block.
     pub white: Vec<f64>,
@@ -73,15 +73,15 @@ pub struct Floor {
     pub wander: Vec<f64>,
 }
 
-/// Power of one channel in every window, and the windows in which it has a vote.
+/// Power of one channel in every window, and the windows in which it counts.
 struct Channel {
     inside: Vec<f64>,
     between: Vec<f64>,
     tells: Vec<bool>,
 }
 
-/// The floor of a channel is the median over the quiet windows, so that neither axes of different noise nor a few
-/// disturbed windows matter; the limit is [`still_limit`].
+/// The floor of a channel is the median over the quiet windows, so that axes of different noise and a few disturbed
+/// windows do not matter; the limit is [`still_limit`].
 #[must_use]
 pub fn noise_floor(blocks: &Blocks, asked: &Question) -> Floor {
     let m = blocks.is_valid.len();
@@ -119,8 +119,8 @@ pub fn noise_floor(blocks: &Blocks, asked: &Question) -> Floor {
     floor
 }
 
-/// Highest activity of a sensor at rest: the false-alarm quantile of a log-normal whose width is that of the chi-square
-/// law with as many degrees of `freedom`, or of the lower half of the values where that is larger (coloured noise).
+/// Highest activity of a static sensor: the false-alarm quantile of a log-normal as wide as chi-square with `freedom`
+/// degrees of freedom, or as the lower half of the values where that is wider (coloured noise).
 pub fn still_limit(activity: &mut [f64], freedom: usize, tails: &Tails) -> f64 {
     let middle = median(activity);
     let lower = middle - quantile(activity, tails.lower);
@@ -133,7 +133,7 @@ fn whole_windows(is_valid: &[bool], width: usize) -> Vec<bool> {
     missing.iter().map(|&part| part <= 0.0).collect()
 }
 
-/// `None` where the usual window of a channel shows no noise at all.
+/// `None` where the median window of a channel has no noise at all.
 fn channel(blocks: &Blocks, width: usize, whole: &[bool], c: usize) -> Option<Channel> {
     let column = |values: &[f64]| -> Vec<f64> {
         let all = values.iter().skip(c).step_by(blocks.channels);
@@ -145,7 +145,7 @@ fn channel(blocks: &Blocks, width: usize, whole: &[bool], c: usize) -> Option<Ch
     let (mut mean, mut variance) = (column(blocks.mean), column(blocks.variance));
     let present = blocks.is_valid.iter().filter(|&&ok| ok).count();
     let sum: f64 = mean.iter().filter(|v| !v.is_nan()).sum();
-    // Running sums round: means are counted from near their own, and nothing where blocks are invalid.
+    // Running sums round: means are taken about their average, and invalid blocks count as zero.
     let centre = sum / present as f64;
     for (value, other) in mean.iter_mut().zip(&mut variance) {
         (*value, *other) = if value.is_nan() {
@@ -173,7 +173,7 @@ fn channel(blocks: &Blocks, width: usize, whole: &[bool], c: usize) -> Option<Ch
     if !(usual_inside > 0.0 && usual(&between) > 0.0) {
         return None;
     }
-    // A simulation without noise must not take the rounding of sums for its noise.
+    // In a simulation without noise the rounding of sums must not be taken for noise.
     let rms = square.iter().sum::<f64>() / square.len() as f64;
     let tiny = (LEAST_POWER * usual_inside).max(ROUNDING_POWER * rms);
     let part = tiny / blocks.length as f64;
@@ -203,7 +203,7 @@ fn both(a: &[bool], b: &[bool]) -> Vec<bool> {
 }
 
 impl Channel {
-    /// Median over quiet windows in which the channel tells; over all in which it does where no quiet one is.
+    /// Median over quiet windows in which the channel counts; where none is quiet, over all in which it counts.
     fn median_of(&self, values: &[f64], quiet: &[bool]) -> f64 {
         let mut seen = chosen(values, &both(quiet, &self.tells));
         if seen.is_empty() {
@@ -213,7 +213,7 @@ impl Channel {
     }
 }
 
-/// `(m,)` mean over the channels that tell of the values of each; infinite where none does.
+/// `(m,)` mean over the channels that count in each window; infinite where none does.
 fn mean_over(alive: &[&Channel], m: usize, values: &[Vec<f64>]) -> Vec<f64> {
     let mut sum = vec![0.0; m];
     if alive.iter().all(|one| !one.tells.contains(&false)) {
@@ -241,7 +241,7 @@ fn mean_over(alive: &[&Channel], m: usize, values: &[Vec<f64>]) -> Vec<f64> {
     sum.into_iter().zip(&count).map(mean).collect()
 }
 
-/// `(m,)` logarithm of the power of a window: each channel in units of its own when still, roughly.
+/// `(m,)` logarithm of the power of a window, each channel relative to its approximate power in static windows.
 fn total_power(alive: &[&Channel], whole: &[bool]) -> Vec<f64> {
     let relative = |one: &&Channel| -> Vec<f64> {
         let both_parts = one.inside.iter().zip(&one.between);
@@ -274,7 +274,7 @@ fn seed(total: &[f64], whole: &[bool], least: usize) -> Vec<bool> {
     total.iter().map(|&value| value <= last).collect()
 }
 
-/// Every window below both limits is quiet, and this repeats until nothing changes.
+/// Repeated until nothing changes: every window below both limits is quiet.
 fn grow(floor: &mut Floor, alive: &[&Channel], whole: &[bool], length: usize, asked: &Question) {
     let (m, n) = (whole.len(), alive.len());
     let freedom = [asked.width * (length - 1) * n, (asked.width.max(2) - 1) * n];

@@ -1,6 +1,6 @@
-//! Medians and quantiles, to the last bit as `NumPy` has them.
+//! Medians and quantiles, equal to those of `NumPy` to the last bit.
 
-/// Median of numbers, their order lost; the mean of the middle two of an even number. NaN of none.
+/// Median, the mean of the middle two of an even number; reorders the values. NaN of none.
 pub fn median(values: &mut [f64]) -> f64 {
     let n = values.len();
     if n == 0 {
@@ -14,7 +14,7 @@ pub fn median(values: &mut [f64]) -> f64 {
     f64::midpoint(lower, upper)
 }
 
-/// Quantile `at` (0 to 1) of numbers, their order lost, linear between neighbours. NaN of none.
+/// Quantile `at` (0 to 1), linear between neighbours; reorders the values. NaN of none.
 pub fn quantile(values: &mut [f64], at: f64) -> f64 {
     let n = values.len();
     if n == 0 || at.is_nan() {
@@ -33,7 +33,7 @@ pub fn quantile(values: &mut [f64], at: f64) -> f64 {
     if above.is_empty() || share == 0.0 {
         return lower;
     }
-    // From the nearer of the two, so that neither end is missed by rounding.
+    // From the nearer of the two, so that both ends are exact.
     if share < 0.5 {
         lower + (upper - lower) * share
     } else {
@@ -41,13 +41,13 @@ pub fn quantile(values: &mut [f64], at: f64) -> f64 {
     }
 }
 
-/// Medians of each of the columns of rows of `width`; NaN where one is.
+/// Median of each column of rows of `width`; NaN where the column holds one.
 #[must_use]
 pub fn column_medians(rows: &[f64], width: usize) -> Vec<f64> {
     of_columns(rows, width, median)
 }
 
-/// `(quantiles, width)` quantiles of each column; NaN where one is.
+/// `(quantiles, width)` quantiles of each column; NaN where the column holds one.
 #[must_use]
 pub fn column_quantiles(rows: &[f64], width: usize, at: &[f64]) -> Vec<f64> {
     let of_one = |&at: &f64| of_columns(rows, width, |column: &mut [f64]| quantile(column, at));

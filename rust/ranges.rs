@@ -1,4 +1,4 @@
-//! Means and noise of readings over ranges of rows: what a log of still poses is asked for again and again.
+//! Means and noise of readings over ranges of rows, such as the poses of a log.
 
 type Row = [f64; 3];
 
@@ -6,8 +6,8 @@ fn is_number(row: &Row) -> bool {
     row.iter().all(|value| value.is_finite())
 }
 
-/// Means of rows by owner, `n` of them, with their numbers of rows: range `k` belongs to `owner[k]`. Rows with a missing
-/// reading count as none; an owner without rows has no mean (NaN). Sums are about the first row: an offset costs no digits.
+/// Means of rows by owner, `n` of them, with their numbers of rows: range `k` is of `owner[k]`. Rows with a missing
+/// reading are excluded; the mean of no rows is NaN. Sums are about the first row: offsets cost no precision.
 #[must_use]
 pub fn means_by_owner(
     rows: &[Row],
@@ -34,8 +34,8 @@ pub fn means_by_owner(
     ((0..n).map(mean).collect(), count)
 }
 
-/// `(n, channels)` means by owner of rows of `channels` numbers; those that are no numbers are passed over one by one.
-/// NaN where none is left.
+/// `(n, channels)` means by owner of rows of `channels` numbers; NaN values are excluded one by one. NaN where none
+/// remains.
 #[must_use]
 pub fn column_means(
     rows: &[f64],
@@ -60,8 +60,8 @@ pub fn column_means(
 }
 
 /// `Σ ½ (difference of neighbouring block means)² · rows in a block`, and the number of differences: blocks of `length`
-/// rows that are numbers, or of a quarter of the rows of an owner that has fewer than four of those. Ranges of one owner
-/// stand side by side and are read as one.
+/// finite rows, or of a quarter of the rows of an owner that has fewer than four blocks. Ranges of one owner are
+/// consecutive and are read as one.
 #[must_use]
 pub fn block_differences(
     rows: &[Row],

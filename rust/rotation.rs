@@ -1,6 +1,6 @@
 //! Rotations by vectors: exponential, logarithm and their derivatives.
 //!
-//! Convention: `exp(v)` is the active rotation by angle `|v|` about `v`, so `exp(v) x` turns `x`.
+//! Convention: `exp(v)` is the active rotation by angle `|v|` about `v`, so `exp(v) x` rotates `x`.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -12,8 +12,8 @@ pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
 
-/// Up to this squared angle (half a radian) seven terms of the Taylor series are exact to rounding; beyond it the closed
-/// forms lose less than two digits.
+/// Up to this squared angle (half a radian) seven terms of the Taylor series are exact to rounding; beyond it the
+/// closed forms lose less than two digits.
 pub(crate) const SERIES_LIMIT: f64 = 0.25;
 
 /// Taylor coefficients in `θ²`, highest first: of `sin θ/θ`, `(1 − cos θ)/θ²` and `(θ − sin θ)/θ³`.
@@ -103,7 +103,7 @@ pub fn left_jacobian(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() + k * b + k * k * c
 }
 
-/// [`exp`] and [`left_jacobian`] of one vector, for the price of one series.
+/// [`exp`] and [`left_jacobian`] of one vector, from one series.
 #[must_use]
 pub fn exp_and_left_jacobian(v: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     let (a, b, c) = series(v.norm_squared());

@@ -1,11 +1,11 @@
-//! Order statistics of a window that runs over numbers.
+//! Order statistics of a running window.
 
 use rayon::prelude::*;
 
-/// Numbers whose window a thread moves on, in windows: sorting the first one is soon paid for.
+/// Length of a thread's share, in windows: sorting its first window then costs little.
 const WINDOWS_OF_A_SHARE: usize = 16;
 
-/// Median of the `size` (odd) numbers about each; beyond the ends the last number stands.
+/// Median of the `size` (odd) numbers about each; beyond the ends the last number is repeated.
 #[must_use]
 pub fn running_median(values: &[f64], size: usize) -> Vec<f64> {
     let half = size / 2;

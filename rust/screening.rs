@@ -1,4 +1,4 @@
-//! What happens in a static log: differences of neighbouring means that stand far outside their own scatter.
+//! Events in a static log: differences of neighbouring means far outside their own scatter.
 
 use rayon::prelude::*;
 
@@ -7,18 +7,18 @@ use crate::allan::readings::Readings;
 use crate::error::{Error, Result};
 use crate::interrupt;
 
-/// Differences from which a spread is read: its error is 0.8 %, far below that of the limit.
+/// Differences from which a spread is estimated: its error is 0.8 %, far below that of the limit.
 const SAMPLE: usize = 16384;
-/// Differences that are looked at together.
+/// Differences that are tested together.
 const RUN: usize = 1024;
 /// Median absolute deviation to standard deviation of a Gaussian.
 const MAD_TO_SIGMA: f64 = 1.4826;
-/// What a Gaussian exceeds once in a hundred, either side, in sigmas.
+/// Two-sided 1 % point of a Gaussian, in sigmas.
 const TWO_SIDED_HUNDREDTH: f64 = 2.5758;
 
-/// Events that are no tail yet.
+/// Number of events up to which they are not tested for a tail.
 const FEW: usize = 2;
-/// Part of the limit from which on a difference lies closely below it.
+/// Differences between this part of the limit and the limit lie closely below it.
 const CLOSELY: f64 = 0.7;
 
 /// One scale at which the log is searched.
@@ -26,9 +26,9 @@ const CLOSELY: f64 = 0.7;
 pub struct Scale {
     /// Readings per mean.
     pub size: usize,
-    /// Distance of neighbouring starts.
+    /// Readings between neighbouring starts.
     pub stride: usize,
-    /// Sigmas above which a difference is an event.
+    /// Difference, in sigmas, above which it is an event.
     pub limit: f64,
 }
 
@@ -53,7 +53,7 @@ pub fn jumps(readings: &impl Readings, scales: &[Scale]) -> Result<Vec<Jump>> {
     jumps_in(readings, scales, &mut vec![0.0; readings.len() + 1])
 }
 
-/// As [`jumps`], the running sum in memory of the caller's, one longer than the readings.
+/// As [`jumps`], with the running sum in memory of the caller, one longer than the readings.
 ///
 /// # Errors
 /// As [`jumps`].
@@ -133,7 +133,7 @@ fn at_scale(sums: &[f64], scale: Scale) -> Vec<Jump> {
         }
         last = i;
     }
-    // Events are rare. Where every thousandth mean is one, the noise at this scale is not Gaussian, and no judge.
+    // Events are rare. Where every thousandth mean is one, the noise at this scale is not Gaussian, and no test.
     let is_common = out.len() > 10 + sums.len() / size / 1000;
     if is_common || (out.len() > FEW && is_a_tail((0..count).map(difference), limit, spread)) {
         Vec::new()
@@ -142,8 +142,8 @@ fn at_scale(sums: &[f64], scale: Scale) -> Vec<Jump> {
     }
 }
 
-/// Whether as many differences, beyond a Gaussian's, lie closely below the limit as above it: events have any size, a tail
-/// that falls off falls through the limit.
+/// Whether more differences, less those of a Gaussian, lie closely below the limit than above it: events have any size,
+/// the density of a noise tail falls across the limit.
 fn is_a_tail(differences: impl Iterator<Item = f64>, limit: f64, spread: f64) -> bool {
     let (mut below, mut above, mut all) = (0_usize, 0_usize, 0_usize);
     for d in differences {
@@ -177,8 +177,8 @@ fn largest(sums: &[f64], m: usize, n: usize) -> f64 {
     most.into_iter().chain(rest).fold(0.0, f64::max)
 }
 
-/// Spread of the bulk, and not less than what one difference in a hundred demands: readings with long tails are noise,
-/// not events, and counts that mostly stand still have no median.
+/// Robust spread, and at least what one difference in a hundred requires: readings with long tails are noise, not
+/// events, and counts that rarely change have a median of zero.
 fn spread(mut values: Vec<f64>) -> f64 {
     let rms = (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
     let centre = median(&mut values);
@@ -203,7 +203,7 @@ fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Mean squares of the differences from reading to reading in blocks of `size`; NaN where a block has none.
+/// Mean squares of the differences between neighbouring readings in blocks of `size`; NaN where a block has none.
 #[must_use]
 pub fn scatter<F: Fn(usize) -> f64 + Sync>(n: usize, get: F, size: usize) -> Vec<f64> {
     (0..n / size.max(1))

@@ -1,11 +1,11 @@
-//! What a calibration of one triad is, whoever found it.
+//! Calibration of one triad, by any method.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// The instrument trihedron in which `S` is expressed.
+/// The body frame in which `S` is expressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Frame {
-    /// z1 along accelerometer axis 1, z2 in the plane of axes 1 and 2: `S` lower triangular.
+    /// X along accelerometer X, Y in the plane of accelerometer X and Y: `S` lower triangular.
     Lower,
     /// `S` symmetric.
     Symmetric,
@@ -14,9 +14,9 @@ pub enum Frame {
 /// Direct model `f = S a' + b`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Model {
-    /// m/s² per raw unit.
+    /// Scale and misalignment, m/s² per raw unit.
     pub s: Matrix3<f64>,
-    /// m/s².
+    /// Bias term, m/s².
     pub b: Vector3<f64>,
 }
 

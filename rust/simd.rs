@@ -1,4 +1,4 @@
-//! One wheel, fast everywhere: loops compiled once per instruction set and chosen when they are called.
+//! Loops compiled once per instruction set and chosen when they are called.
 //!
 //! A kernel is an ordinary function over short arrays of lanes whose inner loops run over the lanes; the compiler turns
 //! them into vectors as long as the instruction set has. `FUSED` says whether a multiply-add is one instruction there:
@@ -6,7 +6,7 @@
 
 use std::sync::OnceLock;
 
-/// A set of instructions that this processor was seen to offer: only [`Instructions::offered`] makes one.
+/// An instruction set that this processor was found to offer: only [`Instructions::offered`] makes one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Instructions(pub(crate) Set);
 
@@ -18,7 +18,7 @@ pub(crate) enum Set {
     /// 256-bit vectors with fused multiply-add.
     #[cfg(target_arch = "x86_64")]
     Avx2,
-    /// What every processor of the target offers (on aarch64 128-bit vectors with fused multiply-add).
+    /// The baseline of the target (on aarch64 128-bit vectors with fused multiply-add).
     Portable,
 }
 
@@ -41,7 +41,7 @@ impl Instructions {
         })
     }
 
-    /// As in `TRIHEDRON_INSTRUCTIONS`.
+    /// Its name in `TRIHEDRON_INSTRUCTIONS`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self.0 {

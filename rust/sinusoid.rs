@@ -1,10 +1,10 @@
-//! How much of a series a sinusoid explains, over a grid of frequencies.
+//! Power of a series explained by a sinusoid, over a grid of frequencies.
 
 use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 
-/// Samples taken through all frequencies while they are near the processor.
+/// Samples processed at all frequencies while they are in the cache.
 const CHUNK: usize = 512;
 
 /// Sums over the samples at one frequency: `Σ x cos`, `Σ x sin`, `Σ cos 2φ`, `Σ sin 2φ`.
@@ -13,8 +13,8 @@ type Sums = [f64; 4];
 /// Power `‖A (AᵀA)⁻¹ Aᵀ x‖²` that a sinusoid explains, `A = (cos 2πft, sin 2πft)`, at `count` frequencies
 /// `start_hz + k step_hz`.
 ///
-/// The phases of one frequency become those of the next by a turn of every sample: two sines and cosines a sample in
-/// all. Sums are added in the order of time, whatever the number of threads.
+/// The phases at one frequency become those at the next by a rotation of every sample: two sines and cosines per sample
+/// in all. Sums are added in the order of time, for any number of threads.
 #[must_use]
 pub fn explained(
     time_s: &[f64],

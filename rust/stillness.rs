@@ -1,4 +1,4 @@
-//! One pass over a log: mean and scatter of short blocks, all that stillness is judged by.
+//! One pass over a log: mean and scatter of short blocks, from which static intervals are detected.
 
 #![expect(
     clippy::inline_always,
@@ -28,7 +28,7 @@ const SHARE: usize = 4096;
 
 /// Mean and variance of consecutive blocks of `length` rows of an `(n, 3)` row-major array.
 ///
-/// Rows that are not finite are skipped; a rest shorter than a block is left out. Two passes over each block keep
+/// Rows that are not finite are skipped; a remainder shorter than a block is excluded. Two passes over each block keep
 /// the variance exact under a large offset.
 ///
 /// # Errors
@@ -37,7 +37,7 @@ pub fn block_statistics(readings: &[f64], length: usize) -> Result<Blocks> {
     block_statistics_with(Instructions::detect(), readings, length)
 }
 
-/// As [`block_statistics`], by instructions of the caller's choice; the results differ by rounding.
+/// As [`block_statistics`], with a chosen instruction set; results differ by rounding.
 ///
 /// # Errors
 /// As [`block_statistics`].
@@ -142,7 +142,7 @@ fn squares<const FUSED: bool>(block: &[f64], mean: [f64; 3]) -> [f64; 3] {
     folded(sum, rest, |x, axis| (x - mean[axis]) * (x - mean[axis]))
 }
 
-/// Sums of the axes of a wide sum, the rest added row by row.
+/// Sums of the axes of a wide sum, the remaining rows added one by one.
 #[inline(always)]
 fn folded(wide: [f64; WIDE], rest: &[f64], term: impl Fn(f64, usize) -> f64) -> [f64; 3] {
     let mut half = [0.0; WIDE / 2];

@@ -1,36 +1,34 @@
-"""TRIHEDRON: calibrate an inertial measurement unit from a raw log, and say how sure the answer is.
+"""Trihedron: calibrate an inertial measurement unit from a raw log, with the uncertainty of every parameter.
 
 Vocabulary
 ----------
 recording
-    What one IMU wrote: raw readings of accelerometer and gyro on one time base, in the unit of the log, with the audit
+    The log of one IMU: raw readings of accelerometer and gyro on one time base, in the unit of the log, with the audit
     of the log as findings. (:func:`read` makes one.)
 segments
-    *Poses* (``poses``), where the sensor stood still, and the *moves* between them. (:func:`segment`)
+    *Poses* (``poses``), in which the sensor is static, and the *moves* between them. (:func:`segment`)
 pose
-    A static stretch in one orientation. It shows the accelerometer the vector of gravity.
+    A static interval in one orientation. The accelerometer then measures gravity alone.
 body frame
     The right-handed orthogonal frame fixed in the instrument (*Mz* of the laboratory manual) in which specific force f
-    [m/s²] and angular rate ω [rad/s] are wanted, one for both sensors. *Lower* (triangular, X along accelerometer X),
-    *symmetric* and *case* say how it lies.
+    [m/s²] and angular rate ω [rad/s] are expressed, one for both sensors. *Lower* (triangular, X along accelerometer
+    X), *symmetric* and *case* define its orientation.
 S, b
     The direct model, raw → SI: ``f = S_f a' + b_f``, ``ω = S_ω w' + b_ω``. S is a full 3 × 3 matrix. *Correct* means
     raw → truth, *distort* truth → raw.
 calibration
-    S and b of both sensors with the covariance of every number. (:func:`calibrate`; :func:`apply`, :func:`verify`)
+    S and b of both sensors with their covariance. (:func:`calibrate`; :func:`apply`, :func:`verify`)
 attitude
-    Where the body points: the rotation from its frame at a sample to that at the start. (:func:`integrate_rate`, from a
-    corrected rate)
+    The rotation from the body frame at a sample to that at the start. (:func:`integrate_rate`, from a calibrated rate)
 diagnosis
-    Where a recording and its model differ, and which effect (physical mechanism) is missing, with σ and cross-validated
-    proof.
-    (:func:`diagnose`)
+    Where a recording and its model differ, and which effect (physical mechanism) is missing, with σ and
+    cross-validation. (:func:`diagnose`)
 finding
-    Something noticed that bears on the answer: what was seen, with its number; the likely cause; the next action. A
-    *serious* finding means that the answer is not to be trusted.
+    A problem or remark about a log or a result: observation with its number, likely cause, next action. A *serious*
+    finding means that the answer is not to be trusted.
 held out
-    Predicted by a fit that did not see it. A residual in sample says how well a curve bends; held out, how well it
-    predicts.
+    Cross-validated: predicted by a fit without that pose or move. A residual in sample measures how well the model
+    fits; one held out, how well it predicts.
 
 Units: SI everywhere but in raw readings. Angles are in radians unless a name ends in ``_deg``.
 
@@ -187,14 +185,14 @@ _OF_ROOM = {
     "report.presenting": "plot report",
 }
 _HOME = {name: f"trihedron.{room}" for room, names in _OF_ROOM.items() for name in names.split()}
-"""Where each name stands."""
+"""The module of each public name."""
 
 
 class _Front(ModuleType):
-    """The package as people call it.
+    """The package object with its public functions.
 
-    ``trihedron.read`` is a verb here although a room of that name exists: importing the room must not hide the verb.
-    ``from trihedron.read import ...`` reaches the room as always.
+    ``trihedron.read`` is a function although a subpackage has that name: importing the subpackage must not hide it.
+    ``from trihedron.read import ...`` still imports from the subpackage.
     """
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -208,7 +206,7 @@ class _Front(ModuleType):
         elif name in _HOME:
             value = getattr(import_module(_HOME[name]), name)
             if not isinstance(value, type):
-                # The command calls the same functions as they are: there sentences name flags.
+                # The command line calls the unwrapped functions, whose error messages name flags.
                 value = import_module("trihedron.api.asking").asked_in_python(value)
         else:
             raise AttributeError(f"module 'trihedron' has no attribute {name!r}")
@@ -228,7 +226,7 @@ def _installed_version() -> str:
         return "0+unknown"
 
 
-# Records name these; here it is said who makes them.
+# Functions that records call by name, and the modules that define them.
 answered_by(
     dict.fromkeys(("as_dict", "as_frame", "as_html", "as_screen", "as_text", "plot"), "trihedron.report.presenting")
 )
@@ -237,7 +235,7 @@ answered_by(dict.fromkeys(("effect_words", "experiment", "why_not"), "trihedron.
 answered_by({"family_words": "trihedron.report.effects.relations", "of_arrays": "trihedron.api.reading"})
 answered_by({"facts_of": "trihedron.channel_facts", "find_low_passes": "trihedron.channel_facts.filters"})
 answered_by({"find_possible_limits": "trihedron.channel_facts.possible_limits"})
-# Before anything starts threads.
+# Before any thread pool starts.
 cap_threads()
-# Names are fetched when first asked for: `trihedron --help` must not wait for what it does not use.
+# Names are imported on first use, so that `trihedron --help` starts fast.
 sys.modules[__name__].__class__ = _Front

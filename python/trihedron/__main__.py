@@ -1,4 +1,4 @@
-"""``python -m trihedron``, and what the installed command calls."""
+"""Entry point of ``python -m trihedron`` and of the installed command."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import sys
 from trihedron.interruption import SENTENCE, Interrupted, install, status_of
 
 _SELDOM = (50_000, 20, 20)
-"""When Python looks for cycles of objects that nobody holds; a command makes some 100 000 objects as it loads."""
+"""Thresholds of the garbage collector: a command makes some 100 000 objects as it loads."""
 _FIRST_FREE = 3
-"""After standard input, output and error."""
+"""First file descriptor after standard input, output and error."""
 
 
 def main() -> int:
-    """Run the command line; interrupted while it still loads, it ends as it would later."""
-    # The allocator of the library of tables complains aloud where threads are short, and goes on without one.
+    """Run the command line; an interruption during import ends it like a later one."""
+    # Without a background thread polars' allocator prints no warning where threads are scarce.
     os.environ.setdefault("_RJEM_MALLOC_CONF", "background_thread:false")
-    # The kernels have threads of their own: a second pool that waits in a loop would only take a processor from them.
+    # The Rust core has its own threads: a second, busy-waiting pool would take a processor from them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # A command is over soon: what its modules leave need not be looked through after every 700 objects.
+    # A command is short-lived: garbage collection after every 700 objects is not needed.
     gc.set_threshold(*_SELDOM)
     try:
         _fill_standard_places()
@@ -30,13 +30,13 @@ def main() -> int:
         return run()
     except (Interrupted, KeyboardInterrupt) as error:
         if sys.stderr is not None:
-            # Without one, `print` would say it on standard output.
+            # Without stderr, `print` would write to standard output.
             print(f"trihedron: {SENTENCE}", file=sys.stderr)
         return status_of(error)
 
 
 def _fill_standard_places() -> None:
-    """Something behind the numbers 0, 1 and 2: a pipe or an output that got one would take what is said there."""
+    """Open descriptors 0, 1 and 2 where closed: a file that got one would receive text meant for the terminal."""
     place = os.open(os.devnull, os.O_RDWR)
     while place < _FIRST_FREE:
         place = os.open(os.devnull, os.O_RDWR)

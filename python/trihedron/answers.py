@@ -1,7 +1,7 @@
-"""What records are asked for and others make: sentences, reports, the audit of arrays.
+"""Functions that records need from other modules: sentences, reports, the audit of arrays.
 
-A record names its question and imports nobody; ``trihedron/__init__`` says which module answers it, and a module is
-loaded when it is first asked.
+A record calls a function by name and imports no module; ``trihedron/__init__`` registers the module of each name, which
+is imported on first use.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ _MODULES: dict[str, str] = {}
 
 
 def answered_by(modules: Mapping[str, str]) -> None:
-    """Which module holds the function that answers a question, by the question's name, which is the function's."""
+    """Register the modules of functions, by function name."""
     _MODULES.update(modules)
 
 
 def ask(question: str, /, *values: Any, **named: Any) -> Any:
-    """The answer to a question.
+    """Call the registered function of that name.
 
     Raises
     ------
     KeyError
-        When nobody answers it.
+        When no module is registered for it.
     """
     return getattr(import_module(_MODULES[question]), question)(*values, **named)

@@ -1,4 +1,4 @@
-"""Names of the arrays that pass between rooms; shapes and units are in each docstring. And who holds their memory."""
+"""Types of the arrays that pass between modules (shapes and units are in each docstring), and names of axes."""
 
 import numpy as np
 import numpy.typing as npt
@@ -10,8 +10,8 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
 CORE_MEMORY = type(_core.room(1, 1).base)
-"""What holds the memory of an array that the core made; nobody reaches the numbers through it."""
+"""Type of the object that owns the memory of an array made by the core; it gives no write access to the values."""
 AXES = ("x", "y", "z")
 """The axes of a triad: columns of every (n, 3) array."""
 XYZ = ("X", "Y", "Z")
-"""The same as reports print them, and a silkscreen."""
+"""The axes as printed in reports and on a silkscreen."""

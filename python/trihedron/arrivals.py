@@ -1,4 +1,4 @@
-"""The host's clock and the device's: which line joins them, and how late bytes arrive."""
+"""The host's clock against the device's: the line between them, and the delay of arriving bytes."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class ClockLine:
     """``host_s = offset_s + device · slope``, along the earliest arrivals.
 
     ``device`` is the device's clock in seconds, or a frame's index where it has none (``slope`` is then seconds per
-    frame). ``sigma_slope`` is the standard error of the slope; ``jitter_rms_s`` and ``jitter_95_s`` say how much later
-    than the earliest bytes arrive.
+    frame). ``sigma_slope`` is the standard error of the slope; ``jitter_rms_s`` and ``jitter_95_s`` are the standard
+    deviation and the 95 % quantile of the delay.
     """
 
     offset_s: float
@@ -33,7 +33,7 @@ class ClockLine:
 
     @property
     def rate_ppm(self) -> float:
-        """By how much the device's second is shorter than the host's (its clock fast), in parts per million."""
+        """Rate error of the device's clock [ppm]; positive where it runs fast."""
         return (1.0 / self.slope - 1.0) * 1e6
 
     @property
@@ -45,8 +45,8 @@ class ClockLine:
 class ClockFit:
     """Collects (device, host) instants of arrivals and fits their lower edge.
 
-    A byte can be late, never early: delays of buffers and of the operating system only add. So the line runs through
-    the earliest arrival of each stretch, not through the mean.
+    Delays of buffers and of the operating system are never negative, so that the line is fitted to the earliest arrival
+    of each interval, not to the mean.
     """
 
     def __init__(self) -> None:
@@ -56,7 +56,7 @@ class ClockFit:
         self._count = 0
 
     def add(self, device: float, host_s: float) -> None:
-        """One arrival: the last frame of a piece of bytes."""
+        """Add one arrival: the last frame of a piece of bytes."""
         self._count += 1
         if self._count % self._stride:
             return
@@ -67,7 +67,7 @@ class ClockFit:
             self._stride *= 2
 
     def line(self) -> ClockLine | None:
-        """The line so far; None before a second has passed or ten pieces have come."""
+        """The line so far; None before one second and ten pieces."""
         if len(self._device) < 10 or self._host[-1] - self._host[0] < LEAST_SPAN_S:
             return None
         device, host = np.array(self._device), np.array(self._host)
@@ -75,7 +75,7 @@ class ClockFit:
         x, y = device - d0, host - h0
         if x[-1] <= 0.0:
             return None
-        # Through all of them first: one byte that came without the usual wait would tilt a line through the ends.
+        # First a fit to all arrivals: a line through the two ends would be tilted by a single early byte.
         away = x - x.mean()
         slope, offset = float(away @ y / (away @ away)), 0.0
         n_bins = int(min(MOST_BINS, max(4, len(x) // 25)))
@@ -85,7 +85,7 @@ class ClockFit:
             order = np.lexsort((y - slope * x, bins))
             first = order[np.unique(bins[order], return_index=True)[1]]
             px, py = x[first], y[first]
-            # Stretches in which every arrival was late say little: twice the median distance is excluded.
+            # Intervals in which every arrival was late are excluded: residuals beyond four median deviations.
             residual = py - slope * px
             residual -= np.median(residual)
             keep = np.abs(residual) <= 4.0 * max(float(np.median(np.abs(residual))), 1e-9)
@@ -113,15 +113,15 @@ class ClockFit:
 
 
 LONGEST_PAUSE_S = 0.25
-"""Bytes of one connection do not stay away longer; after that another may have begun, and begins where it arrives."""
+"""Longest pause within one connection; after a longer one the time restarts at the next arrival."""
 
 
 def paced(frame: FloatArray, host_s: FloatArray) -> FloatArray:
-    """(n,) seconds of frames (n,) without a clock of their own, from their arrivals (n,): even between two pauses.
+    """(n,) times [s] of frames (n,) without a clock of their own, from their arrivals (n,): even between two pauses.
 
-    The period is that of the longest stretch without a pause, as the board's clock stays the same; a stretch begins
-    where its earliest arrivals say, and never before the one before has ended. Arrivals as they are where no stretch
-    is long enough to tell a period.
+    The period of all intervals between pauses is that of the longest one; each starts where its earliest arrivals put
+    it, but not before the previous one has ended. Arrivals are returned unchanged where no interval is long enough to
+    determine a period.
     """
     pauses = np.flatnonzero(np.diff(host_s) > LONGEST_PAUSE_S) + 1
     stretches = [slice(*edges) for edges in pairwise([0, *pauses.tolist(), len(host_s)])]

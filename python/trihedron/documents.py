@@ -1,4 +1,4 @@
-"""Small text files that people write, edit and pass on: read with bounds, whatever lies behind the name."""
+"""Small text files written or edited by users: read with limits on type, size, depth and numbers."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ else:
     import tomli as tomllib
 
 MOST_BYTES = 64_000_000
-"""A diagnosis of a day's log with all its curves has 3 MB."""
+"""Largest document in bytes; a diagnosis of a day's log with all its curves has 3 MB."""
 MOST_DEPTH = 64
-"""Our own documents nest eight deep; what walks through them walks recursively."""
+"""Deepest nesting, since documents are processed recursively; trihedron's own have eight levels."""
 MOST_DIGITS = 300
-"""Of a whole number: more do not fit into a float."""
+"""Most digits of an integer: more do not fit into a float."""
 
 
 class DocumentError(RefusedError):
-    """What is wrong with a file, as the rest of a sentence that begins with its name."""
+    """An error in a file; the message continues a sentence that begins with the file's name."""
 
 
 def read_text(path: str | os.PathLike[str], what: str) -> str:
-    """The text of a plain file of sane size; ``what`` it should be ("calibration file") is for the sentence.
+    """The text of a plain file of limited size; ``what`` it should be ("calibration file") is for error messages.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def read_text(path: str | os.PathLike[str], what: str) -> str:
         When there is no such file, it is no plain file, too large, unreadable, or not text.
     """
     try:
-        # Without waiting: a pipe without a writer would be waited for.
+        # Non-blocking: opening a pipe without a writer would block.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
     except FileNotFoundError:
         raise DocumentError("there is no such file; check the name and the folder.") from None
@@ -67,12 +67,12 @@ def read_text(path: str | os.PathLike[str], what: str) -> str:
 
 
 def read_json(path: str | os.PathLike[str], what: str, meant: str, refusal: type[RefusedError]) -> Any:
-    """The JSON of a file that should be ``what``; where it is none, ``meant`` says which file was.
+    """The JSON of a file that should be ``what``; ``meant`` describes the expected file in the error message.
 
     Raises
     ------
     refusal
-        In one sentence, as :func:`read_text` and :func:`parse_json` find it.
+        In place of the errors of :func:`read_text` and :func:`parse_json`.
     """
     try:
         text = read_text(path, what)
@@ -85,12 +85,12 @@ def read_json(path: str | os.PathLike[str], what: str, meant: str, refusal: type
 
 
 def parse_json(text: str) -> Any:
-    """JSON with finite numbers, sane depth and every key once: of two values neither may win silently.
+    """JSON with finite numbers, limited depth and unique keys.
 
     Raises
     ------
     DocumentError
-        When it is not; the line is said where the text breaks.
+        When it is not; the message gives the line of a syntax error.
     """
     try:
         document = json.loads(
@@ -107,18 +107,18 @@ def parse_json(text: str) -> Any:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """TOML of sane depth, with numbers that a float holds.
+    """TOML of limited depth, with numbers that fit into a float.
 
     Raises
     ------
     DocumentError
-        When it is not; the line is said where the text breaks.
+        When it is not; the message gives the line of a syntax error.
     """
     try:
         table = tomllib.loads(text)
     except RecursionError:
         raise DocumentError("this is nested too deeply.") from None
-    # A whole number of thousands of digits is a ValueError that is no TOMLDecodeError.
+    # An integer of thousands of digits raises a ValueError other than TOMLDecodeError.
     except ValueError as error:
         raise DocumentError(f"this is not a TOML file: {str(error).split(';')[0][:200]}.") from None
     check_values(table)
@@ -126,12 +126,12 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 def check_values(document: Any) -> None:
-    """Refuse what no document of ours holds, from whatever notation it was parsed.
+    """Check the values of a parsed document, of any notation.
 
     Raises
     ------
     DocumentError
-        For nesting that is too deep, and whole numbers that no float holds.
+        For nesting that is too deep, and integers that do not fit into a float.
     """
     level = [document]
     for _ in range(MOST_DEPTH):
@@ -150,7 +150,7 @@ def check_values(document: Any) -> None:
 
 
 def of_path(path: str | os.PathLike[str], error: DocumentError) -> str:
-    """The whole sentence."""
+    """The whole error message: path and error."""
     return f"{Path(path)}: {error}"
 
 

@@ -1,4 +1,4 @@
-"""Catalogues whose entries are files: what lies in a folder belongs to it, and no list names it again."""
+"""Catalogues whose entries are the modules of a folder, without a list of their names."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ def normal_gravity(latitude_deg: float, height_m: float = 0.0) -> float:
     """Magnitude of normal gravity [m/s²] at a geodetic latitude [deg] and height above the ellipsoid [m].
 
     Somigliana's closed formula on the WGS 84 ellipsoid and the second-order height correction (NIMA TR8350.2, eq. 4-1
-    and 4-3). What it leaves out, the local anomaly, is typically 3e-4 m/s² and seldom above 2e-3 m/s²: 0.02 % of scale.
+    and 4-3). The local anomaly is not included: typically 3e-4 m/s², seldom above 2e-3 m/s², which is 0.02 % of scale.
 
     Raises
     ------

@@ -1,8 +1,7 @@
-"""Ctrl-C and SIGTERM: a command ends within a second, whatever it was doing, and leaves nothing half-written.
+"""Ctrl-C and SIGTERM: a command ends within a second, whatever it is doing, and leaves no partial file.
 
-The handlers raise :class:`Interrupted` where Python runs. Where it does not (a library is busy for minutes), a thread
-that the system wakes ends the process after a short grace. This module imports nothing large: it stands before
-everything else.
+The handlers raise :class:`Interrupted` in Python code. Where a library is busy for minutes, a thread that the system
+wakes ends the process after ``GRACE_S``. This module imports nothing large, since it is imported first.
 """
 
 from __future__ import annotations
@@ -15,15 +14,15 @@ import time
 from types import FrameType
 
 GRACE_S = 0.5
-"""Given to a command to end in order: with the rest of what is done here, less than a second."""
+"""Time for a command to end in order [s]; the total stays below a second."""
 SENTENCE = "interrupted; what was not finished was not written."
 _NUMBERS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Interrupted(BaseException):
-    """Somebody asked the command to end; ``status`` is what it ends with: 130 for Ctrl-C, 143 for SIGTERM.
+    """The command was interrupted; ``status`` is its exit status: 130 for Ctrl-C, 143 for SIGTERM.
 
-    No ``KeyboardInterrupt``, which libraries take for their own and turn into an end without a word.
+    Not a ``KeyboardInterrupt``, which libraries catch and turn into a silent exit.
     """
 
     def __init__(self, number: int = signal.SIGINT) -> None:
@@ -37,9 +36,9 @@ def status_of(error: BaseException) -> int:
 
 
 def install() -> None:
-    """Let SIGINT and SIGTERM end this process; for commands, not for programs that import the package."""
+    """Install handlers for SIGINT and SIGTERM; for commands, not for programs that import the package."""
     for number in _NUMBERS:
-        # What the caller told us to ignore (nohup, a shell's background job) stays ignored.
+        # A signal that the caller ignores (nohup, a shell's background job) stays ignored.
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _raise)
     sys.unraisablehook = _say_unless_interrupted
@@ -52,7 +51,7 @@ def install() -> None:
 
 
 def _say_unless_interrupted(lost: sys.UnraisableHookArgs) -> None:
-    # Raised inside a callback of the interpreter (a lock of imports) it goes nowhere: the thread ends the process.
+    # Raised inside a callback of the interpreter (an import lock) it is discarded; the thread then ends the process.
     if not isinstance(lost.exc_value, Interrupted):
         sys.__unraisablehook__(lost)
 
@@ -64,14 +63,14 @@ def _raise(number: int, _frame: FrameType | None) -> None:
 def _end_in_time(heard: int) -> None:
     while True:
         for number in os.read(heard, 1):
-            # A recording that ends in order has handlers of its own.
+            # A running capture has handlers of its own.
             if number in _NUMBERS and signal.getsignal(number) is _raise:
                 time.sleep(GRACE_S)
                 end_now(128 + number)
 
 
 def end_now(status: int) -> None:
-    """End the process here: its unfinished files removed, its terminal as it was, its reason said."""
+    """End the process now: remove unfinished files, restore the terminal, print the reason."""
     temporary = sys.modules.get("trihedron.files.output")
     if temporary is not None:
         temporary.remove_unfinished()

@@ -1,8 +1,8 @@
-"""Numbers of a calibration that do not depend on the choice of its frame (docs/diagnosis-method.md, section 9).
+"""Parameters of a calibration that do not depend on the choice of its frame (docs/diagnosis-method.md, section 9).
 
-Two sessions have each their own lower frame, and ``S_r S_m⁻¹`` leaks from one number into another: a pure change in
-scale lights up the off-diagonals. In the distort direction ``M = S⁻¹`` rows are ``k_i n_i``: sensitivity k of axis i
-and its unit vector n. Scales, biases along the own axis and angles between axes are then the same in every frame.
+Each session has its own lower-triangular frame, so that ``S_r S_m⁻¹`` mixes parameters: a pure change of scale shows in
+the off-diagonals. In the distort direction ``M = S⁻¹`` rows are ``k_i n_i``: sensitivity k of axis i and its unit
+vector n. Scales, biases along each axis and angles between axes are then the same in every frame.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from trihedron.transforms import rotation_by
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
 STEP = 1e-6
-"""Relative step of the central differences: their error is its square, 1e-12, and rounding 1e-10 of the value."""
+"""Relative step of the central differences: their relative error is its square, 1e-12, plus 1e-10 by rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class Invariants:
     """``bias`` (3,) [SI] along each axis, ``log_scale`` (3,) ln of raw units per SI, ``angle`` (3,) [rad] between axes
-    (1,2), (1,3), (2,3), ``axes`` (3, 3) rows n_i in the model's own frame."""
+    X and Y, X and Z, Y and Z, ``axes`` (3, 3) rows n_i in the model's own frame."""
 
     bias: FloatArray
     log_scale: FloatArray
@@ -52,7 +52,7 @@ def polar_rotation(axes: FloatArray) -> FloatArray:
 
 
 def triad_rotation(accel: Invariants, gyro: Invariants) -> FloatArray:
-    """(3, 3) ``U_g U_aᵀ``: the gyro triad as seen from the accelerometer triad, the same in every frame."""
+    """(3, 3) ``U_g U_aᵀ``: rotation between gyro and accelerometer triad, the same in every frame."""
     return polar_rotation(gyro.axes) @ polar_rotation(accel.axes).T
 
 
@@ -104,8 +104,8 @@ def triad_jacobian(S_a: FloatArray, S_g: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Anchor:
-    """What the numbers leave open: ``signs`` (3,) of the accelerometer's axes in frame lower, and ``triad`` (3, 3), the
-    signed permutation of axes nearest to the gyro triad against the accelerometer's: its rotation is counted from it.
+    """What the parameters do not determine: ``signs`` (3,) of the accelerometer's axes in frame lower, and ``triad``
+    (3, 3), the signed permutation nearest to the rotation between the triads, from which that rotation is measured.
     """
 
     signs: FloatArray
@@ -156,7 +156,7 @@ def model_of_numbers(
     """``(S_a, b_a, S_g, b_g)`` in frame ``lower``: the inverse of :func:`numbers_of`.
 
     ``S = (K N)⁻¹``, ``b = -S (k ∘ bias)``. Rows of N_a follow from the angles, n_1 along X and n_2 in the plane of
-    axes 1 and 2; ``N_g = √(Gram of its angles) · R · U_a``.
+    X and Y; ``N_g = √(Gram of its angles) · R · U_a``.
     """
     N_a = _lower_axes(numbers[6:9], anchor.signs)
     S_a, b_a = _direct(numbers[:3], numbers[3:6], N_a)
@@ -205,5 +205,5 @@ def _gram(angle: FloatArray) -> FloatArray:
 def _lower_axes(angle: FloatArray, signs: FloatArray) -> FloatArray:
     """(3, 3) unit rows, lower triangular with the given signs on the diagonal, at the given angles."""
     factor = np.linalg.cholesky(_gram(angle))
-    # Cholesky's diagonal is positive: a column of the other sign is turned round.
+    # Cholesky's diagonal is positive: columns with a negative sign are reversed.
     return factor * signs

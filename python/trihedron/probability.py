@@ -1,6 +1,6 @@
-"""Tails and quantiles of the distributions that tests are judged by; names and arguments as in ``scipy.special``.
+"""Tail probabilities and quantiles of test distributions; names and arguments as in ``scipy.special``.
 
-They are made by the core, so that a calibration need not load SciPy, which takes longer than the calibration.
+They are computed by the core: importing SciPy takes longer than a calibration.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def chdtri(dof: float, above: float) -> float:
 
 
 MEDIAN_CHI2 = {dof: chdtri(dof, 0.5) for dof in (1, 2)}
-"""Median of a chi-square variate, for robust scales of one number and of a pair."""
+"""Median of a chi-square variate with 1 and 2 degrees of freedom, for robust scale estimates."""
 
 
 def fdtrc(top: float, bottom: float, value: float) -> float:
@@ -33,12 +33,12 @@ def fdtri(top: float, bottom: float, below: float) -> float:
 
 
 def f_upper(top: float, bottom: float, above: float) -> float:
-    """Value that an F variate exceeds with probability ``above``, however small."""
+    """Value that an F variate exceeds with probability ``above``, which may be very small."""
     return _core.f_upper(above, top, bottom)
 
 
 def betaincinv(a: float, b: float, below: float) -> float:
-    """Value that a beta variate stays below with probability ``below``: an F variate in other words."""
+    """Value that a beta variate stays below with probability ``below``, from the F distribution."""
     ratio = a * fdtri(2.0 * a, 2.0 * b, below)
     return ratio / (b + ratio)
 
@@ -59,5 +59,5 @@ def ndtri(below: float) -> float:
 
 
 def bdtrc(count: float, trials: float, chance: float) -> float:
-    """Probability that of ``trials`` more than ``count`` succeed."""
+    """Probability of more than ``count`` successes in ``trials`` with success probability ``chance``."""
     return _core.binomial_above(count, trials, chance)

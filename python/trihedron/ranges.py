@@ -15,7 +15,7 @@ def edges_of(mask: BoolArray) -> IntArray:
 
 
 def ranges_of(mask: BoolArray) -> list[Range]:
-    """The same as a list, for loops over few runs."""
+    """Runs of true values in ``mask`` (n,) as a list of ranges, for loops over few runs."""
     return [(first, last) for first, last in edges_of(mask).tolist()]
 
 
@@ -30,10 +30,10 @@ def grown(mask: BoolArray, part: Range) -> Range:
 
 
 def rows_beside(ranges: IntArray, beside: int, n: int) -> tuple[IntArray, IntArray]:
-    """Rows (r,) of ``n`` that lie in half-open ``ranges`` (m, 2) or up to ``beside`` from one, range after range, and
-    where each range lies among them, (m, 2).
+    """Rows (r,) of ``n`` inside half-open ``ranges`` (m, 2) or within ``beside`` rows of one, range after range, and
+    the position of each range among these rows, (m, 2).
 
-    Of a long log nothing else is asked for once its poses are means.
+    For a long log these are the only rows that a fit needs once the means of its poses are computed.
     """
     wide = np.clip(ranges + np.array([-beside, beside]), 0, n)
     before = np.cumsum(wide[:, 1] - wide[:, 0]) - (wide[:, 1] - wide[:, 0])

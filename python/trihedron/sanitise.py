@@ -1,4 +1,4 @@
-"""Names from elsewhere (columns, files, keys) in messages: harmless for a terminal; the one meant, when unknown."""
+"""External names (columns, files, keys) in messages: escaped for a terminal; a suggestion for an unknown one."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import difflib
 import re
 from collections.abc import Iterable
 
-# C0 but for tab and line end, DEL and C1 (of which terminals take 0x9b for an escape), and what turns the direction of
-# writing: a name could hide or forge what stands beside it. Bytes that are no text (surrogates) cannot be written.
+# C0 except tab and line end, DEL, C1 (terminals interpret 0x9b as an escape), and marks that change the direction of
+# writing: with these a name could hide or forge adjacent text. Surrogates (bytes that are no text) cannot be written.
 _UNSEEN = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
 )
 
 
 def printable(text: str) -> str:
-    r"""The text with every control character spelled out as ``\x1b`` or ``\u202e``, lines and tabs as they are.
+    r"""The text with every control character escaped as ``\x1b`` or ``\u202e``; line ends and tabs are kept.
 
     >>> printable("a\x1b[2Jx")
     'a\\x1b[2Jx'
@@ -23,7 +23,7 @@ def printable(text: str) -> str:
 
 
 def one_line(text: str) -> str:
-    r"""As :func:`printable`, line ends and tabs too: for a name inside a line.
+    r"""As :func:`printable`, with line ends and tabs escaped too: for a name inside a line.
 
     >>> one_line("a\nb")
     'a\\nb'
@@ -32,7 +32,7 @@ def one_line(text: str) -> str:
 
 
 def printable_json(text: str) -> str:
-    """JSON text with the same characters as the escapes of JSON: the document stays the same."""
+    """JSON text with control characters as JSON escapes: the content of the document is unchanged."""
     return _UNSEEN.sub(lambda found: _spelled(found[0], "\\u{:04x}"), text)
 
 
@@ -42,6 +42,6 @@ def _spelled(character: str, short: str) -> str:
 
 
 def meant(name: str, known: Iterable[str]) -> str:
-    """`` (is 'near' meant?)`` where a name that nothing bears is nearly one of those known, else nothing."""
+    """`` (is 'near' meant?)`` where an unknown name is close to a known one, else an empty text."""
     near = difflib.get_close_matches(name, list(known), 1)
     return f" (is {near[0]!r} meant?)" if near else ""

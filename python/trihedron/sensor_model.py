@@ -1,13 +1,13 @@
-r"""The linear sensor model in both directions, and the frames in which it may be expressed (docs/model.md, section 1).
+r"""The linear sensor model in both directions, and its body frames (docs/model.md, section 1).
 
 Direct form, raw → truth (*correct*):  ``f = S a' + b``.
 Inverse form, truth → raw (*distort*):  ``a' = S_a f + b_a`` with ``S_a = S⁻¹``, ``b_a = -S⁻¹ b``.
 
 Signs and handedness
 --------------------
-``|f| = |g|`` is unchanged when Mz is reflected, so nothing in poses decides the sign of a row of ``S``. A frame
-is therefore reached from another by a *proper rotation* only: a triad whose documented axes are left-handed
-(``det S < 0``) stays left-handed in every frame, with the signs on the diagonal of ``S``, and is reported, not mended.
+``|f| = |g|`` is unchanged by a reflection of the body frame, so that poses do not determine the sign of a row of ``S``.
+Frames are therefore related by *proper rotations* only: a triad whose documented axes are left-handed (``det S < 0``)
+stays left-handed in every frame, with the signs on the diagonal of ``S``, and is reported, not corrected.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def other_form_jacobian(S: FloatArray, b: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Reframing:
-    """How one triad gets into a frame: ``S → R S``, ``b → R b`` with a proper rotation that depends on S itself.
+    """Change of a triad's frame: ``S → R S``, ``b → R b`` with a proper rotation that depends on S itself.
 
     ``rotation`` R (3, 3); ``tilt`` (3, 12) the small rotation vector of R per change of the 12 parameters (so that
     ``δR = [tilt δp]× R``); ``jacobian`` (12, 12) of the new parameters with respect to the old ones.
@@ -74,7 +74,7 @@ class Reframing:
     jacobian: FloatArray
 
     def follow(self, S: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Derivatives of another sensor's ``R S``, ``R b``: (12, 12) per its own and (12, 12) per this triad's."""
+        """Derivatives of another sensor's ``R S``, ``R b`` (12, 12): by its own and by this triad's parameters."""
         order = _columns_first()
         own = np.asarray(np.kron(np.eye(4), self.rotation)[np.ix_(order, order)], dtype=np.float64)
         moved = np.column_stack([self.rotation @ S, self.rotation @ b])
@@ -144,7 +144,7 @@ def _nearest_proper(q: FloatArray) -> FloatArray:
 
 
 def rotated(sensor: SensorCalibration, rotation: FloatArray) -> SensorCalibration:
-    """The same sensor in a frame turned by a known rotation R: ``S → R S``, ``b → R b``, covariance along."""
+    """The same sensor in a frame rotated by a known R: ``S → R S``, ``b → R b``, covariance likewise."""
     rotation = np.asarray(rotation, dtype=np.float64)
     order = _columns_first()
     jacobian = np.kron(np.eye(4), rotation)[np.ix_(order, order)]
@@ -153,12 +153,12 @@ def rotated(sensor: SensorCalibration, rotation: FloatArray) -> SensorCalibratio
 
 
 def in_frame(calibration: Calibration, frame: Frame) -> Calibration:
-    """Both sensors in another frame; the uncertainty of the accelerometer's axes turns the gyro's axes with it (eq. 6).
+    """Both sensors in another frame; the uncertainty of the accelerometer's axes also rotates the gyro's (eq. 6).
 
     Raises
     ------
     ValueError
-        When the accelerometer's S is singular, or ``case`` is asked for: no pose knows the case.
+        When the accelerometer's S is singular, or ``frame`` is ``case``, which poses do not determine.
     """
     if frame == calibration.frame:
         return calibration
@@ -191,7 +191,7 @@ def in_frame(calibration: Calibration, frame: Frame) -> Calibration:
 
 
 def _exactly_in_frame(S: FloatArray, frame: Frame) -> FloatArray:
-    """Rounding removed from the entries that the frame makes zero or equal."""
+    """S with the entries that the frame makes 0 or equal set exactly so."""
     if frame == "lower":
         return np.tril(S)
     signs = np.sign(np.diag(S))
@@ -199,10 +199,10 @@ def _exactly_in_frame(S: FloatArray, frame: Frame) -> FloatArray:
 
 
 def _flatten(S_and_b: FloatArray) -> FloatArray:
-    """(3, 4) of S beside b → the 12 parameters."""
+    """(3, 4) matrix [S b] → (12,) parameters: S row by row, then b."""
     return np.concatenate([S_and_b[:, :3].ravel(), S_and_b[:, 3]])
 
 
 def _columns_first() -> list[int]:
-    """Where each of the 12 parameters lies in the columns of S, then b, stacked."""
+    """Index of each of the 12 parameters in the stacked columns of S, then b."""
     return [3 * j + i for i in range(3) for j in range(3)] + [9, 10, 11]

@@ -1,7 +1,7 @@
-"""A forked child of a process that had read tables: its library of tables has locks and threads that stayed behind.
+"""Check of polars in a forked child: its locks and threads are those of the parent, and it may block for ever.
 
-Polars waits for ever there. Whether it still works is tried once, on a thread of its own, and a child in which it does
-not says so at once. The numerical core makes threads of its own in a child and needs none of this.
+Whether it works is tried once, on a separate thread, and a child in which it does not raises at once. The numerical
+core starts its own threads in a child and needs no check.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import threading
 from trihedron.errors import RefusedError
 
 PATIENCE_S = 2.0
-"""A trial takes milliseconds where the library works; a loaded machine may take a hundred times as long."""
+"""Time limit of the trial: milliseconds where polars works, a hundred times as long on a loaded machine."""
 
 SENTENCE = (
     "this process was forked from one that had already read or written a table, and the library behind tables does not "
@@ -34,12 +34,12 @@ if hasattr(os, "register_at_fork"):
 
 
 def check_tables() -> None:
-    """Refuse to wait for ever.
+    """Raise where polars would block for ever.
 
     Raises
     ------
     ValueError
-        In a forked child whose library of tables does not answer.
+        In a forked child in which polars does not respond.
     """
     global _is_doubtful
     if not _is_doubtful:
@@ -54,6 +54,6 @@ def check_tables() -> None:
 def _try(answered: threading.Event) -> None:
     import polars
 
-    # Large enough to be shared out between threads.
+    # Large enough to be read by several threads.
     polars.read_csv(b"a,b\n" + b"1,2\n" * 50_000)
     answered.set()

@@ -1,4 +1,4 @@
-"""S and b as functions of temperature, as a calibration of several recordings `--by temperature` holds them."""
+"""S and b as functions of temperature, from a calibration of several recordings `--by temperature`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from trihedron.sensor_model import in_frame, reframing
 def parameters_at(calibration: Calibration, degc: float) -> FloatArray:
     """(12,) or (24,) S row by row, then b, of each sensor at one temperature [°C], in the calibration's frame.
 
-    ``calibration.extensions["thermal"]`` holds the polynomials (docs/calibration-file.md).
+    The polynomials are ``calibration.extensions["thermal"]`` (docs/calibration-file.md).
     """
     thermal: Any = calibration.extensions["thermal"]
     signs = np.array(thermal["axis_signs"], dtype=np.float64)
@@ -33,7 +33,7 @@ def parameters_at(calibration: Calibration, degc: float) -> FloatArray:
             numbers[picked] += (t ** np.arange(1, len(coefficients))) @ coefficients[1:]
     parameters = model_vector(numbers, anchor)
     if calibration.frame != "lower":
-        # The frame follows the axes as they are at this temperature, as it does at the reference.
+        # The frame is defined by the axes at this temperature, as at the reference temperature.
         turn = reframing(parameters[:9].reshape(3, 3), parameters[9:12], calibration.frame).rotation
         for first in range(0, len(parameters), 12):
             parameters[first : first + 9] = (turn @ parameters[first : first + 9].reshape(3, 3)).ravel()

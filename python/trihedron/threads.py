@@ -1,4 +1,4 @@
-"""How many threads the numerical core and the library of tables may start: what the environment says, within reason."""
+"""Limits on the threads of the numerical core and of polars that the environment requests."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MOST_PER_PROCESSOR = 4
 
 
 def cap_threads() -> None:
-    """Numbers of threads in the environment that no machine of this size could run become its number of processors."""
+    """Replace unreasonably large numbers of threads in the environment by the number of processors."""
     processors = os.cpu_count() or 1
     for name in ("RAYON_NUM_THREADS", "POLARS_MAX_THREADS"):
         asked = os.environ.get(name, "").strip()
@@ -23,7 +23,7 @@ def cap_threads() -> None:
 
 
 def side_by_side(make: Callable[[Given], Made], given: Iterable[Given]) -> list[Made]:
-    """``make`` of each, as many at a time as the core may start threads: fits that do not need one another."""
+    """``make`` of each, in parallel on as many threads as the core may start; for independent fits."""
     work = list(given)
     asked = os.environ.get("RAYON_NUM_THREADS", "").strip()
     allowed = int(asked) if asked.isdecimal() and int(asked) > 0 else os.cpu_count() or 1

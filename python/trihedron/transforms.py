@@ -1,4 +1,4 @@
-"""Transforms that several rooms take."""
+"""Transforms that several modules use."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Units: the only place where a number changes its unit.
 
 Inside the package everything is SI (m/s², rad/s, s, °C) except *raw* sensor readings, which stay in the unit of the
-log so that a calibration maps exactly what the sensor wrote.
+log, so that a calibration maps the logged values themselves.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from enum import Enum
 from trihedron.errors import RefusedError
 
 STANDARD_GRAVITY_M_S2 = 9.80665
-"""Conventional value that defines the unit ``g``. It is not the gravity at anybody's desk."""
+"""Conventional value that defines the unit ``g``; local gravity differs."""
 
 
 class AccelerationUnit(str, Enum):
@@ -54,7 +54,7 @@ _RATE_TO_SI = {
 
 
 def acceleration_to_si(unit: AccelerationUnit) -> float | None:
-    """Nominal m/s² per unit; ``None`` for counts, whose scale only a calibration can tell."""
+    """Nominal m/s² per unit; ``None`` for counts, whose scale only a calibration determines."""
     return _ACCELERATION_TO_SI.get(unit)
 
 
@@ -64,7 +64,7 @@ def rate_to_si(unit: RateUnit) -> float | None:
 
 
 def ratio_of_units(one: AccelerationUnit | RateUnit, other: AccelerationUnit | RateUnit) -> float | None:
-    """How many of ``other`` one of ``one`` is; ``None`` for counts beside anything but counts."""
+    """Size of the unit ``one`` in ``other``; ``None`` between quantities, and between counts and another unit."""
     if one is other:
         return 1.0
     if isinstance(one, AccelerationUnit) and isinstance(other, AccelerationUnit):
@@ -77,7 +77,7 @@ def ratio_of_units(one: AccelerationUnit | RateUnit, other: AccelerationUnit | R
 
 
 def rate_lsb_to_si(text: str) -> float:
-    """Size of a gyro's count, as in ``0.05 deg/s``, in rad/s.
+    """LSB of a gyro, as in ``0.05 deg/s``, in rad/s.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def rate_lsb_to_si(text: str) -> float:
 
 
 def acceleration_lsb_to_si(text: str) -> float:
-    """Size of an accelerometer's count, as in ``3.33 mg``, in m/s².
+    """LSB of an accelerometer, as in ``3.33 mg``, in m/s².
 
     Raises
     ------

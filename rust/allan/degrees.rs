@@ -1,12 +1,12 @@
 //! Equivalent degrees of freedom of the variances by type of noise.
 //!
 //! `edf = 2 E(V)² / var(V)`. Source: C. A. Greenhall, W. J. Riley, "Uncertainty of stability variances based on finite
-//! differences", Proc. 35th PTTI Meeting, 2003, pp. 267-280; for the total variance C. A. Greenhall, D. A. Howe,
-//! D. B. Percival, "Total variance, an estimator of long-term frequency stability", IEEE Trans. UFFC 46 (1999), Table I.
+//! differences", Proc. 35th PTTI Meeting, 2003, pp. 267-280; total variance: C. A. Greenhall, D. A. Howe, D. B.
+//! Percival, "Total variance, an estimator of long-term frequency stability", IEEE Trans. UFFC 46 (1999), Table I.
 //!
-//! The source supposes a phase that was averaged over one reading. The phase of a rate sensor is the sum of its readings:
-//! white noise and a random walk of the readings then have exact autocovariances, which are used instead (docs/noise.md,
-//! section 2). The difference is 15 % of edf at clusters of one reading and nothing beyond ten.
+//! The source assumes a phase that was averaged over one reading. The phase of a rate sensor is the sum of its
+//! readings: white noise and a random walk of the readings then have exact autocovariances, which are used instead
+//! (docs/noise.md, section 2). The difference is 15 % of edf at clusters of one reading and nothing beyond ten.
 
 use super::Kind;
 use crate::error::{Error, Result};
@@ -43,7 +43,7 @@ impl NoiseType {
 /// Degrees of freedom of the variance of `n` readings in clusters of `m`.
 ///
 /// # Errors
-/// `BadInput` when the readings hold no term.
+/// `BadInput` when `n` readings give no term.
 pub fn degrees_of_freedom(n: usize, m: usize, noise: NoiseType, kind: Kind) -> Result<f64> {
     if kind.terms(n, m) == 0 {
         return Err(Error::bad_input(format!(
@@ -68,10 +68,10 @@ pub fn degrees_of_freedom(n: usize, m: usize, noise: NoiseType, kind: Kind) -> R
     Ok(if m < 8 { table.min(summed) } else { table }.max(1.0))
 }
 
-/// Total variance of white phase: both ends of the phase stand in every reflected term, twice.
+/// Total variance of white phase noise: every term reflected at an end contains the phase at that end, with factor 2.
 ///
-/// A term that is reflected at one end is `2 e_0 − e_{m−k} − 2 e_k + e_{k+m}`: variance 10 instead of 6, of which the
-/// `4 e_0²` is the same number in all `m − 1` of them: 32 of the variance of each end's sum, per square of their count.
+/// A term that is reflected at one end is `2 e_0 − e_{m−k} − 2 e_k + e_{k+m}`: variance 10 instead of 6. Its part
+/// `4 e_0²` is common to all `m − 1` of them and adds `32 (m − 1)²` to the variance of the sum at each end.
 fn reflected_white_phase(n: usize, m: usize, summed: f64) -> f64 {
     let (terms, reflected) = ((n - 1) as f64, m.min(n - m).saturating_sub(1) as f64);
     let plain = 6.0 * terms;
@@ -98,7 +98,7 @@ fn summed(
     let phase = |t: f64| match noise {
         _ if is_modified => filtered(t, Some(1.0), noise.alpha()),
         NoiseType::White => -t.abs(),
-        // The sum of a walk that steps once a reading.
+        // The sum of a random walk that steps once per reading.
         NoiseType::Walk => t.abs().powi(3) - t.abs() / (m as f64).powi(2),
         _ => filtered(t, (m < MANY).then_some(m as f64), noise.alpha()),
     };
@@ -156,7 +156,7 @@ fn generalised(t: f64, alpha: i32) -> f64 {
     }
 }
 
-/// The same averaged over a reading; `None` is the limit of many readings to a cluster.
+/// Generalised autocovariance averaged over a reading; `None` is the limit of many readings per cluster.
 fn filtered(t: f64, filtering: Option<f64>, alpha: i32) -> f64 {
     match filtering {
         None => generalised(t, alpha + 2),

@@ -1,4 +1,4 @@
-//! The relatives that do not tile: disjoint clusters, the modified variance, and the reflected ends of the total one.
+//! Sums computed without tiles: disjoint clusters, the modified variance, the reflected ends of the total variance.
 
 use rayon::prelude::*;
 
@@ -41,7 +41,7 @@ fn modified_one(p: &[f64], m: usize) -> f64 {
     }))
 }
 
-/// `Σ D2²` over the terms of the total variance that need reflected readings: `P[-j] = 2 P[0] − P[j]`, likewise behind.
+/// `Σ D2²` over the terms of the total variance with reflected readings: `P[-j] = 2 P[0] − P[j]`, likewise at the end.
 #[must_use]
 pub fn reflected(p: &[f64], m: usize) -> f64 {
     let last = p.len() - 1;

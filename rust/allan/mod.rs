@@ -1,4 +1,4 @@
-//! Allan variance and its relatives of equally spaced rate data, at the speed of the memory.
+//! Allan variance and its relatives of equally spaced rate data, at memory bandwidth.
 //!
 //! Everything is computed from the running sum `P` (`P[0] = 0`, `P[k] = x[0] + … + x[k-1]`) of the readings without
 //! their mean. With `n` readings and clusters of `m` readings, `D2[k] = P[k+2m] − 2 P[k+m] + P[k]` is `m` times the
@@ -35,7 +35,7 @@ pub enum Kind {
     Overlapping,
     /// Disjoint clusters only.
     NonOverlapping,
-    /// Averaged over the phase as well: tells white from flicker phase noise.
+    /// Averaged over the phase as well: separates white from flicker phase noise.
     Modified,
     /// Third difference: blind to a linear ramp.
     Hadamard,
@@ -55,7 +55,7 @@ impl Kind {
             Self::NonOverlapping => (n / m).saturating_sub(1),
             Self::Modified => (n + 2).saturating_sub(3 * m),
             Self::Hadamard => (n + 1).saturating_sub(3 * m),
-            // Beyond n/2 nearly every term would be a reflection of the data in itself.
+            // Beyond n/2 nearly every term would consist of reflected readings.
             Self::Total if 2 * m <= n => n - 1,
             Self::Total => 0,
         }
@@ -72,18 +72,18 @@ impl Kind {
     }
 }
 
-/// One curve: a value for each cluster size.
+/// Variance against cluster size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     /// Variances, in the square of the unit of the readings.
     pub variance: Vec<f64>,
-    /// Number of terms behind each.
+    /// Number of terms in each variance.
     pub terms: Vec<usize>,
     /// Sum of the weights of the terms: the number of terms where no reading is missing.
     pub weight: Vec<f64>,
 }
 
-/// Refuse cluster sizes that have no term, in the words of the person who asked.
+/// Checks that every cluster size has a term.
 ///
 /// # Errors
 /// `BadInput` naming the first cluster size that is zero or too long for `n` readings.
@@ -118,7 +118,7 @@ pub fn variances(readings: &impl Readings, clusters: &[usize], kind: Kind) -> Re
     variances_in(readings, clusters, kind, &mut vec![0.0; readings.len() + 1])
 }
 
-/// As [`variances`], the running sum in memory of the caller's, one longer than the readings.
+/// As [`variances`], with the running sum in memory of the caller, one longer than the readings.
 ///
 /// # Errors
 /// As [`variances`].

@@ -1,10 +1,10 @@
-//! Running sums that keep their digits: centred on the mean, exact at block starts.
+//! Running sums without loss of precision: centred on the mean, block starts summed in twice the working precision.
 
 use rayon::prelude::*;
 
 use super::readings::Readings;
 
-/// Readings per block; block starts are summed in twice the working precision, so that no error grows along the log.
+/// Readings per block; block starts are summed in twice the working precision, so that no error grows along it.
 const BLOCK: usize = 4096;
 
 /// Running sum of one channel without its mean.
@@ -12,13 +12,13 @@ const BLOCK: usize = 4096;
 pub struct Prefix {
     /// `n + 1` values, the first zero. Readings that are missing count as the mean.
     pub sums: Vec<f64>,
-    /// What was subtracted from every reading.
+    /// Constant subtracted from every reading, in their unit.
     pub centre: f64,
     /// Number of finite readings when some are missing, `None` when all are present.
     pub present: Option<usize>,
 }
 
-/// `a + b` as a rounded sum and what the rounding lost (Knuth's two-sum).
+/// `a + b` as a rounded sum and its rounding error (Knuth's two-sum).
 #[inline]
 #[must_use]
 pub fn two_sum(a: f64, b: f64) -> (f64, f64) {
@@ -64,7 +64,7 @@ impl Prefix {
         );
         let blocks = n.div_ceil(BLOCK);
         let range = |b: usize| b * BLOCK..((b + 1) * BLOCK).min(n);
-        // Around a first reading rather than zero: a bias of 1e4 times the noise would cost its digits.
+        // About a first reading rather than zero: a bias of 1e4 times the noise would cost four digits of the noise.
         let pivot = (0..n)
             .map(|i| readings.get(i))
             .find(|v| v.is_finite())
@@ -89,7 +89,7 @@ impl Prefix {
             total / present as f64
         };
         let centre = pivot + shift;
-        // What readings are freed of is the rounded centre: at a level of 1e9 the block starts must know.
+        // The rounded centre is subtracted from the readings; block starts must use it too, at a level of 1e9.
         let shift = centre - pivot;
         let (mut high, mut low) = (0.0, 0.0);
         let starts: Vec<f64> = partial
@@ -115,7 +115,7 @@ impl Prefix {
     }
 }
 
-/// Sum around `pivot` of the readings present, and their number.
+/// Sum about `pivot` of the readings present, and their number.
 fn block_sum(values: &[f64], pivot: f64) -> (f64, usize) {
     const LANES: usize = 16;
     let mut lanes = [0.0; LANES];

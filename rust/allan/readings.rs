@@ -1,4 +1,4 @@
-//! Where the readings of one channel come from: an array of any number type, a column of rows, a function.
+//! Source of the readings of one channel: an array of any number type, a column of rows, a function.
 
 /// Readings of one channel; one that is not finite is missing.
 pub trait Readings: Sync {
@@ -8,7 +8,7 @@ pub trait Readings: Sync {
     /// Reading `i`.
     fn get(&self, i: usize) -> f64;
 
-    /// There is none.
+    /// Whether there are no readings.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -26,9 +26,9 @@ pub trait Readings: Sync {
 pub struct Column<'a, T> {
     /// All readings, row by row.
     pub data: &'a [T],
-    /// Readings in a row.
+    /// Readings per row.
     pub channels: usize,
-    /// Which one.
+    /// Index of the channel.
     pub channel: usize,
 }
 

@@ -3,8 +3,8 @@
 //! Clusters up to [`FINE`] readings are evaluated at every reading from a window of the running sum that moves with the
 //! chunks. For longer ones the running sum is kept at every `stride`-th reading (a power of two, doubled whenever the
 //! kept values exceed the budget), and terms are taken at every `stride`-th start: at least [`FINE_PER_STRIDE`] starts
-//! to a cluster, which holds all the information of every start to within 0.1 % of its variance. As long as
-//! the budget suffices (`stride` = 1) the result is that of the whole array.
+//! per cluster, which keep the information of every start to within 0.1 % of its variance. As long as the budget
+//! suffices (`stride` = 1) the result is that of the whole array.
 
 use super::Curve;
 use super::prefix::{compensated_sum, two_sum};
@@ -12,9 +12,9 @@ use super::readings::Readings;
 use super::tiles::{self, Difference};
 use crate::error::{Error, Result};
 
-/// Longest cluster that is evaluated at every reading whatever the length of the log.
+/// Longest cluster that is evaluated at every reading, for logs of any length.
 pub const FINE: usize = 65536;
-/// Fewest starts per cluster among the longer ones.
+/// Fewest starts per cluster of the longer ones.
 pub const FINE_PER_STRIDE: usize = 64;
 
 /// Overlapping Allan variance of one channel that arrives in chunks.
@@ -33,14 +33,14 @@ pub struct Stream {
     n: usize,
 }
 
-/// What a stream amounts to.
+/// Overlapping Allan variance of a stream.
 #[derive(Debug, Clone)]
 pub struct StreamedCurve {
     /// Cluster sizes as evaluated: those above [`FINE`] are multiples of `stride`; sizes without a term are left out.
     pub clusters: Vec<usize>,
-    /// The curve at these.
+    /// Variance at these cluster sizes.
     pub curve: Curve,
-    /// Distance of the starts of the longer clusters.
+    /// Readings between the starts of the longer clusters.
     pub stride: usize,
     /// Number of readings.
     pub n: usize,
@@ -102,7 +102,7 @@ impl Stream {
     /// `BadInput` naming the first reading that is not finite.
     pub fn extend(&mut self, readings: &impl Readings) -> Result<()> {
         let n = readings.len();
-        // Pieces bound the window whatever chunk the caller likes.
+        // Pieces bound the window for chunks of any length.
         let mut buffer = vec![0.0; n.min(4 * FINE)];
         for first in (0..n).step_by(4 * FINE) {
             let piece = &mut buffer[..(n - first).min(4 * FINE)];
@@ -114,7 +114,7 @@ impl Stream {
                 )));
             }
             if self.n == 0 {
-                // Close to the mean is enough: a constant drops out of every difference.
+                // The mean of the first piece suffices: a constant drops out of every difference.
                 let pivot = piece[0];
                 self.centre =
                     pivot + compensated_sum(piece.iter().map(|v| v - pivot)) / piece.len() as f64;
@@ -151,7 +151,7 @@ impl Stream {
         self.stride *= 2;
     }
 
-    /// Add the terms of the fine clusters that became complete: every start for which the window holds all clusters.
+    /// Add the terms of the fine clusters that became complete: every start whose clusters all lie in the window.
     fn settle(&mut self) {
         let Some(&longest) = self.clusters[..self.n_fine].last() else {
             self.window.clear();
@@ -171,7 +171,7 @@ impl Stream {
         self.window_start += starts;
     }
 
-    /// What [`Stream::restore`] needs to go on: numbers (centre, running sum and its remainder, readings, stride, start of
+    /// The state for [`Stream::restore`]: scalars (centre, running sum and its remainder, readings, stride, start of
     /// the window), sums of the fine clusters with their remainders, window, kept running sums.
     #[must_use]
     pub fn state(&self) -> [Vec<f64>; 4] {
@@ -184,12 +184,12 @@ impl Stream {
         ]
     }
 
-    /// Go on where a stream of the same clusters and budget was.
+    /// Continues from the state of a stream of the same clusters and budget.
     ///
     /// # Errors
     /// `BadInput` when the state is of another stream, or damaged.
     pub fn restore(&mut self, [numbers, fine, window, kept]: [Vec<f64>; 4]) -> Result<()> {
-        // Counts that were written as numbers: exact below 2⁵³, and checked.
+        // Counts that were stored as floats: exact below 2⁵³, and checked.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let whole = |v: f64| (v >= 0.0 && v.fract() == 0.0 && v < 9e15).then_some(v as usize);
         let counted =
@@ -226,7 +226,7 @@ impl Stream {
         Ok(())
     }
 
-    /// The curve of everything so far.
+    /// The curve of all readings so far.
     ///
     /// # Errors
     /// `NotDetermined` when the log is too short for every cluster.
@@ -278,9 +278,9 @@ impl Stream {
         Ok(out)
     }
 
-    /// Means of `lag · stride` readings, one after the other, and that number of readings.
+    /// Means of consecutive clusters of `lag · stride` readings, and that number of readings.
     ///
-    /// `lag` is the least that gives means of at least `readings` readings.
+    /// `lag` is the smallest that gives means of at least `readings` readings.
     #[must_use]
     pub fn means(&self, readings: usize) -> (Vec<f64>, usize) {
         let lag = readings.div_ceil(self.stride).max(1);

@@ -1,9 +1,9 @@
 //! Sums of squared second and third differences of a running sum, for many lags in one pass over the memory.
 //!
 //! A tile of the running sum is visited once and all lags pass over it while it is in the cache; the far ends of
-//! neighbouring lags lie close together and are found in the cache as well. Tiles are handed to the threads in order, so
-//! that all threads work on neighbouring memory; each tile leaves one number per lag and these are added in order, with
-//! compensation: the result does not depend on the number of threads.
+//! neighbouring lags lie close together and are found in the cache as well. Tiles are handed to the threads in order,
+//! so that all threads work on neighbouring memory; each tile leaves one number per lag and these are added in order,
+//! with compensation: the result does not depend on the number of threads.
 
 // The loops are compiled once per instruction set: they take on the features of the function they are inlined into.
 #![expect(
@@ -69,7 +69,7 @@ pub fn energies(p: &[f64], lags: &[usize], difference: Difference) -> Vec<f64> {
                 if interrupt::is_requested() {
                     return;
                 }
-                // Nobody else holds this row: the lock is taken once and never waits.
+                // No other thread takes this row: the lock never waits.
                 let mut row = row
                     .lock()
                     .unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -111,7 +111,7 @@ pub enum Kernel {
     Avx512,
     /// 256-bit vectors with fused multiply-add.
     Avx2,
-    /// What every processor of the target offers.
+    /// The baseline instructions of the target.
     Portable,
 }
 

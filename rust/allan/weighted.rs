@@ -1,10 +1,10 @@
-//! Logs with gaps: clusters are means of the readings they do have, and weigh accordingly.
+//! Allan variance of logs with gaps: a cluster is the mean of the readings present, weighted by their number.
 //!
 //! With `c1`, `c2` readings present in two neighbouring clusters of `m`, the squared difference of their means has the
-//! weight `w = 2 c1 c2 / (m (c1 + c2))`: 1 when both are complete, 0 when either is empty, and in between the inverse of
-//! the variance that white noise gives it. `variance = Σ w (mean2 − mean1)² / (2 Σ w)`. Nothing is interpolated. For a
-//! random walk this is unbiased up to the position of the gap in its cluster; for white noise it is the variance of
-//! means of the readings that are there.
+//! weight `w = 2 c1 c2 / (m (c1 + c2))`: 1 when both are complete, 0 when either is empty, and in between the inverse
+//! of the variance that white noise gives it. `variance = Σ w (mean2 − mean1)² / (2 Σ w)`. Nothing is interpolated. For
+//! a random walk this is unbiased up to the position of the gap in its cluster; for white noise it is the variance of
+//! means of the readings present.
 
 use rayon::prelude::*;
 
@@ -108,7 +108,7 @@ fn one(p: &[f64], c: &[f64], m: usize, kind: Kind) -> (f64, usize, f64) {
     (sum / (per_term * weight), terms, weight)
 }
 
-/// The overlapping variance by the same weights: `w d² = 2 (S2 c1 − S1 c2)² / (m c1 c2 (c1 + c2))`, one division a term.
+/// The overlapping variance by these weights: `w d² = 2 (S2 c1 − S1 c2)² / (m c1 c2 (c1 + c2))`, one division per term.
 fn every_start(p: &[f64], c: &[f64], m: usize) -> (f64, usize, f64) {
     const STRETCH: usize = 4096;
     let terms = p.len() - 2 * m;

@@ -1,10 +1,10 @@
-//! Attitude from a rate in SI: `R' = R [ω]×`, a chain of exact rotations, as fast as memory takes the answer.
+//! Attitude from rates in rad/s: `R' = R [ω]×`, a chain of exact rotations, at memory bandwidth.
 //!
 //! `R` takes a vector from the body frame at a sample to the body frame at the first one (or to the frame of the
-//! attitude given for it); it is the transpose of the `B` of [`crate::poisson`], and each step is the same: the rotation
-//! vector `φ = φ₀ + φ₀ × φ₁` from the moments of the rate over the step (equation 5.4 of docs/model-gyroscope.md).
-//! Unit quaternions `w x y z` are multiplied, a stretch of the log in every lane of a vector; long logs are cut into
-//! pieces of fixed size for the threads, so that the answer does not depend on their number.
+//! attitude given for it); it is the transpose of the `B` of [`crate::poisson`], and each step is the same: the
+//! rotation vector `φ = φ₀ + φ₀ × φ₁` from the moments of the rate over the step (equation 5.4 of
+//! docs/model-gyroscope.md). Unit quaternions `w x y z` are multiplied, a stretch of the log in every lane of a vector;
+//! long logs are cut into pieces of fixed size for the threads, so that the result does not depend on their number.
 
 mod tile;
 
@@ -18,10 +18,10 @@ use tile::{Start, Tile};
 /// `w x y z`, of unit length.
 pub type Quaternion = [f64; 4];
 
-/// The attitude that changes nothing.
+/// The identity rotation.
 pub const IDENTITY: Quaternion = [1.0, 0.0, 0.0, 0.0];
 
-/// How an attitude is written.
+/// Representation of an attitude in the output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// Nine numbers, row by row.
@@ -77,7 +77,7 @@ impl<'a> Samples<'a> {
         })
     }
 
-    /// The same by instructions of the caller's choice; the results differ by rounding.
+    /// The same with a chosen instruction set; results differ by rounding.
     #[must_use]
     pub fn with(mut self, instructions: Instructions) -> Self {
         self.instructions = instructions;
@@ -114,7 +114,7 @@ impl<'a> Samples<'a> {
     /// The attitude at every sample, `width` numbers each, the first being `initial`.
     ///
     /// # Errors
-    /// As [`last`](Self::last), and when `out` has not room for exactly all.
+    /// As [`last`](Self::last), and when `out` is not as long as all attitudes together.
     pub fn all(&self, initial: Quaternion, form: Form, out: &mut [f64]) -> Result<()> {
         let width = form.width();
         if out.len() != width * self.time_s.len() {
@@ -134,7 +134,7 @@ impl<'a> Samples<'a> {
             }
             return Ok(());
         }
-        // Two passes over the steps: where each piece starts is known only when all before it were turned through.
+        // Two passes over the steps: the attitude where a piece starts needs the rotations over all pieces before it.
         let turns: Vec<Quaternion> = pieces
             .par_iter()
             .map(|&(first, stop)| self.rotation_over(first, stop))
@@ -194,7 +194,7 @@ impl<'a> Samples<'a> {
         Ok(turned)
     }
 
-    /// What is wrong with the samples of a step.
+    /// Error that names the invalid sample near a step.
     fn blame(&self, step: usize) -> Error {
         let reach = step.saturating_sub(2)..(step + 4).min(self.time_s.len());
         for k in reach {

@@ -1,4 +1,4 @@
-//! What is looked for in every log: extreme values, readings that equal the one before, readings that are missing.
+//! Statistics of every log: extreme values, readings that equal the one before, missing readings.
 
 mod repeats;
 
@@ -58,7 +58,7 @@ fn joined(a: (f64, usize), b: (f64, usize), beats: impl Fn(f64, f64) -> bool) ->
     }
 }
 
-/// Extremes of each axis; readings that are no numbers (NaN) are passed over.
+/// Extremes of each axis; NaN readings are skipped.
 #[must_use]
 pub fn extremes(rows: &[[f64; 3]]) -> [Extremes; 3] {
     let parts: Vec<[Extremes; 3]> = rows
@@ -75,7 +75,7 @@ pub fn extremes(rows: &[[f64; 3]]) -> [Extremes; 3] {
 fn extremes_of_axis(rows: &[[f64; 3]], axis: usize) -> Extremes {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for row in rows {
-        // Comparisons with NaN are false, so that it is passed over.
+        // Comparisons with NaN are false: NaN is skipped.
         low = if row[axis] < low { row[axis] } else { low };
         high = if row[axis] > high { row[axis] } else { high };
     }
@@ -95,18 +95,18 @@ fn extremes_of_axis(rows: &[[f64; 3]], axis: usize) -> Extremes {
     }
 }
 
-/// What lies near an extreme value.
+/// Readings near an extreme value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Near {
     /// Readings within the depth, those at the value itself among them.
     pub count: usize,
-    /// Distance of the nearest reading that is not the value; infinite where there is none.
+    /// Distance of the nearest reading that differs from the value; infinite where there is none.
     pub width: f64,
     /// Rows that hold the value.
     pub at: Vec<i64>,
 }
 
-/// What lies within `depth` of a value of one axis.
+/// Readings within `depth` of a value of one axis.
 ///
 /// # Panics
 /// When `axis` is not below 3.

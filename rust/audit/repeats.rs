@@ -17,24 +17,24 @@ pub struct Repeats {
     pub count: [u64; KINDS],
     /// Rows of the longest run of equal ones.
     pub longest: [u64; KINDS],
-    /// Where the first such run begins.
+    /// First row of the first such run.
     pub start: [u64; KINDS],
-    /// Equal rows of every whole window of 64, from the second row on, and of the rows behind the last one.
+    /// Equal rows of every whole window of 64, from the second row on, and of the rows after the last whole window.
     pub windows: Vec<[u8; KINDS]>,
-    /// Rows that hold a reading which is not finite, and the first of them.
+    /// Number of rows with a reading that is not finite.
     pub missing: u64,
-    /// `None` where all are finite.
+    /// The first such row; `None` where all are finite.
     pub first_missing: Option<u64>,
 }
 
-/// What one share tells.
+/// Repeats in one share of the rows.
 struct Part {
     count: [u64; KINDS],
-    /// Equal rows at its start, `None` where all of it are.
+    /// Equal rows at the start of the share, `None` where all its rows are equal.
     head: [Option<u64>; KINDS],
     /// Longest run that starts inside: rows, and where it starts.
     inner: [(u64, u64); KINDS],
-    /// Rows of the run that is open at its end, where it has a break.
+    /// Rows of the run that is open at the end of the share, if the share has a break.
     tail: [u64; KINDS],
     windows: Vec<[u8; KINDS]>,
     len: u64,
@@ -43,7 +43,7 @@ struct Part {
     first_missing: Option<u64>,
 }
 
-/// Equal neighbours of the rows of a triad.
+/// Repeated rows of a triad.
 #[must_use]
 pub fn repeats(rows: &[[f64; 3]]) -> Repeats {
     let n = rows.len().saturating_sub(1);
@@ -107,7 +107,7 @@ fn part(rows: &[[f64; 3]], first: usize, stop: usize) -> Part {
         missing: 0,
         first_missing: None,
     };
-    // The run that is open, from the last break on; rows of no break so far are counted as the head.
+    // Rows of the open run since the last break; up to the first break they form the head.
     let mut run = [0_u64; KINDS];
     let mut at = first;
     while at < stop {
@@ -117,7 +117,7 @@ fn part(rows: &[[f64; 3]], first: usize, stop: usize) -> Part {
         for i in at..end {
             let (before, row) = (rows[i - 1], rows[i]);
             let bit = 1_u64 << (i - at);
-            // Repeated means to the last bit.
+            // Equal to the last bit.
             #[allow(clippy::float_cmp)]
             let equal: [bool; 3] = std::array::from_fn(|axis| row[axis] == before[axis]);
             for axis in 0..3 {
@@ -145,10 +145,10 @@ fn part(rows: &[[f64; 3]], first: usize, stop: usize) -> Part {
     out
 }
 
-/// Runs of one window: `bits` say which of `len` rows from `at` on equal the row before.
+/// Runs of one window: bit `i` of `bits` is set where row `at + i` equals the row before, for `len` rows.
 fn follow(out: &mut Part, k: usize, bits: u64, at: u64, len: u64, run: &mut u64) {
     if bits == 0 && out.head[k].is_some() && *run <= out.inner[k].0 && out.inner[k].0 > 0 {
-        // Nothing repeats, and the run that ends here is none to be kept.
+        // Nothing repeats, and the run that ends here is not the longest.
         *run = 1;
         return;
     }

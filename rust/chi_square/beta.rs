@@ -1,12 +1,12 @@
-//! The incomplete beta function, and with it the distributions of F, of Student and of counts.
+//! The incomplete beta function, and from it the F, Student's t and binomial distributions.
 
 use super::ln_gamma;
 
-/// Terms of the continued fraction: their number grows with the root of the larger parameter.
+/// Terms of the continued fraction: their number grows with the square root of the larger parameter.
 const MOST_TERMS: u32 = 200_000;
 
-/// Probabilities that a beta variate with parameters `a`, `b` stays below `x`, and above it (`y` is `1 - x`, given so
-/// that neither loses its digits near the other end).
+/// Probabilities that a beta variate with parameters `a`, `b` is below `x`, and above it (`y` is `1 - x`, passed as
+/// well so that precision is kept near either end).
 #[must_use]
 pub fn beta_tails(a: f64, b: f64, x: f64, y: f64) -> (f64, f64) {
     if !(a > 0.0 && b > 0.0 && (0.0..=1.0).contains(&x)) {
@@ -19,7 +19,7 @@ pub fn beta_tails(a: f64, b: f64, x: f64, y: f64) -> (f64, f64) {
         return (1.0, 0.0);
     }
     let front = (ln_gamma(a + b) - ln_gamma(a) - ln_gamma(b) + a * x.ln() + b * y.ln()).exp();
-    // The fraction converges quickly on the near side of the mean.
+    // The continued fraction converges quickly on the near side of the mean.
     if x < (a + 1.0) / (a + b + 2.0) {
         let below = front * fraction(a, b, x) / a;
         (below, 1.0 - below)
@@ -81,7 +81,7 @@ pub fn student_upper(above: f64, dof: f64) -> f64 {
     f_upper(2.0 * above, 1.0, dof).sqrt()
 }
 
-/// Probability that of `trials` more than `count` succeed, each with `chance`.
+/// Probability of more than `count` successes in `trials`, each with probability `chance`.
 #[must_use]
 pub fn binomial_above(count: f64, trials: f64, chance: f64) -> f64 {
     if count < 0.0 {
@@ -93,7 +93,7 @@ pub fn binomial_above(count: f64, trials: f64, chance: f64) -> f64 {
     beta_tails(count + 1.0, trials - count, chance, 1.0 - chance).0
 }
 
-/// Where a probability that falls from one to zero on `(0, ∞)` passes `wanted`.
+/// Argument at which a probability that falls from one to zero on `(0, ∞)` equals `wanted`.
 pub(super) fn falling_root(wanted: f64, above: impl Fn(f64) -> f64) -> f64 {
     if !(0.0..=1.0).contains(&wanted) || above(1.0).is_nan() {
         return f64::NAN;
@@ -110,7 +110,7 @@ pub(super) fn falling_root(wanted: f64, above: impl Fn(f64) -> f64) -> f64 {
         high = low;
         low *= 0.5;
     }
-    // Halving the interval: 52 times for every digit there is.
+    // Bisection: 52 steps reach full precision.
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
         if above(middle) > wanted {

@@ -1,5 +1,5 @@
-//! Chi-square and normal probabilities for any real number of degrees of freedom; with [`beta`] those of F, of Student
-//! and of counts.
+//! Chi-square and normal probabilities for any real number of degrees of freedom; with [`beta`] the F, Student's t and
+//! binomial ones.
 
 pub mod beta;
 
@@ -34,7 +34,7 @@ pub fn ln_gamma(x: f64) -> f64 {
 
 /// Probabilities that a chi-square variate of `dof` degrees of freedom stays below `value`, and above it.
 ///
-/// Each is computed where it is small: neither loses its digits.
+/// The smaller one is computed directly: neither loses precision.
 #[must_use]
 pub fn chi_square_tails(value: f64, dof: f64) -> (f64, f64) {
     if !(value > 0.0 && dof > 0.0) {

@@ -1,4 +1,4 @@
-//! The ellipsoid on which raw readings of a still triad lie, and the factors `S`, `b` it contains (model.md, section 4).
+//! The ellipsoid on which raw readings of a static triad lie, and the `S`, `b` that it gives (model.md, section 4).
 //!
 //! `|S a' + b| = |g|` is the quadric `a'ᵀ M a' + 2 mᵀ a' = |g|² - c` with `M = SᵀS`, `m = Sᵀb`, `c = bᵀb`. Readings
 //! are centred on their mean and divided by their spread before the linear step.
@@ -16,7 +16,7 @@ pub use standard::Standardisation;
 /// `uᵀ A u + 2 hᵀ u = 1` in standardised readings.
 #[derive(Debug, Clone, Copy)]
 pub struct Quadric {
-    /// Symmetric.
+    /// Symmetric matrix of the quadratic terms.
     pub a: Matrix3<f64>,
     /// Half the linear coefficients.
     pub h: Vector3<f64>,
@@ -85,7 +85,7 @@ pub fn symmetric_root(m: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     Some((root + root.transpose()) * 0.5)
 }
 
-/// Least squares on the quadric's nine coefficients; it may be no ellipsoid.
+/// Least squares on the quadric's nine coefficients; the result need not be an ellipsoid.
 ///
 /// # Errors
 /// When there are fewer than nine readings or they do not determine nine coefficients.
@@ -114,8 +114,8 @@ pub fn fit_quadric(u: &[Vector3<f64>]) -> Result<Quadric> {
         .map_err(Error::not_determined)
 }
 
-/// The best quadric among ellipsoids (Li and Griffiths, *Least squares ellipsoid specific fitting*, 2004): minimises the
-/// algebraic distance under `4J - I² = 1`, which no hyperboloid satisfies.
+/// The best quadric among ellipsoids (Li and Griffiths, *Least squares ellipsoid specific fitting*, 2004): minimises
+/// the algebraic distance under `4J - I² = 1`, which no hyperboloid satisfies.
 ///
 /// # Errors
 /// When there are fewer than nine readings.
@@ -140,7 +140,7 @@ pub fn fit_ellipsoid(u: &[Vector3<f64>]) -> Result<Quadric> {
             missing_directions(u)
         ))
     };
-    // A touch of ridge keeps poses in a plane (and data without noise) factorisable; 1e-12 is below any sensor's noise.
+    // A ridge of 1e-12, below any sensor's noise, keeps poses in one plane (and noise-free data) factorisable.
     let ridge4 = SMatrix::<f64, 4, 4>::identity() * 1e-12;
     let back = (s22 + ridge4).cholesky().ok_or_else(trouble)?;
     let reduced = s11 - s12 * back.solve(&s12.transpose())
@@ -179,8 +179,8 @@ pub fn fit_ellipsoid(u: &[Vector3<f64>]) -> Result<Quadric> {
     Ok(quadric(&x))
 }
 
-/// The sphere through the readings, `|u - centre| = radius`, of smallest `|centre|` where it is not determined: the start
-/// that needs least.
+/// The sphere through the readings, `|u - centre| = radius`, of smallest `|centre|` where it is not determined: the
+/// starting point that needs the fewest readings.
 #[must_use]
 pub fn fit_sphere(u: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64)> {
     let n = u.len();
@@ -193,7 +193,7 @@ pub fn fit_sphere(u: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64)> {
     (squared > 0.0).then(|| (centre, squared.sqrt()))
 }
 
-/// Ellipsoid route from raw readings to a model: unconstrained, then ellipsoid-constrained if that is no ellipsoid.
+/// Model from raw readings by an ellipsoid: unconstrained, then ellipsoid-constrained if the first quadric is none.
 ///
 /// # Errors
 /// When the readings do not determine an ellipsoid, naming the directions that are missing.
@@ -219,7 +219,7 @@ pub fn calibrate(readings: &[Vector3<f64>], gravity: f64, frame: Frame) -> Resul
     }
 }
 
-/// From rows: where sums lose too many digits, or the quadric is no ellipsoid.
+/// Fit from rows, for when sums lose too many digits or their quadric is no ellipsoid.
 fn by_rows(
     readings: &[Vector3<f64>],
     standard: &Standardisation,
@@ -242,8 +242,8 @@ fn by_rows(
         })
 }
 
-/// [`fit_quadric`] in two passes over readings of which no row is kept: the sums, then one step of refinement, which
-/// gives back the digits that sums of squares lose. `None` where they would lose too many.
+/// [`fit_quadric`] in two passes over the readings without storing rows: the sums, then one step of refinement, which
+/// restores the digits that sums of squares lose. `None` where they would lose too many.
 fn by_moments(readings: &[Vector3<f64>], standard: &Standardisation) -> Option<Quadric> {
     let moments = Moments::of(readings, standard);
     let first = moments.quadric()?;
@@ -260,10 +260,10 @@ fn by_moments(readings: &[Vector3<f64>], standard: &Standardisation) -> Option<Q
     })
 }
 
-/// Which half axes no reading points to within 55° (the angle from an axis to the corner of a cube), in words.
+/// Names the half axes to which no reading points within 55° (the angle from an axis to the corner of a cube).
 #[must_use]
 pub fn missing_directions(u: &[Vector3<f64>]) -> String {
-    // Seen from the centre of the sphere through them: mean and mid-range lean towards wherever there are more poses.
+    // From the centre of a sphere through them: mean and mid-range shift to where there are more poses.
     let centre = fit_sphere(u).map_or_else(Vector3::zeros, |(centre, _)| centre);
     let mut missing = Vec::new();
     for axis in 0..3 {

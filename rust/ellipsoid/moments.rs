@@ -1,4 +1,4 @@
-//! All that the linear fits need of any number of readings: sums of products of the quadric's nine columns.
+//! Sums of products of the quadric's nine columns: all that the linear fits need, for any number of readings.
 
 #![expect(
     clippy::inline_always,
@@ -18,7 +18,7 @@ type Row = [f64; LANES];
 /// Readings per share; shares are summed in order.
 const SHARE: usize = 16_384;
 
-/// Smallest pivot, with unit diagonal, at which the sums determine the answer to ten digits.
+/// Smallest pivot, with unit diagonal, at which the sums determine the coefficients to ten digits.
 const SMALLEST_PIVOT: f64 = 1e-5;
 
 /// `HᵀH` and `Hᵀ1` of the rows `[x² y² z² 2xy 2xz 2yz 2x 2y 2z]` of standardised readings.
@@ -68,7 +68,7 @@ impl Moments {
         solve(&self.gram, &self.sum).map(|x| quadric(x.as_slice()))
     }
 
-    /// What a correction of the quadric would be for residuals `1 - H x` whose sum `Hᵀ(1 - H x)` is given.
+    /// Correction of the quadric's coefficients for residuals `1 - H x`, of which `Hᵀ(1 - H x)` is given.
     pub(crate) fn correction(&self, rest: &SVector<f64, COLUMNS>) -> Option<SVector<f64, COLUMNS>> {
         solve(&self.gram, rest)
     }

@@ -1,4 +1,4 @@
-//! Readings brought to the origin and to unit size.
+//! Readings centred on their mean and scaled to unit size.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::sensor_model::Model;
 
-/// Readings moved to the origin and to unit size: `a' = centre + size · u`.
+/// Centre and scale of readings: `a' = centre + size · u`.
 #[derive(Debug, Clone, Copy)]
 pub struct Standardisation {
     /// Mean reading.
@@ -16,7 +16,7 @@ pub struct Standardisation {
 }
 
 impl Standardisation {
-    /// Of these readings.
+    /// Standardisation of the given readings.
     ///
     /// # Errors
     /// When all readings are the same, or one is missing, infinite or beyond any sensor.
@@ -37,13 +37,13 @@ impl Standardisation {
         Ok(Self { centre, size })
     }
 
-    /// The reading as the linear step sees it.
+    /// The standardised reading `u`.
     #[must_use]
     pub fn apply(&self, reading: &Vector3<f64>) -> Vector3<f64> {
         (reading - self.centre) / self.size
     }
 
-    /// The model in raw units of a model in standardised readings.
+    /// The model of raw readings for a model of standardised ones.
     #[must_use]
     pub fn undo(&self, model: &Model) -> Model {
         let s = model.s / self.size;
@@ -54,7 +54,7 @@ impl Standardisation {
     }
 }
 
-/// Readings summed side by side, three numbers each.
+/// Numbers summed side by side: eight readings, three numbers each.
 const WIDE: usize = 24;
 /// Readings per share; shares are summed in order.
 const SHARE: usize = 16_384;

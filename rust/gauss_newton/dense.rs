@@ -6,7 +6,7 @@ use super::linear::{Certainty, Linear, Scaled, certainty, column_norms, cosine, 
 use super::{Descent, Local, Loss, Options, Stop, descend};
 use crate::error::{Error, Result};
 
-/// A problem the solver can work on. Weighted by the loss already.
+/// A problem for the solver, already weighted by the loss.
 pub trait Problem {
     /// The compressed problem at `x`.
     ///
@@ -14,14 +14,14 @@ pub trait Problem {
     /// When the model cannot be evaluated there at all.
     fn linearise(&self, x: &DVector<f64>) -> Result<Linear>;
 
-    /// F of GN1 at `x`; infinite where the model does not hold, which the solver treats as a wall.
+    /// F of GN1 at `x`; infinite where the model is invalid: the solver then shortens the step.
     ///
     /// # Errors
     /// When the model cannot be evaluated there at all.
     fn cost(&self, x: &DVector<f64>) -> Result<f64>;
 }
 
-/// Where the solver ended and how sure that is.
+/// The solver's result and its uncertainty.
 #[derive(Debug, Clone)]
 pub struct Solution {
     /// The parameters `(p)`.
@@ -42,7 +42,7 @@ pub struct Solution {
     pub r_factor: DMatrix<f64>,
     /// Number of residuals.
     pub n_residuals: usize,
-    /// Certainty of the parameters.
+    /// Covariance and rank of the parameters.
     pub certainty: Certainty,
 }
 
@@ -129,7 +129,7 @@ impl<P: Problem> Descent for Dense<'_, P> {
                 "the residuals or their derivatives are not finite at the start of the fit; check the input for NaN",
             ));
         }
-        // Marquardt's scaling, never shrinking: a column that fades must not let its parameter run away.
+        // Marquardt's scaling, never decreasing: a parameter whose column vanishes would take unbounded steps.
         let before = previous.map_or_else(|| DVector::zeros(x.len()), |local| local.scale.clone());
         let scale = before.zip_map(&column_norms(&linear.r_factor), f64::max);
         let scaled = Scaled::new(&linear.r_factor, &scale.map(positive_or_one), &linear.rhs);

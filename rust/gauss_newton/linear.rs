@@ -1,4 +1,4 @@
-//! A least-squares problem compressed at one point, its decomposition, and the certainty that it gives.
+//! A least-squares problem compressed at one point, its decomposition, and the covariance that it gives.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,9 +11,9 @@ pub struct Linear {
     pub rhs: DVector<f64>,
     /// F of GN1.
     pub cost: f64,
-    /// Σ r², every weight one.
+    /// Σ r² of the whitened residuals, without weights.
     pub chi2: f64,
-    /// Residuals behind it.
+    /// Number of residuals.
     pub n_residuals: usize,
 }
 
@@ -48,7 +48,7 @@ impl Linear {
         }
     }
 
-    /// From the normal equations, for problems with too many rows to keep: costs half the digits of the rank.
+    /// From the normal equations, for problems with too many rows to store: only half of the digits determine the rank.
     #[must_use]
     pub fn from_normal_equations(
         gram: &DMatrix<f64>,
@@ -83,14 +83,14 @@ impl Linear {
     }
 }
 
-/// What the Jacobian at the solution says about the parameters.
+/// Covariance, rank and directions of the parameters, from the Jacobian at the solution.
 #[derive(Debug, Clone)]
 pub struct Certainty {
     /// `(p, p)` for unit-variance residuals; over the determined directions only when `rank < p`.
     pub covariance: DMatrix<f64>,
-    /// Directions determined.
+    /// Number of directions determined.
     pub rank: usize,
-    /// Of the Jacobian with unit columns, largest first, `p` of them.
+    /// Singular values of the Jacobian with unit columns `(p,)`, largest first.
     pub singular_values: DVector<f64>,
     /// Column `k` is the unit direction, in scaled parameters, of singular value `k`.
     pub directions: DMatrix<f64>,

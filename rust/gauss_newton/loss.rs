@@ -1,6 +1,6 @@
-//! What a residual costs: least squares and its robust kin.
+//! Loss functions of residuals: least squares and robust ones.
 
-/// What a residual costs. `scale` is in standard errors of the (whitened) residual; 2ρ is χ² for small residuals.
+/// Loss of a residual. `scale` is in standard errors of the (whitened) residual; 2ρ is χ² for small residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Loss {
     /// ρ(s) = s: least squares.
@@ -13,7 +13,7 @@ pub enum Loss {
     },
     /// ρ(s) = 2 c² (√(1 + s/c²) - 1): a smooth Huber.
     SoftL1 {
-        /// Residual, in standard errors, at which the loss bends.
+        /// Residual, in standard errors, about which the loss becomes linear.
         scale: f64,
     },
     /// ρ(s) = c² ln(1 + s/c²): gross outliers lose all influence. 2.385 keeps 95 % efficiency on Gaussian noise.
@@ -80,7 +80,7 @@ impl Loss {
         weight * psi2 / slope.powi(2)
     }
 
-    /// `E[ψ²]` per residual for Gaussian noise: Σψ² divided by it estimates χ² without the weight of outliers.
+    /// `E[ψ²]` per residual for Gaussian noise: Σψ² divided by it estimates χ² with outliers downweighted.
     #[must_use]
     pub fn expected_influence(self, block: usize) -> f64 {
         self.expectations(block).1

@@ -1,21 +1,21 @@
 //! The only solver: weighted nonlinear least squares by Gauss-Newton with Levenberg-Marquardt damping.
 //!
-//! It knows no sensor. Residuals arrive *whitened* (divided by their standard error), so that the inverse of `JᵀJ` at
-//! the solution is the covariance of the parameters. It minimises
+//! It is independent of sensors. Residuals are passed *whitened* (divided by their standard error), so that the inverse
+//! of `JᵀJ` at the solution is the covariance of the parameters. It minimises
 //!
 //! ```text
 //! F(x) = ½ Σ_k ρ(|r_k|²)                                                             (GN1)
 //! ```
 //!
-//! over blocks `r_k` of residuals (single ones by default), ρ being the [`Loss`]. Each step solves the reweighted linear
-//! problem in scaled parameters `D x`, `D = diag|J_j|`:
+//! over blocks `r_k` of residuals (single ones by default), ρ being the [`Loss`]. Each step solves the reweighted
+//! linear problem in scaled parameters `D x`, `D = diag|J_j|`:
 //!
 //! ```text
 //! δ(λ) = -D⁻¹ V diag(s/(s² + λ)) Uᵀ q,      U diag(s) Vᵀ = R D⁻¹,   RᵀR = JᵀWJ,  Rᵀq = JᵀWr   (GN2)
 //! ```
 //!
-//! with λ = 0 (a pure Gauss-Newton step) whenever that lowers the cost. The two ways to converge are inequalities,
-//! evaluated on magnitudes, whatever the sign of the last change of cost:
+//! with λ = 0 (a pure Gauss-Newton step) whenever that lowers the cost. It converges when one of two inequalities is
+//! met, both on magnitudes and independent of the sign of the last change of cost:
 //!
 //! ```text
 //! |D δ(0)| ≤ step_tolerance · |D x|                     the undamped step no longer moves the parameters   (GN3)
@@ -34,18 +34,18 @@ pub use dense::{Problem, Solution, minimise, minimise_problem};
 pub use linear::{Certainty, Linear, certainty};
 pub use loss::Loss;
 
-/// When to stop, and how residuals are charged.
+/// Stopping criteria and loss.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// GN3.
     pub step_tolerance: f64,
     /// GN4.
     pub gradient_tolerance: f64,
-    /// Linearisations allowed.
+    /// Largest number of linearisations.
     pub max_iterations: usize,
     /// The loss of one block.
     pub loss: Loss,
-    /// Residuals per block: 1, or 3 when a residual is a vector that is right or wrong as a whole.
+    /// Residuals per block: 1, or 3 when a residual vector is weighted as a whole.
     pub block: usize,
     /// A singular value of the column-scaled Jacobian below this fraction of the largest counts as zero.
     pub rank_tolerance: f64,
@@ -80,7 +80,7 @@ pub enum Stop {
 }
 
 impl Stop {
-    /// The solution satisfies one of the convergence inequalities.
+    /// Whether the solution satisfies one of the convergence inequalities.
     #[must_use]
     pub fn is_converged(self) -> bool {
         matches!(
@@ -89,7 +89,7 @@ impl Stop {
         )
     }
 
-    /// As an id; its words are the report's.
+    /// Its identifier; reports choose the wording.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -102,13 +102,13 @@ impl Stop {
     }
 }
 
-/// The linear problem at one point, whatever form its normal equations have.
+/// The linear problem at one point, for any form of its normal equations.
 pub trait Local {
     /// F of GN1 here.
     fn cost(&self) -> f64;
-    /// Residuals behind it.
+    /// Number of residuals.
     fn n_residuals(&self) -> usize;
-    /// Whether residuals and derivatives are all numbers.
+    /// Whether residuals and derivatives are all finite.
     fn is_finite(&self) -> bool;
     /// Left side of GN4.
     fn gradient_cosine(&self) -> f64;
@@ -117,15 +117,15 @@ pub trait Local {
     /// # Errors
     /// When the damped equations cannot be solved.
     fn step(&self, lambda: f64) -> Result<DVector<f64>>;
-    /// By how much the step lowers the linear problem's cost.
+    /// Decrease of the linear problem's cost by a step.
     fn predicted(&self, step: &DVector<f64>) -> f64;
-    /// What the step tolerance limits: for dense problems the left side of GN3 over `|D x|`.
+    /// Length that the step tolerance limits: for dense problems the left side of GN3 over `|D x|`.
     fn length(&self, step: &DVector<f64>) -> f64;
 }
 
 /// A problem whose points need not be vectors and whose normal equations may have structure.
 pub trait Descent {
-    /// Where the problem is evaluated.
+    /// Point at which the problem is evaluated.
     type Point;
     /// Its linearisation.
     type Local: Local;
@@ -137,13 +137,13 @@ pub trait Descent {
     fn linearise(&self, point: &Self::Point, previous: Option<&Self::Local>)
     -> Result<Self::Local>;
 
-    /// F of GN1; infinite where the model does not hold, which the solver treats as a wall.
+    /// F of GN1; infinite where the model is invalid: the solver then shortens the step.
     ///
     /// # Errors
     /// When the model cannot be evaluated there at all.
     fn cost(&self, point: &Self::Point) -> Result<f64>;
 
-    /// The point a step away.
+    /// The point after a step.
     fn moved(&self, point: &Self::Point, step: &DVector<f64>) -> Self::Point;
 }
 
@@ -191,7 +191,7 @@ pub fn descend<D: Descent>(
         let gradient = local.gradient_cosine();
         let undamped = local.step(0.0)?;
         let step = local.length(&undamped);
-        // Whitened residuals are of order one; a root mean square of 1e-13 is rounding whatever the unit.
+        // Whitened residuals are of order one; a root mean square of 1e-13 is rounding in any unit.
         let mut stop = if local.cost() <= 1e-26 * local.n_residuals() as f64 {
             Some(Stop::NoResidual)
         } else if step <= options.step_tolerance {

@@ -8,7 +8,7 @@ use super::ud::{Factors, Transition, UdFilter};
 use crate::error::{Error, Result};
 use crate::simd::{Instructions, for_each_instruction_set};
 
-/// Constants of one axis: sensitivity to each of the three reference components, and zero reading.
+/// Constants of one axis: sensitivity to each of the three reference components, and bias (raw).
 pub const N_CONSTANTS: usize = 4;
 
 /// One reading of the axis in a known attitude.
@@ -26,7 +26,7 @@ pub struct Pose {
     pub extra_variance: f64,
 }
 
-/// What is believed of the constants before the first pose.
+/// Prior of the constants, before the first pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     /// Mean of `(kx, ky, kz, U0)`.
@@ -37,7 +37,7 @@ pub struct Prior {
     pub walk: [f64; N_CONSTANTS],
 }
 
-/// One step of the filter, as the caller may want to plot it.
+/// One step of the filter, for diagnostics.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxisStep {
     /// Measured minus predicted reading.
@@ -46,7 +46,7 @@ pub struct AxisStep {
     pub innovation_variance: f64,
 }
 
-/// Recursive estimate of one axis, a pose at a time.
+/// Recursive estimate of one axis, pose by pose.
 #[derive(Debug, Clone)]
 pub struct AxisFilter {
     model: ShapingModel,
@@ -57,14 +57,14 @@ pub struct AxisFilter {
     moving: usize,
     pub(crate) filter: UdFilter,
     pub(crate) row: Vec<f64>,
-    /// What the slow noise is of all states.
+    /// Row of the slow noise over all states.
     slow: Vec<f64>,
     timeline: Timeline,
     steps: Steps,
 }
 
 impl AxisFilter {
-    /// A filter that has seen nothing yet.
+    /// A filter before its first pose.
     ///
     /// # Errors
     /// When the noise or the prior is malformed.
@@ -118,19 +118,19 @@ impl AxisFilter {
         })
     }
 
-    /// Number of noise states in front of the four constants.
+    /// Number of noise states; the four constants follow them.
     #[must_use]
     pub fn n_noise(&self) -> usize {
         self.layout.n()
     }
 
-    /// Which noise state is what.
+    /// Meaning of the noise states.
     #[must_use]
     pub fn layout(&self) -> Layout {
         self.layout
     }
 
-    /// Poses seen.
+    /// Number of poses processed.
     #[must_use]
     pub fn n_poses(&self) -> usize {
         self.timeline.n_poses()
@@ -190,7 +190,7 @@ impl AxisFilter {
         Ok(())
     }
 
-    /// Take one more pose.
+    /// Processes one more pose.
     ///
     /// # Errors
     /// When the pose is not finite, or earlier than the last one.
@@ -233,14 +233,14 @@ impl AxisFilter {
     }
 
     fn drift_and_variance(&self) -> (f64, f64) {
-        // Behind the noise nothing of the row is left but zeros.
+        // Beyond the noise states the row is zero.
         let row = &self.slow[..self.n_noise()];
         let value = row.iter().zip(&self.filter.x).map(|(h, x)| h * x).sum();
         (value, self.filter.factors.variance_along(row))
     }
 }
 
-/// Everything one axis' filter said, pose by pose.
+/// Results of the filter of one axis, pose by pose.
 #[derive(Debug, Clone, Default)]
 pub struct AxisTrack {
     /// Constants after each pose.
@@ -285,7 +285,7 @@ pub fn track(model: &ShapingModel, prior: &Prior, poses: &[Pose]) -> Result<Axis
         out.drift.push(drift);
         out.drift_sigma.push(variance);
     }
-    // All roots at once: one after the other they take as long as the update.
+    // All square roots at once: one by one they take as long as the update.
     let instructions = Instructions::detect();
     take_roots(instructions, out.sigma.as_flattened_mut());
     take_roots(instructions, &mut out.drift_sigma);

@@ -38,7 +38,7 @@ pub fn discretise(f: &DMatrix<f64>, qc: &DMatrix<f64>, step: f64) -> (DMatrix<f6
         q = &phi * &q * phi.transpose() + &q;
         phi = &phi * &phi;
     }
-    // The exact matrix is symmetric; rounding is not.
+    // Rounding leaves Q slightly asymmetric.
     let q = (&q + q.transpose()) * 0.5;
     (phi, q)
 }

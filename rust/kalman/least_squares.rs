@@ -7,12 +7,12 @@ use super::shaping::ShapingModel;
 use super::ud::{Factors, UdFilter};
 use crate::error::{Error, Result};
 
-/// Estimates after every pose, with the standard errors that the method itself would state.
+/// Estimates after every pose, with standard errors by the method's own assumptions.
 #[derive(Debug, Clone)]
 pub struct Recursion {
     /// `(kx, ky, kz, U0)` after each pose.
     pub constants: Vec<[f64; N_CONSTANTS]>,
-    /// Stated standard errors.
+    /// Standard errors by these assumptions.
     pub sigma: Vec<[f64; N_CONSTANTS]>,
 }
 
@@ -21,7 +21,7 @@ pub struct Recursion {
 pub struct Batch {
     /// `(kx, ky, kz, U0)`.
     pub constants: [f64; N_CONSTANTS],
-    /// Covariance under the noise model, coloured as it is (for ordinary least squares: the sandwich formula).
+    /// Covariance under the coloured noise model (for ordinary least squares: the sandwich formula).
     pub covariance: DMatrix<f64>,
 }
 
@@ -149,7 +149,7 @@ fn batch(constants: &DVector<f64>, covariance: DMatrix<f64>) -> Batch {
     }
 }
 
-/// Ordinary batch least squares, with the covariance that the coloured noise really gives it.
+/// Ordinary batch least squares, with its covariance under the coloured noise.
 ///
 /// # Errors
 /// When the poses do not determine the constants.

@@ -1,8 +1,8 @@
 //! Calibration by Kalman filter with the identified noise in its state (docs/kalman.md).
 //!
-//! One axis reads `U = k·f + U0 + n(t)`: constants `c = (k, U0)` and coloured noise `n`. The noise becomes the output of
-//! a shaping filter whose states join the state vector, so that what remains is white and least squares in Kalman's
-//! form is the best linear estimate. Covariances live in the factors `P = U D Uᵀ` and cannot lose their sign.
+//! One axis reads `U = k·f + U0 + n(t)`: constants `c = (k, U0)` and coloured noise `n`. The noise is modelled as the
+//! output of a shaping filter whose states extend the state vector, so that the remaining noise is white and the Kalman
+//! filter is the best linear estimate. Covariances are stored as `P = U D Uᵀ` and stay positive.
 
 pub mod axis;
 pub mod discretisation;

@@ -1,11 +1,11 @@
-//! What rounding by the converter leaves in the mean of many readings.
+//! Rounding error of an ADC in the mean of many readings.
 
 use std::f64::consts::PI;
 
-/// Part of the rounding error of a converter of step `resolution` that averaging does not remove, as a variance.
+/// Variance of that part of the rounding error of an ADC of the given resolution (LSB) that averaging does not remove.
 ///
-/// Rounding is a sawtooth of the input; noise of standard deviation `dither` before the converter smooths it, so that
-/// harmonic `m` of the mean error keeps the factor `exp(−2π²m²σ²/Δ²)`: `Δ²/(2π²) Σ exp(−4π²m²σ²/Δ²)/m²`. Without dither
+/// Rounding is a sawtooth of the input; noise of standard deviation `dither` before the ADC smooths it, so that
+/// harmonic `m` of the mean error is reduced by `exp(−2π²m²σ²/Δ²)`: `Δ²/(2π²) Σ exp(−4π²m²σ²/Δ²)/m²`. Without dither
 /// this is `Δ²/12`. Source: Widrow and Kollár, Quantization Noise (2008), chapter on dither.
 #[must_use]
 pub fn undithered_variance(resolution: f64, dither: f64) -> f64 {
@@ -14,7 +14,7 @@ pub fn undithered_variance(resolution: f64, dither: f64) -> f64 {
     }
     let ratio = 4.0 * (PI * dither / resolution).powi(2);
     if ratio < 1e-3 {
-        // The sum converges too slowly to be worth its terms: it is within 4 % of the value without dither.
+        // The sum converges slowly here; it is within 4 % of the value without dither.
         return resolution * resolution / 12.0;
     }
     let sum: f64 = (1..200)

@@ -23,26 +23,26 @@ pub struct NoiseTerms {
     pub walk: f64,
     /// Standard deviation of the slope of the drift, u/s.
     pub ramp: f64,
-    /// Standard deviation of a Gauss-Markov process that was seen as such, u.
+    /// Standard deviation of a Gauss-Markov process identified in the noise, u.
     pub gauss_markov: f64,
     /// Its inverse correlation time, 1/s.
     pub gauss_markov_rate: f64,
-    /// Resolution of the reading itself (one step of the converter), u.
+    /// Resolution (LSB) of the reading itself, u.
     pub resolution: f64,
 }
 
-/// How the terms are turned into states.
+/// How the terms are represented by states.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShapingModel {
-    /// The noise to be shaped.
+    /// The noise terms.
     pub terms: NoiseTerms,
-    /// Inverse correlation times β [1/s] of the Gauss-Markov processes that stand for flicker, increasing.
+    /// Inverse correlation times β [1/s] of the Gauss-Markov processes that represent flicker, increasing.
     pub flicker_rates: Vec<f64>,
-    /// Undamped natural frequency ω₀ [rad/s] of the second-order process that stands for the ramp.
+    /// Undamped natural frequency ω₀ [rad/s] of the second-order process that represents the ramp.
     pub ramp_frequency: f64,
     /// Its damping ratio ζ.
     pub ramp_damping: f64,
-    /// Noise of one sample before the converter, u; zero where a reading is a single conversion.
+    /// Noise of one sample before the ADC, u; zero where a reading is a single conversion.
     pub dither: f64,
     /// Whether a reading is the mean over its pose (exact) or the value at its end (the article's 8 states).
     pub averages: bool,
@@ -53,8 +53,8 @@ const GAUSS_MARKOV_PEAK: f64 = 0.381_138_658;
 
 /// Variance of the slowest and the fastest of several Gauss-Markov processes, over that of the others.
 ///
-/// With one process per decade from 0.3/T to 6/P (P: length of a pose) the Allan deviation then follows 0.664 B within 2 %
-/// between one pose and a third of the session T.
+/// With one process per decade from 0.3/T to 6/P (P: length of a pose) the Allan deviation then follows 0.664 B within
+/// 2 % between one pose and a third of the session T.
 const END_SHARE: f64 = 1.25;
 
 /// The continuous system behind a [`ShapingModel`], with states of unit amplitude: `n(t) = h·s`.
@@ -68,7 +68,7 @@ pub struct Shaping {
     quantisation: f64,
 }
 
-/// Where each state of the discrete system lies.
+/// Positions of the states of the discrete system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Whether state 0 is the running mean of the current pose.
@@ -152,11 +152,11 @@ impl ShapingModel {
         Ok(())
     }
 
-    /// Standard deviations of the Gauss-Markov processes that stand for flicker.
+    /// Standard deviations of the Gauss-Markov processes that represent flicker.
     ///
     /// One process: the peak of its Allan variance equals the floor `(2 ln 2/π) B²`. Several, with rates in a geometric
-    /// series of ratio ρ: `σ² = B² ln ρ/π` makes the sum of their spectra `B²/(2πf)` between the extreme rates; the first
-    /// and the last also stand for what lies beyond them ([`END_SHARE`]).
+    /// series of ratio ρ: `σ² = B² ln ρ/π` makes the sum of their spectra `B²/(2πf)` between the extreme rates; the
+    /// first and the last also represent the spectrum beyond them ([`END_SHARE`]).
     fn flicker_sigmas(&self) -> Vec<f64> {
         let rates = &self.flicker_rates;
         let n = rates.len();
@@ -200,7 +200,7 @@ impl ShapingModel {
         }
         let mut i = processes.len();
         if t.walk > 0.0 {
-            // Starts at zero: U0 is the zero reading at the start, which a free start could not be told from.
+            // Starts at zero: U0 is the bias at the start, which could not be separated from a free initial state.
             qc[(i, i)] = 1.0;
             h[i] = t.walk;
             i += 1;
@@ -239,7 +239,7 @@ impl ShapingModel {
 }
 
 impl Shaping {
-    /// Which state is what.
+    /// Positions of the states.
     #[must_use]
     pub fn layout(&self) -> Layout {
         Layout {
@@ -320,7 +320,7 @@ impl Shaping {
         if layout.quantises {
             let e = usize::from(layout.averages);
             q[(e, e)] = 1.0;
-            // Shorter than a millionth of the pose is no pause but the rounding of the clock.
+            // A pause shorter than a millionth of the pose is a rounding error of the clock.
             if gap <= 1e-6 * pose_s {
                 phi[(e + 1, e)] = 1.0;
             } else {

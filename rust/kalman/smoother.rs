@@ -1,7 +1,7 @@
-//! Fixed-interval smoother: what every state was, given all readings.
+//! Fixed-interval smoother: every state estimated from all readings.
 //!
-//! The Rauch-Tung-Striebel estimate in the modified Bryson-Frazier form, which carries the adjoint `λ`, `Λ` backward and
-//! inverts nothing but the scalar innovation variances; the textbook form inverts predicted covariances, which are
+//! The Rauch-Tung-Striebel estimate in the modified Bryson-Frazier form, which carries the adjoint `λ`, `Λ` backward
+//! and inverts nothing but the scalar innovation variances; the textbook form inverts predicted covariances, which are
 //! singular here (the walk starts at zero, a constant has no process noise). Source: Bierman, IEEE CDC 1973.
 
 use nalgebra::{DMatrix, DVector};
@@ -34,10 +34,10 @@ struct Passed {
 /// A prior that is this many final standard errors wide has no influence on the estimate (1e-8 of its information).
 const DIFFUSE: f64 = 1e4;
 
-/// The same prior where it matters; where it is diffuse, one around the final estimate that is only just diffuse.
+/// The prior, its diffuse constants replaced by the narrowest diffuse ones about the final estimate.
 ///
-/// Smoothing subtracts from the filtered covariance: at the first poses that of a diffuse start is so large that
-/// nothing would be left of the difference.
+/// Smoothing subtracts from the filtered covariance: at the first poses that of a diffuse prior is so large that the
+/// difference would have no digits.
 fn tamed(model: &ShapingModel, prior: &Prior, poses: &[Pose]) -> Result<Prior> {
     let mut filter = AxisFilter::new(model.clone(), prior)?;
     for pose in poses {

@@ -1,12 +1,12 @@
-//! When the poses were held, and the transitions between them, each computed once.
+//! Times of the poses, and the transitions between them, each computed once.
 
 use super::ud::Transition;
 use crate::error::{Error, Result};
 
-/// Steps remembered: regular logs need one, and a forgotten one costs microseconds.
+/// Steps stored: regular logs need one, and recomputing one takes microseconds.
 const REMEMBERED_STEPS: usize = 64;
 
-/// Shorter than this part of the pose is no time but the rounding of the clock.
+/// An overlap of poses shorter than this part of the pose is a rounding error of the clock.
 const CLOCK_ROUNDING: f64 = 1e-6;
 
 /// Poses in order of time.
@@ -17,7 +17,7 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// Poses seen.
+    /// Number of poses.
     #[must_use]
     pub fn n_poses(&self) -> usize {
         self.n_poses
@@ -26,7 +26,7 @@ impl Timeline {
     /// Pause before a pose of `pose_s` seconds from `start` on.
     ///
     /// # Errors
-    /// When the pose is not a stretch of time, or starts before the last one ended.
+    /// When the start is not finite, the length not positive, or the pose starts before the last one ended.
     pub fn gap(&self, start: f64, pose_s: f64) -> Result<f64> {
         let pose = self.n_poses + 1;
         if !(pose_s.is_finite() && pose_s > 0.0 && start.is_finite()) {
@@ -44,7 +44,7 @@ impl Timeline {
         }
     }
 
-    /// Take the pose.
+    /// Adds a pose.
     pub fn pass(&mut self, start: f64, pose_s: f64) {
         self.end = Some(start + pose_s);
         self.n_poses += 1;
@@ -59,7 +59,7 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// The transition over `gap` and `pose_s`, made by `make` when it is not known yet.
+    /// The transition over `gap` and `pose_s`, computed by `make` unless it is stored.
     pub fn get(&mut self, gap: f64, pose_s: f64, make: impl FnOnce() -> Transition) -> &Transition {
         let key = [gap.to_bits(), pose_s.to_bits()];
         let is_latest = self.known.get(self.latest).is_some_and(|(k, _)| *k == key);
@@ -77,7 +77,7 @@ impl Steps {
         &self.known[self.latest].1
     }
 
-    /// The one last asked for.
+    /// The transition requested last.
     #[must_use]
     pub fn last(&self) -> Option<&Transition> {
         self.known.get(self.latest).map(|(_, step)| step)

@@ -1,12 +1,12 @@
 //! Square-root-free factors `P = U D Uᵀ` of a covariance: Bierman's measurement update, Thornton's time update.
 //!
-//! Only the first `m` states move; the constants behind them do not. With `U` upper triangular this order leaves the
-//! constants' factor untouched by the time update, which therefore costs `O(m³ + m n)` instead of `O(n³)`.
+//! Only the first `m` states change with time; the constants after them do not. With `U` upper triangular this order
+//! leaves the constants' factor unchanged by the time update, which therefore costs `O(m³ + m n)` instead of `O(n³)`.
 //! Source: Bierman, Factorization Methods for Discrete Sequential Estimation (1977), chapters V and VI.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Number of states that is not known beforehand.
+/// Number of states that is unknown at compile time.
 const ANY: usize = 0;
 
 /// Unit upper triangular `U` (by columns) and diagonal `D` of a covariance.
@@ -32,7 +32,7 @@ impl Factors {
                     rest -= u[k * n + i] * d[k] * u[k * n + j];
                 }
                 if i == j {
-                    // A pivot below the rounding of its own diagonal is zero: nothing is left of that variance.
+                    // A pivot below the rounding error of its own diagonal is zero.
                     let floor = 4.0 * f64::EPSILON * covariance[(j, j)].abs();
                     d[j] = if rest > floor { rest } else { 0.0 };
                     u[j * n + j] = 1.0;
@@ -136,7 +136,7 @@ impl Transition {
     }
 }
 
-/// What one scalar measurement said that the filter did not know.
+/// Innovation of one scalar measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Innovation {
     /// Measured minus predicted.
@@ -182,9 +182,9 @@ impl UdFilter {
         self.update_with_innovation(h, z - predicted, r)
     }
 
-    /// The same with the innovation given, as an extended filter computes it from its non-linear prediction.
+    /// The same for a given innovation, such as an extended filter's from its non-linear prediction.
     pub fn update_with_innovation(&mut self, h: &[f64], innovation: f64, r: f64) -> Innovation {
-        // The constants of an axis behind up to four states of noise: loops of a length that the compiler knows.
+        // The constants of an axis after up to four noise states: loop lengths known to the compiler.
         match self.x.len() {
             4 => self.update_of::<4>(h, innovation, r),
             5 => self.update_of::<5>(h, innovation, r),
@@ -201,7 +201,7 @@ impl UdFilter {
         let (u, d, h, x) = (&mut u[..n * n], &mut d[..n], &h[..n], &mut self.x[..n]);
         let gain = &mut self.work[..n];
         let mut alpha = r;
-        // Of a number too small to have an inverse the quotients are formed themselves.
+        // A number too small to have a finite inverse is divided by instead.
         let inverse_of = |alpha: f64| (alpha >= f64::MIN_POSITIVE).then(|| alpha.recip());
         let over = |value: f64, alpha: f64, inverse: Option<f64>| {
             inverse.map_or(value / alpha, |one| value * one)
@@ -215,7 +215,7 @@ impl UdFilter {
             alpha += f * v;
             gain[j] = v;
             if v == 0.0 {
-                // Nothing known about this direction can change: it is exact already, or not seen by `h`.
+                // This direction cannot change: its variance is zero already, or `h` does not measure it.
                 continue;
             }
             // Without noise so far (`before == 0`) the gain's earlier entries are all zero and λ multiplies nothing.
@@ -254,7 +254,7 @@ impl UdFilter {
         &self.work[..self.x.len()]
     }
 
-    /// Move the first `m` states: Thornton's update by modified weighted Gram-Schmidt.
+    /// Propagates the first `m` states: Thornton's update by modified weighted Gram-Schmidt.
     pub fn predict(&mut self, step: &Transition) {
         match step.m {
             1 => self.predict_of::<1>(step),

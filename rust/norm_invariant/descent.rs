@@ -1,7 +1,7 @@
-//! The norm fit by its normal equations: nothing is allocated per reading, nothing decomposed per step but nine by nine.
+//! The norm fit by its normal equations: no allocation per reading, and only 9×9 matrices decomposed per step.
 //!
-//! Normal equations cost half the digits of what poses leave free. They are used where the poses leave nothing nearly
-//! free ([`SMALLEST_PIVOT`]); elsewhere rows are kept and compressed orthogonally.
+//! Normal equations cost half of the digits in weakly determined directions. They are used where the poses leave no
+//! such direction ([`SMALLEST_PIVOT`]); elsewhere rows are kept and compressed orthogonally.
 
 use std::cell::RefCell;
 
@@ -16,17 +16,17 @@ use crate::gauss_newton::{Certainty, Descent, Linear, Local, Problem};
 type Square = SMatrix<f64, N_PARAMETERS, N_PARAMETERS>;
 type Column = SVector<f64, N_PARAMETERS>;
 
-/// Smallest pivot of the normal equations with unit diagonal at which they are trusted: a column less than 1/300 of
-/// which is its own costs five digits, and the step keeps ten.
+/// Smallest pivot of the normal equations with unit diagonal at which they are used: a column of which less than 1/300
+/// is independent of the others costs five digits, and the step keeps ten.
 const SMALLEST_PIVOT: f64 = 1e-5;
 
-/// The readings charged with their noise, the collapse of `S` a wall.
+/// Readings weighted by their noise; the cost is infinite where `S` collapses.
 pub(super) struct Direct<'a> {
     pub charged: Charged<'a>,
     pub at: At,
     /// `|det S|` of the start, in standardised readings.
     pub volume: f64,
-    /// The point whose cost was asked for last, and its sums: the next linearisation is nearly always there.
+    /// Point of the last cost, and its sums: the next linearisation is nearly always there.
     pub tried: RefCell<Option<(Column, sums::Normal)>>,
 }
 
@@ -58,14 +58,14 @@ impl Direct<'_> {
     /// The normal equations at a point.
     ///
     /// # Errors
-    /// When they leave too few digits.
+    /// When they lose too many digits.
     pub(super) fn equations(&self, x: &Column, previous: Option<&Equations>) -> Result<Equations> {
         let normal = match self.tried.take() {
             Some((point, normal)) if point == *x => normal,
             _ => self.normal(x.as_slice())?,
         };
         let norms = Column::from_fn(|j, _| positive_or_one(normal.gram[(j, j)].sqrt()));
-        // Marquardt's scaling, never shrinking: a column that fades must not let its parameter run away.
+        // Marquardt's scaling, never decreasing: a parameter whose column vanishes would take unbounded steps.
         let scale = previous.map_or(norms, |local| local.scale.zip_map(&norms, f64::max));
         let scaled = Square::from_fn(|i, j| normal.gram[(i, j)] / (scale[i] * scale[j]));
         let factor = scaled
@@ -89,7 +89,7 @@ impl Direct<'_> {
     }
 }
 
-/// The linear problem at one point, its Cholesky factor with unit diagonal at hand.
+/// The linear problem at one point, with its Cholesky factor of unit diagonal.
 pub(super) struct Equations {
     normal: sums::Normal,
     n: usize,
@@ -102,7 +102,7 @@ pub(super) struct Equations {
 }
 
 impl Equations {
-    /// What the normal equations say about the parameters.
+    /// Covariance, rank and directions of the parameters.
     pub(super) fn certainty(&self, covariance_factor: f64) -> Certainty {
         let own =
             Square::from_fn(|i, j| self.normal.gram[(i, j)] / (self.norms[i] * self.norms[j]));
@@ -210,7 +210,7 @@ impl Local for Equations {
     }
 }
 
-/// The same sums for the general solver, which finds its way where the normal equations are weak.
+/// The same sums for the general solver, which also solves weak normal equations.
 impl Problem for Direct<'_> {
     fn linearise(&self, x: &DVector<f64>) -> Result<Linear> {
         let normal = self.normal(x.as_slice())?;

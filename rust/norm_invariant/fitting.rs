@@ -1,4 +1,4 @@
-//! The fit itself: a start, steps with σ frozen, σ renewed, and what is known of the answer.
+//! The fit: a start, steps with σ fixed, σ renewed, and the uncertainty of the result.
 
 use nalgebra::{DVector, Vector3};
 
@@ -11,16 +11,16 @@ use super::{Fit, Model, N_PARAMETERS, ROWS_KEPT, Readings, Settings};
 use crate::ellipsoid::Standardisation;
 use crate::error::{Error, Result};
 
-/// Times that σ is renewed at most; it depends on the answer only through directions and settles in two.
+/// Largest number of renewals of σ, which depends on the result only through directions and converges in two.
 const RENEWALS: usize = 8;
 
 /// Fits from an ellipsoid start, or from `start`.
 ///
-/// Poses that leave a parameter unknown to 2 % of |g| (six faces leave three altogether) would let it run away into any
-/// accident of the readings: all are then held near a sphere through the readings, and `is_anchored` tells.
+/// Poses that leave a parameter uncertain by 2 % of |g| (six faces leave three undetermined) would let it follow any
+/// error of the readings: all are then kept near a sphere through the readings, and `is_anchored` is set.
 ///
-/// A given start that leads nowhere (no convergence, or a triad a hundred times smaller than the sphere through the
-/// readings: the way to `S = 0`) is given up for the ellipsoid.
+/// A given start that fails (no convergence, or a triad a hundred times smaller than the sphere through the readings:
+/// the path to `S = 0`) is replaced by the ellipsoid.
 ///
 /// # Errors
 /// When readings are malformed or all the same, or the fit collapses to `S = 0`.
@@ -34,7 +34,7 @@ pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) ->
         {
             Ok(found)
         }
-        // A malformed start is a mistake to be told of, not to be worked around.
+        // A malformed start is an error to report; it is not replaced.
         Err(error @ Error::BadInput(_)) => Err(error),
         first => fit_from(readings, settings, None).or(first),
     }
@@ -58,7 +58,7 @@ fn fit_from(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -
         )));
     }
     let few = start::even_share(readings, ROWS_KEPT);
-    // Of very many readings, a share shows nearly the same answer: all are then passed over a few times only.
+    // A share of very many readings gives nearly the same result: all of them then need a few passes only.
     let shown = of_share(&few, settings);
     let starts = Starts::of(few.values())?;
     let standard = match few {
@@ -117,7 +117,7 @@ fn fit_from(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -
         let change = (settled.theta - theta).norm() / theta.norm();
         theta = settled.theta;
         if is_anchored {
-            // Scatter beyond the noise must not buy itself an angle of ten degrees where nothing else contradicts it.
+            // Scatter beyond the noise must not allow an angle of ten degrees where no other reading contradicts it.
             let spare = readings.values.len().saturating_sub(N_PARAMETERS).max(1);
             let scatter =
                 problem.chi2(&DVector::from_column_slice(theta.as_slice())) / spare as f64;

@@ -1,4 +1,4 @@
-//! Poses predicted by fits that did not see them.
+//! Cross-validation: poses predicted by fits without them.
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -7,7 +7,7 @@ use super::problem::predicted;
 use super::{Fit, N_PARAMETERS, Objective, Readings, Settings, fit};
 use crate::error::{Error, Result};
 
-/// One pose as predicted without it.
+/// One pose, predicted without it.
 #[derive(Debug, Clone, Copy)]
 pub struct HeldOut {
     /// `|S a' + b| - |g|` by the other poses' model, m/s²; NaN where they do not determine one.
@@ -85,7 +85,7 @@ fn one_fold(
             let reading = &readings.values[i];
             let f = other.model.correct(reading);
             let (noise, excess) = predicted(readings, settings, &other.model, i);
-            // Reported as a norm error whatever was minimised: that is what a user can picture.
+            // Reported as a norm error for either objective.
             let excess = match settings.objective {
                 Objective::Norm => excess,
                 Objective::SquaredNorm => excess - noise * noise / (2.0 * settings.gravity),

@@ -1,4 +1,4 @@
-//! Eight readings at a time: what the sums over readings are made of.
+//! Eight readings at a time: the terms of the sums over readings.
 
 #![expect(
     clippy::inline_always,
@@ -12,7 +12,7 @@ use crate::ellipsoid::Standardisation;
 use crate::simd::fma;
 
 pub(super) const LANES: usize = 8;
-/// One number of each reading.
+/// One number per reading.
 pub(super) type Row = [f64; LANES];
 pub(super) const ZERO: Row = [0.0; LANES];
 

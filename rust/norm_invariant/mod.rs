@@ -1,8 +1,8 @@
-//! Accelerometer triad from still poses alone: `|S a' + b| = |g|` in every orientation (model.md, section 3).
+//! Accelerometer triad from static poses alone: `|S a' + b| = |g|` in every orientation (model.md, section 3).
 //!
-//! Nine parameters, `S` lower triangular or symmetric. The residual `|S a' + b| - |g|` of a pose is divided by the noise
-//! of its mean *projected on gravity*, `σ² = uᵀ S Σ Sᵀ u` with `u = f/|f|`. σ is frozen while the solver runs and renewed
-//! between runs: left free it would reward a large `S`.
+//! Nine parameters, `S` lower triangular or symmetric. The residual `|S a' + b| - |g|` of a pose is divided by the
+//! noise of its mean *projected on gravity*, `σ² = uᵀ S Σ Sᵀ u` with `u = f/|f|`. σ is fixed while the solver runs and
+//! renewed between runs: if it varied with `S`, a large `S` would lower the cost.
 
 mod descent;
 mod fitting;
@@ -32,7 +32,7 @@ use crate::gauss_newton::{Certainty, Loss, Stop};
 /// Free parameters: six of `S`, three of `b`.
 pub const N_PARAMETERS: usize = 9;
 
-/// The solver's.
+/// Parameters of the solver.
 type Parameters = SVector<f64, N_PARAMETERS>;
 
 impl Frame {
@@ -40,7 +40,7 @@ impl Frame {
     const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 }
 
-/// What is squared.
+/// The residual that is squared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Objective {
     /// `|S a' + b| - |g|`.
@@ -49,39 +49,39 @@ pub enum Objective {
     SquaredNorm,
 }
 
-/// How to fit.
+/// Options of the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// |g| in m/s².
     pub gravity: f64,
-    /// Of the answer.
+    /// Body frame of the result.
     pub frame: Frame,
-    /// What is squared.
+    /// The residual that is squared.
     pub objective: Objective,
-    /// How large residuals are charged.
+    /// Loss of a residual.
     pub loss: Loss,
 }
 
 /// A fitted triad.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// The answer.
+    /// The fitted `S` and `b`.
     pub model: Model,
-    /// Of `S` row by row, then `b`; entries fixed by the frame have none. For the stated noise, not rescaled.
+    /// Covariance of `S` row by row, then `b`; zero for entries fixed by the frame. For the stated noise, not rescaled.
     pub covariance: SMatrix<f64, 12, 12>,
     /// `|S a' + b| - |g|` in m/s² (less the mean inflation that noise across gravity gives a norm).
     pub residuals: Vec<f64>,
     /// Predicted standard error of each residual, m/s².
     pub sigmas: Vec<f64>,
-    /// Weight that the loss gave each residual; empty for least squares, where each has its full one.
+    /// Weight of each residual by the loss; empty for least squares, where all are one.
     pub weights: Vec<f64>,
     /// Σ (residual/sigma)².
     pub chi2: f64,
-    /// The same estimated without the weight of outliers, Σψ²/E[ψ²]; `chi2` for least squares.
+    /// The same with outliers downweighted, Σψ²/E[ψ²]; `chi2` for least squares.
     pub robust_chi2: f64,
     /// Rank, singular values of the Jacobian in the solver's parameters.
     pub certainty: Certainty,
-    /// The poses leave parameters so free that each was held near its start, to [`ANCHOR`] of |g|.
+    /// Whether the poses determine so little that each parameter was kept near its start, to [`ANCHOR`] of |g|.
     pub is_anchored: bool,
     /// Why the solver stopped.
     pub stop: Stop,
@@ -92,9 +92,9 @@ pub struct Fit {
 /// Readings with the noise covariance of each: `noise` has one entry for all, or one per pose.
 #[derive(Debug, Clone, Copy)]
 pub struct Readings<'a> {
-    /// Raw.
+    /// Raw readings.
     pub values: &'a [Vector3<f64>],
-    /// Raw unit squared.
+    /// Noise covariances, raw unit squared.
     pub noise: &'a [Matrix3<f64>],
     /// The pose of each reading; empty where each is a pose of its own.
     pub pose: &'a [usize],
@@ -130,7 +130,7 @@ impl Readings<'_> {
             )));
         }
         let is_finite = |a: &Vector3<f64>| a.iter().all(|value| value.is_finite());
-        // Without a branch for each reading; the place is looked for where there is one.
+        // No branch per reading; the index is searched for only where one is not finite.
         let all_finite =
             |part: &[Vector3<f64>]| part.iter().fold(true, |all, a| all & is_finite(a));
         if !self.values.par_chunks(sums::SHARE).all(all_finite)
@@ -139,7 +139,7 @@ impl Readings<'_> {
             return Err(Error::bad_input(format!("reading {i} is not finite")));
         }
         for (i, noise) in self.noise.iter().enumerate() {
-            // An axis without noise is legal (a stuck channel is the audit's business), a pose without any is not.
+            // An axis without noise is valid (the audit reports stuck channels), a pose without any is not.
             if noise.iter().any(|value| !value.is_finite()) || noise.trace() <= 0.0 {
                 return Err(Error::bad_input(format!(
                     "the standard error of reading {i} must be finite and positive"
@@ -153,9 +153,9 @@ impl Readings<'_> {
 /// Above this many readings rows are not kept: the normal equations are summed in one parallel pass.
 const ROWS_KEPT: usize = 20_000;
 
-/// Standard error, in |g|, above which a scale, an angle or a zero counts as left free by the poses: errors no longer
-/// propagate linearly, and no triad is made that badly.
+/// Standard error, in |g|, above which a scale, an angle or a bias counts as undetermined by the poses: errors no
+/// longer propagate linearly, and no triad is made that badly.
 pub const UNKNOWN: f64 = 0.02;
 
-/// How far, in |g|, parameters left free may be from the sphere's: scales within 10 %, axes within 6°.
+/// Deviation, in |g|, of undetermined parameters from the sphere's: scales within 10 %, axes within 6°.
 pub const ANCHOR: f64 = 0.1;

@@ -1,4 +1,4 @@
-//! The last steps of a fit to very many readings, from the answer of a share of them.
+//! The last steps of a fit to very many readings, from the result for a share of them.
 
 use super::parameters::unpack;
 use super::problem::{Frozen, PoseProblem};
@@ -8,7 +8,7 @@ use crate::ellipsoid::Standardisation;
 use crate::error::Result;
 use crate::gauss_newton::{Local, Stop};
 
-/// A fit to very many readings whose start is a share's answer: it lies so near that full steps are enough.
+/// A fit to very many readings that starts from a share's result: so near that full steps suffice.
 pub(super) struct Near<'a> {
     pub readings: Readings<'a>,
     pub settings: &'a Settings,
@@ -16,16 +16,16 @@ pub(super) struct Near<'a> {
     pub volume: f64,
 }
 
-/// Steps that are tried.
+/// Largest number of steps.
 const NEAR_STEPS: usize = 6;
-/// Relative length of a step behind which the next would be lost in rounding: each is some hundred times shorter than
-/// the one before.
+/// Relative length of a step after which the next would be rounding error: each is some hundred times shorter than the
+/// one before.
 const NEAR_STEP: f64 = 1e-7;
-/// Part of the step before that a step may have where that goes on.
+/// Largest length of a step relative to the one before.
 const NEAR_SHRINKS: f64 = 0.1;
 
 impl Near<'_> {
-    /// The fit, σ renewed at every step; `None` where steps do not shrink, so that the careful way is taken.
+    /// The fit, σ renewed at every step; `None` where steps do not shrink and the damped solver is needed.
     pub(super) fn finished(&self, frozen: &mut Frozen, start: Parameters) -> Result<Option<Fit>> {
         let mut theta = start;
         let (mut before, mut equations) = (f64::INFINITY, None);

@@ -1,4 +1,4 @@
-//! What the noise of the readings predicts: standard errors, the excess of a norm, a pull on the answer.
+//! Predictions from the noise of the readings: standard errors, excess of a norm, systematic error of the estimate.
 
 #![expect(
     clippy::inline_always,
@@ -100,7 +100,7 @@ fn write_predictions_lanes<const FUSED: bool>(
                 (along * per_square, trace)
             };
             let across = if is_norm { trace - along } else { trace };
-            // A pose whose noisy axes all lie across gravity still has the noise of the quietest direction, not none.
+            // A pose whose noisy axes all lie across gravity still has some noise along it.
             let floor = 1e-6 * trace;
             found_sigma[l] = if along > floor { along } else { floor }.sqrt();
             found_excess[l] = across * per_two_g;
@@ -110,7 +110,7 @@ fn write_predictions_lanes<const FUSED: bool>(
     }
 }
 
-/// `E[Jᵀr]` at the truth: what the noise common to a whitened residual and its own derivative leaves on average.
+/// `E[Jᵀr]` at the truth: a whitened residual and its own derivative share noise, so that their product has a mean.
 ///
 /// With `n` the noise of a reading, `E[∂r/∂S_jk · r] = u_j (Σ Sᵀ u)_k + (P S Σ Sᵀ u)_j a_k/|g|`, `P = I - uuᵀ`, and
 /// for `b` the second term without `a`.

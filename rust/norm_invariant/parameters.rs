@@ -1,4 +1,4 @@
-//! The solver's nine numbers and the model they stand for.
+//! The solver's nine parameters and the model that they represent.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
@@ -6,7 +6,7 @@ use super::{Frame, Model, N_PARAMETERS, Parameters};
 use crate::ellipsoid::{self, Standardisation};
 use crate::error::{Error, Result};
 
-/// The same norms in the frame asked for.
+/// The model with the same norms in the given frame.
 ///
 /// # Errors
 /// When `S` is singular.

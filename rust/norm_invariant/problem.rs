@@ -10,10 +10,10 @@ use super::{
 };
 use crate::ellipsoid::Standardisation;
 
-/// `S` may not shrink its volume below this fraction of the start's: beyond lies the minimum `S = 0, |b| = |g|`.
+/// Least volume of `S` as a part of the start's: below it lies the minimum `S = 0, |b| = |g|`.
 pub(super) const SMALLEST_VOLUME: f64 = 1e-2;
 
-/// What the noise predicts for each residual at a given model, held fixed while the solver runs.
+/// Predictions of the noise for each residual at a given model, fixed while the solver runs.
 pub(super) struct Frozen {
     /// Standard error of the residual, m/s².
     pub sigma: Vec<f64>,
@@ -28,7 +28,7 @@ impl Frozen {
         self.sigma[i] * self.widening
     }
 
-    /// The readings with what is predicted for them.
+    /// The readings with their predicted noise.
     pub(super) fn charge<'a>(&'a self, readings: Readings<'a>) -> Charged<'a> {
         Charged {
             values: readings.values,
@@ -48,7 +48,7 @@ impl Frozen {
         new
     }
 
-    /// The same memory at another model.
+    /// Recomputes the predictions at another model.
     pub(super) fn renew(&mut self, readings: Readings<'_>, settings: &Settings, model: &Model) {
         let at = At::raw(*model, *settings);
         noise::predict(&readings, &at, &mut self.sigma, &mut self.excess);
@@ -70,12 +70,12 @@ pub(super) fn predicted(
         Objective::Norm => noise.trace() - along,
         Objective::SquaredNorm => noise.trace(),
     };
-    // A pose whose noisy axes all lie across gravity still has the noise of the quietest direction, not none.
+    // A pose whose noisy axes all lie across gravity still has some noise along it.
     let floor = 1e-6 * noise.trace();
     (along.max(floor).sqrt(), across / (2.0 * settings.gravity))
 }
 
-/// All that one evaluation needs.
+/// Data of the problem at one set of predictions.
 pub(super) struct PoseProblem<'a> {
     pub readings: Readings<'a>,
     pub settings: &'a Settings,
@@ -83,7 +83,7 @@ pub(super) struct PoseProblem<'a> {
     pub frozen: &'a Frozen,
     /// `|det S|` of the start, in standardised readings.
     pub volume: f64,
-    /// Where the parameters are held, to `ANCHOR` of |g| each, when the poses leave some free.
+    /// Values to which the parameters are tied, to `ANCHOR` of |g| each, when the poses leave some undetermined.
     pub anchor: Option<DVector<f64>>,
 }
 
@@ -135,13 +135,13 @@ impl PoseProblem<'_> {
         (residuals, jacobian)
     }
 
-    /// Of the readings, with the sigmas charged.
+    /// χ² of the readings, with the widened sigmas.
     pub(super) fn chi2(&self, x: &DVector<f64>) -> f64 {
         let n = self.readings.values.len();
         self.residuals(x).rows(0, n).norm_squared()
     }
 
-    /// Rows of the readings alone.
+    /// Jacobian rows of the readings alone.
     pub(super) fn data_jacobian(&self, x: &DVector<f64>) -> DMatrix<f64> {
         let (_, jacobian) = self.linearise(x);
         jacobian.rows(0, self.readings.values.len()).into_owned()
@@ -166,7 +166,7 @@ impl PoseProblem<'_> {
         residuals
     }
 
-    /// The readings with what the noise predicts for them.
+    /// The readings with their predicted noise.
     pub(super) fn charged(&self) -> Charged<'_> {
         self.frozen.charge(self.readings)
     }
@@ -188,10 +188,10 @@ impl PoseProblem<'_> {
     }
 }
 
-/// Whether the directions of gravity in these readings leave some scale, angle or zero unknown.
+/// Whether the directions of gravity in these readings leave some scale, angle or bias undetermined.
 ///
-/// In the truth's own coordinates `δf = M f + z`, a pose sees `uᵀδf = |g| Σ M_jk u_j u_k + zᵀu`: the information on the
-/// nine numbers depends on directions and noise alone.
+/// In true coordinates `δf = M f + z`, a pose measures `uᵀδf = |g| Σ M_jk u_j u_k + zᵀu`: the information on the nine
+/// parameters depends on directions and noise alone.
 pub(super) fn is_weak(charged: &Charged<'_>, settings: &Settings, model: &Model) -> bool {
     let information = sums::information(charged, &At::raw(*model, *settings));
     information
@@ -199,8 +199,8 @@ pub(super) fn is_weak(charged: &Charged<'_>, settings: &Settings, model: &Model)
         .is_none_or(|factor| factor.inverse().diagonal().max() > UNKNOWN * UNKNOWN)
 }
 
-/// Gradient of the residual in m/s² with respect to the solver's parameters, `S11 S21 S22 S31 S32 S33` and `b`, at a
-/// (standardised) reading `u` with `f = S u + b`.
+/// Gradient of the residual in m/s² with respect to the solver's parameters, `S_xx S_yx S_yy S_zx S_zy S_zz` and `b`,
+/// at a (standardised) reading `u` with `f = S u + b`.
 #[must_use]
 pub fn residual_gradient(
     f: &Vector3<f64>,

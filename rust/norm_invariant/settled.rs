@@ -1,4 +1,4 @@
-//! The solver for one set of σ, and what is known of the answer.
+//! The solver for one set of σ, and the uncertainty of its result.
 
 use std::cell::RefCell;
 
@@ -28,7 +28,7 @@ pub(super) fn direct<'a>(problem: &'a PoseProblem<'_>, theta: &Parameters) -> Di
     }
 }
 
-/// Where the solver ended for one set of σ.
+/// Result of the solver for one set of σ.
 pub(super) struct Settled {
     pub theta: Parameters,
     pub stop: Stop,
@@ -36,7 +36,7 @@ pub(super) struct Settled {
     pub found: Found,
 }
 
-/// What the solution is known by.
+/// Source of the solution's covariance.
 pub(super) enum Found {
     /// Normal equations.
     Direct(Box<Equations>),
@@ -79,7 +79,7 @@ pub(super) fn settle(problem: &PoseProblem<'_>, theta: &Parameters) -> Result<Se
     })
 }
 
-/// Poses whose specific forces differ by less than this fraction of |g|, half a degree, are one pose, or `S` is nothing.
+/// Spread of the specific forces in |g| (half a degree) below which all poses are one, or `S` has collapsed.
 pub(super) const SMALLEST_SPREAD: f64 = 1e-2;
 
 pub(super) const WORTHLESS: &str = "the fit runs into the worthless minimum S = 0, |b| = |g|: the poses hardly differ, or are not \
@@ -101,7 +101,7 @@ pub(super) fn finish(
         Found::Direct(equations) => equations.certainty(factor),
         Found::Dense(certainty) => certainty.clone(),
     };
-    // Noise in a reading enters residual and derivative alike and draws S towards zero, by (σ/g)² of itself.
+    // Noise in a reading enters residual and derivative alike: it biases S towards zero, by (σ/g)² of itself.
     let pull = problem.noise_in_gradient(settled.theta.as_slice());
     let theta = settled.theta + fixed(&held.covariance) * pull;
     let certainty = match problem.anchor {
@@ -147,7 +147,7 @@ pub(super) fn finish(
     })
 }
 
-/// `Σ (r/σ)²`, eight at a time: one sum would wait for itself at every reading.
+/// `Σ (r/σ)²`, eight at a time: a single sum would depend on its last addition at every reading.
 fn sum_of_squares(residuals: &[f64], sigmas: &[f64]) -> f64 {
     let share = |k: usize| {
         let range = k * SHARE..((k + 1) * SHARE).min(residuals.len());
@@ -165,7 +165,7 @@ fn sum_of_squares(residuals: &[f64], sigmas: &[f64]) -> f64 {
     by_share(residuals.len(), share, |a, b| a + b).unwrap_or(0.0)
 }
 
-/// The same numbers without a heap.
+/// The same matrix on the stack.
 fn fixed(square: &DMatrix<f64>) -> SMatrix<f64, N_PARAMETERS, N_PARAMETERS> {
     SMatrix::from_column_slice(square.as_slice())
 }

@@ -1,4 +1,4 @@
-//! Where the fit of the norm begins.
+//! Starting points of the norm fit.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -8,9 +8,9 @@ use crate::error::{Error, Result};
 
 /// The readings, or an even share of them that shows the same poses.
 pub(super) enum Share<'a> {
-    /// There are few.
+    /// All readings, where there are few.
     All(&'a [Vector3<f64>]),
-    /// There are many.
+    /// A share of many readings.
     Some {
         values: Vec<Vector3<f64>>,
         noise: &'a [Matrix3<f64>],
@@ -25,7 +25,7 @@ pub(super) fn even_share(readings: Readings<'_>, most: usize) -> Share<'_> {
     if stride == 1 {
         return Share::All(readings.values);
     }
-    // One of each stretch, at a place that walks through it: a fixed one could fall in step with the poses.
+    // One of each stretch, at a position that varies: a fixed stride could coincide with the poses.
     let chosen = (0..n.div_ceil(stride)).map(|k| {
         let size = stride.min(n - k * stride);
         k * stride + (k * 7919) % size
@@ -55,7 +55,7 @@ impl Share<'_> {
     }
 }
 
-/// Root mean square misfit of norms, in |g|, below which an ellipsoid is a good start whatever else there is.
+/// Root mean square residual of norms, in |g|, below which an ellipsoid is the start without any comparison.
 const CLOSE: f64 = 1e-2;
 
 /// Readings, standardised, and the sums of their products.
@@ -66,7 +66,7 @@ pub(super) struct Starts<'a> {
 }
 
 impl<'a> Starts<'a> {
-    /// Of these readings.
+    /// Starting points from these readings.
     ///
     /// # Errors
     /// When all readings are the same.

@@ -1,6 +1,6 @@
 //! Sums over readings, eight at a time: normal equations, information, cost, residuals.
 //!
-//! Shares of fixed size are summed apart and joined in order, so that an answer does not depend on the number of
+//! Shares of fixed size are summed separately and joined in order, so that a result does not depend on the number of
 //! threads.
 
 #![expect(
@@ -25,7 +25,7 @@ const GRAM: usize = N_PARAMETERS * (N_PARAMETERS + 1) / 2;
 /// Readings per share.
 pub(super) const SHARE: usize = 16_384;
 
-/// Where a sum is taken.
+/// Model and settings at which a sum is taken.
 #[derive(Clone, Copy)]
 pub(super) struct At {
     /// `f = S u + b` of the readings as they are loaded.
@@ -37,7 +37,7 @@ pub(super) struct At {
 }
 
 impl At {
-    /// In raw readings and raw units.
+    /// For raw readings in raw units.
     pub(super) fn raw(model: Model, settings: Settings) -> Self {
         Self {
             model,
@@ -51,7 +51,7 @@ impl At {
     }
 }
 
-/// What the noise predicts for each reading, and the readings.
+/// Readings with the predicted noise of each.
 #[derive(Clone, Copy)]
 pub(super) struct Charged<'a> {
     pub values: &'a [Vector3<f64>],
@@ -116,7 +116,7 @@ impl Lanes {
     }
 }
 
-/// Joins what `sum` gives for each share, in order.
+/// Joins the results of `sum` for each share, in order.
 pub(super) fn by_share<T: Send>(
     n: usize,
     sum: impl Fn(usize) -> T + Sync + Send,
@@ -149,7 +149,7 @@ pub(super) fn normal(charged: &Charged<'_>, at: &At) -> Option<Normal> {
     )
 }
 
-/// What the directions of gravity tell of nine numbers: in the truth's own coordinates `δf = M f + z`, a pose sees
+/// Information of the directions of gravity on the nine parameters: in true coordinates `δf = M f + z`, a pose measures
 /// `uᵀδf = |g| Σ M_jk u_j u_k + zᵀu`.
 pub(super) fn information(
     charged: &Charged<'_>,
@@ -217,7 +217,7 @@ fn add_rows_lanes<const FUSED: bool>(charged: &Charged<'_>, at: &At, sums: &mut 
         for l in 0..LANES {
             let f = force::<FUSED>(&at.model, &u, l);
             let (value, length) = misfit::<FUSED>(f, excess[l], settings);
-            // One division for both: they cost more than all the products.
+            // One division for both: divisions cost more than all the products.
             let charge = 1.0 / (length * sigma[l] * at.widening);
             let row =
                 columns::<FUSED>(f.map(|c| c * charge), [u[0][l], u[1][l], u[2][l]], mirrored);

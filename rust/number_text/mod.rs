@@ -1,7 +1,7 @@
 //! Plain tables of numbers in text, parsed by all threads: one separator, one number in every field, one row a line.
 //!
-//! Anything else (a quote, a word, a remark, a missing cell, an odd line) makes the block no plain table, and whoever
-//! asked reads it with more patience.
+//! Any other content (a quote, a word, a comment, a missing cell, an irregular line) makes the text no plain table; the
+//! caller then uses a slower and more general parser.
 
 mod number;
 
@@ -20,7 +20,7 @@ pub struct Block<'a> {
     pub width: usize,
 }
 
-/// What became of a text.
+/// Result of parsing a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Outcome {
     /// Lines of the text.
@@ -31,9 +31,9 @@ pub struct Outcome {
 
 /// Write a plain table to its place: column `i` becomes number `places[i].1` of the rows of block `places[i].0`.
 ///
-/// Every number is the double nearest to its decimal digits. Blanks round fields are passed over; lines end with `\n` or
-/// `\r\n`, the last one also with the text. Where the text is anything else, or the blocks have too few rows, what they
-/// hold afterwards is of no use.
+/// Every number is the double nearest to its decimal digits. Blanks around fields are skipped; lines end with `\n` or
+/// `\r\n`, the last one also with the text. Where the text is anything else, or the blocks have too few rows, their
+/// content afterwards is undefined.
 #[must_use]
 pub fn plain_table(
     text: &[u8],
@@ -82,7 +82,7 @@ pub fn plain_table(
     Outcome { rows, is_read }
 }
 
-/// Pieces that end with a line.
+/// Pieces of the text, each of whole lines.
 fn shares(text: &[u8]) -> Vec<&[u8]> {
     let mut out = Vec::with_capacity(text.len() / SHARE + 1);
     let mut rest = text;
@@ -100,7 +100,7 @@ fn shares(text: &[u8]) -> Vec<&[u8]> {
 }
 
 fn lines(share: &[u8]) -> usize {
-    // In pieces of 255, whose count fits into a byte: the compiler counts them side by side.
+    // Pieces of 255 bytes, whose count fits into a byte: the compiler vectorises it.
     let ends: usize = share
         .chunks(255)
         .map(|piece| usize::from(piece.iter().map(|&b| u8::from(b == b'\n')).sum::<u8>()))

@@ -5,9 +5,9 @@ const POWERS: [f64; 23] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16,
     1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
 ];
-/// Whole numbers up to this are doubles exactly.
+/// Integers up to this are exact as doubles.
 const EXACT: u64 = 1 << 53;
-/// The first of them as whole numbers.
+/// The first of them as integers.
 const TENS: [u64; 8] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10_000_000];
 
 /// A decimal number and where it ends.
@@ -19,7 +19,7 @@ pub(super) fn number(text: &[u8], start: usize) -> Option<(f64, usize)> {
     }
 }
 
-/// A number of at most seven digits before the point and seven behind it, eight bytes at a time.
+/// A number of at most seven digits before the point and seven after it, eight bytes at a time.
 #[inline]
 fn short(text: &[u8], start: usize) -> Option<(f64, usize)> {
     let sign = *text.get(start)?;
@@ -36,7 +36,7 @@ fn short(text: &[u8], start: usize) -> Option<(f64, usize)> {
         if n_part == 8 {
             return None;
         }
-        // Fourteen digits are a whole number that a double holds, and so is the power of ten: one rounding.
+        // Fourteen digits are an integer that is exact as a double, and so is the power of ten: one rounding.
         let digits = whole * TENS[n_part] + part;
         size = digits as f64 / POWERS[n_part];
         at += 1 + n_part;
@@ -56,11 +56,11 @@ fn word(text: &[u8], at: usize) -> Option<u64> {
         .map(u64::from_le_bytes)
 }
 
-/// The number that the first digits of eight bytes make, and how many there are.
+/// The number formed by the first digits of eight bytes, and how many there are.
 #[inline]
 fn leading_digits(word: u64) -> (u64, usize) {
     let ones = word ^ 0x3030_3030_3030_3030;
-    // A byte above nine sets its highest bit; what it carries over goes to bytes behind it.
+    // A byte above nine sets its highest bit; its carry reaches only bytes after it.
     let others = (ones.wrapping_add(0x7676_7676_7676_7676) | ones) & 0x8080_8080_8080_8080;
     let n = others.trailing_zeros() as usize / 8;
     if n <= 1 {
@@ -104,7 +104,7 @@ fn any(text: &[u8], start: usize) -> Option<(f64, usize)> {
         power += exponent;
         at = next;
     }
-    // One rounding: a whole number a double holds, times or over a power of ten a double holds. 19 digits fit into 64 bits.
+    // One rounding: an integer times or over a power of ten, both exact as doubles. 19 digits fit into 64 bits.
     let scale = usize::try_from(power.unsigned_abs())
         .ok()
         .and_then(|p| POWERS.get(p));

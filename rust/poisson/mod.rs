@@ -1,11 +1,11 @@
 //! Poisson's equation `B' = −[ω]× B`: the rotation of a move and its sensitivities in one pass.
 //!
-//! `B` takes a vector from the body frame at the start of the move to the body frame at its end: `f_after = B f_before`.
-//! The rate is `ω(t) = S w'(t) + b(t)`; `w'` are raw readings and `b` runs linearly between two anchor instants, the
-//! middles of the still poses before and after. Over one step the rate is a polynomial through the neighbouring
-//! samples; with its zeroth and first moments `φ₀ = ∫ω dτ`, `φ₁ = (1/h)∫τω dτ` about the middle of the step the rotation
-//! vector is `φ = φ₀ + φ₀ × φ₁` (fourth-order Magnus), and the step is the exact exponential `B ← exp(−[φ]×) B`.
-//! Equations (5.1)-(5.5) of docs/model-gyroscope.md.
+//! `B` takes a vector from the body frame at the start of the move to the body frame at its end:
+//! `f_after = B f_before`. The rate is `ω(t) = S w'(t) + b(t)`; `w'` are raw readings and `b` runs linearly between two
+//! anchor instants, the middles of the static poses before and after. Over one step the rate is a polynomial through
+//! the neighbouring samples; with its zeroth and first moments `φ₀ = ∫ω dτ`, `φ₁ = (1/h)∫τω dτ` about the middle of the
+//! step the rotation vector is `φ = φ₀ + φ₀ × φ₁` (fourth-order Magnus), and the step is the exact exponential
+//! `B ← exp(−[φ]×) B`. Equations (5.1)-(5.5) of docs/model-gyroscope.md.
 
 mod lanes;
 mod prepared;
@@ -22,10 +22,10 @@ pub use steps::{StepWeights, step_weights};
 /// 3 × 9 sensitivity of a rotation vector to `S`, column `3 i + j` for `S_ij`.
 pub type WrtScale = SMatrix<f64, 3, 9>;
 
-/// How the rate runs between two samples.
+/// Rate between two samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RateModel {
-    /// The sample holds until the next one: first order.
+    /// The sample is valid until the next one: first order.
     Constant,
     /// A straight line from sample to sample, with the commutator of that line: second order.
     Linear,
@@ -50,33 +50,33 @@ impl RateModel {
     }
 }
 
-/// A move to be integrated: samples `[start, stop)`, and the instants between which the zero reading is interpolated.
+/// A move to be integrated: samples `[start, stop)`, and the instants between which the bias is interpolated.
 #[derive(Debug, Clone, Copy)]
 pub struct MoveRange {
     /// First sample.
     pub start: usize,
     /// One past the last sample.
     pub stop: usize,
-    /// Middle of the still pose before, s.
+    /// Middle of the static pose before, s.
     pub anchor_before_s: f64,
-    /// Middle of the still pose after, s.
+    /// Middle of the static pose after, s.
     pub anchor_after_s: f64,
 }
 
-/// What the samples contribute to the uncertainty of a rotation.
+/// Noise of the samples, from which the uncertainty of a rotation follows.
 #[derive(Debug, Clone, Copy)]
 pub struct RateNoise {
     /// Angle random walk of each raw axis, raw unit · √s (white density `N`).
     pub density: Vector3<f64>,
-    /// Standard deviation of a time stamp, s.
+    /// Standard deviation of a timestamp, s.
     pub sigma_time_s: f64,
     /// A step longer than one and a half of these has lost samples, s.
     pub nominal_step_s: f64,
 }
 
-/// The rotation of one move and how it answers to everything it was computed from.
+/// The rotation of one move, with its sensitivities and its covariance.
 ///
-/// Sensitivities are rotation vectors `θ` in the frame at the start of the move: `B(p + δp) ≈ B exp(−[θ]×)`, `θ = G δp`.
+/// Sensitivities are rotation vectors `θ` in the frame where the move starts: `B(p + δp) ≈ B exp(−[θ]×)`, `θ = G δp`.
 #[derive(Debug, Clone)]
 pub struct Turn {
     /// `B`, body at the start → body at the end.
@@ -87,7 +87,7 @@ pub struct Turn {
     pub wrt_bias_before: Matrix3<f64>,
     /// `G` with respect to the rate bias at the anchor after, s.
     pub wrt_bias_after: Matrix3<f64>,
-    /// Covariance of `θ` from rate noise, time timestamps and lost samples, rad².
+    /// Covariance of `θ` from rate noise, timestamp errors and lost samples, rad².
     pub cov_noise: Matrix3<f64>,
     /// Integrated time, s.
     pub duration_s: f64,
@@ -101,7 +101,7 @@ impl Turn {
     }
 }
 
-/// Prepares and integrates every move, in parallel; for an integration that is not repeated: nothing is kept in between.
+/// Prepares and integrates every move, in parallel; for a single integration: the prepared moves are not stored.
 ///
 /// # Errors
 /// As [`prepare`], for the first move that fails, and when there are not as many biases as moves.

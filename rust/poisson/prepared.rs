@@ -1,4 +1,4 @@
-//! A move reduced to moments of its raw readings, and integrated as often as wanted.
+//! A move reduced to moments of its raw readings, for repeated integration.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -63,7 +63,7 @@ pub(super) fn integrate_once(
     })
 }
 
-/// What a move is prepared from.
+/// Samples of a move to be prepared.
 struct Samples<'a> {
     time_s: &'a [f64],
     raw: &'a [Vector3<f64>],
@@ -72,7 +72,7 @@ struct Samples<'a> {
 }
 
 impl<'a> Samples<'a> {
-    /// Time between the anchors, of a range that can be integrated.
+    /// Time between the anchors, s, where the range can be integrated.
     fn span_s(&self) -> Result<f64> {
         let Self {
             time_s, raw, range, ..
@@ -99,7 +99,7 @@ impl<'a> Samples<'a> {
         self.raw[k].iter().all(|x| x.is_finite()) && self.time_s[k].is_finite()
     }
 
-    /// The samples where all of them are numbers of rising time, as nearly always.
+    /// The samples where all are finite and of increasing time, which is nearly always so.
     fn whole(&self, span_s: f64) -> Option<Whole<'a>> {
         let MoveRange { start, stop, .. } = *self.range;
         let time_s = &self.time_s[start..stop];
@@ -119,7 +119,7 @@ impl<'a> Samples<'a> {
         self.step(|k| start + k, stop - start, i, span_s)
     }
 
-    /// The steps between those samples that are numbers of rising time.
+    /// The steps between those samples that are finite and of increasing time.
     fn steps(&self, span_s: f64) -> Result<Steps> {
         let range = self.range;
         let mut used: Vec<usize> = Vec::with_capacity(range.stop - range.start);
@@ -174,7 +174,7 @@ impl PreparedMove {
         self.span_s
     }
 
-    /// `∫ w' dt` over the move, raw unit · s: the turn as the gyro saw it when its axis stays fixed.
+    /// `∫ w' dt` over the move, raw unit · s: the rotation angle by the gyro where the axis of rotation is fixed.
     #[must_use]
     pub fn raw_angle(&self) -> Vector3<f64> {
         self.steps.raw_angle()
@@ -186,7 +186,7 @@ impl PreparedMove {
         self.steps.duration_s()
     }
 
-    /// Rotation and sensitivities for `ω = S w' + b`, `b` from `bias_before` to `bias_after` (rad/s) between the anchors.
+    /// Rotation and sensitivities for `ω = S w' + b`, `b` linear from `bias_before` to `bias_after`, rad/s.
     #[must_use]
     pub fn integrate(
         &self,
@@ -204,7 +204,7 @@ impl PreparedMove {
         )
     }
 
-    /// As [`integrate`](Self::integrate), by instructions of the caller's choice; the results differ by rounding.
+    /// As [`integrate`](Self::integrate), with a chosen instruction set; results differ by rounding.
     #[must_use]
     pub fn integrate_with(
         &self,
@@ -220,7 +220,7 @@ impl PreparedMove {
 }
 
 impl RateNoise {
-    /// With what the rate itself is made of.
+    /// The rate together with its noise.
     pub(super) fn beside(
         &self,
         scale: &Matrix3<f64>,

@@ -76,7 +76,7 @@ impl StepWeights {
         }
     }
 
-    /// Step `i` of the `n` samples `used(0), used(1), …` (ascending, of rising time).
+    /// Step `i` of the `n` samples `used(0), used(1), …` (ascending, of increasing time).
     pub(crate) fn at(
         time_s: &[f64],
         used: impl Fn(usize) -> usize,
@@ -119,11 +119,11 @@ impl StepWeights {
     }
 }
 
-/// Neighbouring steps may differ by this factor (jitter, one lost sample) before a cubic through them is worse than a
-/// straight line: across a longer gap it overshoots.
+/// Ratio of neighbouring steps (jitter, one lost sample) above which a cubic through them is worse than a straight
+/// line: across a longer gap it overshoots.
 pub(super) const UNEVEN_STEPS: f64 = 3.0;
 
-/// Integration steps between the samples `used` (ascending, of strictly rising time).
+/// Integration steps between the samples `used` (ascending, of strictly increasing time).
 #[must_use]
 pub fn step_weights(time_s: &[f64], used: &[usize], model: RateModel) -> Vec<StepWeights> {
     let n = used.len();

@@ -1,4 +1,4 @@
-//! Accelerometer fits across the seam.
+//! Bindings of the accelerometer fits.
 
 use nalgebra::{Matrix3, Vector3};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, ToPyArray};
@@ -20,7 +20,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     Ok(())
 }
 
-/// How the norm is fitted. Losses: 0 linear, 1 Huber, 2 soft-L1, 3 Cauchy.
+/// Options of the norm fit. Losses: 0 linear, 1 Huber, 2 soft-L1, 3 Cauchy.
 #[pyclass(frozen)]
 struct NormSettings(Settings);
 
@@ -78,38 +78,38 @@ struct NormFit(Fit);
 
 #[pymethods]
 impl NormFit {
-    /// (3, 3) m/s² per raw unit.
+    /// `S` (3, 3), m/s² per raw unit.
     #[getter]
     #[pyo3(name = "S")]
     fn s<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         rows(py, self.0.model.s.transpose().as_slice(), 3)
     }
 
-    /// (3,) m/s².
+    /// `b` (3,), m/s².
     #[getter]
     fn b<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.0.model.b.as_slice().to_pyarray(py)
     }
 
-    /// (12, 12) of S row by row, then b.
+    /// Covariance (12, 12) of S row by row, then b.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         rows(py, self.0.covariance.as_slice(), 12)
     }
 
-    /// (n,) m/s².
+    /// Residuals (n,), m/s².
     #[getter]
     fn residuals<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.0.residuals.to_pyarray(py)
     }
 
-    /// (n,) m/s².
+    /// Standard errors (n,) of the residuals, m/s².
     #[getter]
     fn sigmas<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.0.sigmas.to_pyarray(py)
     }
 
-    /// (n,) weight that the loss gave each residual.
+    /// Weight (n,) of each residual by the loss.
     #[getter]
     fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         if self.0.weights.is_empty() {
@@ -154,7 +154,7 @@ impl NormFit {
     }
 }
 
-/// `S` and `b` to start from.
+/// Starting values of `S` and `b`.
 type Start<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray1<'py, f64>);
 
 #[pyfunction]

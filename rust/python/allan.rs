@@ -1,4 +1,4 @@
-//! Allan variances across the seam.
+//! Bindings of the Allan variances.
 
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
@@ -77,7 +77,7 @@ fn allan_degrees(
     })
 }
 
-/// Readings `(n, channels)` in the type they were logged in: counts need not be copied to be read.
+/// Readings `(n, channels)` in the number type of the log: counts are read without a copy.
 #[derive(FromPyObject)]
 enum Readings<'py> {
     F64(PyReadonlyArray2<'py, f64>),
@@ -86,7 +86,7 @@ enum Readings<'py> {
     I32(PyReadonlyArray2<'py, i32>),
 }
 
-/// A view that may cross threads: where the readings lie, row by row.
+/// A view that may cross threads: the readings in memory, row by row.
 struct View<'a, T> {
     data: &'a [T],
     channels: usize,
@@ -103,7 +103,7 @@ impl<'a, T> View<'a, T> {
 }
 
 fn view<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<View<'a, T>> {
-    // `as_slice` is content with Fortran order too, which would be read down the columns.
+    // `as_slice` accepts Fortran order too, which would be read down the columns.
     if !array.is_c_contiguous() {
         return Err(PyValueError::new_err(
             "readings must be C-contiguous, one row per sample",
@@ -118,7 +118,7 @@ fn view<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<V
     })
 }
 
-// The readings are borrowed, not owned: a copy would be the largest piece of memory in the whole computation.
+// The readings are borrowed, not owned: a copy would be the largest allocation of the whole computation.
 macro_rules! with_view {
     ($readings:expr, $view:ident => $body:expr) => {
         match $readings {
@@ -189,7 +189,7 @@ fn allan_variance<'py>(
     kind: AllanKind,
 ) -> PyResult<Curves<'py>> {
     let x = readings(x)?;
-    // NumPy asks the system for large pages, which halves the time: this is the largest piece of memory here.
+    // NumPy requests large pages from the system, which halves the time: this is the largest allocation here.
     let workspace = PyArray1::<f64>::zeros(py, rows(&x) + 1, false);
     let mut workspace = workspace.try_readwrite()?;
     let workspace = workspace.as_slice_mut()?;
@@ -236,7 +236,7 @@ impl AllanStream {
         })
     }
 
-    /// Four arrays per channel that `restore` goes on from.
+    /// Four arrays per channel from which `restore` continues.
     fn state<'py>(&self, py: Python<'py>) -> Vec<[Bound<'py, PyArray1<f64>>; 4]> {
         self.channels
             .iter()
@@ -244,7 +244,7 @@ impl AllanStream {
             .collect()
     }
 
-    /// Go on from the `state` of a stream of the same clusters, budget and number of channels.
+    /// Continues from the `state` of a stream of the same clusters, budget and number of channels.
     fn restore(
         &mut self,
         py: Python<'_>,
@@ -303,7 +303,7 @@ impl AllanStream {
         Ok((clusters, variance, terms, stride, n, means))
     }
 
-    /// Means `(k,)` of at least `readings` readings of one channel, and how many they hold.
+    /// Means `(k,)` of at least `readings` readings of one channel, and the number of readings in each.
     fn means<'py>(
         &self,
         py: Python<'py>,

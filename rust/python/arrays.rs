@@ -1,4 +1,4 @@
-//! Arrays of `NumPy` as the kernels want them, and back: lent where they lie in one piece, copied where they do not.
+//! `NumPy` arrays in the form that kernels need, and back: borrowed where they are contiguous, copied otherwise.
 
 use std::borrow::Cow;
 

@@ -1,4 +1,4 @@
-//! Attitude integration across the seam.
+//! Binding of the attitude integration.
 
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
@@ -12,7 +12,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(integrate_rate, module)?)
 }
 
-/// Forms: 0 matrices, 1 quaternions `x y z w`, 2 rotation vectors.
+/// Attitude from a rate. Forms: 0 matrices, 1 quaternions `x y z w`, 2 rotation vectors.
 #[pyfunction]
 fn integrate_rate<'py>(
     py: Python<'py>,
@@ -54,7 +54,7 @@ fn integrate_rate<'py>(
     }
     let mut shape = vec![time_s.len()];
     shape.extend(inner);
-    // NumPy's own memory: it asks for large pages, without which half of the time would go into page faults.
+    // Memory from NumPy, which requests large pages: without them page faults take half of the time.
     let out = PyArrayDyn::<f64>::zeros(py, shape, false);
     {
         let mut lent = out.readwrite();
@@ -66,7 +66,7 @@ fn integrate_rate<'py>(
     Ok(out)
 }
 
-/// `x y z w` as it comes → unit `w x y z`.
+/// Quaternion `x y z w` of length one to rounding → unit `w x y z`.
 fn unit(q: &[f64]) -> PyResult<[f64; 4]> {
     let length = q.iter().map(|c| c * c).sum::<f64>().sqrt();
     match q {

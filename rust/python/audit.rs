@@ -1,4 +1,4 @@
-//! The audit of readings across the seam.
+//! Bindings of the audit of readings.
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
@@ -13,7 +13,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(readings_near, module)?)
 }
 
-/// `(low, how many, high, how many)` of each axis of `(n, 3)` readings.
+/// `(low, count at low, high, count at high)` of each axis of `(n, 3)` readings.
 #[pyfunction]
 fn triad_extremes(
     py: Python<'_>,
@@ -36,7 +36,7 @@ type RepeatNumbers<'py> = (
     Option<u64>,
 );
 
-/// Counts, longest runs, where they start, equal rows of every window `(w, 4)`, rows that are missing, the first of them.
+/// Counts, longest runs, their starts, equal rows of every window `(w, 4)`, number of missing rows, the first of them.
 #[pyfunction]
 fn triad_repeats<'py>(
     py: Python<'py>,
@@ -56,7 +56,7 @@ fn triad_repeats<'py>(
     ))
 }
 
-/// Readings of one axis within `depth` of a value, the distance of the nearest other one, rows `(k,)` of the value.
+/// Number of readings of one axis within `depth` of a value, distance of the nearest other, rows `(k,)` of the value.
 #[pyfunction]
 fn readings_near<'py>(
     py: Python<'py>,

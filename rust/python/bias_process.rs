@@ -1,4 +1,4 @@
-//! Scatter, walk and drift of a zero across the seam.
+//! Binding of the bias process: scatter, walk and drift.
 
 use numpy::{
     PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,

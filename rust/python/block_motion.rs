@@ -1,4 +1,4 @@
-//! Motion in the means of blocks across the seam.
+//! Bindings of motion in block means.
 
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
@@ -19,9 +19,9 @@ fn wrong(what: &str) -> PyErr {
     PyValueError::new_err(what.to_owned())
 }
 
-/// Blocks to take off both ends of a pose of `rows` `(n, c)` without `bumps`: by the terms `noise` `(3, c)` of a mean, the
-/// variance of `rounding` `(c,)`, blocks of `step_s`, `variances` `(k, c)` of the means of 1, 2, 4 ... blocks, and the
-/// `limit` of the channels `is_live` `(c,)`.
+/// Blocks to trim from either end of a pose of `rows` `(n, c)` without `bumps`: `noise` `(3, c)` are the terms of the
+/// variance of a mean, `rounding` `(c,)` its variance, `step_s` the length of a block, `variances` `(k, c)` those of
+/// means of 1, 2, 4 ... blocks, `limit` that of the channels `is_live` `(c,)`.
 #[pyfunction]
 #[expect(
     clippy::too_many_arguments,
@@ -62,7 +62,7 @@ fn ends_to_trim(
     })
 }
 
-/// Sums `(r, 3)` of the squared output of five taps over ranges `(r, 2)` of rows, two less at either end.
+/// Sums `(r, 3)` of the squared output of five taps over ranges `(r, 2)` of rows, without two rows at either end.
 #[pyfunction]
 fn band_power<'py>(
     py: Python<'py>,
@@ -95,7 +95,7 @@ fn band_power<'py>(
     PyArray1::from_vec(py, bytemuck::cast_vec::<[f64; 3], f64>(found)).reshape([inside.len(), 3])
 }
 
-/// `(12,)` by which the gyro foretells the changes of windows best, in units of `scale`.
+/// Coefficients `(12,)` by which the gyro best predicts the changes of windows, in units of `scale`.
 #[pyfunction]
 fn share_of_gyroscope(
     py: Python<'_>,

@@ -1,4 +1,4 @@
-//! Probabilities and quantiles across the seam.
+//! Bindings of probabilities and quantiles.
 
 use pyo3::prelude::*;
 
@@ -58,7 +58,7 @@ fn student_upper(above: f64, dof: f64) -> f64 {
     beta::student_upper(above, dof)
 }
 
-/// Probability that of `trials` more than `count` succeed, each with `chance`.
+/// Probability of more than `count` successes in `trials`, each with probability `chance`.
 #[pyfunction]
 fn binomial_above(count: f64, trials: f64, chance: f64) -> f64 {
     beta::binomial_above(count, trials, chance)

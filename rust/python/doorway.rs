@@ -1,4 +1,5 @@
-//! How a kernel is run: without the interpreter, on threads that exist, stopped by Ctrl-C, its panics kept quiet.
+//! Running a kernel: without the interpreter lock, on existing threads, interruptible by Ctrl-C, its panics not
+//! printed.
 
 use std::any::Any;
 use std::cell::{Cell, OnceCell, RefCell};
@@ -15,13 +16,13 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use crate::error::Result as KernelResult;
 use crate::interrupt;
 
-/// How often a long kernel looks whether a signal arrived.
+/// Interval at which a long kernel checks for signals.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// Where the last panic happened; its text is for a bug report, not for the screen.
+/// Location of the last panic, for a bug report; it is not printed.
 static PANIC: Mutex<String> = Mutex::new(String::new());
 
-/// Run a kernel without holding the interpreter; its refusal becomes `ValueError` in the kernel's own words.
+/// Runs a kernel without holding the interpreter; its error becomes a `ValueError` with the kernel's text.
 pub(crate) fn run<T: Send>(
     py: Python<'_>,
     kernel: impl FnOnce() -> KernelResult<T> + Send,
@@ -31,7 +32,7 @@ pub(crate) fn run<T: Send>(
     finish(out, before)
 }
 
-/// As [`run`], for kernels that may take seconds: signals are looked for while it works, and end it between blocks.
+/// As [`run`], for kernels that may take seconds: signals are checked while it works, and end it between blocks.
 pub(crate) fn run_long<T: Send>(
     py: Python<'_>,
     kernel: impl FnOnce() -> KernelResult<T> + Send,
@@ -44,7 +45,7 @@ pub(crate) fn run_long<T: Send>(
         let (done, mut waiting) = channel::<()>();
         let worker = std::thread::Builder::new().spawn_scoped(scope, move || {
             let out = guarded(kernel, Threads::Own);
-            // Nobody waits any more when this fails, which cannot happen before the thread is joined.
+            // This fails only when nobody waits any more, which cannot happen before the thread is joined.
             let _ = done.send(());
             out
         });
@@ -79,8 +80,7 @@ thread_local! {
     static STOPPED: RefCell<Option<(PyErr, interrupt::Request)>> = const { RefCell::new(None) };
 }
 
-/// As [`run_long`] where the caller's thread is the only one there is: it works itself, and looks for signals between
-/// blocks.
+/// As [`run_long`] where the caller's thread is the only one: it computes itself and checks for signals between blocks.
 fn run_watched<T: Send>(
     py: Python<'_>,
     kernel: impl FnOnce() -> KernelResult<T> + Send,
@@ -97,7 +97,7 @@ fn run_watched<T: Send>(
     }
 }
 
-/// Whether a signal ends what this thread does; asked of the interpreter now and then only.
+/// Whether a signal ends the work of this thread; the interpreter is queried once per interval.
 fn look_for_signals() -> bool {
     let now = Instant::now();
     if LOOKED.get().is_some_and(|last| now - last < PATIENCE) {
@@ -123,17 +123,17 @@ enum Failure {
     Panic,
 }
 
-/// Whose threads a kernel works on where rayon has only one.
+/// Threads on which a kernel runs where rayon has only one.
 #[derive(Clone, Copy, PartialEq)]
 enum Threads {
-    /// Those of all callers, or the caller's own: a short kernel is done before another thread has begun.
+    /// Those of all callers, or the caller's own: a short kernel ends before another thread would begin.
     Shared,
-    /// One that no other caller has.
+    /// One that no other caller uses.
     Own,
 }
 
 fn guarded<T: Send>(kernel: impl FnOnce() -> KernelResult<T> + Send, on: Threads) -> Guarded<T> {
-    // The kernel owns what it works on, so that nothing half-changed outlives a panic.
+    // The kernel owns its data, so that nothing half-changed outlives a panic.
     match catch_unwind(AssertUnwindSafe(|| with_threads(kernel, on))) {
         Ok(out) => out.map_err(Failure::Threads),
         Err(payload) => {
@@ -144,7 +144,7 @@ fn guarded<T: Send>(kernel: impl FnOnce() -> KernelResult<T> + Send, on: Threads
 }
 
 fn forget(payload: Box<dyn Any + Send>) {
-    // Dropping what was thrown may throw again.
+    // Dropping the payload may panic again.
     std::mem::forget(payload);
 }
 
@@ -180,7 +180,7 @@ fn no_threads(why: &impl ToString) -> PyErr {
 
 /// The process in which rayon's own threads live; 0 before the first kernel.
 static HOME: AtomicU32 = AtomicU32::new(0);
-/// No process: the system refused rayon's own threads, and every kernel asks again for a pool of its own.
+/// No process: the system refused rayon's own threads, and every kernel requests a pool of its own.
 const NOWHERE: u32 = u32::MAX;
 /// The threads of a forked child, made when its first kernel runs.
 static CHILD: AtomicPtr<Child> = AtomicPtr::new(std::ptr::null_mut());
@@ -190,7 +190,7 @@ struct Child {
     pool: ThreadPool,
 }
 
-/// Run on threads of this process: those of its parent did not come along when it was forked.
+/// Runs on threads of this process: a fork does not inherit those of its parent.
 fn with_threads<T: Send>(kernel: impl FnOnce() -> T + Send, on: Threads) -> Result<T, String> {
     let here = std::process::id();
     match HOME.load(Ordering::Acquire) {
@@ -202,10 +202,10 @@ fn with_threads<T: Send>(kernel: impl FnOnce() -> T + Send, on: Threads) -> Resu
             Ok(kernel())
         }
         0 => {
-            // Made now, where a system without threads can be reported; rayon would panic at its first use.
+            // Created here, where a system without threads can be reported; rayon would panic at its first use.
             let made = ThreadPoolBuilder::new().build_global();
             let failed = made.is_err_and(|error| std::error::Error::source(&error).is_some());
-            // Without an error of the system behind it, a failure says that another thread was first.
+            // A failure without an error of the system as its source means that another thread was first.
             HOME.store(if failed { NOWHERE } else { here }, Ordering::Release);
             if failed {
                 return Ok(pool_of_child(here)?.install(kernel));
@@ -216,15 +216,15 @@ fn with_threads<T: Send>(kernel: impl FnOnce() -> T + Send, on: Threads) -> Resu
     }
 }
 
-/// Callers' threads that may work for themselves: what rayon keeps of each (some kilobytes) stays when it ends.
+/// Most callers' threads that may work for themselves: rayon's data of each (some kilobytes) remain when it ends.
 const SETTLED: u32 = 256;
 static FREE_TO_SETTLE: AtomicU32 = AtomicU32::new(SETTLED);
 thread_local! {
     static HERE: OnceCell<Option<ThreadPool>> = const { OnceCell::new() };
 }
 
-/// Where rayon has one thread only: let that be, as far as this caller is concerned, the caller's own, and say so.
-/// Nothing is handed over, which took two callers side by side a third of their time, and neither waits for the other.
+/// Where rayon has one thread only: makes the caller's own thread rayon's for this caller, and returns whether it did.
+/// No work is handed over, which cost two concurrent callers a third of their time, and neither waits for the other.
 fn is_alone() -> bool {
     if HOME.load(Ordering::Acquire) != std::process::id() || rayon::current_num_threads() > 1 {
         return false;
@@ -242,11 +242,11 @@ fn is_alone() -> bool {
     })
 }
 
-/// Pools of one thread that nobody uses now.
+/// Idle pools of one thread each.
 static IDLE: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
 
-/// Run on a thread that no other caller has: of two callers that shared the only one, the second would wait for the
-/// first. A forked child never comes here, so the lock may be held when a process is forked.
+/// Runs on a thread that no other caller uses: of two callers sharing the only one, the second would wait for the
+/// first. A forked child never calls this, so the lock may be held when a process is forked.
 fn on_one_thread<T: Send>(kernel: impl FnOnce() -> T + Send) -> Result<T, String> {
     let idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner).pop();
     let pool = match idle {
@@ -264,9 +264,9 @@ fn on_one_thread<T: Send>(kernel: impl FnOnce() -> T + Send) -> Result<T, String
 }
 
 fn pool_of_child(here: u32) -> Result<&'static ThreadPool, String> {
-    // Without a lock: one that was held when the process was forked would be held for ever.
+    // Without a lock: one held when the process was forked would stay held for ever.
     let known = CHILD.load(Ordering::Acquire);
-    // SAFETY: what is stored was leaked below and lives as long as the process.
+    // SAFETY: the stored pointer was leaked below and lives as long as the process.
     if let Some(child) = unsafe { known.as_ref() }
         && child.process == here
     {
@@ -288,7 +288,7 @@ fn pool_of_child(here: u32) -> Result<&'static ThreadPool, String> {
     Ok(unsafe { &(*kept).pool })
 }
 
-/// Keep panics off the screen: they are reported as an exception, with the place.
+/// Keeps panics off the screen: they are reported as an exception, with their location.
 pub(super) fn keep_panics_quiet() {
     std::panic::set_hook(Box::new(|info| {
         if let (Some(place), Ok(mut last)) = (info.location(), PANIC.try_lock()) {

@@ -1,4 +1,4 @@
-//! Levels, windows and running order statistics across the seam.
+//! Bindings of levels, windows and running order statistics.
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
@@ -17,7 +17,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(running_median, module)?)
 }
 
-/// Different values `(k,)` that are numbers, ascending, and how many readings are numbers.
+/// Distinct finite values `(k,)`, ascending, and the number of finite readings.
 #[pyfunction]
 fn levels_of<'py>(
     py: Python<'py>,
@@ -28,7 +28,7 @@ fn levels_of<'py>(
     Ok((PyArray1::from_vec(py, found), finite))
 }
 
-/// The step of a grid on which all `levels` `(k,)`, ascending, of `n` readings lie.
+/// The step (LSB) of the grid on which `levels` `(k,)`, ascending, of `n` readings lie.
 #[pyfunction]
 fn adc_grid(py: Python<'_>, levels: PyReadonlyArray1<'_, f64>, n: usize) -> PyResult<Option<f64>> {
     let levels = flat1(&levels);
@@ -44,7 +44,7 @@ type WindowArrays<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
-/// Mean and noise `(m, 3)` and spread `(m,)` of windows; nothing where a reading in them is no number.
+/// Mean and noise `(m, 3)` and spread `(m,)` of windows; `None` where a reading in them is not finite.
 #[pyfunction]
 fn window_statistics<'py>(
     py: Python<'py>,
@@ -77,7 +77,7 @@ fn places(starts: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<usize>> {
     places.map_err(|_| PyValueError::new_err("starts must not be negative"))
 }
 
-/// Median length of the readings in windows, those that are no numbers left out.
+/// Median length of the readings (vectors) in windows, NaN excluded.
 #[pyfunction]
 fn median_length(
     py: Python<'_>,
@@ -109,7 +109,7 @@ fn block_mean_readings<'py>(
     PyArray1::from_vec(py, bytemuck::cast_vec::<[f64; 3], f64>(means)).reshape([count, 3])
 }
 
-/// Rows in which a direction at its quickest turned by `turn` [rad]: between two stretches at rest, and at all.
+/// Fewest rows in which a direction turns by `turn` [rad]: between two static stretches, and between any two.
 #[pyfunction]
 fn quickest_turns(
     py: Python<'_>,
@@ -123,7 +123,7 @@ fn quickest_turns(
     })
 }
 
-/// Median of the `size` (odd) numbers about each; beyond the ends the last number stands.
+/// Median of the `size` (odd) numbers about each; beyond the ends the last number is repeated.
 #[pyfunction]
 fn running_median<'py>(
     py: Python<'py>,

@@ -1,4 +1,4 @@
-//! Joints of a motion across the seam.
+//! Binding of the joints of a motion.
 
 use numpy::{
     PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
@@ -16,9 +16,9 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 
 type Flags<'py> = Bound<'py, PyArray1<bool>>;
 
-/// Which steps of moves `(m, 2)`, one after the other, would show a lost sample, are one sample too long, one too short,
-/// `(k,)` each; readings `(n, c)` with a `noise` `(c,)` of their own. `left` is what
-/// may be left, in ordinary joints, and of a step that falls short as a part of what there was.
+/// Flags `(k,)` of the sample intervals of moves `(m, 2)`, one after the other: a lost sample is detectable, one sample
+/// too long, one too short. Readings `(n, c)` have the `noise` `(c,)`; `left` is the largest misfit that may remain, in
+/// ordinary misfits, and at a short interval as a part of the misfit before.
 #[pyfunction]
 #[pyo3(signature = (readings, noise, moves, contrasts, *, nearby, sharp, part, whole, left))]
 #[expect(clippy::too_many_arguments, reason = "limits by name")]

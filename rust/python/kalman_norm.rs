@@ -1,4 +1,4 @@
-//! The norm-invariant Kalman filter across the seam.
+//! Bindings of the norm-invariant Kalman filter.
 
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
@@ -35,7 +35,7 @@ fn pose(reading: [f64; 3], start: f64, pose_s: f64, extra_variance: [f64; 3]) ->
     }
 }
 
-/// The filter of a triad that needs only the length of gravity.
+/// The filter of a triad that needs only the norm of gravity.
 #[pyclass(module = "trihedron._core")]
 struct NormKalman {
     inner: NormFilter,
@@ -74,7 +74,7 @@ impl NormKalman {
         })
     }
 
-    /// Take one pose; innovation and its predicted variance.
+    /// Processes one pose; returns its innovation and the predicted variance.
     #[pyo3(signature = (reading, start_s, pose_s, extra_variance=[0.0; 3]))]
     fn add(
         &mut self,
@@ -91,7 +91,7 @@ impl NormKalman {
         Ok((seen.value, seen.variance))
     }
 
-    /// Take many poses without estimating anything yet.
+    /// Stores many poses without estimating.
     fn load(
         &mut self,
         py: Python<'_>,
@@ -116,7 +116,7 @@ impl NormKalman {
         super::run_long(py, || filter.load(&poses))
     }
 
-    /// Run over all poses again at the latest constants until they stay; the number of runs, or None.
+    /// Repeats the run over all poses at the latest constants until convergence; the number of runs, or None.
     fn relinearise(&mut self, py: Python<'_>, most: usize) -> PyResult<Option<usize>> {
         let filter = &mut self.inner;
         super::run_long(py, || filter.relinearise(most))

@@ -1,4 +1,4 @@
-//! Noise of means: what halves of stretches say of it, and how it falls with their length, across the seam.
+//! Bindings of the noise of means: differences between halves of stretches, and variance against length.
 
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
@@ -41,8 +41,8 @@ fn mean_noise_terms(
     Ok((found.deviance, found.terms))
 }
 
-/// Halved squared differences `(k, channels)` of the means of halves of stretches `(s, 2)` of `blocks` `(m, channels)`,
-/// blocks in a half, depth and stretch `(k,)` of each.
+/// Half the squared differences `(k, channels)` between the means of halves of stretches `(s, 2)` of `blocks`
+/// `(m, channels)`, blocks in a half, depth and stretch `(k,)` of each.
 #[pyfunction]
 fn halves_of<'py>(
     py: Python<'py>,

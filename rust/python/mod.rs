@@ -1,9 +1,9 @@
-//! THE SEAM: the only place that may name `pyo3` or `numpy`. One file per room of the mathematics.
+//! The Python bindings: the only place that may name `pyo3` or `numpy`. One file per module of the mathematics.
 //!
-//! Every entry lends or copies its arrays (`arrays`), then calls [`run`] (or [`run_long`]), which releases the interpreter
-//! and turns a kernel's refusal into a `ValueError` with the kernel's own sentence.
+//! Every entry borrows or copies its arrays (`arrays`), then calls [`run`] (or [`run_long`]), which releases the
+//! interpreter and turns a kernel's error into a `ValueError` with the kernel's text.
 
-// pyo3 hands arguments over by value; that is its calling convention, not a choice of ours.
+// pyo3 passes arguments by value: that is its calling convention.
 #![allow(clippy::needless_pass_by_value)]
 
 use pyo3::prelude::*;
@@ -74,7 +74,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     timestamps::register(module)?;
     stillness::register(module)?;
     bias_process::register(module)?;
-    // The stub is the list of names; a second one made on the fly would have to be kept in step with it.
+    // The stub lists the names; a second list made at run time would have to be kept in step with it.
     module.delattr("__all__")?;
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Signals of effects across the seam.
+//! Bindings of the regressors of effects.
 
 use numpy::{
     PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
@@ -19,7 +19,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 
 type Array2<'py> = Bound<'py, PyArray2<f64>>;
 
-/// How far a path `(n, 3)` leads a follower dragged with slack, in half-widths `(n, 3)`.
+/// Play (backlash): distance of a path `(n, 3)` from a follower dragged with slack, in half-widths `(n, 3)`.
 #[pyfunction]
 fn play<'py>(
     py: Python<'py>,
@@ -75,7 +75,7 @@ fn same_length(
     Ok(n)
 }
 
-/// Time derivative `(n, 3)` of values inside moves, nothing outside.
+/// Time derivative `(n, 3)` of values inside moves, zero outside.
 #[pyfunction]
 fn move_derivative<'py>(
     py: Python<'py>,
@@ -92,7 +92,7 @@ fn move_derivative<'py>(
     out.as_flattened().to_pyarray(py).reshape([n, 3])
 }
 
-/// Values `(n, 3)` read `ahead_s` later inside moves, by the spline with level ends of every move.
+/// Values `(n, 3)` at a time `ahead_s` later inside moves, by the spline of every move with zero slope at its ends.
 #[pyfunction]
 fn move_shifted<'py>(
     py: Python<'py>,
@@ -116,7 +116,7 @@ fn move_shifted<'py>(
 }
 
 /// `∫ (S a + b) (w - bias)ᵀ dt` `(3, 3)` of readings `a` and rates `w` `(n, 3)` over each of the moves `(m, 2)`, with a
-/// `bias` `(m, 3)` each; nothing where fewer than two rows of a move are numbers.
+/// `bias` `(m, 3)` each; `None` where fewer than two rows of a move are finite.
 #[pyfunction]
 #[expect(
     clippy::too_many_arguments,

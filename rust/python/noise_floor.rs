@@ -1,4 +1,4 @@
-//! The noise floor of a log across the seam.
+//! Bindings of the noise floor of a log.
 
 use numpy::{
     PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
@@ -25,9 +25,9 @@ type FloorArrays<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
-/// Activities `(m,)` inside blocks and between them, their limits, quiet windows `(m,)`, and the floors `(c,)`, of blocks
-/// `(m, c)` of `length` readings: `asked` is blocks in a window, windows of the seed, and the median of a window's
-/// variance over the variance; `tails` the part below a deviation under the median, and deviations above it.
+/// Activities `(m,)` inside blocks and between them, their limits, quiet windows `(m,)`, and the floors `(c,)`, of
+/// blocks `(m, c)` of `length` readings: `asked` is blocks per window, windows of the seed, median of a window's
+/// variance over the variance; `tails` the part of windows a deviation below the median, and the limit above.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "blocks by name")]
 fn noise_floor<'py>(
@@ -84,7 +84,7 @@ fn noise_floor<'py>(
     ))
 }
 
-/// Highest activity of a sensor at rest, from those of windows `(k,)` that are.
+/// Highest activity of a static sensor, from the activities `(k,)` of static windows.
 #[pyfunction]
 fn still_limit(
     py: Python<'_>,

@@ -1,4 +1,4 @@
-//! Tables of numbers in text across the seam.
+//! Bindings of tables of numbers in text.
 
 use std::alloc::{self, Layout};
 
@@ -16,7 +16,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(plain_table_into, module)?)
 }
 
-/// The columns of a plain table of numbers, or nothing where the text is anything else.
+/// The columns of a plain table of numbers, or `None` where the text is anything else.
 #[pyfunction]
 fn plain_table<'py>(
     py: Python<'py>,
@@ -51,10 +51,10 @@ fn plain_table<'py>(
         .transpose()
 }
 
-/// Zeros `(rows, width)` whose memory is taken in small pages, as they are written to.
+/// Zeros `(rows, width)` whose memory is committed in small pages, when it is written to.
 ///
-/// An array of `NumPy`'s own asks for huge pages, which a machine shared by others may first have to find: then half of
-/// the time of reading a long log went into that.
+/// `NumPy`'s own arrays request huge pages, which a shared machine may first have to free: that took half of the time
+/// of reading a long log.
 #[pyfunction]
 fn room(py: Python<'_>, rows: usize, width: usize) -> PyResult<Bound<'_, PyArray2<f64>>> {
     let refused = || PyMemoryError::new_err(format!("no room for {rows} rows of {width} numbers"));
@@ -63,7 +63,7 @@ fn room(py: Python<'_>, rows: usize, width: usize) -> PyResult<Bound<'_, PyArray
     let flat = if count == 0 {
         Vec::new()
     } else {
-        // SAFETY: the layout has a size; zero bytes are numbers; and it is that of the Vec which gives the memory back.
+        // SAFETY: the layout has a size; zero bytes are numbers; and it is that of the Vec which frees the memory.
         unsafe {
             let first = alloc::alloc_zeroed(layout);
             if first.is_null() {
@@ -83,8 +83,8 @@ fn room(py: Python<'_>, rows: usize, width: usize) -> PyResult<Bound<'_, PyArray
     Ok(PyArray2::from_owned_array(py, array))
 }
 
-/// `(lines, whether they were read)`: a plain table of numbers, written to `blocks` `(rows, width)`; column `i` goes to
-/// `places[i]`, a block and a number of its rows.
+/// `(lines, whether all were read)`: writes a plain table of numbers to `blocks` `(rows, width)`; column `i` goes to
+/// `places[i]`, a block and a column of it.
 #[pyfunction]
 fn plain_table_into(
     py: Python<'_>,

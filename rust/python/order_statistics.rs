@@ -1,4 +1,4 @@
-//! Medians and quantiles across the seam.
+//! Bindings of medians and quantiles.
 
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -12,7 +12,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(column_quantiles, module)?)
 }
 
-/// Median of each column `(c,)`; NaN where one of its values is.
+/// Median of each column `(c,)`; NaN where one of its values is NaN.
 #[pyfunction]
 fn column_medians<'py>(
     py: Python<'py>,

@@ -1,4 +1,4 @@
-//! Poisson integration across the seam.
+//! Bindings of the Poisson integration.
 
 use numpy::{
     PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
@@ -19,7 +19,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     Ok(())
 }
 
-/// Noise of the rate during moves, raw units, and of the instants at which it was read.
+/// Noise of the rate during moves, raw units, and of its timestamps.
 #[pyclass(frozen, module = "trihedron._core")]
 pub(super) struct RateNoise(pub(super) poisson::RateNoise);
 
@@ -39,7 +39,7 @@ impl RateNoise {
     }
 }
 
-/// Ranges from an `(m, 2)` array `start, stop` and the instants `(m, 2)` between which the bias runs.
+/// Ranges from an `(m, 2)` array `start, stop` and the instants `(m, 2)` between which the bias is interpolated.
 pub(super) fn ranges(
     edges: &PyReadonlyArray2<'_, i64>,
     anchors_s: &PyReadonlyArray2<'_, f64>,

@@ -1,4 +1,4 @@
-//! Means and noise over ranges of rows across the seam.
+//! Bindings of means and noise over ranges of rows.
 
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -43,7 +43,7 @@ pub(super) fn ranges_within(
         .collect()
 }
 
-/// Owners `(k,)` of as many ranges, below `n`.
+/// Owners `(k,)` of `k` ranges, each below `n`.
 fn owners(given: &PyReadonlyArray1<'_, i64>, k: usize, n: usize) -> PyResult<Vec<usize>> {
     let owner: Vec<usize> = flat1(given)
         .iter()
@@ -56,7 +56,7 @@ fn owners(given: &PyReadonlyArray1<'_, i64>, k: usize, n: usize) -> PyResult<Vec
     }
 }
 
-/// `(n, 3)` means of readings `(m, 3)` over ranges `(k, 2)` by `owner` `(k,)`, and the `(n,)` rows in each.
+/// `(n, 3)` means of readings `(m, 3)` over ranges `(k, 2)` by `owner` `(k,)`, and the number of rows `(n,)` in each.
 #[pyfunction]
 #[allow(clippy::type_complexity)]
 fn means_by_owner<'py>(
@@ -87,7 +87,7 @@ fn means_by_owner<'py>(
     ))
 }
 
-/// `(n, c)` means of values `(m, c)` over ranges `(k, 2)` by `owner` `(k,)`; what is no number is passed over.
+/// `(n, c)` means of values `(m, c)` over ranges `(k, 2)` by `owner` `(k,)`; NaN values are excluded.
 #[pyfunction]
 fn column_means<'py>(
     py: Python<'py>,
@@ -109,7 +109,7 @@ fn column_means<'py>(
     rows(py, &means, channels)
 }
 
-/// `(3,)` sums over blocks of `length` rows, and how many differences there were.
+/// `(3,)` sums of squared differences between means of blocks of `length` rows, and the number of differences.
 #[pyfunction]
 fn block_differences(
     py: Python<'_>,

@@ -1,4 +1,4 @@
-//! A gyro beside known motion across the seam.
+//! Bindings for a gyro beside a reference motion.
 
 use nalgebra::{DMatrix, Dyn, OMatrix, U3};
 use numpy::{
@@ -18,7 +18,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<ReferenceNormal>()
 }
 
-/// A log on even times: its first time and step, which samples hold, and the signals `(n, q)` whose integrals are wanted.
+/// A log at even times: its first time and step, validity of samples, and the signals `(n, q)` to be integrated.
 #[pyclass(frozen, module = "trihedron._core")]
 struct ReferenceLog {
     start_s: f64,
@@ -46,7 +46,7 @@ impl ReferenceLog {
         }
     }
 
-    /// Blocks of `block` samples of the corrected `rate` `(n, 3)` against attitudes `(m, 3, 3)` at times `(m,)` of the log.
+    /// Blocks of `block` samples of the corrected `rate` `(n, 3)` against attitudes `(m, 3, 3)` at log times `(m,)`.
     fn blocks(
         &self,
         py: Python<'_>,
@@ -95,7 +95,7 @@ fn columns_of(rows: &OMatrix<f64, U3, Dyn>) -> DMatrix<f64> {
 }
 
 /// Normal equations: `gram` `(p, p)`, `log_det` of the covariance of `rows` observations of three; standardised
-/// `innovations` `(3 m, p)`; the bias walk's mean over time `(3, p)` by columns, with its covariance `(3, 3)` beside them.
+/// `innovations` `(3 m, p)`; the mean over time of the bias walk `(3, p)` by columns, and its covariance `(3, 3)`.
 #[pyclass(frozen, get_all, module = "trihedron._core")]
 struct ReferenceNormal {
     gram: Py<PyArray2<f64>>,
@@ -108,7 +108,7 @@ struct ReferenceNormal {
 
 #[pymethods]
 impl ReferenceBlocks {
-    /// `(m,)` middles of the rows seen, s.
+    /// `(m,)` mean times of the reference's rows in each block, s.
     fn time_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.0
             .iter()
@@ -117,7 +117,7 @@ impl ReferenceBlocks {
             .to_pyarray(py)
     }
 
-    /// `(m, 2)` rows of the reference that count, and that were left out.
+    /// `(m, 2)` numbers of the reference's rows used, and excluded as outliers.
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<usize>>> {
         let flat: Vec<usize> = self.0.iter().flat_map(|b| b.rows).collect();
         flat.to_pyarray(py).reshape([self.0.len(), 2])
@@ -128,7 +128,7 @@ impl ReferenceBlocks {
         vectors(py, &self.0.iter().map(|b| b.angle).collect::<Vec<_>>())
     }
 
-    /// `(m, 3)` mean rate in the world, and `(m, 3)` of it times the time from the log's middle.
+    /// `(m, 3)` mean rate in the world, and `(m, 3)` mean of the rate times the time from the log's middle.
     #[allow(clippy::type_complexity, reason = "a pair of arrays")]
     fn wrt_clock<'py>(
         &self,
@@ -178,8 +178,8 @@ impl ReferenceBlocks {
         })
     }
 
-    /// The bias walk as a combination `(3 m, p)` of the columns, its covariance `(m, 3, 3)` beside them, and the
-    /// reference's slow errors of world and body as such combinations.
+    /// The bias walk as a combination `(3 m, p)` of the columns, its covariance `(m, 3, 3)`, and the reference's slow
+    /// errors of world and body as such combinations.
     #[allow(clippy::type_complexity, reason = "four arrays")]
     fn smoothed<'py>(
         &self,

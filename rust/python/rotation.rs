@@ -1,4 +1,4 @@
-//! Rotations across the seam.
+//! Bindings of rotations.
 
 use nalgebra::Matrix3;
 use numpy::{

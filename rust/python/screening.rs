@@ -1,4 +1,4 @@
-//! The search for events across the seam.
+//! Bindings of the search for events.
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, ToPyArray};
 use pyo3::exceptions::PyValueError;
@@ -34,7 +34,7 @@ fn find_jumps(
             limit,
         })
         .collect();
-    // NumPy asks the system for large pages, which halves the time.
+    // NumPy requests large pages from the system, which halves the time.
     let workspace = PyArray1::<f64>::zeros(py, x.len() + 1, false);
     let mut workspace = workspace.try_readwrite()?;
     let workspace = workspace.as_slice_mut()?;

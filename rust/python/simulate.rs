@@ -1,4 +1,4 @@
-//! Simulation across the seam.
+//! Bindings of the simulation.
 
 use nalgebra::Vector3;
 use numpy::{
@@ -93,7 +93,7 @@ fn vector3(v: &[f64]) -> Vector3<f64> {
     Vector3::new(v[0], v[1], v[2])
 }
 
-/// Index of the segment that a row of another table names in its first column.
+/// Index of the segment named in the first column of another table's row.
 fn owner(row: &[f64], n: usize) -> PyResult<usize> {
     (0..n)
         .find(|&k| (k as f64 - row[0]).abs() < 0.5)
@@ -326,7 +326,7 @@ fn simulate_resample<'py>(
 }
 
 #[pyfunction]
-#[allow(clippy::too_many_arguments)] // The converter's data sheet.
+#[allow(clippy::too_many_arguments)] // The ADC's data sheet.
 fn simulate_convert<'py>(
     py: Python<'py>,
     signal: PyReadonlyArray2<'py, f64>,

@@ -1,4 +1,4 @@
-//! Sinusoids in a series, across the seam.
+//! Binding of sinusoids in a series.
 
 use numpy::{PyArray1, PyReadonlyArray1, ToPyArray};
 use pyo3::exceptions::PyValueError;
@@ -12,7 +12,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     Ok(())
 }
 
-/// Sum of squares `(count,)` of what a sinusoid explains of `readings` `(n,)`, at frequencies from `start_hz` on.
+/// Sum of squares `(count,)` of `readings` `(n,)` explained by a sinusoid, at frequencies from `start_hz` on.
 #[pyfunction]
 #[pyo3(signature = (time_s, readings, *, start_hz, step_hz, count))]
 fn sinusoid_power<'py>(

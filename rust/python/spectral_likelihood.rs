@@ -1,4 +1,4 @@
-//! The likelihood of noise terms across the seam.
+//! Bindings of the likelihood of noise terms.
 
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -12,7 +12,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     Ok(())
 }
 
-/// Averages of spectral ordinates, and what each noise term of unit strength contributes to them.
+/// Averages of spectral ordinates, and the contribution of each noise term of unit strength to them.
 #[pyclass(frozen, module = "trihedron._core")]
 pub(crate) struct SpectralBins {
     bins: Bins,
@@ -29,7 +29,7 @@ pub(crate) struct SpectralFit {
     is_converged: bool,
 }
 
-/// What a spectrum says about the amplitude of every term, about a pair of them, and about the line.
+/// Estimates and intervals of the amplitude of every term, of a pair of them, and of the line.
 #[pyclass(frozen, get_all, module = "trihedron._core")]
 pub(crate) struct SpectralInversion {
     most_likely: Vec<f64>,
@@ -88,7 +88,7 @@ impl SpectralBins {
         })
     }
 
-    /// What the spectrum says about every term with all of them in the model and the line integrated out.
+    /// Estimates and intervals of every term with all of them in the model and the line integrated out.
     fn invert(
         &self,
         py: Python<'_>,

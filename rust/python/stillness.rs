@@ -1,4 +1,4 @@
-//! Stillness across the seam.
+//! Binding of block statistics.
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;

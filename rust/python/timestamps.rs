@@ -1,4 +1,4 @@
-//! Time timestamps across the seam.
+//! Bindings of the timestamps.
 
 use numpy::{PyArray1, PyReadonlyArray1, PyReadwriteArray1, PyUntypedArrayMethods, ToPyArray};
 use pyo3::exceptions::PyValueError;
@@ -25,7 +25,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(lay_even_clock, module)?)
 }
 
-/// Ticks as the reader holds them: half the room where they allow it.
+/// Ticks in the reader's integer type: half the memory where their range allows it.
 #[derive(FromPyObject)]
 enum Ticks<'py> {
     Short(PyReadonlyArray1<'py, i32>),
@@ -41,7 +41,7 @@ fn same_length(what: &str, expected: usize, found: usize) -> PyResult<()> {
     )))
 }
 
-/// Steps back, of zero, forward, and timestamps that are not finite.
+/// Numbers of steps back, of zero, forward, and of timestamps that are not finite.
 #[pyfunction]
 fn timestamp_steps(
     py: Python<'_>,
@@ -59,7 +59,7 @@ fn usual_step(py: Python<'_>, time: PyReadonlyArray1<'_, f64>) -> PyResult<f64> 
     super::run(py, || Ok(timestamps::usual_step(&time)))
 }
 
-/// Rows `(k,)` behind which the step is longer than `limit`.
+/// Rows `(k,)` after which the step is longer than `limit`.
 #[pyfunction]
 fn steps_above<'py>(
     py: Python<'py>,
@@ -94,7 +94,7 @@ fn inside_steps(
     ))
 }
 
-/// Write `time - period tick` `(n,)` to `late`; ticks are rows where there are none.
+/// Writes `time - period tick` `(n,)` to `late`; without ticks the tick is the row number.
 #[pyfunction]
 #[pyo3(signature = (time, ticks, period, late))]
 fn timestamp_lateness<'py>(
@@ -131,7 +131,7 @@ fn timestamp_lateness<'py>(
     }
 }
 
-/// Row of the earliest of every block of `width` timestamps.
+/// Row of the earliest timestamp in every block of `width`.
 #[pyfunction]
 fn earliest_timestamps<'py>(
     py: Python<'py>,
@@ -178,7 +178,7 @@ fn block_mean_ticks<'py>(
     Ok(found.to_pyarray(py))
 }
 
-/// `(slope, level)` of a line through points of which some are far off.
+/// `(slope, level)` of a line through points with outliers.
 #[pyfunction]
 fn robust_line(
     py: Python<'_>,
@@ -190,7 +190,7 @@ fn robust_line(
     super::run(py, || Ok(timestamps::robust_line(&u, &y)))
 }
 
-/// Write `slope (tick - origin) / scale + level + period tick` to `even`.
+/// Writes `slope (tick - origin) / scale + level + period tick` to `even`.
 #[pyfunction]
 fn lay_even_clock(
     py: Python<'_>,
@@ -230,8 +230,8 @@ fn lay_even_clock(
     }
 }
 
-/// Power `(length / 2 + 1,)` of the phase sums of windows of timestamps on a grid of `length` cells, and that length: the
-/// first from `least` on at which a transform is fast.
+/// Power `(length / 2 + 1,)` of the phase sums of windows of timestamps on a grid of `length` cells, and that length:
+/// the first from `least` on with a fast transform.
 #[pyfunction]
 fn phase_power<'py>(
     py: Python<'py>,
@@ -262,7 +262,7 @@ fn direct_power<'py>(
     Ok(PyArray1::from_vec(py, power))
 }
 
-/// `time - even` `(n,)` in the place of `even`.
+/// Writes `time - even` `(n,)` to `even`.
 #[pyfunction]
 fn timestamp_errors(
     py: Python<'_>,
@@ -287,7 +287,7 @@ fn errors_deviation(py: Python<'_>, errors: PyReadonlyArray1<'_, f64>) -> PyResu
     super::run(py, || Ok(timestamps::deviation(&errors)))
 }
 
-/// How many errors `(n,)` are less than the one before by more than `fall`.
+/// Number of errors `(n,)` that are less than the one before by more than `fall`.
 #[pyfunction]
 fn errors_falls(py: Python<'_>, errors: PyReadonlyArray1<'_, f64>, fall: f64) -> PyResult<usize> {
     let errors = flat1(&errors);

@@ -6,12 +6,12 @@ use crate::error::{Error, Result};
 use crate::order_statistics::median;
 use crate::rotation::{exp, log};
 
-/// A row this many robust standard deviations from its block's median is no row of this motion.
+/// A row this many robust standard deviations from its block's median is an outlier.
 const OUTLIER: f64 = 7.0;
 /// Standard deviation over median absolute deviation of a normal variable.
 const NORMAL: f64 = 1.4826;
 
-/// A log on even times: the rate as it is corrected so far, and the signals whose integrals are wanted.
+/// A log at even times: its rate as corrected so far, and the signals to be integrated.
 #[derive(Debug, Clone, Copy)]
 pub struct Log<'a> {
     /// Time of the first sample, s.
@@ -20,11 +20,11 @@ pub struct Log<'a> {
     pub step_s: f64,
     /// Corrected angular rate of every sample, rad/s.
     pub rate: &'a [Vector3<f64>],
-    /// Whether a sample holds; a step with one that does not loses the attitude.
+    /// Whether a sample is valid; the attitude is lost over a step with an invalid one.
     pub is_valid: &'a [bool],
     /// `n_signals` values of every sample.
     pub signals: &'a [f64],
-    /// Signals of a sample.
+    /// Signals per sample.
     pub n_signals: usize,
 }
 
@@ -37,12 +37,12 @@ pub struct Truth<'a> {
     pub attitude: &'a [Matrix3<f64>],
 }
 
-/// One block.
+/// One block of the log.
 #[derive(Debug, Clone)]
 pub struct Block {
     /// Middle of the reference's rows in it (of the block, where there are none), s.
     pub time_s: f64,
-    /// Rows of the reference that hold, and rows left out as outliers.
+    /// Rows of the reference that are used, and rows excluded as outliers.
     pub rows: [usize; 2],
     /// Whether the attitude was lost within it: a gap of the log.
     pub is_lost: bool,
@@ -52,13 +52,13 @@ pub struct Block {
     pub attitude: Matrix3<f64>,
     /// `∫ C dt` over the block, s, and its mean from the block's start to the reference's rows.
     pub wrt_bias: [Matrix3<f64>; 2],
-    /// Mean over the rows of the rate in the world, and of it times the time from the log's middle: the clock's columns.
+    /// Columns of the clock: mean rate in the world over the rows, and mean of it times the time from the log's middle.
     pub wrt_clock: [Vector3<f64>; 2],
     /// Mean over the rows of `∫ C_ai s_j dt` since the beginning: row 3 a + i, column j.
     pub moments: DMatrix<f64>,
 }
 
-/// Where the gyro carries a body from the block's start to a row of the reference.
+/// Motion by the gyro from the block's start to one row of the reference.
 struct Row {
     time_s: f64,
     turned: Matrix3<f64>,
@@ -68,7 +68,7 @@ struct Row {
     attitude: Matrix3<f64>,
 }
 
-/// The block's own path: rows of the reference in it, and everything at its end.
+/// Motion by the gyro over a block: at the rows of the reference in it, and at its end.
 struct Path {
     rows: Vec<Row>,
     turned: Matrix3<f64>,
@@ -101,7 +101,7 @@ pub fn blocks(of: &Log<'_>, truth: &Truth<'_>, block: usize) -> Result<Vec<Block
     let mut next = truth.time_s.partition_point(|&t| t < of.start_s);
     for first in (0..n.saturating_sub(block)).step_by(block) {
         let path = path(of, truth, first, block, &mut next);
-        // Where nothing was carried here the reference itself says where the block starts.
+        // Without an attitude carried to here, the reference's first row gives the attitude at the block's start.
         let start =
             carried.or_else(|| path.rows.first().map(|r| r.attitude * r.turned.transpose()));
         let Some(start) = start else {
@@ -156,7 +156,7 @@ fn turned(start: &Matrix3<f64>, moments: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// Change of the rate over a step, by its neighbours where they hold.
+/// Change of the rate over a step, from its valid neighbours.
 fn slope(of: &Log<'_>, i: usize) -> Vector3<f64> {
     let before = if i > 0 && of.is_valid[i - 1] {
         i - 1
@@ -235,7 +235,7 @@ fn path(of: &Log<'_>, truth: &Truth<'_>, first: usize, block: usize, next: &mut 
     at
 }
 
-/// The block as its rows see it, and their mean rotation from the carried attitude; `None` where none holds.
+/// The block from its rows, and their mean rotation from the carried attitude; `None` without rows.
 fn seen(
     path: &Path,
     start: &Matrix3<f64>,
@@ -281,7 +281,7 @@ fn seen(
     Some((mean, one))
 }
 
-/// Which rotations stand with the others of their block.
+/// Whether each rotation is no outlier among those of its block.
 fn within(off: &[Vector3<f64>]) -> Vec<bool> {
     let of = |mut values: Vec<f64>| median(&mut values);
     let centre = Vector3::from_fn(|k, _| of(off.iter().map(|d| d[k]).collect()));

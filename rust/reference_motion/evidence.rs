@@ -1,12 +1,12 @@
-//! The blocks' likelihood by a Kalman filter over what moves: attitude, gyro bias, and the reference's own slow error.
+//! The blocks' likelihood by a Kalman filter with the states attitude, gyro bias, and the reference's own slow errors.
 
 use nalgebra::{DMatrix, Dim, Dyn, Matrix3, OMatrix, RawStorageMut, SMatrix, U3, U24};
 
 use super::Block;
 use crate::error::{Error, Result};
 
-/// State at a block's end: angle, its mean over the rows seen, bias, its integral over time, the slow error in the world
-/// with its rate, and in the body.
+/// State at a block's end: angle, its mean over the reference's rows, bias, its integral over time, the slow error in
+/// the world with its rate, and in the body.
 const STATE: usize = 24;
 const ANGLE: usize = 0;
 const MEAN: usize = 3;
@@ -14,9 +14,9 @@ const BIAS: usize = 6;
 const TOTAL: usize = 9;
 const WORLD: usize = 12;
 const BODY: usize = 18;
-/// Variance of an attitude that nothing tells yet, rad²: any linearisation is worse.
+/// Variance of an undetermined attitude, rad²: for larger angles the linearisation fails.
 const UNKNOWN: f64 = 1.0;
-/// White error of a reference as a part of the largest angle that varies: below it the covariance is rounding.
+/// White error of a reference as a part of the largest angle that varies: below it the covariance is rounding error.
 const ROUNDING: f64 = 1e-7;
 
 type State = SMatrix<f64, STATE, STATE>;
@@ -24,7 +24,7 @@ type Columns = OMatrix<f64, U24, Dyn>;
 type Rows = OMatrix<f64, U3, Dyn>;
 type Seen = SMatrix<f64, 3, STATE>;
 
-/// Strengths of everything that is random.
+/// Strengths of all random processes.
 #[derive(Debug, Clone, Copy)]
 pub struct Strengths {
     /// Angle random walk, rad/√s.
@@ -48,26 +48,26 @@ pub struct Normal {
     pub log_det: f64,
     /// Observations of three rows.
     pub rows: usize,
-    /// Standardised innovations of every column, 3 rows per block (zero where nothing was seen).
+    /// Standardised innovations of every column, 3 rows per block (zero where there is no observation).
     pub innovations: DMatrix<f64>,
     /// Mean of the bias walk over time as a combination of the columns, rad/s.
     pub mean_bias: Rows,
-    /// Its covariance where the columns' coefficients are known.
+    /// Its covariance for known coefficients of the columns.
     pub cov_mean_bias: Matrix3<f64>,
 }
 
-/// What moves, smoothed over time: values as combinations of the columns, 3 rows per block.
+/// Smoothed states over time: values as combinations of the columns, 3 rows per block.
 #[derive(Debug, Clone)]
 pub struct Smoothed {
     /// The bias about its value at the start, rad/s.
     pub bias: DMatrix<f64>,
-    /// Its covariance where the columns' coefficients are known.
+    /// Its covariance for known coefficients of the columns.
     pub bias_cov: Vec<Matrix3<f64>>,
     /// The reference's slow errors, of its world and of its body, rad.
     pub slow: [DMatrix<f64>; 2],
 }
 
-/// One step of the filter, as the smoother wants it.
+/// One step of the filter, for the smoother.
 struct Step {
     predicted: Columns,
     cov: State,
@@ -83,7 +83,7 @@ pub fn normal(blocks: &[Block], columns: &DMatrix<f64>, with: &Strengths) -> Res
     filter(blocks, columns, with, |_| ())
 }
 
-/// The bias walk and the reference's slow error over time, by fixed-interval smoothing (Bryson and Frazier: nothing of the state is inverted).
+/// Bias walk and slow errors of the reference by fixed-interval smoothing (Bryson and Frazier: no matrix is inverted).
 ///
 /// # Errors
 /// As [`normal`].
@@ -219,7 +219,7 @@ fn block_length(blocks: &[Block]) -> f64 {
     (blocks[n - 1].time_s - blocks[0].time_s) / (n - 1) as f64
 }
 
-/// A Matérn-3/2 process over one step: its transition, its stationary variances, what a step adds.
+/// A Matérn-3/2 process over one step: its transition, its stationary variances, the noise that a step adds.
 struct Slow {
     step: [[f64; 2]; 2],
     cov: [f64; 2],
@@ -266,7 +266,7 @@ fn before_all(slow: &[(usize, Slow); 2]) -> State {
     cov
 }
 
-/// Every column over one block.
+/// Propagates every column over one block.
 fn advance<C: Dim, S: RawStorageMut<f64, U24, C>>(
     columns: &mut nalgebra::Matrix<f64, U24, C, S>,
     block: &Block,
@@ -295,7 +295,7 @@ fn advance<C: Dim, S: RawStorageMut<f64, U24, C>>(
     }
 }
 
-/// What a block adds: of a walk over it, a mean over it has a third of the variance and half of it in common.
+/// Process noise of a block: the mean of a walk over it has a third of the walk's variance, and half of it in common.
 fn add_process(cov: &mut State, with: &Strengths, slow: &[(usize, Slow); 2], step_s: f64) {
     let walk = with.angle_walk * with.angle_walk * step_s;
     let bias = with.bias_walk * with.bias_walk * step_s;
@@ -315,7 +315,7 @@ fn add_process(cov: &mut State, with: &Strengths, slow: &[(usize, Slow); 2], ste
     }
 }
 
-/// What an observation sees: the mean angle, the world's error, and the body's where the body points.
+/// Observation of a block: the mean angle, the world's error, and the body's error rotated to the world.
 fn seen_rows<C: Dim, S: nalgebra::RawStorage<f64, U24, C>>(
     block: &Block,
     columns: &nalgebra::Matrix<f64, U24, C, S>,

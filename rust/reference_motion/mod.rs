@@ -1,8 +1,8 @@
 //! A gyro beside known motion: its attitude against the reference's, absolutely and over the whole recording.
 //!
-//! The log is cut into blocks of about a second. In each the gyro carries the attitude from the block's start, and every
-//! row of the reference inside says by which rotation of the world the two differ; their mean is one observation. Summed
-//! over blocks it is linear in everything that is unknown (docs/reference.md):
+//! The log is cut into blocks of about a second. In each the gyro carries the attitude from the block's start, and
+//! every row of the reference inside gives the rotation of the world between the two; their mean is one observation.
+//! Summed over blocks it is linear in all unknowns (docs/reference.md):
 //!
 //! ```text
 //! y(t) = ∫ C (δS w' + δb + ...) dt + ∫ C β dt + a(t) + e_w(t) + C e_b(t) + white

@@ -6,10 +6,10 @@ use super::chain::{Layout, Rows};
 use super::rows::{Domain, Group, Kind};
 use super::{N_POSE_SCATTER, Session, State, Strengths};
 
-/// Standard error that holds the accelerometer's constant bias at nothing (it is `b`), in units of its noise of 1 s.
+/// Standard error that keeps the accelerometer's constant bias at zero (it is `b`), in units of its noise of 1 s.
 const PINNED: f64 = 1e-3;
 
-/// Processes of scatter: kind, number of the strength, axes.
+/// Processes of scatter: kind, index of the strength, axes.
 const OF_FORCE: [(Kind, usize, &[usize]); 1] = [(Kind::ForceScatter, 0, &[0, 1, 2])];
 const OF_RATE: [(Kind, usize, &[usize]); 3] = [
     (Kind::RateScatterX, 1, &[0]),
@@ -18,7 +18,7 @@ const OF_RATE: [(Kind, usize, &[usize]); 3] = [
 ];
 
 impl Session {
-    /// (11.8): walks between poses, and the scatter of each.
+    /// (11.8): random walks between poses, and the scatter of each pose.
     pub(super) fn process_rows(
         &self,
         state: &State,
@@ -101,7 +101,7 @@ impl Session {
     }
 }
 
-/// No gyro: its unknowns are pinned so that the system stays regular.
+/// Without a gyro its unknowns are pinned, so that the system stays regular.
 fn pin_missing_gyro(layout: Layout, column: usize, out: &mut Vec<Group>) {
     for i in 0..layout.n_poses {
         let mut group = Group::of(DVector::zeros(3), layout, i, Domain::Prior, Kind::Prior);

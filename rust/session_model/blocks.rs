@@ -1,7 +1,7 @@
 //! Products and solutions of the small blocks of a chain.
 //!
-//! A block has some ten rows: columns that short keep no vector unit busy, so both run along what is long, four numbers
-//! at a time.
+//! A block has some ten rows: columns that short do not fill vector registers, so loops run along the longer dimension,
+//! four numbers at a time.
 
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
@@ -28,7 +28,7 @@ fn add_scaled<const FUSED: bool>(out: &mut [f64], factor: f64, values: &[f64]) {
     }
 }
 
-/// `out += factor · aᵀ b`; what is zero in `b` costs nothing.
+/// `out += factor · aᵀ b`; zeros in `b` are skipped.
 pub(super) fn add_product(out: &mut DMatrix<f64>, factor: f64, a: &DMatrix<f64>, b: &DMatrix<f64>) {
     let width = a.ncols();
     if width == 0 || b.ncols() == 0 {
@@ -89,7 +89,7 @@ fn add_products_body<const FUSED: bool>(
     }
 }
 
-/// Adds `factor · Σ rᵀr` over rows of `width` numbers to the lower triangle of `out`; what is zero costs nothing.
+/// Adds `factor · Σ rᵀr` over rows of `width` numbers to the lower triangle of `out`; zeros are skipped.
 pub(super) fn add_gram(out: &mut DMatrix<f64>, factor: f64, rows: &[f64], width: usize) {
     if width == 0 {
         return;

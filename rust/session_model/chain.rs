@@ -1,5 +1,5 @@
-//! Normal equations of a chain of poses with a border of what all share: block-tridiagonal, solved in time linear in
-//! the number of poses (docs/model-session.md, equations 11.9-11.13).
+//! Normal equations of a chain of poses with a border of the unknowns that all share: block-tridiagonal, solved in time
+//! linear in the number of poses (docs/model-session.md, equations 11.9-11.13).
 //!
 //! Unknowns are ordered border first, then pose after pose. Poses are eliminated forward, the border is solved in what
 //! remains (its Schur complement), and the poses are substituted back.
@@ -51,7 +51,7 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Rows without any derivative yet.
+    /// Rows whose derivatives are zero so far.
     #[must_use]
     pub fn new(residual: DVector<f64>, layout: Layout, pose: usize) -> Self {
         let r = residual.len();
@@ -70,13 +70,13 @@ impl Rows {
         self.residual.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no rows.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.residual.is_empty()
     }
 
-    /// Everything times a factor.
+    /// Multiplies residuals and derivatives by a factor.
     pub fn scale_mut(&mut self, factor: f64) {
         self.residual *= factor;
         self.border *= factor;
@@ -150,7 +150,7 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// No rows yet.
+    /// A chain without rows.
     #[must_use]
     pub fn zeros(layout: Layout) -> Self {
         let Layout {
@@ -167,14 +167,14 @@ impl Chain {
         }
     }
 
-    /// Of all these rows.
+    /// Normal equations of all these rows.
     pub fn of<'a>(layout: Layout, rows: impl IntoIterator<Item = &'a Rows>) -> Self {
         let mut chain = Self::zeros(layout);
         chain.add_all(rows);
         chain
     }
 
-    /// Of rows that the border does not enter.
+    /// Normal equations of rows without border derivatives.
     pub fn of_poses<'a>(layout: Layout, rows: impl IntoIterator<Item = &'a Rows>) -> Self {
         let mut chain = Self::zeros(layout);
         chain.corner = DMatrix::zeros(0, 0);
@@ -190,7 +190,7 @@ impl Chain {
         self.mirror();
     }
 
-    /// Adds rows; of what is symmetric the lower triangle.
+    /// Adds rows; of symmetric blocks only the lower triangle.
     fn add(&mut self, rows: &Rows) {
         let has_border = rows.border.ncols() > 0;
         let add_own = |out: &mut DMatrix<f64>, block: &DMatrix<f64>| {
@@ -213,7 +213,7 @@ impl Chain {
         }
     }
 
-    /// Completes symmetric blocks of which the lower triangle was added to.
+    /// Completes symmetric blocks whose lower triangle was added to.
     pub(super) fn mirror(&mut self) {
         mirror(&mut self.corner);
         self.diagonal.iter_mut().for_each(mirror);
@@ -307,7 +307,7 @@ pub(super) fn indefinite() -> Error {
     )
 }
 
-/// Lengths of columns from the diagonal of `JᵀJ`; a column of nothing has length one.
+/// Lengths of columns from the diagonal of `JᵀJ`; a zero column gets length one.
 pub(super) fn lengths(diagonal: &DVector<f64>) -> DVector<f64> {
     diagonal.map(|value| {
         let length = value.max(0.0).sqrt();

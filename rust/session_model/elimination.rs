@@ -1,8 +1,8 @@
-//! One pass forward over a weighted sum of chains: its log-determinant and `sideᵀ A⁻¹ side`, for likelihoods that are
-//! asked for hundreds of times (docs/model-session.md, 11.12).
+//! One forward pass over a weighted sum of chains: its log-determinant and `sideᵀ A⁻¹ side`, for likelihoods that a
+//! search evaluates hundreds of times (docs/model-session.md, 11.12).
 //!
-//! Blocks are rows of whole vectors, filled up with zeros: every loop runs along a row, nothing is allocated between
-//! poses, and nothing is substituted back.
+//! Blocks are rows of whole vectors, padded with zeros: every loop runs along a row, nothing is allocated between
+//! poses, and there is no back substitution.
 
 use nalgebra::DMatrix;
 
@@ -11,15 +11,15 @@ use super::fit::RIDGE;
 use super::lanes::{Rows, cholesky, forward, take_product};
 use crate::simd::{Instructions, for_each_instruction_set};
 
-/// What the elimination of one pose needs and leaves.
+/// Workspace of the elimination of one pose.
 struct Pass {
-    /// Unknowns of a pose; of the border and `side`.
+    /// Number of unknowns of a pose; columns of the border and `side`.
     pose: usize,
     width: usize,
     /// The pose's own block, then its upper factor `U`, `UᵀU` the block.
     block: Rows,
     inverse: Vec<f64>,
-    /// Its border with `side` behind it, then `U⁻ᵀ` times that.
+    /// Its border columns, followed by `side`, then `U⁻ᵀ` times that.
     edge: Rows,
     /// Rows of the pose before, columns of this one, then `U⁻ᵀ` of the pose before times that.
     coupling: Rows,
@@ -27,13 +27,13 @@ struct Pass {
     half_before: Rows,
     inverse_before: Vec<f64>,
     edge_before: Rows,
-    /// What is left of the border with `side` behind it.
+    /// Schur complement of the border, followed by `side`.
     schur: Rows,
     /// `½ ln det` of the poses eliminated.
     half_log_det: f64,
 }
 
-/// `ln det A` and `sideᵀ A⁻¹ side`, `A` the sum of a chain and of others times their factors that have no border; nothing
+/// `ln det A` and `sideᵀ A⁻¹ side`, `A` the sum of a chain and of others without border times their factors; `None`
 /// where `A` is not positive definite.
 pub(super) fn eliminated(
     chain: &Chain,
@@ -97,7 +97,7 @@ pub(super) fn eliminated(
     Some((2.0 * (pass.half_log_det + log_scale), explained_border))
 }
 
-/// The same block of every chain, summed with its factor, column after column.
+/// Sum over all chains of the same block times its factor, column after column.
 fn sum_blocks<'a>(
     out: &mut [f64],
     others: &[(&'a Chain, f64)],
@@ -141,7 +141,7 @@ impl Pass {
         }
     }
 
-    /// What was eliminated last is the pose before.
+    /// The pose eliminated last becomes the pose before.
     fn keep(&mut self) {
         std::mem::swap(&mut self.block, &mut self.half_before);
         std::mem::swap(&mut self.inverse, &mut self.inverse_before);
@@ -150,7 +150,7 @@ impl Pass {
 }
 
 for_each_instruction_set! {
-    /// Eliminates one pose; whether its block is positive definite.
+    /// Eliminates one pose; returns whether its block is positive definite.
     fn advance(pass: &mut Pass, has_before: bool) -> bool = advance_body
 }
 
@@ -227,7 +227,7 @@ mod tests {
     use super::super::fit::RIDGE;
     use super::eliminated;
 
-    /// Numbers between -1 and 1 that look like chance.
+    /// Pseudo-random numbers between -1 and 1.
     fn numbers(rows: usize, columns: usize, seed: f64) -> DMatrix<f64> {
         DMatrix::from_fn(rows, columns, |i, j| {
             let x = (seed + 12.9898 * i as f64 + 78.233 * j as f64).sin() * 43758.5453;
@@ -245,7 +245,7 @@ mod tests {
         out
     }
 
-    /// Against solutions there and back, of columns that touch poses and of such that do not.
+    /// Against full solutions, for columns that involve poses and for columns that do not.
     #[test]
     fn inner_products_by_one_pass_forward_are_those_of_the_solutions() {
         let layout = Layout {
@@ -267,7 +267,7 @@ mod tests {
         }
     }
 
-    /// Against the sum factored as a whole and solved there and back.
+    /// Against the sum factored as a whole, with forward and back substitution.
     #[test]
     fn one_pass_forward_gives_what_the_factor_of_the_sum_gives() {
         let layout = Layout {

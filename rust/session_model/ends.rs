@@ -1,7 +1,7 @@
-//! A chain eliminated from both of its ends: what a few neighbouring poses and the border see of all the others.
+//! A chain eliminated from both ends: the information of all other poses on a few neighbouring ones and the border.
 //!
-//! Folds of a cross-validation take rows from a few poses each. What lies before and after them is eliminated once for all
-//! folds, so that a fold costs what its own poses cost (docs/model-session.md, 11.15).
+//! Folds of a cross-validation remove rows of a few poses each. The poses before and after them are eliminated once for
+//! all folds, so that a fold costs only its own poses (docs/model-session.md, 11.15).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,7 +9,7 @@ use super::blocks::{add_gram, add_product, forward, mirror, solve};
 use super::chain::{Chain, Layout, add_ridge, indefinite, lengths, scaled};
 use crate::error::Result;
 
-/// What the poses on one side take from a pose and from the border; the right-hand side is one more column.
+/// Reduction of a pose and the border by the poses eliminated on one side; the right-hand side is one more column.
 struct End {
     /// `(pose, pose)`.
     block: DMatrix<f64>,
@@ -19,7 +19,7 @@ struct End {
     corner: DMatrix<f64>,
 }
 
-/// What is left at every pose, by the poses before it and by those after it.
+/// Reductions of every pose by the poses before it and by those after it.
 pub(super) struct Ends {
     scale: DVector<f64>,
     ridge: f64,
@@ -28,7 +28,7 @@ pub(super) struct Ends {
 }
 
 impl Ends {
-    /// Of `JᵀJ` with a ridge on columns of unit length, and `side` `(n, 1)`.
+    /// Eliminates `JᵀJ` with a ridge on columns of unit length, and the right-hand side `side` `(n, 1)`.
     ///
     /// # Errors
     /// When it is not positive definite.
@@ -46,7 +46,7 @@ impl Ends {
         })
     }
 
-    /// The chain of the poses from `first` to `last`, all others eliminated; the ridge is in it.
+    /// The chain of the poses from `first` to `last`, all others eliminated; the ridge is included.
     pub(super) fn between(&self, chain: &Chain, first: usize, last: usize) -> Chain {
         let layout = Layout {
             n_poses: last - first + 1,
@@ -117,7 +117,7 @@ fn picked(values: &DVector<f64>, layout: Layout, first: usize) -> DVector<f64> {
     out
 }
 
-/// Pose after pose in the order of elimination: what those before leave it.
+/// Reductions, in the order of elimination, of every pose by those before it.
 fn ends(
     chain: &Chain,
     side: &DMatrix<f64>,

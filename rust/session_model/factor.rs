@@ -34,7 +34,7 @@ impl Factor {
         x
     }
 
-    /// `sideᵀ (JᵀJ)⁻¹ side` for columns `(n, k)`: forward alone, and through the poses only what touches them.
+    /// `sideᵀ (JᵀJ)⁻¹ side` for columns `(n, k)`: a forward pass, through the poses only for those that involve them.
     #[must_use]
     pub fn inner(&self, side: &DMatrix<f64>) -> DMatrix<f64> {
         let layout = self.layout;
@@ -86,7 +86,7 @@ impl Factor {
             }
             parts.push(y);
         }
-        // Forward parts hold y_i; the border loses Bᵢᵀ Dᵢ⁻¹ yᵢ.
+        // Forward parts are y_i; Bᵢᵀ Dᵢ⁻¹ yᵢ is subtracted from the border.
         let solved: Vec<DMatrix<f64>> = parts
             .iter()
             .zip(&self.diagonal)
@@ -113,14 +113,14 @@ impl Factor {
         }
     }
 
-    /// `ln det JᵀJ` over the poses alone: the border is held.
+    /// `ln det JᵀJ` over the poses alone, for a fixed border.
     #[must_use]
     pub fn log_det_poses(&self) -> f64 {
         let inner: f64 = self.diagonal.iter().map(log_det).sum();
         inner + 2.0 * sum_ln(&self.scale.as_slice()[self.layout.border..])
     }
 
-    /// `ln det JᵀJ` over everything.
+    /// `ln det JᵀJ` over all unknowns.
     #[must_use]
     pub fn log_det(&self) -> f64 {
         self.log_det_poses()
@@ -187,22 +187,22 @@ fn sum_ln(values: &[f64]) -> f64 {
     values.iter().map(|v| v.ln()).sum()
 }
 
-/// Covariances that one backward pass gives.
+/// Covariances from one backward pass.
 #[derive(Debug, Clone)]
 pub struct Marginals {
     layout: Layout,
-    /// Of the border.
+    /// Covariance of the border.
     pub corner: DMatrix<f64>,
-    /// Of every pose (rows) with the border (columns).
+    /// Covariance of every pose (rows) with the border (columns).
     pub border: Vec<DMatrix<f64>>,
-    /// Of every pose.
+    /// Covariance of every pose.
     pub own: Vec<DMatrix<f64>>,
-    /// Of every pose (rows) with the next (columns).
+    /// Covariance of every pose (rows) with the next (columns).
     pub next: Vec<DMatrix<f64>>,
 }
 
 impl Marginals {
-    /// `diag(J C Jᵀ)` of some rows: the share of each that the fit used up.
+    /// Leverage of some rows, `diag(J C Jᵀ)`.
     #[must_use]
     pub fn leverage(&self, rows: &Rows) -> DVector<f64> {
         let mut image = DMatrix::zeros(rows.len(), 0);

@@ -1,4 +1,4 @@
-//! The fit of a session, and the strengths of the processes behind its zeros (docs/model-session.md, 11.9-11.12).
+//! The fit of a session at given strengths of the processes behind its biases (docs/model-session.md, 11.9-11.12).
 
 use std::cell::RefCell;
 
@@ -14,36 +14,36 @@ use super::{Distortion, Session, State, Strengths};
 use crate::error::Result;
 use crate::gauss_newton::{Local, Options, Stop, descend};
 
-/// Added to the diagonal of the scaled normal equations: directions that nothing sees stay finite.
+/// Added to the diagonal of the scaled normal equations: undetermined directions stay finite.
 pub const RIDGE: f64 = 1e-12;
-/// The undamped step moves all whitened rows together by less than this many standard errors, as large as the rows show
-/// them to be: converged.
+/// Converged: the undamped step moves all whitened rows together by less than this many standard errors, these widened
+/// to the actual scatter of the rows.
 const STEP_TOLERANCE: f64 = 1e-3;
-/// The same of a descent whose weights are to be renewed: they change by far less on the rest of the way.
+/// The same for a descent whose weights are then renewed: they change by far less on the remaining way.
 const ROUGH_TOLERANCE: f64 = 0.1;
-/// Angle, rad, between a vertical and the plane it was compared in, below which moves carried there count as they are:
-/// residual and noise shrink together, in second order.
+/// Angle, rad, between a vertical and the plane in which it was compared, below which moves integrated there are
+/// reused: residual and noise shrink together, in second order.
 const SAME_PLANE: f64 = 1e-2;
-/// Iterations of such a descent, and of any.
+/// Largest number of iterations of such a descent, and of any.
 const ROUGH_ITERATIONS: usize = 12;
 const MOST_ITERATIONS: usize = 50;
-/// Renewals of the moves' weights; they follow the state in second order and settle in two.
+/// Largest number of renewals of the moves' weights; they depend on the state in second order and converge in two.
 const RENEWALS: usize = 6;
 
 /// A fitted session.
 #[derive(Debug)]
 pub struct Fit {
-    /// Where it ended.
+    /// State at the optimum.
     pub state: State,
-    /// Strengths of the processes there.
+    /// Strengths of the noise processes.
     pub strengths: Strengths,
-    /// Effects in it.
+    /// Effects in the model.
     pub distortion: Distortion,
     /// Whitening of the moves.
     pub weights: Weights,
-    /// Moves carried there.
+    /// Moves integrated at that state.
     pub passed: Vec<Passed>,
-    /// All rows there.
+    /// All rows at that state.
     pub groups: Vec<Group>,
     /// Their normal equations.
     pub chain: Chain,
@@ -51,11 +51,11 @@ pub struct Fit {
     pub factor: Factor,
     /// Why the last descent stopped.
     pub stop: Stop,
-    /// Linearisations made in all.
+    /// Total number of linearisations.
     pub iterations: usize,
-    /// Length of the undamped step there, in standard errors of all rows together.
+    /// Length of the undamped step at that state, in standard errors of all rows together.
     pub step: f64,
-    /// Left side of the orthogonality test.
+    /// Left side of the orthogonality test GN4.
     pub gradient: f64,
 }
 
@@ -102,7 +102,7 @@ pub fn gradient<'a>(layout: Layout, groups: impl IntoIterator<Item = &'a Group>)
 }
 
 impl Session {
-    /// Whether the planes that moves were compared in lie across the verticals of a state.
+    /// Whether the planes in which moves were compared are perpendicular to the verticals of a state.
     fn compares_in(&self, passed: &[Passed], state: &State) -> bool {
         let tilt = |(one, known): (&Move, &Passed)| known.plane.tr_mul(&state.up[one.before + 1]);
         self.moves
@@ -112,10 +112,10 @@ impl Session {
     }
 }
 
-/// Fits a session at given strengths: descents with the moves' weights held, renewed until they no longer move it.
+/// Fits a session at given strengths: descents with fixed weights of the moves, renewed until the state converges.
 ///
 /// # Errors
-/// When the start cannot be evaluated or nothing determines a row's weight.
+/// When the start cannot be evaluated or a row's weight is undetermined.
 pub fn fit(
     session: &Session,
     start: State,
@@ -125,8 +125,8 @@ pub fn fit(
     fit_from(session, start, None, strengths, distortion, false)
 }
 
-/// [`fit`], with the moves as they were carried at the start where that is known; a rough one ends with the first descent,
-/// near enough for the strengths of noise to be sought there.
+/// [`fit`], with the moves as integrated at the start where these are known; with `ends_rough` it ends after the first
+/// descent, near enough for a search of noise strengths.
 pub(super) fn fit_from(
     session: &Session,
     start: State,
@@ -174,7 +174,7 @@ pub(super) fn fit_from(
         passed = local.passed;
         let is_there = ended.stop != Stop::SmallStep || ended.step <= STEP_TOLERANCE * spread;
         let is_settled = (ended.iterations == 1 && is_there) || session.moves.is_empty();
-        // Where rows miss by far more than their noise a descent ends late, and renewed weights would begin it again.
+        // Where residuals far exceed their noise a descent ends late, and renewed weights would start it again.
         let is_endless = !is_rough && ended.stop == Stop::TooManyIterations;
         spread = shown;
         if is_settled || is_endless || ends_rough || renewal >= RENEWALS {

@@ -1,4 +1,4 @@
-//! What the samples that a log lost would have added to an integral, as far as their neighbours do not tell.
+//! Error of an integral over samples that a log lost, beyond what their neighbours determine.
 
 use nalgebra::Vector3;
 
@@ -6,25 +6,25 @@ use crate::poisson::StepWeights;
 
 /// A step longer than this many usual ones has lost samples.
 pub const GAP: f64 = 1.5;
-/// Samples lost together beyond which a straight line crosses the gap, and no cubic (`poisson::UNEVEN_STEPS`).
+/// Number of samples lost together above which a straight line bridges the gap, not a cubic (`poisson::UNEVEN_STEPS`).
 const CROSSED_BY_CUBIC: usize = 2;
-/// Places in the move at which as many samples are there: fewer do not tell how its motion bends.
+/// Fewest places in the move with as many complete samples: fewer do not determine the curvature of its motion.
 const FEWEST: usize = 12;
 
 /// A step over lost samples.
 #[derive(Debug, Clone)]
 pub struct Gap {
-    /// Which step of the move.
+    /// Index of the step in the move.
     pub step: usize,
-    /// Mean square of what the same step misses elsewhere in the move where nothing was lost: integrals of force and
-    /// rate, (raw unit · s)². `None` where the move is too short to tell.
+    /// Mean square error of the same interpolation elsewhere in the move, where nothing was lost: integrals of force
+    /// and rate, (raw unit · s)². `None` where the move is too short.
     pub square: Option<[Vector3<f64>; 2]>,
-    /// Part of the variance of one sample's noise in it, s².
+    /// Factor of the variance of one sample's noise in it, s².
     pub noise: f64,
 }
 
 impl Gap {
-    /// What it misses beyond noise of these densities (force, rate), (raw unit · s)²; `None` as in `square`.
+    /// Its error beyond noise of these densities (force, rate), (raw unit · s)²; `None` as in `square`.
     #[must_use]
     pub fn variance(&self, density: [&Vector3<f64>; 2], step_s: f64) -> Option<[Vector3<f64>; 2]> {
         let square = self.square.as_ref()?;
@@ -36,7 +36,7 @@ impl Gap {
     }
 }
 
-/// The gaps of a move, found by its own usual step (timestamps of bursts lie further apart than samples, all of them).
+/// The gaps of a move, relative to its own median step (timestamps of bursts are all further apart than samples).
 #[must_use]
 pub fn gaps(steps: &[StepWeights], force: &[Vector3<f64>], rate: &[Vector3<f64>]) -> Vec<Gap> {
     let mut lengths: Vec<f64> = steps.iter().map(|step| step.h).collect();
@@ -49,7 +49,7 @@ pub fn gaps(steps: &[StepWeights], force: &[Vector3<f64>], rate: &[Vector3<f64>]
     let mut known: Vec<(usize, Gap)> = Vec::new();
     let mut out = Vec::new();
     for (k, step) in steps.iter().enumerate().filter(|(_, step)| is_gap(step)) {
-        // Of more than the move itself holds nothing can be measured, however long the pause.
+        // A gap longer than the move itself cannot be measured.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let lost = ((step.h / usual).round() as usize).min(steps.len()).max(2) - 1;
         let seen = known
@@ -66,8 +66,8 @@ pub fn gaps(steps: &[StepWeights], force: &[Vector3<f64>], rate: &[Vector3<f64>]
     out
 }
 
-/// Weights of the samples from one before the gap to one behind it, in the integral that is missed, in steps: those lost
-/// count one each, and what is put in their place is taken off.
+/// Weights, in steps, of the samples around a gap (two before, those lost, two after) in the error of the integral: a
+/// lost sample has weight one, and its interpolation is subtracted.
 fn contrast(lost: usize) -> Vec<f64> {
     let mut weights = vec![1.0; lost + 4];
     let end = lost as f64 + 1.0;
@@ -92,7 +92,7 @@ fn contrast(lost: usize) -> Vec<f64> {
     weights
 }
 
-/// What a step over `lost` samples misses where none were lost.
+/// Error of a step over `lost` samples, where none were lost.
 fn measured(
     steps: &[StepWeights],
     is_gap: &impl Fn(&StepWeights) -> bool,

@@ -1,4 +1,4 @@
-//! One descent of a session: the linear problem of a state, the weights of the moves held (docs/model-session.md, 11.9).
+//! One descent of a session: the linear problem at a state, weights of moves fixed (docs/model-session.md, 11.9).
 
 use std::cell::{OnceCell, RefCell};
 
@@ -14,24 +14,24 @@ use super::{Distortion, Session, State, Strengths};
 use crate::error::Result;
 use crate::gauss_newton::{Descent, Local};
 
-/// A session with its weights held: what one descent works on.
+/// A session with fixed weights: the problem of one descent.
 pub(super) struct Held<'a> {
     pub session: &'a Session,
     pub distortion: &'a Distortion,
     pub strengths: Strengths,
     pub weights: &'a Weights,
-    /// The moves at the state that the descent begins at, already carried.
+    /// The moves integrated at the state where the descent begins.
     pub first: RefCell<Option<Vec<Passed>>>,
-    /// The state whose cost was asked for last, and the moves carried there.
+    /// The state whose cost was computed last, and the moves integrated there.
     pub tried: RefCell<Option<(State, Vec<Carried>)>>,
 }
 
-/// The linear problem of a state.
+/// The linear problem at a state.
 pub(super) struct Here {
     pub groups: Vec<Group>,
     pub passed: Vec<Passed>,
     pub chain: Chain,
-    /// Its factors without damping, made when first asked for.
+    /// Its factors without damping, computed at the first request.
     pub factor: OnceCell<Factor>,
     gradient: DMatrix<f64>,
     cost: f64,
@@ -76,7 +76,7 @@ impl Descent for Held<'_> {
         let chi2 = self
             .session
             .chi2(state, &self.strengths, self.distortion, self.weights);
-        // A triad that collapsed on the way is a wall, not an end.
+        // A triad that collapsed on the way has infinite cost: the step is shortened, the fit goes on.
         Ok(chi2.map_or(f64::INFINITY, |(value, carried)| {
             if value.is_finite() {
                 *self.tried.borrow_mut() = Some((state.clone(), carried));

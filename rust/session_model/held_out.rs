@@ -1,4 +1,4 @@
-//! Blocks of rows predicted from the others, by the same factors (docs/model-session.md, 11.15).
+//! Cross-validation: blocks of rows predicted from the others, by the same factors (docs/model-session.md, 11.15).
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -9,25 +9,25 @@ use super::fit::{Fit, gradient};
 use super::predict::{N_DOMAINS, domain_of};
 use crate::error::Result;
 
-/// Ridge of the training rows: the held-out pose's own unknowns keep a weak prior, the same for every model compared.
+/// Ridge of the training rows: the unknowns of the pose left out keep a weak prior, the same for every model compared.
 const TRAINING_RIDGE: f64 = 1e-9;
-/// Directions of a fold whose predicted variance is above this many noise variances were left open by the training rows.
-/// Zeros that scatter by a thousand times the error of a pose's mean are predicted still, however badly: a model that
-/// needs so much scatter pays for it.
+/// Directions of a fold whose predicted variance is above this many noise variances are undetermined by the training
+/// rows. Biases that scatter by a thousand times the error of a pose's mean are still predicted, with a large variance:
+/// the likelihood of a model that needs so much scatter is lower for it.
 const OPEN: f64 = 1e7;
 
-/// Held-out prediction of blocks of rows.
+/// Cross-validated prediction of blocks of rows.
 #[derive(Debug, Clone)]
 pub struct HeldOut {
     /// `(folds, domains)` innovation χ².
     pub chi2: Vec<[f64; N_DOMAINS]>,
     /// `(folds)` log-determinant of the predicted covariance, up to a constant of the readings.
     pub log_det: Vec<f64>,
-    /// `(domains)` directions predicted.
+    /// `(domains)` number of directions predicted.
     pub n_rows: [f64; N_DOMAINS],
     /// `(rows)` whitened innovations.
     pub residual: Vec<f64>,
-    /// `(rows)` the same over each row's own noise alone.
+    /// `(rows)` innovations in units of each row's own noise alone.
     pub innovation: Vec<f64>,
 }
 
@@ -35,7 +35,7 @@ impl Fit {
     /// Predicts every fold's rows from the others (blocked cross-validation). A fold is a list of groups.
     ///
     /// # Errors
-    /// When the rest of the rows determines nothing at all.
+    /// When the remaining rows determine nothing.
     pub fn held_out(&self, folds: &[Vec<usize>]) -> Result<HeldOut> {
         let layout = self.layout();
         let firsts = self.first_rows();
@@ -75,7 +75,7 @@ impl Fit {
         Ok(out)
     }
 
-    /// One fold's rows predicted from the others: its own poses and the border alone, the rest eliminated from both ends.
+    /// Predicts one fold's rows from the others: only its own poses and the border, the rest eliminated from both ends.
     fn predicted(&self, fold: &[usize], side: &DMatrix<f64>, ends: &Ends) -> Result<FoldPart> {
         let mut groups: Vec<Rows> = fold.iter().map(|&g| self.groups[g].rows.clone()).collect();
         let poses = groups.iter().filter_map(|rows| {
@@ -126,7 +126,7 @@ impl Fit {
         let mut whitened = DVector::zeros(n);
         let mut plain = DVector::zeros(n);
         let mut share = DVector::zeros(n);
-        // Rows are whitened by noise that two models need not share: predictions are compared in the rows' own units.
+        // Rows are whitened by noise that may differ between models: predictions are compared in the rows' own units.
         let mut log_det = -2.0 * fold.iter().map(|&g| self.groups[g].log_weight).sum::<f64>();
         for k in 0..n {
             let value = eigen.eigenvalues[k];

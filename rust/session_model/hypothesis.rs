@@ -1,5 +1,5 @@
-//! The evidence of a hypothesis: the rows of a session at one point, with the columns of further effects, at any strengths
-//! of its noise (docs/model-session.md, 11.18).
+//! The evidence of a hypothesis: the rows of a session at one state, with the columns of further effects, at any noise
+//! strengths (docs/model-session.md, 11.18).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -21,7 +21,7 @@ pub(super) struct Part {
     pub n: usize,
 }
 
-/// A session at a point with its rows laid open: those of moves not yet weighed.
+/// A session at one state, its rows by process; those of moves are not whitened yet.
 pub struct Hypothesis {
     layout: Layout,
     at: Strengths,
@@ -32,8 +32,8 @@ pub struct Hypothesis {
     n_added: usize,
 }
 
-/// A move in SI: derivatives by border, by the pose before, by the pose after, and the residual, column after column; and
-/// what its covariance is made of.
+/// A move in SI: derivatives with respect to the border, the pose before and the pose after, and the residual, column
+/// after column; and the terms of its covariance.
 pub(super) struct Open {
     pose: usize,
     columns: DMatrix<f64>,
@@ -68,25 +68,25 @@ impl Open {
     }
 }
 
-/// What a hypothesis comes to.
+/// Evidence and estimate of a hypothesis.
 #[derive(Debug, Clone)]
 pub struct Found {
-    /// Log-evidence: everything but the strengths integrated out.
+    /// Log-evidence: all but the strengths integrated out.
     pub log_evidence: f64,
-    /// Strengths there.
+    /// Strengths of largest evidence.
     pub strengths: Strengths,
-    /// Added parameters, one linear step from the point.
+    /// Added parameters, one linear step from the state.
     pub estimate: DVector<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
 }
 
 impl Hypothesis {
-    /// A fitted session with further columns, whitened as its rows are, group after group; `sizes` are the standard
-    /// deviations of their parameters beforehand.
+    /// A fitted session with further columns, whitened as its rows are, group after group; `sizes` are the prior
+    /// standard deviations of their parameters.
     ///
     /// # Errors
-    /// When a move's weight cannot be undone.
+    /// When a move's whitening cannot be inverted.
     pub fn of(fit: &Fit, columns: &[DMatrix<f64>], sizes: &[f64]) -> Result<Self> {
         let k = sizes.len();
         let layout = Layout {
@@ -144,7 +144,7 @@ impl Hypothesis {
         })
     }
 
-    /// The rows that no process changes, at some strengths, and the logarithm of their normalisation.
+    /// All rows but those of the bias processes, at some strengths, and the logarithm of their normalisation.
     pub(super) fn heard(&self, strengths: &Strengths) -> Option<(Part, f64)> {
         let mut weight = self.fixed_weight;
         let mut chain = self.fixed.chain.clone();
@@ -168,7 +168,7 @@ impl Hypothesis {
         ))
     }
 
-    /// `L⁻¹` of every move's covariance at some strengths, by number of the move.
+    /// `L⁻¹` of every move's covariance at some strengths, by index of the move.
     pub(super) fn whitenings(&self, strengths: &Strengths) -> Option<Vec<Whitening>> {
         self.moves
             .iter()
@@ -186,7 +186,7 @@ impl Hypothesis {
         })
     }
 
-    /// Log-evidence at some strengths beside rows that were weighed for them.
+    /// Log-evidence at some strengths; `heard` are the rows outside the processes at them.
     pub(super) fn beside(&self, strengths: &Strengths, heard: &(Part, f64)) -> f64 {
         let (part, mut weight) = (&heard.0, heard.1);
         let mut side = part.side.clone();
@@ -217,11 +217,10 @@ impl Hypothesis {
         strengths.iter().map(one).collect()
     }
 
-    /// The strengths that make the rows likeliest, sought from the best of some, and what they gain in log-evidence over
-    /// that one.
+    /// The most likely strengths, searched from the best of `starts`, and their gain in log-evidence over that one.
     ///
     /// # Errors
-    /// When there are none.
+    /// When there are no `starts`.
     pub fn likeliest(&self, starts: &[Strengths], within: &Within) -> Result<(Strengths, f64)> {
         let values = self.at_each(starts);
         let best = starts
@@ -251,10 +250,10 @@ impl Hypothesis {
         Ok((chain, side))
     }
 
-    /// The strengths that make the rows likeliest, sought from the best of some, and all that follows there.
+    /// The most likely strengths, searched from the best of `starts`, with the evidence and the estimate there.
     ///
     /// # Errors
-    /// When there are none, or nothing determines the session there.
+    /// When there are no `starts`, or the session is undetermined there.
     pub fn tuned(&self, starts: &[Strengths], within: &Within) -> Result<Found> {
         let (strengths, _) = self.likeliest(starts, within)?;
         let log_evidence = self.at_each(&[strengths])[0];
@@ -278,7 +277,7 @@ impl Hypothesis {
     }
 }
 
-/// From whitened rows of a move back to SI.
+/// Inverse of a move's whitening: from whitened rows back to SI.
 pub(super) fn unweighed(white: &Whitening) -> Result<Whitening> {
     white
         .try_inverse()

@@ -1,14 +1,14 @@
-//! Small matrices as rows of whole vectors, filled up with zeros.
+//! Small matrices as rows of whole vectors, padded with zeros.
 
 use crate::simd::fma;
 
 const LANES: usize = 8;
 pub(super) type Lane = [f64; LANES];
 
-/// Rows of numbers, each filled up to whole lanes.
+/// Rows of numbers, each padded to whole lanes.
 pub(super) struct Rows {
     pub data: Vec<Lane>,
-    /// Lanes of a row.
+    /// Lanes per row.
     pub n: usize,
 }
 
@@ -25,7 +25,7 @@ impl Rows {
         &mut self.data[row * self.n + column / LANES][column % LANES]
     }
 
-    /// One row, with what fills it up.
+    /// One row, with its padding.
     pub(super) fn row(&mut self, row: usize) -> &mut [f64] {
         self.data[row * self.n..][..self.n].as_flattened_mut()
     }
@@ -65,7 +65,7 @@ fn add_row<const FUSED: bool, const W: usize>(sum: &mut [Lane; W], factor: f64, 
     }
 }
 
-/// `out -= aᵀ b`, the first `columns` of `a`.
+/// `out -= aᵀ b`, for the first `columns` columns of `a`.
 #[inline(always)]
 #[expect(
     clippy::inline_always,
@@ -81,7 +81,7 @@ pub(super) fn take_product<const FUSED: bool>(
     strip_by_strip!(take_strip::<FUSED>(out, columns, a, b, n), n);
 }
 
-/// The same of `W` lanes of every row, two rows of `out` at a time, which stay in registers.
+/// [`take_product`] of `W` lanes of every row, two rows of `out` at a time, which stay in registers.
 #[inline(always)]
 #[expect(
     clippy::inline_always,
@@ -134,7 +134,7 @@ fn reduce<const FUSED: bool>(
     strip_by_strip!(reduce_strip::<FUSED>(row, before, half, half_lanes, i), n);
 }
 
-/// The same of `W` lanes, in two sums of every other row: an addition need not wait for the one before.
+/// [`reduce`] of `W` lanes, in two sums over alternate rows: an addition need not wait for the one before.
 #[inline(always)]
 #[expect(
     clippy::inline_always,
@@ -161,7 +161,7 @@ fn reduce_strip<const FUSED: bool, const W: usize>(
     }
 }
 
-/// `U` with `UᵀU` the first `n` rows and columns, of which the upper triangle counts, and `½ ln det`; rows may be longer.
+/// `U` with `UᵀU` the first `n` rows and columns, whose upper triangle is read, and `½ ln det`; rows may be longer.
 #[inline(always)]
 #[expect(
     clippy::inline_always,

@@ -1,5 +1,5 @@
-//! Many candidates at a few strengths: what each gains beside a fit with everything else integrated out, from its columns
-//! once what the unknowns imitate is projected out (docs/model-session.md, 11.19).
+//! Many candidates at a few strengths: the gain in evidence of each, added to a fit with everything else integrated
+//! out, from its columns projected orthogonally to the fit's unknowns (docs/model-session.md, 11.19).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -12,8 +12,8 @@ use super::moves::N_MOVE;
 use super::rows::{Group, Kind};
 use crate::error::{Error, Result};
 
-/// A fit at some strengths: normal equations factored, `Jᵀr`, what its moves' rows are multiplied by to get there, and
-/// those rows.
+/// A fit at some strengths: factored normal equations, `Jᵀr`, the matrices from its moves' whitened rows to these
+/// strengths, and the rows so transformed.
 struct Look {
     factor: Factor,
     side: DMatrix<f64>,
@@ -27,10 +27,10 @@ pub struct Looks<'a> {
     each: Vec<Look>,
 }
 
-/// What a candidate comes to.
+/// Gain and estimate of a candidate.
 #[derive(Debug, Clone)]
 pub struct Seen {
-    /// Log-evidence gained, `(scales, strengths)`, sizes beforehand being a scale times those given.
+    /// Gain in log-evidence, `(scales, strengths)`; the prior sizes are a scale times those given.
     pub gain: DMatrix<f64>,
     /// Its parameters at the first strengths and their best scale, one linear step from the fit.
     pub estimate: DVector<f64>,
@@ -78,11 +78,11 @@ impl<'a> Looks<'a> {
         })
     }
 
-    /// A candidate's columns, whitened as the fit's rows are, group after group; `sizes` beforehand times each scale.
-    /// Every one of `parts` (numbers of columns) is looked at as a candidate by itself.
+    /// Scores a candidate by its columns, whitened as the fit's rows are, group after group; its prior sizes are
+    /// `sizes` times each scale. Every one of `parts` (indices of columns) is scored as a candidate by itself.
     ///
     /// # Errors
-    /// When a candidate has no size.
+    /// When columns are not finite, or there are no strengths or scales.
     pub fn seen(
         &self,
         columns: &[DMatrix<f64>],
@@ -99,7 +99,7 @@ impl<'a> Looks<'a> {
         each.collect()
     }
 
-    /// What is left of a candidate's columns at every of the strengths.
+    /// The projected columns of a candidate at each of the strengths.
     fn left(&self, columns: &[DMatrix<f64>], k: usize) -> Vec<Left> {
         let readings = || {
             let pairs = self.fit.groups.iter().zip(columns);
@@ -126,7 +126,7 @@ impl<'a> Looks<'a> {
         each.collect()
     }
 
-    /// `CᵀC` with `Cᵀr` behind it, and `JᵀC`.
+    /// `CᵀC` followed by `Cᵀr`, and `JᵀC`.
     fn sums<'b>(
         &self,
         k: usize,
@@ -145,8 +145,8 @@ impl<'a> Looks<'a> {
     }
 }
 
-/// Columns with what the unknowns of the fit imitate taken off, at some strengths: their products and the slope along
-/// each.
+/// Columns projected orthogonally to the unknowns of the fit, at some strengths: their products, and those with the
+/// residual.
 struct Left {
     normal: DMatrix<f64>,
     slope: DVector<f64>,
@@ -162,14 +162,14 @@ impl Left {
     }
 }
 
-/// What columns come to, their sizes beforehand times each scale.
+/// Gain and estimate of columns, for their prior sizes times each scale.
 fn judged(left: &[Left], sizes: &DVector<f64>, scales: &[f64]) -> Result<Seen> {
     let k = sizes.len();
     let mut gain = DMatrix::zeros(scales.len(), left.len());
     let mut first: Option<(f64, DVector<f64>, DMatrix<f64>)> = None;
     for (l, one) in left.iter().enumerate() {
         for (s, scale) in scales.iter().enumerate() {
-            // In units of the sizes: a prior of one, and no term for its width.
+            // In units of the prior sizes: the prior is one, with no term for its width.
             let d = sizes * *scale;
             let inner = DMatrix::from_fn(k, k, |i, j| {
                 d[i] * d[j] * one.normal[(i, j)] + f64::from(i == j)

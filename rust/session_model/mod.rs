@@ -1,9 +1,9 @@
-//! The one joint estimator of a session of still poses and moves (docs/model-session.md).
+//! The one joint estimator of a session of static poses and moves (docs/model-session.md).
 //!
-//! Unknowns: what all poses share (accelerometer `S` lower and `b`, gyro `S`, effect parameters), and for every pose the
-//! vertical in the body and the zeros of both sensors. Zeros are states in *raw* units: the raw reading is the datum, so
-//! that no sensor can buy itself a smaller residual by shrinking. Rest rows speak of one pose, moves and walks of two
-//! neighbours: the normal equations are a chain with a border ([`chain`]).
+//! Unknowns: those that all poses share (accelerometer `S` lower and `b`, gyro `S`, effect parameters), and for every
+//! pose the vertical in the body and the biases of both sensors. Biases are states in *raw* units: the raw reading is
+//! the measurement, so that a smaller `S` reduces no residual. Rows of static readings involve one pose, moves and
+//! walks two neighbours: the normal equations are a chain with a border ([`chain`]).
 
 mod bias_rows;
 mod blocks;
@@ -42,31 +42,31 @@ pub use state::{Distortion, State, tangent_plane};
 
 /// Parameters of both linear models: six of the accelerometer's `S`, three of its `b`, nine of the gyro's `S`.
 pub const N_MODEL: usize = 18;
-/// Unknowns of a pose without scatter: vertical (2), zero of the gyro (3), of the accelerometer (3).
+/// Unknowns of a pose without scatter: vertical (2), bias of the gyro (3), of the accelerometer (3).
 pub const N_POSE: usize = 8;
-/// Strengths of scatter: lengths of gravity do not tell the accelerometer's axes apart, the gyro's are.
+/// Strengths of scatter: one of the accelerometer, whose axes gravity's length does not separate, three of the gyro.
 pub const N_SCATTER: usize = 4;
-/// With the share of either zero that is this pose's alone.
+/// Unknowns of a pose with scatter: also the part of either bias that belongs to this pose alone (3 each).
 pub const N_POSE_SCATTER: usize = 14;
 /// `(row, column)` of the free elements of the accelerometer's `S`.
 pub const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
-/// Means of one sensor over the still poses, raw and centred.
+/// Means of one sensor over the static poses, raw and centred.
 #[derive(Debug, Clone)]
 pub struct AtRest {
     /// Mean reading of each pose.
     pub mean: Vec<Vector3<f64>>,
-    /// Its standard error.
+    /// Standard error of each mean.
     pub sigma: Vec<Vector3<f64>>,
-    /// `Σ^(-1/2)` of its error.
+    /// `Σ^(-1/2)` of the error of each mean.
     pub white: Vec<Matrix3<f64>>,
     /// White noise, raw unit · √s.
     pub density: Vector3<f64>,
 }
 
 impl AtRest {
-    /// Means with standard errors along the sensor's axes, and, where `along` says so, another error along one direction
-    /// (a unit vector and its standard error, not finite where nothing is known).
+    /// Means with standard errors along the sensor's axes and, where `along` is given, another error along one
+    /// direction (a unit vector and its standard error, not finite where unknown).
     ///
     /// # Errors
     /// When there are not as many directions as poses.
@@ -95,7 +95,7 @@ impl AtRest {
                 if !(error.is_finite() && error > 0.0) {
                     return plain;
                 }
-                // Errors across the direction as the axes have them, one of its own along it.
+                // Across the direction the errors of the axes, along it its own error.
                 let across = Matrix3::identity() - direction * direction.transpose();
                 let covariance = across * Matrix3::from_diagonal(&axes.map(|s| s * s)) * across
                     + direction * direction.transpose() * (error * error);
@@ -117,55 +117,55 @@ impl AtRest {
     }
 }
 
-/// Values the linear models are held to.
+/// Prior of the linear models.
 #[derive(Debug, Clone)]
 pub struct Prior {
-    /// `(18)`.
+    /// Mean, `(18)`.
     pub mean: SVector<f64, N_MODEL>,
     /// `L⁻¹` of the covariance `L Lᵀ`.
     pub white: SMatrix<f64, N_MODEL, N_MODEL>,
-    /// Whether it only says what any instrument is like: its rows then belong to no domain.
+    /// Whether it describes instruments in general: its rows then belong to no domain.
     pub is_weak: bool,
 }
 
-/// Everything that was read.
+/// All readings of a session.
 #[derive(Debug, Clone)]
 pub struct Session {
     /// |g|, m/s².
     pub gravity: f64,
     /// Middle of each pose, s.
     pub time_s: Vec<f64>,
-    /// Accelerometer at rest.
+    /// Accelerometer in static poses.
     pub force: AtRest,
-    /// Gyro at rest.
+    /// Gyro in static poses.
     pub rate: Option<AtRest>,
     /// Moves between neighbouring poses.
     pub moves: Arc<Vec<Move>>,
-    /// Noise of their samples.
+    /// Noise of the moves' samples.
     pub noise: MoveNoise,
-    /// What is known beforehand.
+    /// Prior of the linear models, if any.
     pub prior: Option<Prior>,
-    /// Scatter of the zeros that strength one means, raw units (accelerometer, gyro); `None`: zeros only walk.
+    /// Scatter of the biases at strength one, raw units (accelerometer, gyro); `None`: biases only walk.
     pub scatter: Option<[Vector3<f64>; 2]>,
-    /// Strength of the accelerometer's that the noise inside poses lets expect; 0 where it shows none (11.12d).
+    /// Strength of the accelerometer's scatter expected from the noise inside poses; 0 where it shows none (11.12d).
     pub expected_scatter: f64,
 }
 
-/// Strengths of the processes behind the zeros.
+/// Strengths of the processes behind the biases.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strengths {
     /// Corner time at which white noise and walk meet, s: accelerometer, gyro.
     pub corner_s: [f64; 2],
     /// Scatter from pose to pose in units of [`Session::scatter`]: accelerometer, then each axis of the gyro.
     pub scatter: [f64; N_SCATTER],
-    /// How far a zero that scatters leaves, during a move, the line between its poses: in units of its scatter.
+    /// Departure of a bias from the line between its poses, during a move, in units of its scatter.
     pub between: [f64; 2],
     /// Factors, at least 1, on the standard errors of gravity after moves and of the velocity over them.
     pub excess: [f64; 2],
 }
 
 impl Strengths {
-    /// Zeros that neither walk nor scatter to speak of.
+    /// Biases without walk and scatter.
     pub const NONE: Self = Self {
         corner_s: [f64::INFINITY; 2],
         scatter: [0.0; N_SCATTER],
@@ -175,7 +175,7 @@ impl Strengths {
 }
 
 impl Strengths {
-    /// Largest change of a logarithm from other ones; 0 where none differs.
+    /// Largest change of a logarithm from `other`; 0 where none differs.
     #[must_use]
     pub fn changed_from(&self, other: &Self) -> f64 {
         let pairs = (self.corner_s.iter().zip(&other.corner_s))

@@ -15,17 +15,17 @@ use crate::error::{Error, Result};
 /// `L⁻¹` of a move's covariance `L Lᵀ`.
 pub type Whitening = SMatrix<f64, N_MOVE, N_MOVE>;
 
-/// Whitening of the moves, held while the solver runs and renewed between runs: left free it would reward noise.
+/// Whitening of the moves, fixed while the solver runs and renewed between runs: more noise would lower the cost.
 #[derive(Debug, Clone)]
 pub struct Weights {
-    /// Of each move.
+    /// Whitening of each move.
     pub white: Vec<Whitening>,
     /// Plane in which the vertical after each move is compared.
     pub plane: Vec<Matrix3x2<f64>>,
 }
 
 impl Weights {
-    /// From moves that were carried.
+    /// Weights from integrated moves.
     ///
     /// # Errors
     /// When the noise of a move cannot be whitened.
@@ -52,24 +52,24 @@ impl Weights {
     }
 }
 
-/// One move carried at a state, with its derivatives.
+/// One move integrated at a state, with its derivatives.
 #[derive(Debug, Clone)]
 pub struct Passed {
-    /// Forward.
+    /// Forward integration.
     pub carried: Arc<Carried>,
-    /// Backward.
+    /// Derivatives with respect to every sample, from the backward pass.
     pub response: Arc<Response>,
-    /// Products with the readings.
+    /// Derivatives with respect to parameters: products of the response with the readings.
     pub sums: Sums,
-    /// Plane of comparison.
+    /// Plane in which the vertical after the move is compared.
     pub plane: Matrix3x2<f64>,
-    /// What zeros of unit scatter (accelerometer, each axis of the gyro) add to the covariance by leaving the line between
-    /// the poses.
+    /// Covariance added by biases of unit scatter (accelerometer, each axis of the gyro) that depart from the line
+    /// between their poses.
     pub loose: Option<[MoveCovariance; N_SCATTER]>,
 }
 
 impl Passed {
-    /// Covariance of the five residuals: noise of the samples, and zeros that leave the line between their poses.
+    /// Covariance of the residuals: noise of the samples, and biases that depart from the line between their poses.
     #[must_use]
     pub fn covariance(&self, strengths: &Strengths) -> MoveCovariance {
         let mut out = self.response.covariance;
@@ -111,14 +111,14 @@ impl Session {
         }
     }
 
-    /// Planes of comparison at a state.
+    /// Planes of comparison of all moves at a state.
     #[must_use]
     pub fn planes(&self, state: &State) -> Vec<Matrix3x2<f64>> {
         let plane = |m: usize| tangent_plane(&state.up[self.moves[m].before + 1]);
         (0..self.moves.len()).map(plane).collect()
     }
 
-    /// All moves carried at a state, with their derivatives.
+    /// All moves integrated at a state, with their derivatives.
     #[must_use]
     pub fn pass(
         &self,
@@ -129,7 +129,7 @@ impl Session {
         self.pass_carried(state, distortion, planes, vec![None; self.moves.len()])
     }
 
-    /// The same of moves that may be carried there already.
+    /// [`pass`](Self::pass) with moves that may be integrated at that state already.
     pub(super) fn pass_carried(
         &self,
         state: &State,
@@ -223,7 +223,7 @@ impl Session {
             domain: Domain::Moves,
             kind: Kind::Reading,
             segment: index,
-            // Models that loosen the moves differently are compared: what is believed less costs its normalisation.
+            // Models with different weights of the moves are compared: a smaller weight lowers the normalisation.
             log_weight: white.diagonal().map(f64::ln).sum(),
         }
     }

@@ -1,9 +1,9 @@
-//! One move as the session sees it: forward for the residuals, backward for their response to every sample.
+//! One move in the session model: forward for the residuals, backward for their derivatives by every sample.
 //!
-//! The rate `ω = S (w' - z) - D p` is carried through the fourth-order steps of [`crate::poisson`]; the velocity is a
-//! sum over the same samples. One backward pass gives the derivative of the five residuals with respect to the rate and
-//! the force at every sample, exactly as they were computed; the columns of all parameters and of any effect are
-//! products with it (docs/model-session.md, equations 11.3-11.6).
+//! The rate `ω = S (w' - z) - D p` is integrated by the fourth-order steps of [`crate::poisson`]; the velocity is a sum
+//! over the same samples. One backward pass gives the derivative of the five residuals with respect to the rate and the
+//! force at every sample, exactly as they were computed; the columns of all parameters and of any effect are products
+//! with it (docs/model-session.md, equations 11.3-11.6).
 
 use nalgebra::{Matrix3, Matrix3x2, SMatrix, SVector, Vector3};
 
@@ -11,23 +11,23 @@ use super::gaps::{Gap, gaps};
 use crate::poisson::{RateModel, StepWeights, step_weights};
 use crate::rotation::exp_and_left_jacobian;
 
-/// Residuals of a move: gravity across the vertical after it (2), velocity over it (3).
+/// Residuals of a move: tilt error of gravity after it (2, m/s²), velocity error over it (3, m/s).
 pub const N_MOVE: usize = 5;
 /// Covariance of these residuals.
 pub type MoveCovariance = SMatrix<f64, N_MOVE, N_MOVE>;
 
-/// What is read in one move and does not depend on the model.
+/// Readings of one move, and what follows from them without the model.
 #[derive(Debug, Clone)]
 pub struct Move {
-    /// Hold before; the move ends in the next one.
+    /// Pose before; the move ends in the next one.
     pub before: usize,
     /// Raw rate of each sample, centred.
     pub rate: Vec<Vector3<f64>>,
     /// Raw force of each sample, centred.
     pub force: Vec<Vector3<f64>>,
-    /// Where each sample lies between the anchors of the biases: 0 before, 1 after.
+    /// Position of each sample between the anchors of the biases: 0 before, 1 after.
     pub fraction: Vec<f64>,
-    /// Where each sample lies in the move: 0 at its first, 1 at its last.
+    /// Position of each sample in the move: 0 at its first, 1 at its last.
     pub progress: Vec<f64>,
     /// Trapezoid weights, s.
     pub weight: Vec<f64>,
@@ -37,16 +37,16 @@ pub struct Move {
     pub duration_s: f64,
     /// Mean step, s.
     pub step_s: f64,
-    /// Variance of the integrals of force and rate by motion faster than the samples, (raw unit · s)².
+    /// Variance of the integrals of force and rate from motion faster than the samples, (raw unit · s)².
     pub unresolved: [Vector3<f64>; 2],
-    /// Steps over samples that were lost.
+    /// Steps over lost samples.
     pub gaps: Vec<Gap>,
-    /// First of its samples among the points of all moves.
+    /// Index of its first sample among the points of all moves.
     pub first_point: usize,
 }
 
 impl Move {
-    /// Prepares a move; samples that share a stamp carry no weight.
+    /// Prepares a move; samples that share a timestamp carry no weight.
     #[must_use]
     pub fn new(
         before: usize,
@@ -72,7 +72,7 @@ impl Move {
         }
         let (first, last) = (time_s[0], time_s[used.last().copied().unwrap_or_default()]);
         let duration_s = last - first;
-        // Zeros belong to the middles of their poses.
+        // Biases belong to the middles of their poses.
         let span = (anchors_s[1] - anchors_s[0]).max(duration_s);
         let steps = step_weights(time_s, &used, RateModel::Coning);
         Self {
@@ -123,9 +123,9 @@ pub struct Sees<'a> {
     pub up: [Vector3<f64>; 2],
     /// Plane in which the vertical after is compared.
     pub plane: Matrix3x2<f64>,
-    /// What effects add to the force at a sample, SI.
+    /// Error of the force at every sample by effects, SI.
     pub force_effect: Option<&'a [Vector3<f64>]>,
-    /// What effects add to the rate at a sample, SI.
+    /// Error of the rate at every sample by effects, SI.
     pub rate_effect: Option<&'a [Vector3<f64>]>,
 }
 
@@ -151,16 +151,16 @@ pub struct Turn {
     pub left: Matrix3<f64>,
 }
 
-/// A move carried forward.
+/// A move integrated forward.
 #[derive(Debug, Clone)]
 pub struct Carried {
     /// Corrected rate of each sample, rad/s.
     pub rate: Vec<Vector3<f64>>,
     /// Corrected force of each sample, m/s².
     pub force: Vec<Vector3<f64>>,
-    /// Start → each sample.
+    /// Rotation from the body at the start to the body at each sample.
     pub attitude: Vec<Matrix3<f64>>,
-    /// Every step of it.
+    /// Every step of the attitude.
     pub turns: Vec<Turn>,
     /// The five residuals, SI.
     pub residual: SVector<f64, N_MOVE>,
@@ -199,7 +199,7 @@ pub fn carry(one: &Move, sees: &Sees<'_>) -> Carried {
             left,
         });
         let here = turn.transpose() * attitude[step.from];
-        // Samples that share a stamp share its attitude.
+        // Samples that share a timestamp share its attitude.
         for k in done + 1..step.to {
             attitude[k] = attitude[step.from];
         }

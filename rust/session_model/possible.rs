@@ -1,4 +1,4 @@
-//! Error bars over the ways in which the accelerometer's bias may scatter and walk, not over the likeliest alone
+//! Uncertainty over all ways in which the accelerometer's bias may scatter and walk, not only the most likely one
 //! (docs/model-session.md, 11.12b).
 
 use nalgebra::DVector;
@@ -11,26 +11,26 @@ use super::strength_search::NO_SCATTER;
 use super::{Session, Strengths};
 use crate::error::Result;
 
-/// Scatters that error bars allow for, in units of the reference, together as likely beforehand as none, and corner
-/// times of the walk beside them, s; and parts of the likeliest of either.
+/// Scatters that the uncertainty allows for, in units of the reference, together as likely a priori as none, and corner
+/// times of the walk beside them, s; and factors on the most likely value of either.
 const SCATTERS: [f64; 8] = [0.35, 0.55, 0.85, 1.3, 2.0, 3.2, 5.0, 10.0];
 const CORNERS_S: [f64; 4] = [20.0, 80.0, 320.0, 2560.0];
 const AROUND: [f64; 3] = [0.4, 1.0, 2.5];
-/// Where flicker inside poses lets expect a scatter: that it stops there all the same, and how well its size is known
-/// (logarithm); one half of the rest lies around it, the other is as where nothing is expected.
+/// Where flicker inside poses predicts a scatter: prior probability of none, and standard deviation of its logarithm;
+/// one half of the rest lies around it, the other half is as without flicker.
 const NONE_ALL_THE_SAME: f64 = 0.1;
 const EXPECTED_TO: f64 = 0.4;
-/// Possibilities less likely than this beside the best change no error bar.
+/// Weight relative to the best below which a possibility does not change the uncertainty.
 const LEAST_WEIGHT: f64 = 1e-2;
 
-/// One way the bias may scatter: how likely, the step that the fit would make, its normal equations.
+/// One possible scatter of the bias: its weight, the step that the fit would make, its normal equations.
 pub(super) struct Possible {
     pub weight: f64,
     pub step: DVector<f64>,
     pub factor: Factor,
 }
 
-/// Scatters and the logarithm of how likely each is beforehand (11.12b, 11.12d).
+/// Scatters and the logarithm of their prior probabilities (11.12b, 11.12d).
 fn scatters_beforehand(expected: f64) -> Vec<(f64, f64)> {
     let n_some = SCATTERS.len() as f64;
     if expected < SCATTERS[0] {
@@ -48,11 +48,11 @@ fn scatters_beforehand(expected: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Ways the accelerometer's bias may scatter and walk, weighed by their evidence (11.12b); nothing where the model has no
-/// scatter.
+/// Possible scatters and walks of the accelerometer's bias, weighted by their evidence (11.12b); empty where the model
+/// has no scatter.
 ///
-/// Some twenty lengths of gravity less nine unknowns tell a scatter as large as their noise in half of all sessions
-/// only: error bars that take the one best answer for true cover too little there.
+/// Some twenty lengths of gravity less nine unknowns detect a scatter as large as their noise in half of all sessions
+/// only: an uncertainty from the most likely scatter alone is too small there.
 pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Possible>> {
     if session.scatter.is_none() {
         return Ok(Vec::new());

@@ -1,5 +1,5 @@
-//! What a fitted session says beyond its optimum: leverage, projections for score tests, held-out prediction, covariance
-//! of both linear models (docs/model-session.md, 11.13-11.16).
+//! Results of a fit beyond its optimum: leverage, projections for score tests, fits without some rows, covariance of
+//! both linear models (docs/model-session.md, 11.13-11.16).
 
 use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
 
@@ -11,9 +11,9 @@ use super::rows::{Domain, Group};
 use super::{LOWER, N_POSE_SCATTER, Session, State};
 use crate::error::Result;
 
-/// Domains that are judged: all but the prior.
+/// Domains that are tested: all but the prior.
 pub const N_DOMAINS: usize = 4;
-/// Ridge of what is left when rows are taken out: a pose without its accelerometer has a vertical that nothing may see.
+/// Ridge of the rows that remain when some are removed: a pose without its accelerometer may have no vertical.
 const LEFT_OUT_RIDGE: f64 = 1e-9;
 
 /// Domain of row `r` of a group.
@@ -47,7 +47,7 @@ impl Fit {
         self.groups.iter().map(|group| group.rows.len()).sum()
     }
 
-    /// `(rows)` share of every row that the fit used up.
+    /// `(rows)` leverage of every row.
     #[must_use]
     pub fn leverage(&self) -> Vec<f64> {
         let marginals = self.factor.marginals();
@@ -57,7 +57,7 @@ impl Fit {
             .collect()
     }
 
-    /// Columns `(rows, k)` minus what the unknowns of the fit can imitate.
+    /// Columns `(rows, k)` minus their projection onto the unknowns of the fit.
     #[must_use]
     pub fn project(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let layout = self.layout();
@@ -80,7 +80,7 @@ impl Fit {
     /// (accelerometer, gyro), and `b_ω` itself.
     ///
     /// # Errors
-    /// When a way in which the biases may scatter leaves the session undetermined.
+    /// When a possible scatter of the biases leaves the session undetermined.
     pub fn linear_covariance(
         &self,
         session: &Session,
@@ -135,11 +135,11 @@ impl Fit {
             .into_owned()
     }
 
-    /// What the other rows say when those of some groups are left out: one linear step from the optimum, its model, and
-    /// the `(12, 12)` covariance of `(S_a, b_a)` on raw readings whose centre was `origin`.
+    /// The fit without the rows of some groups: one linear step from the optimum, its model, and the `(12, 12)`
+    /// covariance of `(S_a, b_a)` on raw readings whose centre was `origin`.
     ///
     /// # Errors
-    /// When they determine nothing.
+    /// When the remaining rows determine nothing.
     pub fn without(
         &self,
         groups: &[usize],
@@ -177,7 +177,7 @@ impl Fit {
         out
     }
 
-    /// Covariance of the five residuals of each move, SI, before the fit used any of it up.
+    /// Covariance of the five residuals of each move, SI, not reduced by the fit.
     #[must_use]
     pub fn move_covariance(&self) -> Vec<SMatrix<f64, 5, 5>> {
         self.passed
@@ -187,8 +187,8 @@ impl Fit {
     }
 }
 
-/// From all unknowns to `(S_a, b_a)` on raw readings, row by row, in the first of `n` columns; one bias for the session
-/// (11.16b).
+/// From all unknowns to `(S_a, b_a)` on raw readings, row by row, in the first of `n` columns; with one bias for the
+/// session (11.16b).
 fn force_map(state: &State, layout: Layout, origin: &Vector3<f64>, n: usize) -> DMatrix<f64> {
     let mut map = DMatrix::zeros(layout.n(), n);
     let bias = origin + state.mean_pose_force_bias();

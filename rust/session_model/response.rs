@@ -1,5 +1,5 @@
-//! How the residuals of a move answer to every sample: one backward pass, and products with it (docs/model-session.md,
-//! equations 11.5-11.7).
+//! Derivatives of the residuals of a move by every sample: one backward pass, and products with it
+//! (docs/model-session.md, equations 11.5-11.7).
 
 use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, Vector3};
 
@@ -8,20 +8,20 @@ use super::gaps::GAP;
 use super::moves::{Carried, Move, MoveCovariance, MoveNoise, N_MOVE, Sees};
 use crate::rotation::skew;
 
-/// Response of the five residuals to rate and force at each sample.
+/// Derivatives of the five residuals by rate and force at each sample.
 #[derive(Debug, Clone)]
 pub struct Response {
-    /// `(5, 3)` a sample.
+    /// `(5, 3)` per sample.
     pub by_rate: Vec<SMatrix<f64, N_MOVE, 3>>,
-    /// `(3, 3)` a sample: the velocity alone answers to the force.
+    /// `(3, 3)` per sample: only the velocity depends on the force.
     pub by_force: Vec<Matrix3<f64>>,
-    /// Covariance of the residuals by noise of the samples, not widened.
+    /// Covariance of the residuals from noise of the samples, not widened.
     pub covariance: MoveCovariance,
     /// `g Tᵀ C` at the end.
     pub lever: Matrix2x3<f64>,
 }
 
-/// Response of the residuals to every sample, and their covariance (11.5, 11.6).
+/// Derivatives of the residuals by every sample, and their covariance (11.5, 11.6).
 #[must_use]
 pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise) -> Response {
     let n = one.n_samples();
@@ -33,7 +33,7 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
         by_force[k] = carried.attitude[k].transpose() * one.weight[k];
     }
     let mut covariance = MoveCovariance::zeros();
-    // What the residuals answer to a turn made now: the vertical at the end, the velocity still to be gained.
+    // Derivative of the residuals by a rotation at this step: the vertical at the end, the velocity still to be gained.
     let mut to_turn = SMatrix::<f64, N_MOVE, 3>::zeros();
     to_turn
         .fixed_rows_mut::<2>(0)
@@ -67,7 +67,7 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
             let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
             velocity += turned * spread(&sees.force_scale, of_force) * turned.transpose();
         }
-        // Where the move does not tell, a lost sample leaves the rate anywhere between its neighbours: uniform, so h²/12.
+        // Where the move does not determine it, the rate of a lost sample is uniform between its neighbours: h²/12.
         let is_unknown = missed.is_none() && step.h > GAP * noise.nominal_step_s;
         if var_jitter > 0.0 || is_unknown {
             let var = var_jitter
@@ -93,8 +93,8 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
     }
 }
 
-/// Widens gravity and velocity, each by its own factor. What they miss beyond the noise of the samples is not known to be
-/// common to both: widened along, their correlation would make a velocity that is not heard tell gravity's noise.
+/// Widens gravity and velocity, each by its own factor; their covariance stays as noise makes it. If it were widened
+/// too, a velocity without weight would determine parameters of the gyro through the correlation.
 pub(super) fn widen(covariance: &mut MoveCovariance, excess: [f64; 2]) {
     let mut gravity = covariance.fixed_view_mut::<2, 2>(0, 0);
     gravity *= excess[0] * excess[0];
@@ -134,7 +134,7 @@ fn add_white(
     let diagonal = |density: &Vector3<f64>| density.component_mul(density) / one.step_s;
     let spread = |scale: &Matrix3<f64>, density: &Vector3<f64>, fast: &Vector3<f64>| {
         let white = scale * Matrix3::from_diagonal(&diagonal(density)) * scale.transpose();
-        // Motion faster than the samples has no known direction: the same on every axis.
+        // Motion faster than the samples has no known direction: equal variance on all axes.
         let extra = (scale.component_mul(scale) * fast).mean() / (one.duration_s * one.step_s);
         white + Matrix3::identity() * extra
     };
@@ -160,9 +160,9 @@ pub struct Sums {
     pub force_model: SMatrix<f64, N_MOVE, 9>,
     /// With respect to the gyro's `S`, row by row.
     pub rate_model: SMatrix<f64, N_MOVE, 9>,
-    /// With respect to the raw zeros of the gyro before and after.
+    /// With respect to the raw biases of the gyro before and after.
     pub pose_rate_bias: [SMatrix<f64, N_MOVE, 3>; 2],
-    /// With respect to the raw zeros of the accelerometer before and after.
+    /// With respect to the raw biases of the accelerometer before and after.
     pub pose_force_bias: [SMatrix<f64, N_MOVE, 3>; 2],
 }
 
@@ -210,11 +210,11 @@ pub fn sums(one: &Move, sees: &Sees<'_>, response: &Response, lower: &[(usize, u
     }
 }
 
-/// Covariance of the residuals where the zeros (accelerometer, each axis of the gyro) leave the line between their poses during the move,
-/// by `scatter` at its first and at its last sample, independently (11.6).
+/// Covariance of the residuals where biases (accelerometer, each axis of the gyro) depart from the line between their
+/// poses during the move, by `scatter` at its first and at its last sample, independently (11.6).
 ///
-/// A zero that is another in every pose leaps somewhere, or is a third one on the way: the line is then wrong by about
-/// its scatter, and no reading of a pose tells by how much.
+/// A bias that differs from pose to pose jumps somewhere, or takes a third value on the way: the line is then wrong by
+/// about its scatter, and no reading of a pose shows by how much.
 #[must_use]
 pub fn loosened(
     one: &Move,
@@ -245,7 +245,7 @@ pub fn loosened(
     out
 }
 
-/// `(5, k)` change of the residuals per effect parameter: `force`, `rate` are `(3, k)` a sample, parameter after
+/// `(5, k)` change of the residuals per effect parameter: `force`, `rate` are `(3, k)` per sample, parameter after
 /// parameter (11.7).
 #[must_use]
 pub fn effect_columns(
@@ -254,7 +254,7 @@ pub fn effect_columns(
     rate: Option<&[f64]>,
     k: usize,
 ) -> DMatrix<f64> {
-    // Row by row, so that the loop runs along the parameters; few of them in a length that the compiler knows.
+    // Row by row, so that the loop runs along the parameters; small numbers of them are known to the compiler.
     let mut out = vec![0.0; N_MOVE * k];
     let sum = match k {
         1 => add_effects::<1>,
@@ -268,7 +268,7 @@ pub fn effect_columns(
     DMatrix::from_row_slice(N_MOVE, k, &out)
 }
 
-/// The sums of [`effect_columns`] with `K` parameters, or with any number where `K` is none.
+/// The sums of [`effect_columns`] with `K` parameters, or with any number for `K = 0`.
 fn add_effects<const K: usize>(
     response: &Response,
     force: Option<&[f64]>,
@@ -293,7 +293,7 @@ fn add_effects<const K: usize>(
     }
 }
 
-/// Takes `Σ response_i row_i` off, where `row` holds three vectors one after the other.
+/// Subtracts `Σ response_i row_i`, where `row` holds three vectors one after the other.
 #[inline]
 fn subtract_along(out: &mut [f64], response: [f64; 3], row: &[f64]) {
     let k = out.len();

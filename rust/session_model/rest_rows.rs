@@ -1,4 +1,4 @@
-//! Rows of the poses at rest (docs/model-session.md, 11.1, 11.2).
+//! Rows of the static poses (docs/model-session.md, 11.1, 11.2).
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -8,7 +8,7 @@ use super::{AtRest, Distortion, LOWER, N_MODEL, Session, State, tangent_plane};
 use crate::error::{Error, Result};
 
 impl Session {
-    /// (11.1), (11.2): the raw mean less what the model would read.
+    /// (11.1), (11.2): the raw mean less the reading predicted by the model.
     pub(super) fn rest_rows(
         &self,
         state: &State,

@@ -10,22 +10,22 @@ use super::rest_rows::{rest_columns, weight_of};
 use super::{Distortion, N_MODEL, N_SCATTER, Session, State, Strengths};
 use crate::error::{Error, Result};
 
-/// Which part of the recording a row judges.
+/// Part of the recording that a row tests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Domain {
-    /// Accelerometer at rest.
+    /// Accelerometer in static poses.
     StaticForce = 0,
-    /// Gyro at rest.
+    /// Gyro in static poses.
     StaticRate = 1,
-    /// Gravity after a move.
+    /// Tilt error after a rotation.
     Moves = 2,
-    /// Velocity over a move; rows of a move begin with two of `Moves`.
+    /// Velocity error over a rotation; rows of a move begin with two of `Moves`.
     Dynamics = 3,
-    /// What keeps flat directions finite.
+    /// Priors that keep undetermined directions finite.
     Prior = 4,
 }
 
-/// What process a row belongs to.
+/// Process to which a row belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// A reading.
@@ -36,13 +36,13 @@ pub enum Kind {
     RateWalk = 2,
     /// Scatter of the accelerometer's bias.
     ForceScatter = 3,
-    /// Scatter of the gyro's bias, by axis.
+    /// Scatter of the gyro's bias on X.
     RateScatterX = 4,
-    /// The same.
+    /// Scatter of the gyro's bias on Y.
     RateScatterY = 5,
-    /// The same.
+    /// Scatter of the gyro's bias on Z.
     RateScatterZ = 6,
-    /// Prior or pin.
+    /// Prior, or row that pins an unknown.
     Prior = 7,
 }
 
@@ -50,7 +50,7 @@ pub enum Kind {
 pub const N_PROCESSES: usize = 2 + N_SCATTER;
 
 impl Kind {
-    /// Number of the process, if its strength is free.
+    /// Index of the process, if its strength is free.
     #[must_use]
     pub fn process(self) -> Option<usize> {
         match self {
@@ -70,11 +70,11 @@ impl Kind {
 pub struct Group {
     /// The rows.
     pub rows: Rows,
-    /// What they judge.
+    /// Part of the recording that they test.
     pub domain: Domain,
     /// Their process.
     pub kind: Kind,
-    /// Number of the pose or move.
+    /// Index of the pose or move.
     pub segment: usize,
     /// `ln` of the density's normalisation, for groups whose strength is free.
     pub log_weight: f64,
@@ -106,8 +106,7 @@ impl Session {
         Ok(out)
     }
 
-    /// Residual parts that change between trial steps, without derivatives: the cost of a state, and the moves carried
-    /// there.
+    /// χ² of a state without derivatives, for trial steps, and the moves integrated there.
     ///
     /// # Errors
     /// When a triad has collapsed.
@@ -170,7 +169,7 @@ impl Session {
             };
             out.push(Group {
                 rows,
-                // Where a given calibration is contradicted, its sensor's own domain says so.
+                // A contradiction of a given calibration shows in its sensor's own domain.
                 domain: if prior.is_weak { Domain::Prior } else { domain },
                 kind: Kind::Prior,
                 segment: 0,
@@ -180,7 +179,7 @@ impl Session {
     }
 }
 
-/// One parameter of an effect held to its size beforehand.
+/// Prior row of one effect parameter with standard deviation `size`.
 pub(super) fn size_row(n_border: usize, column: usize, value: f64, size: f64) -> Group {
     let mut border = DMatrix::zeros(1, n_border);
     border[(0, column)] = 1.0 / size;
@@ -203,7 +202,7 @@ impl Session {
     /// `(rows, k)` whitened change of every row per parameter of further effects (11.7), group after group.
     ///
     /// # Errors
-    /// When a triad has collapsed, or the columns do not have one entry a point.
+    /// When a triad has collapsed, or the columns do not have one entry per point.
     pub fn columns(
         &self,
         state: &State,
@@ -275,7 +274,7 @@ impl Session {
 }
 
 impl Group {
-    /// Whether these are the rows of a move whose noise is weighed anew.
+    /// Whether these are the rows of a move, whose weights depend on the strengths.
     #[must_use]
     pub fn is_move(&self) -> bool {
         self.domain == Domain::Moves && self.rows.len() == N_MOVE

@@ -1,4 +1,4 @@
-//! One bias of the gyro for a session of poses that differ (docs/model-session.md, 11.16).
+//! One bias of the gyro for a session whose poses differ (docs/model-session.md, 11.16).
 
 use nalgebra::Vector3;
 
@@ -12,13 +12,13 @@ pub struct SessionBias {
     pub weights: Vec<Vector3<f64>>,
     /// The bias.
     pub mean: Vector3<f64>,
-    /// Its variance by poses that differ beyond their noise.
+    /// Its variance from differences between poses beyond their noise.
     pub variance: Vector3<f64>,
 }
 
 impl Fit {
-    /// The session's one bias of the gyro: weights of the poses, raw mean, variance of it by poses that differ beyond
-    /// their noise (11.16).
+    /// The session's one bias of the gyro: weights of the poses, raw mean, its variance from differences between poses
+    /// beyond their noise (11.16).
     #[must_use]
     pub fn session_bias(&self, session: &Session) -> Option<SessionBias> {
         let rate = session.rate.as_ref()?;
@@ -36,7 +36,7 @@ impl Fit {
         })
     }
 
-    /// What each pose reads less what effects add there.
+    /// Raw mean of every pose less the effects there.
     fn read_biases(&self, rate: &AtRest) -> Vec<Vector3<f64>> {
         let effects = super::Distortion::at(
             self.distortion.rate.as_ref(),
@@ -55,7 +55,7 @@ impl Fit {
     }
 }
 
-/// A spread of the biases counts when χ² exceeds its degrees of freedom by four of its standard deviations.
+/// A spread of the biases is significant when χ² exceeds its degrees of freedom by four of its standard deviations.
 const BEYOND_CHANCE: f64 = 4.0;
 
 /// Random-effects weights of biases and the variance between them (`DerSimonian` and Laird 1986), axis by axis.

@@ -1,24 +1,24 @@
-//! A point in the space of all unknowns, and what effects add there.
+//! Values of all unknowns, and the effects there.
 
 use nalgebra::{DVector, Matrix3, Matrix3x2, SVector, Vector3};
 
 use super::chain::Layout;
 use super::{LOWER, N_MODEL, N_POSE_SCATTER};
 
-/// What effects add to the corrected readings, linear in their parameters.
+/// Effects in the corrected readings, linear in their parameters.
 #[derive(Debug, Clone, Default)]
 pub struct Distortion {
     /// `(points, 3, k)` row by row, SI; points are the poses, then the samples of every move.
     pub force: Option<Vec<f64>>,
     /// The same of the rate.
     pub rate: Option<Vec<f64>>,
-    /// Parameters.
+    /// Number of parameters.
     pub k: usize,
-    /// Standard deviation of each beforehand, none where that is not known.
+    /// Prior standard deviation of each; empty where unknown.
     pub sizes: Vec<f64>,
 }
 
-/// A point in the space of all unknowns.
+/// Values of all unknowns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
     /// Accelerometer `S`, lower triangular.
@@ -31,9 +31,9 @@ pub struct State {
     pub up: Vec<Vector3<f64>>,
     /// Raw bias of the gyro in each pose.
     pub pose_rate_bias: Vec<Vector3<f64>>,
-    /// Raw bias of the accelerometer in each pose, beside `b`.
+    /// Raw bias of the accelerometer in each pose, in addition to `b`.
     pub pose_force_bias: Vec<Vector3<f64>>,
-    /// The share of either bias that is one pose's alone (accelerometer, gyro); zero without scatter.
+    /// The part of either bias that belongs to one pose alone (accelerometer, gyro); zero without scatter.
     pub own: [Vec<Vector3<f64>>; 2],
     /// Effect parameters.
     pub effect: DVector<f64>,
@@ -66,7 +66,7 @@ impl Distortion {
 }
 
 impl State {
-    /// The state a step away.
+    /// The state after a step.
     #[must_use]
     pub fn moved(&self, step: &DVector<f64>, layout: Layout) -> Self {
         let mut out = self.clone();
@@ -99,7 +99,7 @@ impl State {
         out
     }
 
-    /// Mean of the accelerometer's raw biases over the poses, without what is one pose's alone.
+    /// Mean of the accelerometer's raw biases over the poses, without the parts of single poses.
     #[must_use]
     pub fn mean_pose_force_bias(&self) -> Vector3<f64> {
         let all = self.pose_force_bias.iter().zip(&self.own[0]);
@@ -129,7 +129,7 @@ impl State {
     }
 }
 
-/// Two unit vectors across a unit vector.
+/// Two unit vectors perpendicular to a unit vector.
 #[must_use]
 pub fn tangent_plane(up: &Vector3<f64>) -> Matrix3x2<f64> {
     let mut helper = Vector3::zeros();

@@ -1,4 +1,4 @@
-//! The strengths of noise that make a hypothesis likeliest: a search along one after the other, in logarithms
+//! The noise strengths of largest evidence for a hypothesis: a search along one after the other, in logarithms
 //! (docs/model-session.md, 11.18).
 
 use std::ops::Range;
@@ -8,15 +8,15 @@ use super::{N_SCATTER, Strengths};
 
 /// Scatter that counts as none, in units of the session's reference.
 pub const NO_SCATTER: f64 = 1e-3;
-/// Where each kind of strength begins among all: corner times, scatters, straying between poses, excess of moves.
+/// First index of each kind of strength: corner times, scatters, departures between poses, excess of moves.
 const SCATTER_AT: usize = 2;
 const BETWEEN_AT: usize = SCATTER_AT + N_SCATTER;
 const EXCESS_AT: usize = BETWEEN_AT + 2;
 const N_STRENGTHS: usize = EXCESS_AT + 2;
-/// Scatters of either sensor.
+/// Indices of the scatters of either sensor.
 const SCATTER_OF: [Range<usize>; 2] = [SCATTER_AT..SCATTER_AT + 1, SCATTER_AT + 1..BETWEEN_AT];
-/// What is changed together, one after the other. Moves that miss for themselves come first: a bias that scatters enough to
-/// explain one of them explains away the poses. The axes of a gyro scatter alike more often than not.
+/// Strengths that are changed together, in this order. Excess of moves comes first: a bias scatter that explains one
+/// bad move would absorb the poses. The axes of a gyro scatter alike more often than not.
 const DIRECTIONS: [Range<usize>; N_STRENGTHS + 1] = [
     EXCESS_AT..EXCESS_AT + 1,
     EXCESS_AT + 1..N_STRENGTHS,
@@ -31,27 +31,27 @@ const DIRECTIONS: [Range<usize>; N_STRENGTHS + 1] = [
     BETWEEN_AT + 1..EXCESS_AT,
 ];
 type Point = [f64; N_STRENGTHS];
-/// Natural logarithms between which each kind is sought. No bound on noise is physical: these only end the search, a
-/// walk that meets white noise in a fifth of a second, scatter of thousands of errors of a pose, rows thousands of times off.
+/// Natural logarithms between which each kind is searched. No bound on noise is physical; these end the search: a walk
+/// that equals white noise after 0.2 s, scatter of thousands of errors of a pose, rows thousands of errors off.
 const CORNER: (f64, f64) = (-1.6, 8.5);
 const SCATTER: (f64, f64) = (-6.9, 9.2);
-/// A leap at an instant that may be any leaves the line by √(1/12) of a leap of √2 (0.4), one at either end of the move by
-/// √2/2 (0.7), a third bias by √(3/2): nothing leaves it farther.
+/// A jump at an unknown instant departs from the line by √(1/12) of a jump of √2 (0.4), one at either end of the move
+/// by √2/2 (0.7), a third bias by √(3/2): no departure is larger.
 const BETWEEN: (f64, f64) = (-3.0, 0.2);
 const EXCESS: (f64, f64) = (0.0, 9.2);
-/// Rows with this excess are not heard, and stay so: a search leaves it as it is given.
+/// Rows with this excess have no weight, and keep none: a search leaves it as given.
 const UNHEARD: f64 = 6.9;
-/// Scatter, and excess of moves, that are sought from nothing begin at these: near nothing the evidence is flat.
+/// Scatter, or excess of moves, at which a search from nothing begins: near nothing the evidence is flat.
 const FROM_NOTHING: [f64; 2] = [1.0, 6.0];
-/// What a walk and a scatter are exchanged for one another by: a bias that wanders may be either, and the evidence has an
-/// optimum at both.
+/// Corner time and scatter by which a walk and a scatter are exchanged for one another: a drifting bias may be either,
+/// and the evidence has an optimum at both.
 const EXCHANGED: [(f64, f64); 4] = [
     (600.0, 3.0),
     (600.0, 10.0),
     (3.0, NO_SCATTER),
     (0.6, NO_SCATTER),
 ];
-/// Scatter below which how far zeros stray between poses shows nowhere.
+/// Scatter below which the departure of biases between poses has no effect.
 const LEAST_SCATTER: f64 = 0.2;
 /// A pass over all strengths that gains less than this ends the search.
 const ENOUGH: f64 = 0.1;
@@ -59,10 +59,10 @@ const MOST_PASSES: usize = 8;
 /// Steps, of the logarithm, at which the search along one strength begins and ends.
 const FIRST_STEP: f64 = 0.8;
 const LAST_STEP: f64 = 0.1;
-/// Changes smaller than this change no evidence by a hundredth.
+/// Changes smaller than this change the evidence by less than a hundredth.
 const LEAST_MOVE: f64 = 0.02;
 
-/// Bounds of some strengths, where a hypothesis says that they are no larger than noise alone makes them.
+/// Bounds of some strengths, for the hypothesis that they are no larger than noise alone makes them.
 #[derive(Debug, Clone, Copy)]
 pub struct Within {
     /// Shortest corner times, s.
@@ -74,7 +74,7 @@ pub struct Within {
 }
 
 impl Within {
-    /// None.
+    /// No bounds.
     pub const ANYTHING: Self = Self {
         corner_s: [0.0; 2],
         scatter: [f64::INFINITY; 2],
@@ -99,7 +99,7 @@ pub(super) struct Search<'a> {
     bounds: [(f64, f64); N_STRENGTHS],
     x: Point,
     value: f64,
-    /// The rows of moves as they were weighed last, and for what.
+    /// The rows outside the bias processes at the strengths evaluated last, and those strengths.
     heard: Option<([u64; N_STRENGTHS - SCATTER_AT], (Part, f64))>,
 }
 
@@ -167,7 +167,7 @@ impl<'a> Search<'a> {
         for pass in 0..MOST_PASSES {
             let before = self.value;
             for (direction, step) in DIRECTIONS.iter().zip(&mut step) {
-                // Axes go their own way once they have gone together.
+                // Axes are changed one by one once they have been changed together.
                 let is_first = direction.start == SCATTER_AT + 1 && direction.len() == 1;
                 if self.is_free(direction.start) && !(is_first && pass == 0) {
                     self.along(direction, step);
@@ -182,7 +182,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Tries a walk for a scatter, and a scatter for a walk, of either sensor.
+    /// Tries a walk in place of a scatter, and a scatter in place of a walk, for either sensor.
     fn exchange(&mut self) {
         for sensor in 0..2 {
             let scatters = SCATTER_OF[sensor].clone();
@@ -232,7 +232,7 @@ impl<'a> Search<'a> {
         self.x[direction.clone()].iter().all(|x| *x < nothing)
     }
 
-    /// Whether a leap from nothing gains.
+    /// Whether a step from nothing gains.
     fn rises(&mut self, direction: &Range<usize>) -> bool {
         for value in FROM_NOTHING {
             let mut x = self.x;
@@ -242,7 +242,7 @@ impl<'a> Search<'a> {
         !self.is_nothing(direction)
     }
 
-    /// A step either way, doubled while it gains; then where a parabola is highest.
+    /// A step either way, doubled while it gains; otherwise the maximum of a parabola.
     fn along(&mut self, direction: &Range<usize>, step: &mut f64) {
         if self.is_nothing(direction) && !self.rises(direction) {
             return;

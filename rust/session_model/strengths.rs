@@ -1,4 +1,4 @@
-//! A session at the strengths of its noise that make it likeliest (docs/model-session.md, 11.18).
+//! A session at its most likely noise strengths (docs/model-session.md, 11.18).
 
 use super::fit::{Fit, fit_from};
 use super::hypothesis::Hypothesis;
@@ -6,14 +6,14 @@ use super::strength_search::Within;
 use super::{Distortion, Session, State, Strengths};
 use crate::error::Result;
 
-/// Rounds of fit and strengths: each finds the other almost where it left it.
+/// Most rounds of fit and search: after the first, either hardly changes the other.
 const MOST_ROUNDS: usize = 4;
-/// Change of the logarithm of every strength below which another round changes no number by a tenth of its error, and gain
-/// in log-evidence below which other strengths are not worth another fit.
+/// Change of the logarithm of every strength below which another round changes no parameter by a tenth of its error,
+/// and gain in log-evidence below which other strengths do not justify another fit.
 const SETTLED: f64 = 0.25;
 const WORTH_A_FIT: f64 = 0.1;
 
-/// Fits a session and the strengths of its noise in turns, all unknowns integrated out where the strengths are judged.
+/// Fits a session and its noise strengths in turns; the search for strengths integrates out all unknowns.
 ///
 /// # Errors
 /// As [`fit`].

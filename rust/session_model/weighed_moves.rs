@@ -1,4 +1,4 @@
-//! Moves weighed anew at other strengths and added to the normal equations: a search asks for it hundreds of times
+//! Moves weighted for other strengths and added to the normal equations, hundreds of times in a search
 //! (docs/model-session.md, 11.18).
 
 use nalgebra::DMatrix;
@@ -9,8 +9,8 @@ use super::move_rows::Whitening;
 use super::moves::N_MOVE;
 
 impl Chain {
-    /// Adds the rows of a move, given as `columns` by border, pose, next pose and residual, once weighed by a lower
-    /// triangular matrix; `Jᵀr` to `side`. Their sum of squares. Blocks are then to be mirrored.
+    /// Adds the rows of a move, given as `columns` by border, pose, next pose and residual and multiplied by the lower
+    /// triangular `white`; `Jᵀr` to `side`. Returns their sum of squares. Blocks must be mirrored afterwards.
     pub(super) fn add_move(
         &mut self,
         pose: usize,

@@ -86,7 +86,7 @@ impl Mul<f64> for Jet {
     }
 }
 
-/// A unit quaternion (w, x, y, z) that turns body coordinates into level ones, with its derivatives.
+/// A unit quaternion (w, x, y, z) that rotates body coordinates to level ones, with its derivatives.
 #[derive(Debug, Clone, Copy)]
 pub struct QuaternionJet(pub [Jet; 4]);
 
@@ -97,14 +97,14 @@ impl QuaternionJet {
         Self(q.map(Jet::constant))
     }
 
-    /// Rotation about a constant unit axis by a moving angle.
+    /// Rotation about a constant unit axis by a time-dependent angle.
     #[must_use]
     pub fn about(axis: &Vector3<f64>, angle: Jet) -> Self {
         let (s, c) = (angle * 0.5).sin_cos();
         Self([c, s * axis.x, s * axis.y, s * axis.z])
     }
 
-    /// Exponential of a moving rotation vector.
+    /// Exponential of a time-dependent rotation vector.
     #[must_use]
     pub fn exp(u: &[Jet; 3]) -> Self {
         let s = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
@@ -184,7 +184,7 @@ fn half_sine_over_angle(s: f64) -> (f64, f64, f64) {
     }
 }
 
-/// Smooth step `10x³ - 15x⁴ + 6x⁵` on `[0, 1]` of a moving argument, clamped outside.
+/// Smooth step `10x³ - 15x⁴ + 6x⁵` on `[0, 1]` of a time-dependent argument, clamped outside.
 #[must_use]
 pub fn smooth_step(x: Jet) -> Jet {
     if x.v <= 0.0 {

@@ -1,7 +1,7 @@
 //! The moving parts and the readout of a sensor, stage by stage, three independent channels at a time.
 //!
-//! Every stage is input-referred: its small-signal gain is one and its output at rest zero, so that the linear
-//! calibration of the instrument keeps its meaning whatever is switched on.
+//! Every stage is input-referred: its small-signal gain is one and its output at zero input is zero, so that the linear
+//! calibration of the instrument stays valid with any stages enabled.
 
 use super::Sample;
 use crate::error::{Error, Result};
@@ -47,7 +47,7 @@ pub fn second_order(
 }
 
 for_each_instruction_set! {
-    /// The three channels side by side: none waits for another, and each step of one for a product and two sums only.
+    /// The three channels side by side: independent, and each step depends on the last by a product and two sums only.
     fn follow_ramps(signal: &mut [Sample], per_s: f64, phi: &[Sample; 4], lag: &Sample) = follow_ramps_body
 }
 
@@ -64,7 +64,7 @@ fn follow_ramps_body<const FUSED: bool>(
 ) {
     let Some(&first) = signal.first() else { return };
     let (mut before, mut slope) = (first, [0.0; 3]);
-    // How far (x, v) is from the settled response to the straight line that the signal is on.
+    // Deviation of (x, v) from the settled response to the current straight line of the signal.
     let (mut x, mut v) = ([0.0; 3], [0.0; 3]);
     for row in signal {
         for k in 0..3 {
@@ -104,7 +104,7 @@ fn exponential(a: &Matrix2<f64>) -> Matrix2<f64> {
 /// First-order low-pass of time constant `tau`, exact for straight lines between samples; starts settled.
 ///
 /// # Errors
-/// A time constant that is negative; zero leaves the channel alone.
+/// A time constant that is negative; zero leaves the channel unchanged.
 pub fn first_order(signal: &mut [Sample], dt: f64, tau_s: &Sample) -> Result<()> {
     for tau in tau_s {
         if !(tau.is_finite() && *tau >= 0.0) {
@@ -164,7 +164,7 @@ impl Bridge {
         None
     }
 
-    /// Voltage ratio `c0/(c1+c0) - c0/(c2+c0)`, written out of the two capacitances.
+    /// Voltage ratio `c0/(c1+c0) - c0/(c2+c0)` from the two capacitances.
     #[must_use]
     pub fn voltage(x: f64, mismatch: f64) -> f64 {
         let c1 = (1.0 + mismatch) / (1.0 + x);
@@ -172,7 +172,7 @@ impl Bridge {
         1.0 / (c1 + 1.0) - 1.0 / (c2 + 1.0)
     }
 
-    /// Input-referred response: acceleration (or rate) in, what a linear readout would make of the voltage out.
+    /// Input-referred response: acceleration (or rate) in, a linear readout of the voltage out.
     ///
     /// # Errors
     /// When the mass would touch a plate.
@@ -203,7 +203,7 @@ impl Bridge {
     }
 }
 
-/// Play (backlash) operator: the output differs from the input by up to `offset`, with the sign of the way it came.
+/// Play (backlash) operator: the output differs from the input by up to `offset`, the sign by the last direction.
 ///
 /// `y` follows the input at distance at most `width`; output `input + offset (y - input)/width`.
 ///
@@ -220,7 +220,7 @@ pub fn play(signal: &mut [Sample], width: &Sample, offset: &Sample) -> Result<()
                 "hysteresis needs a positive width, got {w}"
             )));
         }
-        // The state before the recording: no play used up.
+        // State before the recording: the follower is at the input.
         let mut y = signal.first().map_or(0.0, |row| row[k]);
         for row in signal.iter_mut() {
             // Not `clamp`, which panics where the signal is NaN.
@@ -231,7 +231,7 @@ pub fn play(signal: &mut [Sample], width: &Sample, offset: &Sample) -> Result<()
     Ok(())
 }
 
-/// Creep of the die attach: a fraction of every change arrives late, with time constant `tau`.
+/// Creep of the die attach: a fraction of every change is delayed, with time constant `tau`.
 ///
 /// # Errors
 /// As [`first_order`].
@@ -256,7 +256,7 @@ pub fn project(signal: &[Sample], directions: &[Sample; 3]) -> Vec<Sample> {
         .collect()
 }
 
-/// Force along each sensitive direction at each element's own place: `d·(f + α×r + ω×(ω×r))`.
+/// Specific force along each sensitive direction at each element's own place: `d·(f + α×r + ω×(ω×r))`.
 #[must_use]
 pub fn force_at_places(
     force: &[Sample],

@@ -1,4 +1,4 @@
-//! The instrument and its motion, as mechanisms: nothing here is shared with an estimator.
+//! The instrument and its motion as physical mechanisms: nothing here is shared with an estimator.
 
 pub mod jet;
 pub mod mechanism;

@@ -36,7 +36,7 @@ pub struct Segment {
     pub wobble: Vec<Harmonic>,
     /// Harmonics of the pivot's displacement \[m\], level frame.
     pub shake: Vec<Harmonic>,
-    /// A rate given by samples takes the place of turn and wobble.
+    /// Rate given by samples, in place of turn and wobble.
     pub replay: Option<Replay>,
 }
 
@@ -76,7 +76,7 @@ fn product(p: &[f64; 4], q: &[f64; 4]) -> [f64; 4] {
 }
 
 impl Replay {
-    /// Lay the knots over a duration from a start attitude.
+    /// Places the knots evenly over a duration, from a start attitude.
     ///
     /// # Errors
     /// Fewer than two knots or lists of different length.
@@ -136,7 +136,7 @@ pub struct Harmonic {
     pub phase: f64,
 }
 
-/// Where the motion happens.
+/// Gravity and Earth rate at the place of the motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Place {
     /// Gravity \[m/s²\], along the level frame's -z.
@@ -274,7 +274,7 @@ impl Segment {
 /// Instants that one worker evaluates in a row.
 const CHUNK: usize = 1 << 14;
 
-/// Motion at every instant of `times` (non-decreasing; before the start and after the end the body rests).
+/// Motion at every instant of `times` (non-decreasing; before the start and after the end the body is static).
 ///
 /// # Errors
 /// Segments that are absent, out of order, or malformed; times that run backward.
@@ -293,7 +293,7 @@ pub fn evaluate(segments: &[Segment], place: &Place, times: &[f64]) -> Result<Tr
             )));
         }
     }
-    // A loop rather than `any`: the place of the fault is part of the message.
+    // A loop rather than `any`: the index of the fault is part of the message.
     for i in 1..times.len() {
         if times[i].is_nan() || times[i] < times[i - 1] {
             return Err(Error::bad_input(format!(

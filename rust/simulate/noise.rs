@@ -1,7 +1,7 @@
 //! The five noise terms of one axis with exact discrete statistics.
 //!
-//! `Q/dt` times the first difference of white noise; `N/√dt` white; a walk of increments `K√dt` from zero; a ramp `R t`;
-//! and `B` with a true 1/f spectrum, as a sum of Gauss-Markov processes whose poles are spread evenly over the
+//! `Q/dt` times the first difference of white noise; `N/√dt` white; a walk of increments `K√dt` from zero; a ramp
+//! `R t`; and `B` with a true 1/f spectrum, as a sum of Gauss-Markov processes whose poles are spread evenly over the
 //! logarithm of frequency from far below one over the record to the sampling frequency.
 
 use super::random::Stream;
@@ -43,8 +43,8 @@ const POLE_RATIO: f64 = 4.0;
 const BELOW_RECORD: f64 = 16.0;
 /// Highest pole \[rad per sample\].
 const TOP_POLE: f64 = 3.0;
-/// Weights of the highest three poles. What is cut above them and what aliases is settled here, by least squares on the
-/// exact Allan variance of B²/ω at 1 to 32 samples: it is then kept to 2 % at two samples and 1 % elsewhere.
+/// Weights of the highest three poles: they compensate the poles missing above them and aliasing, by least squares on
+/// the exact Allan variance of B²/ω at 1 to 32 samples, which they keep to 2 % at two samples and 1 % elsewhere.
 const TOP_WEIGHTS: [f64; 3] = [0.336, 1.243, 0.945];
 
 /// Poles \[rad/s\], highest first, and the variance of each process for a unit `B`.
@@ -67,8 +67,8 @@ pub fn flicker_poles(n: usize, dt: f64) -> Vec<(f64, f64)> {
 
 /// One Gauss-Markov process, stationary from its first sample.
 ///
-/// A process much slower than the sampling is drawn exactly at every `hold`-th sample and runs straight between: what
-/// is lost lies where it contributes less than 0.6 % of the sum's spectrum.
+/// A process much slower than the sampling is drawn exactly at every `hold`-th sample and interpolated linearly: the
+/// error lies where it contributes less than 0.6 % of the sum's spectrum.
 struct GaussMarkov {
     stream: Stream,
     keep: f64,
@@ -183,19 +183,19 @@ pub fn add(out: &mut [f64], dt: f64, terms: &Terms, keys: &Keys) {
     }
 }
 
-/// Blocks of work, until somebody asks for an end.
+/// Blocks of work, until an interrupt is requested.
 fn blocks(out: &mut [f64]) -> impl Iterator<Item = &mut [f64]> {
     out.chunks_mut(1 << 16)
         .take_while(|_| !interrupt::is_requested())
 }
 
-/// Steps of time that a recording can have [s]: outside, the processes of flicker noise would have no end.
+/// Time steps that a recording can have [s]: outside, the number of flicker processes would be unbounded.
 const STEPS_S: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
 
 /// Noise of three axes, `n` samples, interleaved.
 ///
 /// # Errors
-/// `BadInput` for a step that no recording has, or a term that is no finite number.
+/// `BadInput` for a step outside these bounds, or a term that is not finite.
 pub fn three_axes(n: usize, dt: f64, terms: &[Terms; 3], keys: &[Keys; 3]) -> Result<Vec<f64>> {
     if !STEPS_S.contains(&dt) {
         return Err(Error::bad_input(format!(

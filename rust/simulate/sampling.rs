@@ -1,4 +1,4 @@
-//! Sampling and conversion: reading a finely computed signal at the instants of a real clock, and the converter.
+//! Sampling and conversion: reading a finely computed signal at the instants of a real clock, and the ADC.
 
 use super::Sample;
 use crate::error::{Error, Result};
@@ -48,7 +48,7 @@ pub fn resample(signal: &[Sample], start: f64, dt: f64, times: &[f64]) -> Result
 /// Analog-to-digital converter, raw units.
 #[derive(Debug, Clone)]
 pub struct Converter {
-    /// Step; 0 leaves the value as it is.
+    /// Resolution (LSB); 0 leaves the value as it is.
     pub lsb: f64,
     /// Lowest code.
     pub low: f64,
@@ -58,7 +58,7 @@ pub struct Converter {
     pub dead_band: f64,
     /// Reading of each channel at zero input.
     pub bias: Sample,
-    /// Every so many codes one is never given, the one below is given instead; 0: none is missing.
+    /// Period of the missing codes, each replaced by the one below; 0: none is missing.
     pub missing_every: u32,
 }
 

@@ -5,15 +5,15 @@
 //! `M(p) = Σ n (ln v + (P − 2 s C + s² S)/v) + ln A`, `A = Σ n S/v`, `s = Σ (n C/v)/A`
 //!
 //! (a flat prior of the slope; docs/noise.md, eq. 15) by scoring: a step is a quadratic programme with the Fisher
-//! information, solved exactly on every face of the positive quadrant, and shortened until `M` falls.
+//! information, solved exactly on every face of the positive quadrant, and shortened until `M` decreases.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::{Bins, first_guess};
 
-/// Fall of the deviance below which a fit has arrived.
+/// Decrease of the deviance below which a fit has converged.
 const ARRIVED: f64 = 1e-7;
-/// Steps; a fit from a neighbour takes three, one from nowhere about ten.
+/// Most steps; a fit from a neighbour takes three, one from a rough guess about ten.
 const MOST_STEPS: usize = 80;
 
 /// A point of the likelihood: strengths of all terms, the deviance there, the line.
@@ -29,7 +29,7 @@ struct Value {
     v: Vec<f64>,
     deviance: f64,
     slope: f64,
-    /// Information on the slope, zero where no bin knows the line.
+    /// Information on the slope, zero where no bin depends on the line.
     information: f64,
 }
 
@@ -60,7 +60,7 @@ fn evaluate(bins: &Bins, strength: &[f64]) -> Value {
     }
 }
 
-/// Half the gradient and half the expected second derivative by the strengths of `free`.
+/// Half the gradient and half the expected second derivative with respect to the strengths of `free`.
 fn derivatives(bins: &Bins, free: &[usize], value: &Value) -> (DVector<f64>, DMatrix<f64>) {
     let m = free.len();
     let mut gradient = DVector::zeros(m);
@@ -72,7 +72,7 @@ fn derivatives(bins: &Bins, free: &[usize], value: &Value) -> (DVector<f64>, DMa
     };
     for b in 0..value.v.len() {
         let inverse = value.v[b].recip();
-        // The line took the share S/A of the power away.
+        // The line has absorbed the share S/A of the power.
         let residual = bins.residual(b, value.slope) + bins.line_square[b] * own;
         let weight = 0.5 * bins.count[b] * inverse;
         let pull = weight * (1.0 - residual * inverse);
@@ -88,7 +88,7 @@ fn derivatives(bins: &Bins, free: &[usize], value: &Value) -> (DVector<f64>, DMa
     (gradient, matrix)
 }
 
-/// The least of `½ y'Hy − r'y` over `y ≥ 0`, by trying every face of the quadrant, the interior first.
+/// Minimises `½ y'Hy − r'y` over `y ≥ 0`, by trying every face of the quadrant, the interior first.
 fn quadratic_programme(matrix: &DMatrix<f64>, pull: &DVector<f64>) -> DVector<f64> {
     let m = pull.len();
     let scale: Vec<f64> = (0..m)
@@ -125,7 +125,7 @@ fn quadratic_programme(matrix: &DMatrix<f64>, pull: &DVector<f64>) -> DVector<f6
     best.1
 }
 
-/// The most likely strengths of `free`, from `start`; strengths that are not free stay what they are there.
+/// The most likely strengths of `free`, from `start`; strengths that are not free keep their values.
 pub(super) fn fit(bins: &Bins, free: &[usize], start: &[f64]) -> Point {
     let mut strength = start.to_vec();
     let mut value = evaluate(bins, &strength);
@@ -189,7 +189,7 @@ pub(super) fn best(bins: &Bins, free: &[usize]) -> Point {
         .unwrap_or_else(|| fit(bins, free, &guess(None)))
 }
 
-/// Standard error of the strength `k`, the others free: where a search along it begins.
+/// Standard error of the strength `k`, the others free: the scale of a search along it.
 pub(super) fn sigma(bins: &Bins, free: &[usize], k: usize, point: &Point) -> f64 {
     let (_, matrix) = derivatives(bins, free, &evaluate(bins, &point.strength));
     let place = free.iter().position(|&f| f == k);

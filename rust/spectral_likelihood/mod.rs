@@ -8,7 +8,7 @@
 //!
 //! by a monotone multiplicative start, then Fisher scoring in `ln p`. `slope` is profiled out: it is linear.
 //!
-//! What is *said* of a term comes from [`invert`]: all terms stay in the model and the line is integrated out.
+//! The reported estimate of a term comes from [`invert`]: all terms stay in the model and the line is integrated out.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,7 +19,7 @@ mod profile;
 
 pub use profile::{Inversion, LineMixture, Statement, invert};
 
-/// Averages of ordinates over bins, and what each noise term of unit strength contributes to them.
+/// Averages of ordinates over bins, and the contribution of each noise term of unit strength to them.
 #[derive(Debug, Clone)]
 pub struct Bins {
     /// Ordinates (degrees of freedom) in each bin.
@@ -34,7 +34,7 @@ pub struct Bins {
     pub basis: Vec<Vec<f64>>,
 }
 
-/// What the likelihood is asked.
+/// Model whose strengths are fitted.
 #[derive(Debug, Clone, Default)]
 pub struct Question {
     /// Terms in the model, as indices of `Bins::basis`.
@@ -56,12 +56,12 @@ pub struct Fit {
     pub deviance: f64,
     /// Standard errors of `ln strength` of the active terms, infinite where the term vanishes.
     pub sigma_log: Vec<f64>,
-    /// Whether the last step was below 1e-7 of every strength that matters.
+    /// Whether the deviance stopped decreasing within 60 steps.
     pub is_converged: bool,
 }
 
 impl Bins {
-    /// Check that all lengths agree and all values can be expectations.
+    /// Checks that all lengths agree and all values can be expectations.
     ///
     /// # Errors
     /// `BadInput` naming what is wrong.
@@ -133,7 +133,7 @@ impl Bins {
 /// Fit the strengths of the active terms.
 ///
 /// # Errors
-/// `BadInput` when the bins disagree or no term is asked for.
+/// As [`Bins::check`].
 pub fn fit(bins: &Bins, question: &Question) -> Result<Fit> {
     bins.check()?;
     let free = question.active.clone();
@@ -173,7 +173,7 @@ pub fn fit(bins: &Bins, question: &Question) -> Result<Fit> {
     })
 }
 
-/// A tenth of the bins lie below this strength of the term alone.
+/// Strength of the term alone below which a tenth of the bins lie.
 fn first_guess(bins: &Bins, k: usize) -> f64 {
     let mut ratio: Vec<f64> = bins
         .power
@@ -186,7 +186,7 @@ fn first_guess(bins: &Bins, k: usize) -> f64 {
     ratio.get(ratio.len() / 10).copied().unwrap_or(1.0)
 }
 
-/// One multiplicative step: never leaves the positive quadrant, never raises the deviance.
+/// One multiplicative step: stays in the positive quadrant and never increases the deviance.
 fn multiply(bins: &Bins, free: &[usize], has_line: bool, strength: &mut [f64]) {
     let v = bins.expectation(strength);
     let slope = if has_line { bins.line(&v).0 } else { 0.0 };
@@ -210,7 +210,7 @@ fn information(bins: &Bins, free: &[usize], strength: &[f64], v: &[f64]) -> DMat
     })
 }
 
-/// Fisher scoring in `ln p` with step halving; says whether it converged.
+/// Fisher scoring in `ln p` with step halving; returns whether it converged.
 fn score(bins: &Bins, free: &[usize], has_line: bool, strength: &mut [f64]) -> bool {
     let mut v = bins.expectation(strength);
     let mut slope = if has_line { bins.line(&v).0 } else { 0.0 };
@@ -229,7 +229,7 @@ fn score(bins: &Bins, free: &[usize], has_line: bool, strength: &mut [f64]) -> b
         });
         let mut matrix = information(bins, free, strength, &v);
         for i in 0..free.len() {
-            // A vanishing term has no information of its own: hold its step rather than divide by nothing.
+            // A vanishing term has no information of its own: the ridge keeps its step finite.
             matrix[(i, i)] += 1e-9 + 1e-9 * matrix[(i, i)];
         }
         let Some(step) = matrix.lu().solve(&gradient) else {

@@ -1,8 +1,8 @@
-//! The likelihood inverted: what a log says about the amplitude of every term, whatever else it may hold.
+//! The likelihood inverted: profile likelihood of the amplitude of every term, with all others in the model.
 //!
-//! For a term `k` of amplitude `a = √p_k` the rise `Δ_k(a)` is the least deviance with `p_k` held, the others refitted,
-//! over the least of all. `{a : Δ_k(a) ≤ rise}` is the interval; `exp(−½ Δ_k)` weighs amplitudes for the median. Fixing
-//! absent terms at zero instead makes every interval conditional on a choice that the same data made.
+//! For a term `k` of amplitude `a = √p_k` the rise `Δ_k(a)` is the least deviance with `p_k` fixed and the others
+//! refitted, less the least of all. `{a : Δ_k(a) ≤ rise}` is the interval; `exp(−½ Δ_k)` weights amplitudes for the
+//! median. With absent terms fixed at zero, every interval would be conditional on a choice that the same data made.
 
 use super::Bins;
 use super::marginal::{Point, best, fit, sigma};
@@ -11,23 +11,23 @@ use crate::error::Result;
 
 /// Rise at which a profile ends: the weight beyond is a thousandth.
 const REACH: f64 = 14.0;
-/// Wanted growth of the root of the rise from point to point.
+/// Target growth of the square root of the rise from point to point.
 const PACE: f64 = 0.35;
-/// Points on one side of the most likely amplitude.
+/// Most points on one side of the most likely amplitude.
 const MOST_POINTS: usize = 200;
-/// Between two points of a profile the root of its rise is a straight line, integrated in as many parts.
+/// Parts of the integral between two points of a profile, where the square root of the rise is linear.
 const PARTS: usize = 8;
 
-/// What is said about one term; amplitudes are roots of strengths.
+/// Estimate and interval of one term; amplitudes are square roots of strengths.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Statement {
     /// Most likely amplitude, all terms free.
     pub most_likely: f64,
-    /// Amplitude with as much weight above as below.
+    /// Amplitude with equal weight above and below.
     pub median: f64,
     /// Root mean square distance of the weight from the median.
     pub spread: f64,
-    /// Least amplitude within the rise, zero where zero is.
+    /// Least amplitude within the rise, zero where zero is within it.
     pub lower: f64,
     /// Largest amplitude within the rise.
     pub upper: f64,
@@ -42,7 +42,7 @@ pub struct LineMixture {
     pub median: f64,
     /// Its standard deviation.
     pub sigma: f64,
-    /// Lower end of the interval asked for.
+    /// Lower end of the requested interval.
     pub lower: f64,
     /// Upper end.
     pub upper: f64,
@@ -50,7 +50,7 @@ pub struct LineMixture {
     pub tail: f64,
 }
 
-/// All that a spectrum says about its terms.
+/// Estimates and intervals of all terms of a spectrum.
 #[derive(Debug, Clone)]
 pub struct Inversion {
     /// Most likely strengths, all terms free.
@@ -59,7 +59,7 @@ pub struct Inversion {
     pub strength_without_pair: Vec<f64>,
     /// Rise of the deviance without the pair.
     pub rise_without_pair: f64,
-    /// One for each term.
+    /// Estimate and interval of each term.
     pub terms: Vec<Statement>,
     /// The line.
     pub line: LineMixture,
@@ -68,8 +68,8 @@ pub struct Inversion {
 /// Amplitudes in order with the point of the likelihood at each.
 type Profile = Vec<(f64, Point)>;
 
-/// Invert the likelihood: intervals at `rise`; `pair` names two terms that may only be seen together; the line's mixture
-/// over the amplitudes of `walk` is quoted with `line_outside` of its weight outside.
+/// Inverts the likelihood: intervals at `rise`; `pair` names two terms that may be detectable only together; the line's
+/// mixture over the amplitudes of `walk` has an interval with `line_outside` of its weight outside.
 ///
 /// # Errors
 /// `BadInput` when the bins disagree.
@@ -87,7 +87,7 @@ pub fn invert(
     let free: Vec<usize> = (0..bins.basis.len()).collect();
     let mut top = best(bins, &free);
     let mut profiles: Vec<Profile> = free.iter().map(|&k| profile(bins, k, &top)).collect();
-    // A profile may find what the search from afar did not.
+    // A profile may find a lower deviance than the search from guesses.
     for point in profiles.iter().flatten().map(|(_, point)| point) {
         if point.deviance < top.deviance - 1e-6 {
             top = fit(bins, &free, &point.strength);
@@ -175,7 +175,7 @@ fn side(bins: &Bins, k: usize, top: &Point, from: f64, first: f64) -> Profile {
 
 fn state(bins: &Bins, k: usize, profile: &Profile, top: &Point, rise: f64) -> Statement {
     let at = top.strength[k].sqrt();
-    // The root of the rise with a sign is nearly a straight line in the amplitude.
+    // The square root of the rise, with a sign, is nearly linear in the amplitude.
     let roots: Vec<(f64, f64)> = profile
         .iter()
         .map(|(a, point)| {

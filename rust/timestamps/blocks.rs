@@ -1,4 +1,4 @@
-//! One number of every block of timestamps: the earliest, the middle, the mean of their ticks.
+//! One number per block of timestamps: the earliest, the median, the mean of their ticks.
 
 use rayon::prelude::*;
 
@@ -8,9 +8,9 @@ use crate::order_statistics::median;
 /// Blocks that a thread takes at a time.
 const BLOCKS: usize = 1024;
 
-/// Row of the first of the least of every block of `width` rows; the last block takes in what is left over.
+/// Row of the first of the least values in every block of `width` rows; the last block includes the remainder.
 ///
-/// Where more than a block lies behind the last row found, that of the last half block follows. `late` holds a number.
+/// Where more than a block follows the last row found, that of the last half block is added. `late` must not be empty.
 #[must_use]
 pub fn earliest(late: &[f64], width: usize) -> Vec<i64> {
     let n = late.len();

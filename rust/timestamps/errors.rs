@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::SHARE;
 
-/// Write `time - values` in the place of `values`.
+/// Writes `time - values` to `values`.
 ///
 /// # Panics
 /// When lengths differ.
@@ -28,12 +28,12 @@ pub fn deviation(errors: &[f64]) -> f64 {
     (total(errors, |error| (error - mean) * (error - mean)) / n).sqrt()
 }
 
-/// How many errors are less than the one before by more than `fall`.
+/// Number of errors that are less than the one before by more than `fall`.
 #[must_use]
 pub fn falls(errors: &[f64], fall: f64) -> usize {
     let shares = errors.len().div_ceil(SHARE);
     let of_share = |k: usize| {
-        // With the last of the share before, so that no step is left out.
+        // With the last of the share before, so that no step is omitted.
         let part = &errors[(k * SHARE).saturating_sub(1)..errors.len().min((k + 1) * SHARE)];
         let is_fall = |pair: &[f64]| usize::from(pair[1] - pair[0] < -fall);
         part.windows(2).map(is_fall).sum::<usize>()
@@ -41,7 +41,7 @@ pub fn falls(errors: &[f64], fall: f64) -> usize {
     (0..shares).into_par_iter().map(of_share).sum()
 }
 
-/// The sum of what is made of each, shares joined in order.
+/// Sum of `of` over all errors, shares joined in order.
 fn total(errors: &[f64], of: impl Fn(f64) -> f64 + Sync) -> f64 {
     let shares: Vec<f64> = errors
         .par_chunks(SHARE)

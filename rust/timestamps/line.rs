@@ -1,16 +1,16 @@
-//! A straight line through points of which some are far off.
+//! A straight line through points with outliers.
 
 use crate::order_statistics::median;
 
 /// Median absolute deviation to standard deviation of a Gaussian.
 const MAD_TO_SIGMA: f64 = 1.4826;
-/// Deviations beyond which a point is left out.
+/// Standard deviations beyond which a point is excluded.
 const FAR: f64 = 4.0;
 const ROUNDS: usize = 3;
-/// Points so near are never left out, in the unit of `y`.
+/// Distance within which points are never excluded, in the unit of `y`.
 const NEAR: f64 = 1e-12;
 
-/// `(slope, level)` of the line through `(u, y)`, points far from the middle of what it leaves out three times.
+/// `(slope, level)` of the line through `(u, y)`; points far from the median residual are excluded, in three rounds.
 ///
 /// # Panics
 /// When lengths differ.

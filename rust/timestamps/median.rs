@@ -1,12 +1,12 @@
-//! The median of the steps of a log, which are never all written down.
+//! The median of the steps of a log, which are never all stored.
 
 use super::steps::{forward, of_each_share};
 
-/// Bits of a step by which one pass narrows down where the median lies.
+/// Bits of a step by which one pass narrows down the position of the median.
 const DIGIT: u32 = 11;
-/// Steps that are asked where the median is about.
+/// Number of steps sampled for the approximate position of the median.
 const ASKED: usize = 4096;
-/// Ranks on either side of theirs, in parts of all, between which the median lies: 3.8 deviations of the answer.
+/// Ranks about the middle, in parts of all, between which the median lies: 3.8 standard deviations of the sample's.
 const MARGIN: f64 = 0.03;
 
 /// Median of the steps forward of timestamps; NaN where there is none.
@@ -18,13 +18,13 @@ pub fn usual_step(time: &[f64]) -> f64 {
         .unwrap_or_else(|| by_digits(time))
 }
 
-/// Steps between which the median of all lies but by mishap, from some of them; none where these are few.
+/// Range of steps that almost certainly contains the median of all, from a sample; `None` where there are few.
 fn asked(time: &[f64]) -> Option<(f64, f64)> {
     if time.len() <= ASKED {
         return None;
     }
     let pairs = time.len() as u64 - 1;
-    // Multiples of the golden section: no pattern in the steps is met with its own period.
+    // Multiples of the golden section: the sample shares no period with a pattern of the steps.
     let place = |k: u64| {
         let part = u128::from(k.wrapping_mul(0x9E37_79B9_7F4A_7C15)) * u128::from(pairs);
         usize::try_from(part >> 64).ok()
@@ -48,7 +48,7 @@ fn asked(time: &[f64]) -> Option<(f64, f64)> {
     Some((at(0.5 - MARGIN), at(0.5 + MARGIN)))
 }
 
-/// Steps about two of them.
+/// Counts of steps below, at, between and of all, for a range of two steps.
 struct About {
     below: usize,
     at_low: usize,
@@ -57,11 +57,11 @@ struct About {
     all: usize,
 }
 
-/// The median in one pass, if it lies between two steps.
+/// The median in one pass; `None` if it does not lie between the two steps.
 #[allow(clippy::float_cmp)] // the same step is the same to the last bit
 fn between(time: &[f64], low: f64, high: f64) -> Option<f64> {
     let parts = of_each_share(time, |timestamps| {
-        // Counted without branches, so that a whole vector of steps is looked at together.
+        // Counted without branches, so that a whole vector of steps is processed together.
         let (mut below, mut at_low, mut at_high, mut above, mut all) = (0, 0, 0, 0, 0);
         for pair in timestamps.windows(2) {
             let step = pair[1] - pair[0];
@@ -110,7 +110,7 @@ fn between(time: &[f64], low: f64, high: f64) -> Option<f64> {
     Some(f64::midpoint(f64::from_bits(lower), upper))
 }
 
-/// The median wherever it is, digit by digit, as in a radix sort.
+/// The median without a known range, digit by digit, as in a radix sort.
 fn by_digits(time: &[f64]) -> f64 {
     let ranges = of_each_share(time, |timestamps| {
         let mut out = (u64::MAX, 0, 0_usize);
@@ -145,7 +145,7 @@ fn by_digits(time: &[f64]) -> f64 {
 
 struct Found {
     bits: u64,
-    /// Steps shorter than it.
+    /// Number of shorter steps.
     below: usize,
 }
 
@@ -186,7 +186,7 @@ fn at_rank(time: &[f64], rank: usize, least: u64, most: u64) -> Found {
 mod tests {
     use super::*;
 
-    /// Steps that are not all alike, some of them back or none.
+    /// Steps that are not all equal, some of them negative or zero.
     fn timestamps(n: usize, kinds: u64) -> Vec<f64> {
         let mut state = 7_u64;
         let mut at = 0.0;
@@ -217,7 +217,7 @@ mod tests {
                 };
                 let same = |found: f64| found.to_bits() == expected.to_bits();
                 assert!(same(usual_step(&time)) && same(by_digits(&time)) || steps.is_empty());
-                // Between any two steps: the median, or the answer that it does not lie there.
+                // Between any two steps: the median, or `None` where it does not lie there.
                 for (low, high) in [(0, k), (k, k), (k / 2, k + k / 3), (k + 1, k + 2)] {
                     let at = |i: usize| steps.get(i).copied();
                     if let (Some(low), Some(high)) = (at(low), at(high)) {

@@ -1,6 +1,6 @@
-//! Time timestamps of a log: what their steps are, and an even clock under or through them.
+//! Timestamps of a log: statistics of their steps, and an even clock below or through them.
 //!
-//! Every pass shares pieces of fixed size between threads and joins them in order, so that answers do not depend on the
+//! Every pass shares pieces of fixed size between threads and joins them in order, so that results do not depend on the
 //! number of threads.
 
 mod blocks;
@@ -21,7 +21,7 @@ use rayon::prelude::*;
 /// Timestamps that a thread takes at a time.
 const SHARE: usize = 1 << 16;
 
-/// A number of a sample on an even clock, lost ones counted.
+/// Index of a sample on an even clock, lost ones counted.
 pub trait Tick: Copy + Send + Sync {
     /// As a double, exactly up to 2⁵³.
     fn number(self) -> f64;
@@ -39,7 +39,7 @@ impl Tick for i64 {
     }
 }
 
-/// Write `time - period tick` to `late`; the row is the tick where there are none.
+/// Writes `time - period tick` to `late`; without ticks the tick is the row.
 ///
 /// # Panics
 /// When lengths differ.
@@ -65,20 +65,20 @@ pub fn lateness<T: Tick>(time: &[f64], ticks: Option<&[T]>, period: f64, late: &
     }
 }
 
-/// A straight course of lateness: `slope (tick - origin) / scale + level`.
+/// A linear course of lateness: `slope (tick - origin) / scale + level`.
 #[derive(Debug, Clone, Copy)]
 pub struct Course {
-    /// Of the line.
+    /// Slope of the line.
     pub slope: f64,
-    /// Of the line at `origin`.
+    /// Level of the line at `origin`.
     pub level: f64,
-    /// Tick.
+    /// Origin, ticks.
     pub origin: f64,
-    /// Ticks.
+    /// Scale, ticks.
     pub scale: f64,
 }
 
-/// Write when an even clock on `course` took each sample: `course + period tick`.
+/// Writes the instant at which an even clock on `course` took each sample: `course + period tick`.
 ///
 /// # Panics
 /// When lengths differ.

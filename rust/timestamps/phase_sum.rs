@@ -1,4 +1,4 @@
-//! The power of phase sums of timestamps, from which the sampling period is read.
+//! The power of phase sums of timestamps, from which the sampling period is estimated.
 
 use std::f64::consts::PI;
 use std::sync::{Arc, Mutex};
@@ -27,11 +27,11 @@ pub fn next_fast_length(n: usize) -> usize {
 
 type Transform = Arc<dyn RealToComplex<f64>>;
 
-/// The transform of a length, and the one asked for before again: windows of most logs are equally long, and the factors
-/// of a transform take longer than using it.
+/// The transform of a length; the last one is kept: windows of most logs are equally long, and the factors of a
+/// transform take longer to compute than its use.
 fn transform_of(length: usize) -> Transform {
     static LAST: Mutex<Option<Transform>> = Mutex::new(None);
-    // Never waited for: a child forked while it was held would wait for good.
+    // Never waits: a child forked while the lock was held would wait for ever.
     if let Ok(last) = LAST.try_lock()
         && let Some(known) = last.as_ref().filter(|one| one.len() == length)
     {
@@ -46,11 +46,11 @@ fn transform_of(length: usize) -> Transform {
 
 /// `|mean exp(2πi f t)|²` on the grid of a transform of `length` cells, the mean of all windows by their timestamps.
 ///
-/// Windows are tapered (Hann) so that lines have no skirts; a stamp is shared linearly between neighbouring cells, which
-/// lowers a frequency by sinc², undone here. `length / 2 + 1` powers.
+/// Windows are tapered (Hann) to suppress sidelobes; a timestamp is shared linearly between neighbouring cells, which
+/// attenuates a frequency by sinc², corrected here. `length / 2 + 1` powers.
 ///
 /// # Errors
-/// `BadInput` when a stamp is not within the cells.
+/// `BadInput` when a timestamp is not within the cells.
 pub fn phase_power(windows: &[&[f64]], cell: f64, length: usize) -> Result<Vec<f64>> {
     if length < 2 {
         return Err(Error::bad_input("a transform needs two cells and more"));
@@ -69,7 +69,7 @@ pub fn phase_power(windows: &[&[f64]], cell: f64, length: usize) -> Result<Vec<f
             let mut taken = 0.0;
             for (i, stamp) in window.iter().enumerate() {
                 let position = stamp / cell;
-                // A stamp beyond the cells, or none at all, has no place in them.
+                // A timestamp beyond the cells, or NaN, has no cell.
                 if !(position >= 0.0 && position < length as f64) {
                     return None;
                 }
@@ -112,7 +112,7 @@ pub fn phase_power(windows: &[&[f64]], cell: f64, length: usize) -> Result<Vec<f
 /// Power of the mean of `exp(2πi f t)` at `count` frequencies from `first` on, `step` apart.
 #[must_use]
 pub fn direct_power(timestamps: &[f64], first: f64, step: f64, count: usize) -> Vec<f64> {
-    // A frequency on, every stamp turns by so much: the first and its turns take the place of exponentials.
+    // Every phase advances from one frequency to the next by a fixed rotation, which replaces exponentials.
     let turn_by = |f: f64| timestamps.iter().map(move |t| (2.0 * PI * f * t).sin_cos());
     let (mut re, mut im) = (
         Vec::with_capacity(timestamps.len()),

@@ -1,30 +1,30 @@
-//! Steps from stamp to stamp, in one pass.
+//! Steps between timestamps, in one pass.
 
 use rayon::prelude::*;
 
 use super::SHARE;
 
-/// Kinds of steps and of timestamps, counted.
+/// Numbers of steps and of timestamps by kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Steps {
     /// Steps back.
     pub back: usize,
-    /// Timestamps as the one before.
+    /// Timestamps equal to the one before.
     pub same: usize,
     /// Steps forward.
     pub forward: usize,
-    /// Timestamps that are no finite numbers.
+    /// Timestamps that are not finite.
     pub missing: usize,
 }
 
-/// What steps there are; those at a missing stamp are of no kind.
+/// Numbers of steps by kind; those at a missing timestamp are of no kind.
 #[must_use]
-#[allow(clippy::float_cmp)] // the same stamp is the same to the last bit
+#[allow(clippy::float_cmp)] // equal timestamps are equal to the last bit
 pub fn steps(time: &[f64]) -> Steps {
     shares(time)
         .map(|(first, timestamps)| {
             let mut out = Steps::default();
-            // Counted without branches, so that a whole vector of steps is looked at together.
+            // Counted without branches, so that a whole vector of steps is processed together.
             for pair in timestamps.windows(2) {
                 out.back += usize::from(pair[1] < pair[0]);
                 out.same += usize::from(pair[1] == pair[0]);
@@ -42,7 +42,7 @@ pub fn steps(time: &[f64]) -> Steps {
         })
 }
 
-/// Rows behind which the step is longer than `limit`.
+/// Rows after which the step is longer than `limit`.
 #[must_use]
 pub fn steps_above(time: &[f64], limit: f64) -> Vec<usize> {
     shares(time)
@@ -66,14 +66,14 @@ pub fn steps_above(time: &[f64], limit: f64) -> Vec<usize> {
         .concat()
 }
 
-/// Steps of usual length.
+/// Statistics of steps of usual length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inside {
-    /// How many.
+    /// Number of steps.
     pub count: usize,
-    /// All together.
+    /// Sum of the steps.
     pub sum: f64,
-    /// About their mean, over their number.
+    /// Standard deviation about their mean, over their number.
     pub deviation: f64,
     /// The shortest.
     pub least: f64,
@@ -81,11 +81,11 @@ pub struct Inside {
     pub most: f64,
 }
 
-/// Steps above `above` and not above `limit`.
+/// Statistics of the steps above `above` and not above `limit`.
 #[must_use]
 pub fn inside(time: &[f64], above: f64, limit: f64) -> Inside {
     let kept = |step: f64| step > above && step <= limit;
-    // About its own mean while a share is near: the log is walked through once.
+    // About each share's own mean while the share is in the cache: the log is read once.
     let parts: Vec<(Inside, f64)> = shares(time)
         .map(|(_, timestamps)| {
             let (mut count, mut sum) = (0, 0.0);
@@ -136,7 +136,7 @@ pub fn inside(time: &[f64], above: f64, limit: f64) -> Inside {
     }
 }
 
-/// Shares of timestamps, each with the stamp before it, and where its own begin.
+/// Shares of timestamps, each with the timestamp before it, and the row where its own begin.
 fn shares(time: &[f64]) -> impl IndexedParallelIterator<Item = (usize, &[f64])> {
     (0..time.len().div_ceil(SHARE))
         .into_par_iter()
@@ -147,7 +147,7 @@ fn shares(time: &[f64]) -> impl IndexedParallelIterator<Item = (usize, &[f64])> 
         })
 }
 
-/// The sum of what is made of each step, eight sums side by side: an addition need not wait for the one before.
+/// Sum of `of` over the steps, eight sums side by side: an addition need not wait for the one before.
 fn in_lanes(timestamps: &[f64], of: impl Fn(f64) -> f64) -> f64 {
     let mut sums = [0.0; 8];
     let n = timestamps.len().saturating_sub(1);
@@ -164,7 +164,7 @@ fn in_lanes(timestamps: &[f64], of: impl Fn(f64) -> f64) -> f64 {
     sums.iter().sum::<f64>() + rest.sum::<f64>()
 }
 
-/// What `visit` makes of the timestamps of each share, with the one before.
+/// Results of `visit` for the timestamps of each share, with the one before.
 pub(super) fn of_each_share<R: Send>(
     time: &[f64],
     visit: impl Fn(&[f64]) -> R + Sync + Send,
@@ -174,7 +174,7 @@ pub(super) fn of_each_share<R: Send>(
         .collect()
 }
 
-/// Steps that are longer than zero, in the order of their size as integers.
+/// Steps longer than zero as integers, which have the same order.
 pub(super) fn forward(timestamps: &[f64]) -> impl Iterator<Item = u64> {
     let steps = timestamps.windows(2).map(|pair| pair[1] - pair[0]);
     steps.filter(|&step| step > 0.0).map(f64::to_bits)

@@ -1,1 +1,1 @@
-"""API: the stages composed. Everything that a person asks for is one function here."""
+"""API: the public functions, one per task, each composed of the stages."""

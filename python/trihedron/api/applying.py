@@ -26,7 +26,7 @@ from trihedron.units import AccelerationUnit, RateUnit
 
 
 class HasCalibration(Protocol):
-    """A result that holds a calibration."""
+    """A result with a calibration."""
 
     @property
     def calibration(self) -> Calibration | None:
@@ -34,11 +34,11 @@ class HasCalibration(Protocol):
 
 
 AnyCalibration = HasCalibration | Calibration | str | os.PathLike[str]
-"""A calibration, a result that holds one (of calibrate, kalman, verify), or a calibration file."""
+"""A calibration, a result with one (of calibrate, kalman, verify), or a calibration file."""
 
 
 def calibration_of(given: AnyCalibration) -> Calibration:
-    """A calibration as a record, whether it comes from a result, a file or is one already.
+    """The calibration of a result or of a file, or the record itself.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def calibration_of(given: AnyCalibration) -> Calibration:
         return given
     if isinstance(given, str | os.PathLike):
         return read_calibration(given)
-    # A check's is made with a standard gravity, for its uncertainties alone.
+    # The calibration of a CheckResult uses standard gravity: only its uncertainties are valid.
     inside = None if isinstance(given, CheckResult) else getattr(given, "calibration", None)
     if isinstance(inside, Calibration):
         return inside
@@ -140,17 +140,17 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
 
 
 def without_effects(calibration: Calibration, recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
-    """Raw readings without the effects of an extended calibration, so that ``S raw + b`` holds again.
+    """Raw readings with the effects of an extended calibration compensated, so that ``S raw + b`` is valid.
 
     Raises
     ------
     ValueError
-        When the calibration's extensions are not what a diagnosis writes.
+        When the calibration's extensions are not in the form that a diagnosis writes.
     """
     effects = calibration.extensions.get("effects")
     if not effects:
         return recording, ()
-    # Imported here: a linear calibration needs none of it.
+    # Imported here: a linear calibration does not need it.
     from trihedron.diagnose import take_off
 
     references = calibration.extensions.get("references", {})
@@ -171,12 +171,12 @@ def without_effects(calibration: Calibration, recording: Recording) -> tuple[Rec
 
 
 def check_units(calibration: Calibration, recording: Recording) -> None:
-    """Refuse readings in other units than a calibration was made for.
+    """Check that readings are in the units that a calibration was made for.
 
     Raises
     ------
     ValueError
-        Naming both units.
+        When they are not; the message names both units.
     """
     pairs = (
         ("accelerometer", recording.accelerometer, recording.accelerometer_unit.value, calibration.accelerometer),
@@ -195,7 +195,7 @@ def _corrected(readings: FloatArray | None, sensor: SensorCalibration | None) ->
 
 
 def doubted(calibration: Calibration) -> tuple[Finding, ...]:
-    """What the calibration said of itself goes with everything that it is applied to."""
+    """A finding that repeats the calibration's first serious finding, for everything that it is applied to."""
     grave = [finding for finding in calibration.findings if finding.severity is Severity.SERIOUS]
     if not grave:
         return ()
@@ -207,13 +207,13 @@ def _not_applied(effect_id: str, why: str) -> Finding:
     return Finding.of(FindingCode.EFFECT_NOT_APPLIED, "of-session" if is_of_session else "", effect=effect_id, why=why)
 
 
-# Temperature when a calibration is applied: polynomials followed inside their range, and the range enforced.
+# Temperature when a calibration is applied: polynomials are evaluated inside their range, and clamped at its limits.
 
 KNOTS = 257
-"""S and b are exact at so many temperatures of the range and linear between: a cubic over the whole range is followed
-to 1e-5 of its swing."""
+"""Number of temperatures of the range at which S and b are exact, linear between: the error for a cubic over the range
+is 1e-5 of its total change."""
 TOLERANCE_DEGC = 1.0
-"""Beyond the range by less is the thermometer's resolution, not another temperature."""
+"""Excess over the range that the thermometer's resolution explains."""
 ROWS = 1 << 17
 
 
@@ -257,10 +257,10 @@ def check_range(calibration: Calibration, recording: Recording) -> tuple[Finding
 def thermally_corrected(
     calibration: Calibration, recording: Recording
 ) -> tuple[FloatArray | None, FloatArray | None] | None:
-    """Specific force and rate (n, 3) by S(T), b(T) of every sample; ``None`` where the calibration does not follow
-    temperature or the log has none.
+    """Specific force and rate (n, 3) by S(T), b(T) of every sample; ``None`` where the calibration has no temperature
+    model or the log no temperature.
 
-    Outside the range the ends are held. Samples without a temperature take that between their neighbours.
+    Outside the range S and b keep their values at its limits. Missing temperatures are interpolated.
     """
     thermal = calibration.extensions.get("thermal")
     T = recording.temperature_degc

@@ -1,4 +1,4 @@
-"""How a verb is asked in Python: plain arguments are checked before work, sentences name parameters, never flags."""
+"""Calls from Python: plain arguments are checked before the work starts; errors name parameters, not flags."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from trihedron.records.checked import WrongTypeError, number_of, numbers_of, sai
 from trihedron.report.in_python import in_python, result_in_python
 
 MOST_WHOLE = 2**63 - 1
-"""What the core takes as a whole number."""
+"""Largest integer that the core accepts (int64)."""
 LONGEST_NAME = 4096
-"""No system takes a longer path, and no option of ours has a longer value."""
+"""Longest text argument, in characters: the longest path of any system, and longer than any value of an option."""
 
 RANGES: dict[str, tuple[float, float, str]] = {
     "gravity_m_s2": (1.0, 100.0, "m/s², about 9.8 on Earth"),
@@ -44,7 +44,7 @@ RANGES: dict[str, tuple[float, float, str]] = {
     "seed": (0, MOST_WHOLE, "the start of a series of random numbers"),
     "workers": (0, 100_000, "a number of processes"),
 }
-"""Smallest and largest value of a quantity, both possible, and what it is."""
+"""Smallest and largest valid value of a quantity, and its description."""
 
 
 def settled(verb: str, name: str, value: Any, annotation: str) -> Any:
@@ -53,9 +53,9 @@ def settled(verb: str, name: str, value: Any, annotation: str) -> Any:
     Raises
     ------
     WrongTypeError
-        (a ``TypeError`` and a ``ValueError``) when it is something else.
+        (a ``TypeError`` and a ``ValueError``) when it is of another type.
     ValueError
-        When a number is not finite, or no such quantity.
+        When a number is not finite, or outside the range of its quantity.
     """
     kinds = set(_alternatives(annotation))
     for alias in kinds & set(_ALIASES):
@@ -84,7 +84,7 @@ def settled(verb: str, name: str, value: Any, annotation: str) -> Any:
     if listed and not isinstance(value, str | os.PathLike):
         return _listed(where, value, listed[0].removeprefix("Sequence[").removesuffix("]"))
     if kinds > _PATH and not kinds & _JUDGED_BY_THE_VERB:
-        # A name of a file or one of ours, which the verb looks at itself: here only what is neither.
+        # A path or a name, which the verb itself checks.
         if isinstance(value, str | bytes | os.PathLike):
             return _path(where, value)
         if not kinds & {one.__name__ for one in type(value).__mro__}:
@@ -93,7 +93,7 @@ def settled(verb: str, name: str, value: Any, annotation: str) -> Any:
 
 
 def _alternatives(annotation: str) -> list[str]:
-    """The parts of a union, whatever their brackets hold."""
+    """The top-level parts of a union type; those inside brackets are not split."""
     parts, depth = [""], 0
     for letter in annotation:
         depth += (letter == "[") - (letter == "]")
@@ -187,7 +187,7 @@ def _listed(where: str, value: Any, inner: str) -> Any:
 
 
 def _whole_of_any(where: str, value: Any) -> int:
-    """Cluster sizes come out of logspace as floats."""
+    """A whole number given as int or float: cluster sizes from logspace are floats."""
     is_whole = isinstance(value, float) and value.is_integer() and abs(value) < MOST_WHOLE
     return _whole(where, "", int(value) if is_whole else value)
 
@@ -211,7 +211,7 @@ _PATH = {"str", "os.PathLike[str]"}
 _JUDGED_BY_THE_VERB = {"Any", "Scenario"}
 _ALIASES = {"AnyReference": {"ReferenceMotion", "Recording", *_PATH}}
 _PLAIN: dict[str, Callable[[str, str, Any], Any]] = {"float": _number, "int": _whole, "str": _text, "bool": _switch}
-# Words of a closed list: the verb names them, here only what is no word.
+# Words of a closed list: the verb checks the choice, only the type is checked here.
 _PLAIN |= dict.fromkeys(("AllanKind", "By", "Form", "Frame", "Loss", "Method", "NormFrame", "RateShape"), _word)
 _LISTED = {"float": " of numbers", "int": " of whole numbers", "str": " of texts", "tuple[float, float]": " of pairs"}
 
@@ -222,12 +222,12 @@ Verb = TypeVar("Verb", bound=Callable[..., Any])
 
 
 def asked_in_python(verb: Verb) -> Verb:
-    """The verb with its plain arguments checked and its sentences in Python's words.
+    """The verb with its plain arguments checked and its error messages in terms of Python parameters.
 
     Raises
     ------
     WrongTypeError
-        (a ``TypeError`` and a ``ValueError``) when a number, a text or a switch is something else.
+        (a ``TypeError`` and a ``ValueError``) when a number, a text or a switch is of another type.
     """
     signature = inspect.signature(verb)
 
@@ -256,13 +256,13 @@ def asked_in_python(verb: Verb) -> Verb:
                 named = ValueError(said)
             raise named from None
 
-    # Pickle finds it under the name that people call.
+    # Pickle looks it up under its public name.
     ask.__module__, ask.__qualname__ = "trihedron", verb.__name__
     return ask  # type: ignore[return-value]
 
 
 def _meant(given: Iterable[str], known: Iterable[str]) -> str:
-    """The name that a wrong one begins, or is nearest to."""
+    """A hint with the known name that a wrong one abbreviates or is nearest to; empty where there is none."""
     known = list(known)
     wrong = next((name for name in given if name not in known), "")
     near = [name for name in known if name.startswith(wrong)] or get_close_matches(wrong, known, 1)
@@ -270,7 +270,7 @@ def _meant(given: Iterable[str], known: Iterable[str]) -> str:
 
 
 def _options(verb: str, options: dict[str, Any]) -> dict[str, Any]:
-    """What is handed on to :func:`trihedron.read`."""
+    """Options that are passed on to :func:`trihedron.read`, checked."""
     known = inspect.signature(import_module("trihedron.api.reading").read).parameters
     for name in options:
         if name not in known or name == "path":

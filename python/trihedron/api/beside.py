@@ -1,4 +1,4 @@
-"""Diagnose with a reference: what poses and moves say, and what known motion beside them adds."""
+"""Diagnose with a reference: the diagnosis by poses and moves, extended by the fit to known motion."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from trihedron.units import AccelerationUnit, RateUnit, rate_to_si
 
 ANOTHER_UNIT = "the log of another unit"
 FEWEST_POSES = 9
-"""Nine numbers of an accelerometer need nine poses: with fewer the poses have no model to hold against anything."""
+"""Fewest poses that determine the nine parameters of an accelerometer; with fewer, only the reference is used."""
 
 
 def beside(
@@ -43,7 +43,7 @@ def beside(
     alpha: float,
     ordinary: Callable[[], DiagnosisResult],
 ) -> DiagnosisResult:
-    """The ordinary diagnosis with what known motion says beside it, or that alone where the log holds too few poses.
+    """The ordinary diagnosis with the fit to the reference added, or that fit alone where the log has too few poses.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def beside(
         result = ordinary()
     except REFUSALS as error:
         if found.kind == ANOTHER_UNIT:
-            # What two gyros separate may be either's: with no poses nobody says whose.
+            # A difference between two gyros may be of either unit: without poses its origin is unknown.
             found = replace(found, findings=(*found.findings, _shared(found)))
         values = diagnosis_by(found, recording, gravity, given, alpha)
         calibration = (
@@ -84,7 +84,7 @@ def beside(
         )
     if found.kind == ANOTHER_UNIT:
         return replace(result, reference=found, findings=(*result.findings, *found.findings, _shared(found)))
-    # What the poses found stands; the reference adds what it alone sees, and never takes away.
+    # The reference only adds effects: those found by the poses are kept.
     effects = (*result.effects, *(e for e in effects_of(found) if e.id not in {o.id for o in result.effects}))
     verdict = result.verdict
     if len(effects) > len(result.effects) and verdict in ("consistent", "parameters-differ", "not-testable"):
@@ -95,12 +95,12 @@ def beside(
 
 
 def in_si(log: Recording, gravity: float | None) -> Recording:
-    """A log whose gyro reads rad/s or deg/s as it is; one in counts by its own calibration.
+    """The log itself where its gyro is in rad/s or deg/s; a log in counts by its own calibration.
 
     Raises
     ------
     ValueError
-        When it is in counts and its poses do not carry a calibration.
+        When it is in counts and its poses do not determine a calibration.
     """
     if rate_to_si(log.gyroscope_unit) is not None:
         return log
@@ -117,10 +117,10 @@ def in_si(log: Recording, gravity: float | None) -> Recording:
 
 
 def shared_log(recording: Recording, other: Any, gravity: float | None) -> Recording | None:
-    """The given log in SI where it moved as this one did (a replay, two units on one beam), else ``None``.
+    """The given log in SI where it shares the motion of this one (a replay, two units on one beam), else ``None``.
 
-    Two sessions of one protocol share no motion sample by sample: their turning rates do not correlate beyond what
-    unrelated hands do.
+    Two sessions of one protocol share no motion sample by sample: their rates correlate no more than those of unrelated
+    hand motions.
     """
     if isinstance(other, str | os.PathLike):
         if names_scenario(other):

@@ -1,4 +1,4 @@
-"""Calibrate: poses and moves in, both sensors with their certainty out."""
+"""Calibrate both sensors from poses and moves, with uncertainties."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ METHODS: tuple[Method, ...] = get_args(Method)
 Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
 
 COUNTS_OF_POSES = (FindingCode.FEW_POSES, FindingCode.NOT_STATIC)
-"""Findings that say themselves how many poses there are."""
+"""Findings that already state the number of poses."""
 MOST_SETTLING = 0.05
-"""Share of poses that may visibly settle, as more settle unseen: with one of 18, on a support that yields, a fifth of
-the elements of the gyro's scale lay outside their 95 % interval."""
+"""Fraction of poses with detected settling that is allowed, since more settle undetected: with one of 18 on a support
+that yields, a fifth of the elements of the gyro's S were outside their 95 % interval."""
 
 Found = tuple[Finding, ...]
 
@@ -160,7 +160,7 @@ def calibrate(
                 recording, segments, gravity, source, method, wanted, axis_signs, loss, options, turns_deg
             )
         except RefusedError as error:
-            # What is wrong with the log comes before what its fit ran into.
+            # Serious findings about the log come before the error of the fit.
             grave = [finding.seen for finding in recording.findings if finding.severity is Severity.SERIOUS]
             raise RefusedError(" ".join((*grave, str(error)))) from None
     calibration = in_frame(with_bending(calibration, segments), wanted)
@@ -175,7 +175,7 @@ def _result(calibration: Calibration, findings: Found, segments: Segments, recor
 
 
 def of_board(calibration: Calibration, recording: Recording) -> Calibration:
-    """The calibration with what a flight controller had done to the readings, which an export composes it with."""
+    """The calibration with the flight controller's own corrections, which an export composes with it."""
     if recording.onboard is None:
         return calibration
     extensions = {**calibration.extensions, "onboard": as_plain(recording.onboard)}
@@ -183,7 +183,7 @@ def of_board(calibration: Calibration, recording: Recording) -> Calibration:
 
 
 def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) -> Found:
-    """Findings of the fit, its poses, a gyro's scale that its unit does not explain, and samples that its log lost."""
+    """Findings about the fit, its poses, a gyro scale that contradicts its unit, and lost samples."""
     gyro, fitted = calibration.gyroscope, with_shapes(calibration, segments)
     if gyro is None:
         return fitted
@@ -193,7 +193,7 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
 
 
 def _as_they_weigh(segments: Segments) -> Found:
-    """Findings of the segmentation; that holds settling is serious for a calibration where it is no exception."""
+    """Findings of the segmentation; settling is serious where more than ``MOST_SETTLING`` of the poses show it."""
     return tuple(
         replace(finding, severity=Severity.SERIOUS)
         if finding.code is FindingCode.POSE_SETTLING and finding.numbers["poses"] > MOST_SETTLING * segments.n_poses
@@ -251,13 +251,13 @@ def _by_poses(
         shared = shared_errors(turns, accelerometer, gravity)
         return _together(alone, *calibrate_turns(recording, turns, resting_spans(segments), shared_errors=shared))
     try:
-        # An accelerometer that is not determined is not refined by the moves: it goes into the gyro's uncertainties.
+        # Moves do not refine an accelerometer with a serious finding: its error adds to the gyro's uncertainties.
         if method == "joint" and alone.is_trustworthy:
             both = calibrate_joint(recording, segments, accelerometer, gravity, source, options)
             pull = pull_on_accelerometer(accelerometer, both.accelerometer)
             if pull <= pull_allowed(accelerometer):
                 return replace(both, findings=(*_still_said(found, both.accelerometer), *both.findings))
-            # Moves that contradict the poses must not pull the accelerometer, which the poses show without them.
+            # Moves that contradict the poses must not bias the accelerometer, which the poses determine alone.
             alone = replace(alone, findings=(*found, Finding.of(FindingCode.JOINT_FIT_LEFT, chi2_increase=pull)))
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, options)
     except REFUSALS as error:
@@ -266,7 +266,7 @@ def _by_poses(
 
 
 def _still_said(found: Found, joint: SensorCalibration) -> Found:
-    """Findings of the accelerometer alone that hold for the joint fit: not its residual, where both count another."""
+    """Findings of the accelerometer's own fit for the joint fit: excess residual only if that is widened as well."""
     if joint.quality is None or joint.quality.covariance_scale > 1.0:
         return found
     return tuple(finding for finding in found if finding.code is not FindingCode.RESIDUAL_ABOVE_NOISE)
@@ -295,7 +295,7 @@ def _by_faces(
     except REFUSALS:
         if recording.gyroscope is None or turns_deg is None or segments.norm_sigma is None:
             raise
-        # Stated turns about stated faces tell the gyro whatever was seen of the accelerometer.
+        # Stated turns about stated faces determine the gyro even without a full accelerometer.
         accelerometer, found = calibrate_few_faces(mean, segments.norm_sigma, gravity, unit)
     alone = _alone(accelerometer, found, "case", gravity, source, recording)
     if recording.gyroscope is None:
@@ -335,7 +335,7 @@ def _alone(
 
 
 def _together(alone: Calibration, gyroscope: SensorCalibration, found: Found) -> Calibration:
-    """Both sensors, one after the other: the accelerometer's error is in the gyro's covariance."""
+    """Both sensors, fitted separately: the gyro's covariance includes the accelerometer's error."""
     covariance = np.zeros((24, 24))
     covariance[:12, :12] = alone.accelerometer.covariance
     covariance[12:, 12:] = gyroscope.covariance

@@ -34,14 +34,14 @@ from trihedron.records.frame_declaration import FrameDeclaration
 Cells = npt.NDArray[np.float64]
 
 PLAUSIBLE_HZ = (2.0, 20_000.0)
-"""What a board streams: slower or faster than that its step is in another unit."""
+"""Plausible rates of a board's stream: outside them the time step is in another unit."""
 
 USUAL_HZ = 100.0
-"""A step that fits two units is taken for the one whose rate is nearer to this, in ratio."""
+"""Of two units that fit a time step, the one whose rate is nearer to this in ratio is used."""
 
 
 def protocol_of(text: str | None) -> str | FrameDeclaration | None:
-    """A protocol by name, a frame declared in a .toml file, or None to have it found."""
+    """A protocol by name, a frame declared in a .toml file, or None for detection."""
     if text is None or text == "auto":
         return None
     return read_frame_declaration(text) if text.lower().endswith(".toml") else text
@@ -56,12 +56,12 @@ def open_device(
     time_unit: str | None = None,
     silence_s: float = 5.0,
 ) -> tuple[Source, Found]:
-    """Open a source and find out what it speaks.
+    """Open a source and detect its protocol.
 
     Raises
     ------
     CaptureError
-        When it cannot be opened, is silent, or is not understood; nothing stays open.
+        When it cannot be opened, sends nothing, or its protocol is unknown; nothing stays open.
     """
     wanted = protocol_of(protocol)
     namer = column_namer(columns, time_unit)
@@ -98,7 +98,7 @@ def capture(
     protocol, baud, columns, time_unit
         Protocol, baud rate, columns of text lines and unit of the board's time; detected when not given.
     seconds : float, optional
-        When to stop; Ctrl-C, or ``on_block`` that returns False, stops any time, and what came is in the log.
+        When to stop; Ctrl-C, or ``on_block`` returning False, stops at any time and keeps the samples received.
     rate_hz : float, optional
         Rate of a board that sends no time.
     wait_s : float
@@ -106,17 +106,17 @@ def capture(
     overwrite : bool
         Replace a log that exists.
     on_block : callable, optional
-        Is given every block of samples as it is written.
+        Called with every block of samples as it is written.
 
     Returns
     -------
     Recording
-        What was read, as ``read`` gives it from the log on disk.
+        The log, as ``read`` returns it from disk.
 
     Raises
     ------
     CaptureError
-        (a ``ValueError``) when the board is silent or not understood, or the disk is full; it says what was saved.
+        (a ``ValueError``) when the board is silent or its protocol unknown, or the disk is full; states what is saved.
 
     Examples
     --------
@@ -146,7 +146,7 @@ def capture(
 
 @contextmanager
 def stopped_by_interrupt(recorder: Recorder) -> Iterator[None]:
-    """Ctrl-C ends the recording in order; a second one ends the program. Elsewhere than in the main thread: nothing."""
+    """Ctrl-C ends the recording in order, a second one ends the program; outside the main thread it has no effect."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -168,7 +168,7 @@ def ports() -> list[Port]:
     Returns
     -------
     list of Port
-        Each with its name, and what the system says of the device behind it.
+        Each with its name and the system's description of the device.
 
     Examples
     --------
@@ -192,7 +192,7 @@ def column_namer(mapping: str | None = None, time_unit: str | None = None) -> Na
             columns = _by_content(cells) if names is None else Columns()
         stated = given or columns.time_unit.replace(TICKS, "")
         if columns.time is not None and not stated and _counts_lines(cells[:, columns.time]):
-            # Samples, or milliseconds at exactly 1 kHz: as a counter it tells losses, and the host's clock the rate.
+            # Samples, or milliseconds at exactly 1 kHz: a counter shows losses, and the host's clock gives the rate.
             columns = replace(columns, time=None, counter=columns.time)
         unit = stated or _unit_of_step(cells, columns.time)
         labels = _labels(columns, names, cells.shape[1], is_mapped=mapping is not None)
@@ -202,12 +202,12 @@ def column_namer(mapping: str | None = None, time_unit: str | None = None) -> Na
 
 
 def sensor_columns(columns: tuple[str, ...]) -> list[int]:
-    """Places of the accelerometer's columns, then the gyro's, among the columns of a stream.
+    """Indices of the accelerometer's columns, then the gyro's, among the columns of a stream.
 
     Raises
     ------
     ValueError
-        When none is an accelerometer.
+        When there is no accelerometer.
     """
     empty = tuple(np.zeros(1) for _ in columns)
     found = find_columns(Table(Path("the stream"), columns, empty), None, None)
@@ -230,9 +230,9 @@ def _labels(columns: Columns, names: tuple[str, ...] | None, n: int, *, is_mappe
 
 
 def _by_content(cells: Cells) -> Columns:
-    """Joined after the names were sent: what counts is a counter, what only grows is the time, the next six are triads.
+    """Roles by content, for a stream joined after its header: a column that rises by one is the counter, another that
+    always rises is the time, the next six are the triads. Other columns keep their place without a role.
 
-    What remains without a role keeps its place; how the log is understood is said when it is read.
     """
     steps = np.diff(cells, axis=0)
     growing = [i for i in range(cells.shape[1]) if len(steps) and np.all(steps[:, i] > 0)]
@@ -249,7 +249,7 @@ def _by_content(cells: Cells) -> Columns:
 
 
 def _counts_lines(values: Cells) -> bool:
-    """Whether numbers (n,) go up by one from line to line, but where lines are lost or the counter wraps."""
+    """Whether numbers (n,) rise by one from line to line, except where lines are lost or the counter wraps."""
     steps = np.diff(values)
     return len(steps) > 1 and bool(np.mean(steps == 1.0) > 0.7) and bool(np.all(values == np.rint(values)))
 

@@ -1,4 +1,4 @@
-"""Check: may a calibration be made from this log, and how sure would it be?"""
+"""Check whether a log is fit for calibration, and the uncertainties to expect."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
     """
     recording = recording_of(recording)
     segments = segment(recording, progress=progress)
-    # A standard value: here only the size of the uncertainties is wanted, to which an error of 0.4 % means nothing.
+    # Standard gravity: only the size of the uncertainties is needed, for which an error of 0.4 % is negligible.
     try:
         result = calibrate(recording, segments=segments, gravity_m_s2=STANDARD_GRAVITY_M_S2)
     except REFUSALS as error:

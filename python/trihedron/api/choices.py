@@ -1,4 +1,4 @@
-"""What a person may say or leave unsaid, settled in one place: gravity, faces, signs of axes."""
+"""Optional inputs of a calibration and their defaults: gravity."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from trihedron.units import STANDARD_GRAVITY_M_S2
 def settle_gravity(
     gravity_m_s2: float | None = None, latitude_deg: float | None = None, height_m: float | None = None
 ) -> tuple[float, str, tuple[Finding, ...]]:
-    """|g| [m/s²], where it comes from, and what must be said about it.
+    """|g| [m/s²], its source, and findings about it.
 
     Raises
     ------
     ValueError
-        When two sources contradict each other, a height comes without a latitude, or a value is no gravity.
+        When two sources contradict each other, a height has no latitude, or a value is not plausible as gravity.
     """
     if gravity_m_s2 is not None:
         if latitude_deg is not None or height_m is not None:

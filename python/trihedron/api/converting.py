@@ -1,4 +1,4 @@
-"""Convert: any log that is read, as one that every program reads."""
+"""Convert a log of any supported format to CSV, npz or Parquet."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ COUNTS_PER_G = 16384.0
 
 @dataclass(frozen=True, eq=False)
 class Demonstration:
-    """What the demonstration did and where it left its files."""
+    """Results of the demonstration's first act and the folder of its files."""
 
     result: CalibrationResult
     verification: VerificationResult
@@ -93,7 +93,7 @@ def demonstrate(folder: Path, *, overwrite: bool = False, say: Callable[[str], N
     """Simulate two sessions of one sensor, calibrate by the first, verify on the second, write everything to
     ``folder``.
 
-    The logs are written as CSV and read back like anybody's: nothing but the final comparison knows the truth.
+    The logs are written as CSV and read back like any log: only the final comparison uses the truth.
     """
     tell = say or (lambda _sentence: None)
     folder.mkdir(parents=True, exist_ok=True)
@@ -125,9 +125,9 @@ def demonstrate(folder: Path, *, overwrite: bool = False, say: Callable[[str], N
 
 
 def compare_with_truth(calibration: Calibration, truth: Truth) -> Comparison:
-    """Estimate, truth and uncertainties of every parameter that the frame leaves free.
+    """Estimate, truth and uncertainties of every free parameter of the frame.
 
-    The truth is turned into the calibration's frame first; the rotation that does so depends on the truth alone.
+    The truth is first rotated into the calibration's frame; that rotation depends on the truth alone.
     """
     change = reframing(truth.accelerometer_S, truth.accelerometer_b, calibration.frame)
     sensors = [("accelerometer", calibration.accelerometer, truth.accelerometer_S, truth.accelerometer_b)]
@@ -150,11 +150,10 @@ def compare_with_truth(calibration: Calibration, truth: Truth) -> Comparison:
 
 
 def truth_of_the_day(scenario: Scenario, seed: int) -> Truth:
-    """The truth with the biases as they were on average in this session.
+    """The truth with the mean biases of this session.
 
-    Flicker and walk move a bias slowly; what a session can show is its mean of that day, and no calibration knows the
-    number the factory started from. The slow part is the difference to the same session without it: every other stage
-    of the simulation draws what it drew before.
+    A session determines the mean of a bias that drifts by flicker, random walk and ramp, not its nominal value. The
+    drift is the difference to the same session simulated without these terms: all other random draws are equal.
     """
     recording, truth = simulate(scenario, seed)
     accelerometer, gyroscope = scenario.accelerometer, scenario.gyroscope
@@ -197,7 +196,7 @@ def _session(path: Path, layout: int, overwrite: bool) -> Recording:
 
 
 def _uncalibrated_rms(segments: Segments, gravity_m_s2: float) -> float:
-    """Norm error [m/s²] at rest with the data sheet's sensitivity and no zero: what a user has without calibration."""
+    """Rms gravity error in static poses [m/s²] without calibration: the data sheet's sensitivity and no bias."""
     assert segments.accelerometer_mean is not None
     norm = np.linalg.norm(segments.accelerometer_mean * (STANDARD_GRAVITY_M_S2 / COUNTS_PER_G), axis=1)
     return float(np.sqrt(np.mean((norm - gravity_m_s2) ** 2)))

@@ -1,4 +1,4 @@
-"""Diagnose: hold a digital twin against a recording, name the physics it lacks, and take that physics into use."""
+"""Diagnose: compare a model or a simulation with a recording and find the effects that it lacks."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def _of_poses(
     alpha: float,
     tell: Progress,
 ) -> DiagnosisResult:
-    """What poses and the moves between them say."""
+    """The diagnosis by poses and moves, without a reference."""
     known = None if calibration is None else calibration_of(calibration)
     if known is None or place != (None, None, None):
         gravity, source, said = settle_gravity(*place)
@@ -150,7 +150,7 @@ def _of_poses(
     tell(begun, "calibrating")
     used, free = _start(calibrated, gravity, known, is_simulation=simulated is not None)
     recording_used, segments_used = recording, segments
-    # Where the poses leave the model open the twin starts from nominal values, for the gyro too.
+    # Where the poses do not determine the model, the session state starts from nominal values, for the gyro too.
     if recording.gyroscope is not None and used.gyroscope is None and not (free and is_open(used)):
         findings += [f for f in used.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT] or [_gyroscope_left_out()]
         recording_used, segments_used = _accelerometer_only(recording, segments)
@@ -196,7 +196,7 @@ def _of_poses(
 def _beside_scenario(
     found: Diagnosis, scenario: Scenario, fitted: tuple[Recording, Segments, Calibration], alpha: float
 ) -> Diagnosis:
-    """What only a scenario shows: its biases were applied as it states them, and it can be moved as often as needed."""
+    """Repeated simulations with the recording's motion; drops the remark on biases that were never applied."""
     asked = tuple(replace(p, remark="") if p.id in BIASES else p for p in found.parameters)
     found = replace(found, parameters=asked)
     if fitted[0].gyroscope is None or fitted[2].gyroscope is None:
@@ -206,7 +206,7 @@ def _beside_scenario(
 
 @dataclass(frozen=True, eq=False)
 class _Free:
-    """A simulated recording, calibrated and diagnosed on its own."""
+    """A simulated recording with its own calibration and diagnosis."""
 
     calibration: Calibration
     segments: Segments
@@ -218,7 +218,7 @@ class _Free:
 
 
 def _with_ranges(simulated: _Free, found: Diagnosis, recording: Recording) -> tuple[Diagnosis, Recording]:
-    """The simulation and its diagnosis, with ranges that its scenario states and no reading of it came to."""
+    """Diagnosis and log of the simulation, with range limits that its scenario states but no reading reaches."""
     if simulated.scenario is None:
         return simulated.diagnosis, simulated.recording
     shown = {effect.id for effect in simulated.diagnosis.effects}
@@ -229,11 +229,11 @@ def _with_ranges(simulated: _Free, found: Diagnosis, recording: Recording) -> tu
 def _start(
     calibrated: Calibrated, gravity: float, known: Calibration | None, *, is_simulation: bool
 ) -> tuple[Calibration, bool]:
-    """The model that the search begins from, and whether it is the recording's own.
+    """The model that the search starts from, and whether it is the recording's own.
 
-    A given model is compared with what the recording says of itself. Where its poses are too few to say it, the numbers
-    of a calibration stay, with their uncertainties as knowledge. Those of a simulation are none: its errors say how
-    well its own log shows its numbers, and nothing of how far this unit lies from them.
+    A given model is compared with the recording's own calibration. Where poses are too few to determine that, a given
+    calibration is the start, its uncertainties the prior. A simulation's is no prior for this unit: its uncertainties
+    describe how well its own log determines its parameters, not how far this unit differs from them.
     """
     if known is None:
         return calibrated(), True
@@ -248,7 +248,7 @@ def _start(
 def _simulated_log(
     against: GivenModel, recording: Recording, segments: Segments, gravity: float
 ) -> tuple[Recording, Scenario | None]:
-    """The simulated log, and the scenario behind it where that was given."""
+    """The simulated log, and its scenario where that was given."""
     if isinstance(against, Recording):
         return against, None
     if not isinstance(against, Scenario):
@@ -270,7 +270,7 @@ def _simulated_log(
 def _simulated(
     against: GivenModel, recording: Recording, segments: Segments, gravity: float, alpha: float, tell: Progress
 ) -> tuple[_Free, Recording, Segments, tuple[Finding, ...]]:
-    """The simulation diagnosed on its own, the recording with the sensors of both, and what is to be said of them."""
+    """The simulation's own diagnosis, the recording with the sensors that both have, its segments, and findings."""
     tell(0.05, "diagnosing the simulated recording")
     logged = _simulated_log(against, recording, segments, gravity)
     logged, recording, segments, one_sided = _both_sensors(logged, recording, segments)
@@ -311,7 +311,7 @@ def _protocol(simulated: Segments, segments: Segments) -> tuple[Finding, ...]:
 def _both_sensors(
     logged: tuple[Recording, Scenario | None], recording: Recording, segments: Segments
 ) -> tuple[tuple[Recording, Scenario | None], Recording, Segments, tuple[Finding, ...]]:
-    """Both sides without their gyro where one side has none."""
+    """Both sides without the gyro where one side has none."""
     theirs, scenario = logged
     if (theirs.gyroscope is None) == (recording.gyroscope is None):
         return logged, recording, segments, ()
@@ -334,7 +334,7 @@ def _accelerometer_only(recording: Recording, segments: Segments) -> tuple[Recor
 def _noise(
     simulated: _Free, found: Diagnosis, recording: Recording, segments: Segments, alpha: float
 ) -> tuple[NoiseDifference, ...]:
-    """Noise and slow noise of the simulation against those of the recording."""
+    """Noise and slow noise of the simulation compared with those of the recording."""
     ours = sampled(recording, segments.poses, model_of_diagnosis(found))
     theirs = (simulated.diagnosis, simulated.recording, simulated.segments)
     return (

@@ -1,4 +1,4 @@
-"""Diagnose what holds one or two orientations: static logs, chamber logs, tables that stand still."""
+"""Diagnose logs of one or two orientations: static logs, temperature chambers, a table that does not turn."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from trihedron.records.results import DiagnosisResult
 from trihedron.units import acceleration_to_si, rate_to_si
 
 Calibrated = Callable[[], Calibration]
-"""The recording's own calibration, made when first asked for; raises what ``calibrate`` raises."""
+"""The recording's own calibration, computed on first use; raises what ``calibrate`` raises."""
 FEWEST_POSES = 3
-"""Below this nothing can be calibrated."""
+"""Fewest poses for which a calibration is tried."""
 SAME_POSE_RAD = 0.15
 """Poses whose gravity points less than 9° apart are one orientation."""
 TWO_ORIENTATIONS = 2
 MOSTLY = 0.9
-"""Share of the time at rest that two orientations take where the others are handling."""
+"""Fraction of the static time in two orientations from which all other poses count as handling."""
 TURNED_RAD, MOST_TURNS = 0.7, 2
-"""A move that turns by 40° belongs to a session; a log of one or two orientations has a turn between them or two."""
+"""Rotation [rad] (40°) from which a move counts as a turn, and the most turns of a log of one or two orientations."""
 
 
 def at_rest(
     recording: Recording, segments: Segments, known: Calibration | None, gravity_m_s2: float, calibrated: Calibrated
 ) -> LinearModel | None:
-    """The model whose units a log of one or two orientations is read in; ``None`` where the log is a session."""
+    """The model that converts a log of one or two orientations to SI; ``None`` where the log is a session."""
     if recording.accelerometer is None or not _is_rest(recording, segments, calibrated):
         return None
     return _nominal(recording, segments, gravity_m_s2) if known is None else _given(known)
@@ -58,7 +58,7 @@ def _is_rest(recording: Recording, segments: Segments, calibrated: Calibrated) -
         near = free & (np.arccos(np.clip(up @ up[first], -1.0, 1.0)) < SAME_POSE_RAD)
         of_orientations.append(float(lasts[near].sum()))
         free &= ~near
-    # Counts about the middle of an ADC's range all point the same way: there the fit alone tells.
+    # Unsigned counts with a large offset all point the same way: only a fit shows whether they are a session.
     is_known = acceleration_to_si(recording.accelerometer_unit) is not None
     if is_known and len(of_orientations) <= TWO_ORIENTATIONS:
         return _turns(recording, segments) <= MOST_TURNS
@@ -73,7 +73,7 @@ def _is_rest(recording: Recording, segments: Segments, calibrated: Calibrated) -
 
 
 def _turns(recording: Recording, segments: Segments) -> int:
-    """Moves that turn the sensor far, as its gyro has it: a table that turns about the vertical shows no other sign."""
+    """Number of moves beyond ``TURNED_RAD`` by the gyro: gravity does not show a turn about the vertical."""
     scale = rate_to_si(recording.gyroscope_unit)
     if recording.gyroscope is None or scale is None or segments.gyroscope_mean is None:
         return 0
@@ -87,7 +87,7 @@ def _turns(recording: Recording, segments: Segments) -> int:
 
 
 def _nominal(recording: Recording, segments: Segments, gravity_m_s2: float) -> LinearModel:
-    """A plain triad of the unit's nominal scale, counts by the length of gravity, with what parts stray by as error."""
+    """An orthogonal triad of nominal scale (counts scaled by |g|), with the typical spread of parts as uncertainty."""
     assert recording.accelerometer is not None
     scale = acceleration_to_si(recording.accelerometer_unit)
     if scale is None:
@@ -131,7 +131,7 @@ def diagnosed_at_rest(
     alpha: float,
     known: Calibration | None,
 ) -> DiagnosisResult:
-    """What a log of one or two orientations can say."""
+    """The diagnosis of a log of one or two orientations."""
     found = diagnose_rest(recording, model, gravity[0], alpha)
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
     return DiagnosisResult(

@@ -1,4 +1,4 @@
-"""Diagnose several recordings of one unit: each by itself, and what all of them share."""
+"""Diagnose several recordings of one unit: each alone, and the effects that they share."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def diagnose_sessions(
     alpha: float = 0.01,
     progress: Progress | None = None,
 ) -> SharedDiagnosis:
-    """Which physics several recordings of one unit lack together, and which one of them lacks alone.
+    """Effects that several recordings of one unit share, and effects of single recordings.
 
     An effect of the instrument has one size in all recordings: their evidence for it adds (docs/diagnosis-method.md).
 
@@ -33,7 +33,7 @@ def diagnose_sessions(
     gravity_m_s2 or latitude_deg, height_m : float
         |g| at the place, as for :func:`calibrate`.
     alpha : float
-        Chance that healthy recordings are said to share an effect.
+        Probability that healthy recordings are said to share an effect.
     progress : callable, optional
         Called with the share done (0 to 1) and what is being done.
 

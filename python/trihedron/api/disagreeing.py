@@ -1,4 +1,4 @@
-"""The demonstration's second act: a simulation and a log that disagree, and what the tool makes of it."""
+"""The demonstration's second act: a simulation and a log that disagree, and the diagnosis."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ FLAWS: dict[str, Draw] = {
 
 @dataclass(frozen=True, eq=False)
 class Disagreement:
-    """What the second act did: the diagnosis, the one of the improved simulation, and what the seal held."""
+    """Results of the second act: the diagnosis, that of the improved simulation, and the sealed answer."""
 
     seed: int
     found: DiagnosisResult
@@ -85,9 +85,9 @@ class Disagreement:
 def disagree(
     folder: Path, seed: int, *, overwrite: bool = False, say: Callable[[str], None] | None = None
 ) -> Disagreement:
-    """Draw a unit with one flaw, seal what it is, hold a plain simulation against its log, then open the seal.
+    """Draw a unit with one flaw, seal the answer, diagnose its log against a plain simulation, then open the seal.
 
-    The log is written and read back like anybody's; the file with the answer is opened after both verdicts stand.
+    The log is written and read back like any log; the file with the answer is opened after both verdicts.
     """
     tell = say or (lambda _sentence: None)
     folder.mkdir(parents=True, exist_ok=True)
@@ -119,7 +119,7 @@ def _drawn(seed: int, gravity: float) -> tuple[Scenario, dict[str, Any]]:
     profile = profile_by_name("mpu")
     number = int(rng.integers(1, 100_000))
     accelerometer, gyroscope = profile.unit(number)
-    # On the wider range, which hand moves do not leave.
+    # Twice the range, so that hand motion does not clip.
     rows = tuple(tuple(2.0 * v for v in row) for row in gyroscope.S)
     gyroscope = replace(gyroscope, S=rows)  # type: ignore[arg-type]
     motion = hand_session(24, layout=int(rng.integers(1, 10_000)))

@@ -1,4 +1,4 @@
-"""A scenario's instrument moved as a recording was, and what its poses and moves miss beside the recording's."""
+"""A scenario simulated with a recording's motion, and its pose and move errors compared with the recording's."""
 
 from __future__ import annotations
 
@@ -23,40 +23,40 @@ from trihedron.simulate import Scenario, simulate, twin_scenario
 from trihedron.units import radians_from_degrees
 
 FEWEST_MOVES = 6
-"""Moves from which their rms, the worst left out, is known to a third."""
+"""Fewest moves for an rms tilt error: without the worst move its standard uncertainty is then a third."""
 FEWEST_POSES_TO_SPARE = 4
-"""Degrees of freedom of the lengths of gravity below which no scatter of theirs is told."""
+"""Fewest degrees of freedom of the gravity error in poses for which its rms is used."""
 ALIKE = 1.05
-"""Ratio of rms up to which a recording and its simulation miss alike: a tenth is aimed at."""
+"""Ratio up to which rms errors of a recording and its simulation count as equal; the aim is 10 %."""
 MOST_STEPS = 4
-"""Scatters that are tried beyond what was given: a secant on a nearly straight line needs two or three."""
+"""Most scatters tried after the given one: secants on a nearly straight line need two or three."""
 LARGEST_STEP = 100.0
-"""Times by which the square of a scatter may grow in one step."""
+"""Largest factor by which the square of a scatter grows in one step."""
 SEED, N_SEEDS = 20, 8
-"""Of the simulations that are held against the recording: any, but always the same ones. The misses of one simulation
-of twenty poses are known to a fifth, those of eight to a fifteenth."""
+"""First seed (arbitrary, fixed) and number of the simulations compared with the recording. The relative uncertainty of
+the rms error of twenty poses is a fifth for one simulation, a fifteenth for eight."""
 
 
 def driven(
     scenario: Scenario, recording: Recording, segments: Segments, own: Calibration, seed: int = SEED
 ) -> Recording:
-    """The scenario's instrument moved as the recording was: its poses and moves, the scenario's own clock.
+    """The scenario's instrument simulated with the recording's poses and moves and the scenario's own clock.
 
-    ``own`` is the recording's own calibration, by which its motion is told from its readings.
+    ``own`` is the recording's own calibration, by which its motion is computed from its readings.
 
     Raises
     ------
     ValueError
-        When the recording lacks a sensor or was never still.
+        When the recording lacks a sensor or has no static pose.
     """
-    # A pose that was pushed is pushed again: what happened to the recording is no property of an instrument.
+    # Disturbances of poses are repeated: they belong to the recording, not to the instrument.
     motion = twin_scenario(recording, resegment(recording, segments), own).motion
     simulated = _sensed(replace(scenario, motion=motion), seed)
     return replace(simulated, source=f"{scenario.name}, moved as {recording.source}")
 
 
 def _sensed(scenario: Scenario, seed: int) -> Recording:
-    """What the instrument makes of its motion, timestamps as a reader settles them."""
+    """The simulated log, with timestamps as after reading from a file where they scatter."""
     simulated, _ = simulate(scenario, seed)
     if scenario.clock.timestamp_jitter_s > 0.0 or scenario.clock.jitter_s > 0.0:
         return _as_read(simulated)
@@ -64,7 +64,7 @@ def _sensed(scenario: Scenario, seed: int) -> Recording:
 
 
 def _as_read(simulated: Recording) -> Recording:
-    """A simulated log through a file: what its timestamps are worth is settled as that of the recording was."""
+    """A simulated log written and read back, so that its timestamps are judged as the recording's were."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "simulated.csv"
         write_recording(simulated, path)
@@ -72,10 +72,10 @@ def _as_read(simulated: Recording) -> Recording:
 
 
 class MovedAlike:
-    """Scenarios moved as a recording was, and what poses and moves of theirs and of the recording miss.
+    """Pose and move errors of a recording, and of scenarios simulated with its motion.
 
-    ``poses`` [(m/s²)²] and ``moves`` [rad²]: mean squares of the recording, the worst spared; ``None`` where too few
-    tell. ``duration_s`` (m,) of the moves that count.
+    ``poses`` [(m/s²)²] and ``moves`` [rad²]: mean square gravity error in static poses and tilt error after rotations
+    of the recording, the worst excluded; ``None`` where too few. ``duration_s`` (m,) of the moves without the worst.
     """
 
     def __init__(self, recording: Recording, segments: Segments, own: Calibration) -> None:
@@ -85,12 +85,12 @@ class MovedAlike:
         carried = tilt_errors_of(own, recording, cut)
         self.poses = _of_poses(own)
         self.moves = _of_moves(carried)
-        # The one that is spared is often the longest.
+        # The worst move, which is excluded, is often the longest.
         worst = [int(np.argmax(carried.angle_rad))] if len(carried.angle_rad) else []
         self.duration_s = np.delete(carried.duration_s, worst)
 
     def missed(self, scenario: Scenario) -> tuple[float | None, float | None]:
-        """Mean squares of poses and of moves over simulations of a scenario, each with its own calibration."""
+        """Mean square pose error [(m/s²)²] and move error [rad²] over ``N_SEEDS`` simulations, each calibrated."""
         for one, said in self._known:
             if one == scenario:
                 return said
@@ -100,7 +100,7 @@ class MovedAlike:
         return said
 
     def missed_by(self, scenario: Scenario, seed: int) -> tuple[float | None, float | None]:
-        """Mean squares of poses and of moves of one simulation, with its own calibration."""
+        """Mean square pose error [(m/s²)²] and move error [rad²] of one simulation, by its own calibration."""
         log = _sensed(replace(scenario, motion=self._motion), seed)
         try:
             result = calibrate(log, gravity_m_s2=scenario.environment.gravity)
@@ -113,10 +113,10 @@ class MovedAlike:
 
 
 def flicker_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
-    """Flicker of the accelerometer [m/s²] with which lengths of gravity miss no more than the recording's.
+    """Accelerometer flicker B [m/s²] with which the simulated gravity error in poses equals the recording's.
 
-    Octaves inside poses of seconds take a slow line or a hand's tremor for flicker, which wanders on between poses: the
-    lengths of gravity in them show how much of it may. ``None`` where they ask for no less.
+    In poses of seconds a slow line or tremor of the hand looks like flicker, and flicker also drifts from pose to pose:
+    the gravity error limits it. ``None`` where B need not be reduced.
     """
     part, seen = better.accelerometer, beside.poses
     if seen is None or not any(part.noise.B):
@@ -132,15 +132,15 @@ def flicker_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float
     none_of_it = missed(0.0)
     if none_of_it is None or none_of_it >= all_of_it:
         return None
-    # B² adds to the square of the misses.
+    # The mean square error is linear in B².
     return _scaled(part.noise.B, min(max((seen - none_of_it) / (all_of_it - none_of_it), 0.0), 1.0))
 
 
 def bias_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
-    """By how much the accelerometer's bias must be another in every pose [m/s²] for lengths of gravity to miss alike.
+    """Accelerometer bias repeatability [m/s²] with which the simulated gravity error in poses equals the recording's.
 
-    The worst pose of either side is excluded: a disturbed one is no scatter of all of them. ``None`` where both
-    miss alike, or the scenario misses more without any scatter to take out.
+    The worst pose of either side is excluded: a single disturbed pose is not bias repeatability. ``None`` where both
+    errors are equal, or where the scenario has the larger error and no scatter that could be reduced.
     """
     part = better.accelerometer
     if beside.poses is None:
@@ -154,11 +154,11 @@ def bias_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, f
 
 
 def bias_in_moves(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
-    """By how much the gyro's bias must stray in moves [rad/s] for an improved scenario to miss as the recording does.
+    """Gyro bias departure during moves [rad/s] with which the simulated tilt error equals the recording's.
 
-    Tilt errors after the rotations of the recording and of the scenario moved alike, the worst of either side excluded:
-    what the recording misses more is put on the bias, the same on all axes. ``None`` where both miss alike, or the
-    scenario misses more without any straying to take out.
+    Compared are tilt errors after the same rotations, the worst of either side excluded; the recording's excess is
+    attributed to the bias, equal on all axes (model-session.md, 11.8b). ``None`` where both errors are equal, or where
+    the scenario has the larger error and no departure that could be reduced.
     """
     part = better.gyroscope
     if beside.moves is None:
@@ -168,7 +168,7 @@ def bias_in_moves(better: Scenario, beside: MovedAlike) -> tuple[float, float, f
         electronics = replace(part.electronics, bias_in_moves=(math.sqrt(square),) * 3)
         return beside.missed(replace(better, gyroscope=replace(part, electronics=electronics)))[1]
 
-    # Straying σ at both ends and straight between turns by σT/√2 an axis, two axes of three of it across the vertical.
+    # Departures σ at both ends, linear between, rotate by σT/√2 per axis; two of three axes are across the vertical.
     return _matched(part.electronics.bias_in_moves, beside.moves, 1.0 / float(np.mean(beside.duration_s**2)), missed)
 
 
@@ -180,10 +180,10 @@ def _scaled(terms: tuple[float, float, float], share: float) -> tuple[float, flo
 def _matched(
     given: tuple[float, float, float], seen: float, slope: float, missed: Callable[[float], float | None]
 ) -> tuple[float, float, float] | None:
-    """The scatter by which ``missed`` of its square comes to ``seen`` (eq. 9.4), the same on all axes.
+    """The scatter s, equal on all axes, with ``missed(s²) = seen`` (eq. 9.4); None where the given one is best.
 
-    ``slope``: square of the scatter per square that it adds, roughly; how much less of it shows once a fit took part of
-    it up is seen from each step (secants; the same draws at every step, so that nothing but the scatter moves).
+    ``slope`` is the expected change of s² per change of ``missed``. A fit absorbs part of the scatter, so that later
+    steps are secants, with the same random draws at every step.
     """
     before = float(np.mean(np.square(given)))
     made = missed(before)
@@ -202,7 +202,7 @@ def _matched(
             break
         (x0, y0), (x1, y1) = tried[-2:]
         rising = (y1 - y0) / (x1 - x0)
-        # A larger scatter that shows as less is chance of the fits: on with the slope that was expected.
+        # A larger scatter with a smaller error is chance: continue with the expected slope.
         step = (seen - y1) / rising if rising > 0.0 else (seen - y1) * slope
         square = max(min(x1 + step, LARGEST_STEP * max(x1, x0)), 0.0)
     best = min(tried, key=lambda one: abs(math.log(max(one[1], 1e-300) / max(seen, 1e-300))))[0]
@@ -210,7 +210,7 @@ def _matched(
 
 
 def _are_alike(one: float, other: float) -> bool:
-    """Whether two mean squares are within ``ALIKE`` as roots."""
+    """Whether the roots of two mean squares have a ratio within ``ALIKE``."""
     return one == other or (min(one, other) > 0.0 and max(one / other, other / one) < ALIKE**2)
 
 
@@ -220,7 +220,7 @@ def _mean(squares: Sequence[float | None]) -> float | None:
 
 
 def _of_poses(calibration: Calibration) -> float | None:
-    """Mean square of a pose's length of gravity [(m/s²)²] but for its worst, per degree of freedom."""
+    """Mean square gravity error in static poses [(m/s²)²] per degree of freedom, without the worst pose."""
     quality = calibration.accelerometer.quality
     if quality is None or quality.dof < FEWEST_POSES_TO_SPARE:
         return None
@@ -233,13 +233,13 @@ def _of_moves(carried: TiltErrors) -> float | None:
 
 
 def _mean_square_without_worst(misses: FloatArray) -> float:
-    """Mean square of all but the largest."""
+    """Mean square of all but the largest error."""
     return float(np.mean(np.sort(misses**2)[:-1]))
 
 
 @dataclass(frozen=True, eq=False)
 class TiltErrors:
-    """Tilt error (m,) [rad] after each rotation by a recording's own calibration, and the rotations' length.
+    """Tilt error (m,) [rad] after each rotation by a recording's own calibration, and the rotations' duration.
 
     Without rotations beyond the gyro's range: clipping is no bias error.
     """

@@ -37,19 +37,19 @@ def export(
     target : str
         One of ``trihedron.files.formats.targets()`` (docs/export.md): kalibr, px4, gazebo, c, ...
     noise : Noise or path, optional
-        What ``trihedron.allan`` found, or the JSON of ``trihedron allan``: white density and walk, for targets that
-        hold them.
+        The result of ``trihedron.allan``, or the JSON of ``trihedron allan``: white density and random walk, for
+        targets with such entries.
     rate_hz : float, optional
         Rate of the samples; that of the static log when not given.
     topic : str
-        Where the samples are published.
+        ROS topic of the samples.
     accelerometer_lsb, gyroscope_lsb : str
-        The size of a count that the target's driver assumes, as ``0.061 mg``, where the calibration maps counts.
+        The LSB that the target's driver assumes, as ``0.061 mg``, for a calibration of counts.
     current_parameters : path or "none", optional
-        For px4 and ardupilot, where the log did not state it: the parameters that the board held while it logged
+        For px4 and ardupilot, where the log does not state them: the board's parameters while it logged
         (.param, .parm, QGroundControl's .params); "none" where the readings were raw.
     output : path, optional
-        Where to write; of several files each takes its own ending.
+        Where to write; each of several files gets its own ending.
     overwrite : bool
         Replace a file that exists.
 
@@ -61,7 +61,7 @@ def export(
     Raises
     ------
     ValueError
-        When the target is unknown or its convention cannot hold the calibration.
+        When the target is unknown or its convention cannot represent the calibration.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def export(
 
 
 def placed(made: dict[str, str], path: Path, *, write: bool = False, overwrite: bool = False) -> list[Path]:
-    """Where the texts of an export go: of several each takes its own ending; written there when ``write``."""
+    """Paths of the files of an export, each of several with its own ending; written when ``write``."""
     targets = {path.with_name(path.stem + ending) if ending else path: text for ending, text in made.items()}
     if write:
         check_free(list(targets), overwrite=overwrite)
@@ -104,7 +104,7 @@ def placed(made: dict[str, str], path: Path, *, write: bool = False, overwrite: 
 
 
 def parameters_text(current: str | os.PathLike[str] | None) -> str:
-    """The text of a file of current parameters; ``none`` stands for readings that were logged raw."""
+    """The text of a file of current parameters; ``none`` means that the readings were logged raw."""
     if current is None or str(current) in ("", "none"):
         return str(current or "")
     try:

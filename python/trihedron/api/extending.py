@@ -1,4 +1,4 @@
-"""Extend: a calibration with the effects that its own recording demands, where they predict unseen poses and moves."""
+"""Extend a calibration by the effects found in its recording, where they improve cross-validated predictions."""
 
 from __future__ import annotations
 
@@ -71,13 +71,13 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
 
 
 MAY_RISE = 1.25
-"""An rms over 30 poses is known to 13 %: held out, an extension may raise it by twice that and no more."""
+"""Largest allowed rise of a cross-validated rms: twice the relative uncertainty (13 %) of an rms over 30 poses."""
 CARRIED: tuple[Domain, ...] = ("static-accel", "moves")
-"""What S and b of an extension are for: the length of gravity in poses and gravity after moves that it did not see."""
+"""Domains that an extension must predict: gravity error in static poses and tilt error after rotations."""
 
 
 def _spoilt(diagnosis: Diagnosis) -> tuple[str, float, float, str] | None:
-    """A domain whose held-out rms the effects raise, before and after, its unit: that carries over to nothing."""
+    """A domain whose cross-validated rms the effects raise: its name, rms before and after, unit; None without one."""
     stages = {stage.stage: {d.domain: d for d in stage.domains} for stage in diagnosis.stages}
     before, after = stages.get("parameters", {}), stages.get("effects", {})
     for domain in CARRIED:
@@ -134,15 +134,15 @@ _OF_THE_LINEAR_FIT = (
 
 
 def _still_true(base: Calibration, diagnosis: Diagnosis) -> tuple[Finding, ...]:
-    """Findings without those about the linear fit's residuals, where the effects account for all of them; of the poses'
-    shape, where they account for that of the poses."""
+    """Findings without those about the linear fit's residuals, where the effects explain every domain; where they
+    explain the static poses alone, only the finding of nonlinear residuals is removed."""
     left = {d.domain for d in diagnosis.remaining if d.disagrees}
     gone = _OF_THE_LINEAR_FIT if not left else () if "static-accel" in left else (FindingCode.NONLINEAR_RESIDUAL,)
     return tuple(f for f in base.findings if f.code not in gone)
 
 
 def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: np.ndarray) -> SensorCalibration:
-    # Residuals and observability were those of the fit without the effects: they do not belong to these numbers.
+    # Residuals and observability are dropped: they are those of the fit without the effects.
     return replace(
         base,
         S=np.array(model["S"]),

@@ -1,4 +1,4 @@
-"""Noise for a filter: from a log, what is known of its sensor at rest, and known motion beside it."""
+"""Process noise of a filter from a log, the static noise of its sensors, and reference motion."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ from trihedron.units import rate_to_si
 UNITS = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
 HORIZONS_S = (1.0, 10.0, 60.0)
 BAND_PART = 0.25
-"""Vibration is looked for above this part of the sampling rate, where a body hardly moves."""
+"""Vibration is measured above this fraction of the sampling rate, where rigid motion is negligible."""
 SHORTEST_REST_S = 20.0
 FILE_PART = 1.1
-"""A file of noise terms is taken as right within 10 %: it tells a sensor of this kind, on another day."""
+"""Noise terms from a file get an interval of 10 % either way: they are of this kind of sensor, on another day."""
 CONSISTENT = (1.0, 9.0)
-"""NEES of three numbers within a factor of three: beyond it the covariance misleads a filter."""
+"""Acceptable NEES (3 expected, within a factor of three): outside, the covariance misleads a filter."""
 
 Static = dict[str, StaticNoise]
 
@@ -54,36 +54,36 @@ def filter_noise(
     latitude_deg: float | None = None,
     height_m: float | None = None,
 ) -> FilterNoise:
-    """N and K that make a filter's predicted errors right, and what those errors are made of (docs/filter-noise.md).
+    """N and K with which a filter predicts its errors correctly, and the causes of these errors (docs/filter-noise.md).
 
     Parameters
     ----------
     recording : Recording, or what trihedron.read takes
         The log in motion.
     static : Noise or path, optional
-        The sensor at rest: what ``trihedron.allan`` found, a static log, or the JSON of ``trihedron allan``. Without it
+        Static noise: the result of ``trihedron.allan``, a static log, or the JSON of ``trihedron allan``. Without it
         the longest static interval of the log, if it lasts 20 s.
     reference : path, Recording or ReferenceMotion, optional
-        Attitude, and with a position also the accelerometer's part. Without it only static intervals and gravity count.
+        Attitude, and with a position also for the accelerometer. Without it only static intervals and gravity are used.
     reference_columns : str, optional
-        Its columns, where names do not say.
+        Its columns, where names do not state them.
     band_hz : float, optional
-        Vibration is looked for above this frequency; a quarter of the sampling rate otherwise.
+        Vibration is measured above this frequency; a quarter of the sampling rate by default.
     horizons_s : sequence of float
-        Times [s] over which a filter carries on alone.
+        Times [s] over which a filter predicts without updates.
     gravity_m_s2, latitude_deg, height_m : float, optional
         |g| [m/s²], or the place.
 
     Returns
     -------
     FilterNoise
-        N [SI/√Hz] and K [SI/√s] of each sensor with 95 % intervals, shares by cause, and NEES on the half held out.
+        N [SI/√Hz] and K [SI/√s] of each sensor with 95 % intervals, shares by cause, and cross-validated NEES.
 
     Raises
     ------
     ValueError
-        When a horizon or the band is impossible, the reference has no attitude, or nothing is at rest and there is no
-        reference.
+        When a horizon or the band is impossible, the reference has no attitude, or there is neither a static interval
+        nor a reference.
 
     Examples
     --------
@@ -154,7 +154,7 @@ def _segments(recording: Recording) -> Segments | None:
 
 
 def _of_rest(recording: Recording, segments: Segments) -> Noise | None:
-    """Noise of the longest rest; None where none is long enough."""
+    """Noise of the longest static interval; None where none is long enough."""
     if not segments.poses:
         return None
     longest = max(segments.poses, key=lambda pose: pose.stop - pose.start)
@@ -183,7 +183,7 @@ def _sensors(found: Noise | None) -> Static:
 
 
 def _static(given: Noise | str | os.PathLike[str]) -> Static:
-    """What is known of the sensor at rest, by sensor."""
+    """Static noise by sensor, from what was given."""
     if isinstance(given, str | os.PathLike) and os.fspath(given).lower().endswith(".json"):
         figures, _ = read_noise(given)
         return {name: StaticNoise(_bounded(one.N), _bounded(one.K)) for name, one in figures.items()}
@@ -208,7 +208,7 @@ def _bounded(figure: NoiseFigure) -> Bounded:
 
 
 def _at_rest(own: Noise, sensor: str, known: Static) -> SensorFilterNoise:
-    """A sensor as this log's own rest shows it, static values beside."""
+    """Filter noise of a sensor from this log's own static interval, with the static values."""
     unit = UNITS[sensor]
     found = at_rest(own.axes, unit)
     assert found is not None
@@ -259,8 +259,8 @@ def _noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
 
 
 def _uncalibrated(one: SensorFilterNoise) -> tuple[float, float] | None:
-    """Share and horizon [s] where what a calibration removes is more than N and K are for, by its lower limit and
-    their upper ones; None where it is nowhere."""
+    """Share and horizon [s] where errors that a calibration removes exceed those of N and K (lower limit against upper
+    limits); None where nowhere."""
     found: list[tuple[float, float]] = []
     for horizon_s in {share.horizon_s for share in one.shares}:
         at = {share.cause: share.share for share in one.shares if share.horizon_s == horizon_s}

@@ -59,8 +59,8 @@ def kalman(
     sigma_angle_deg : float
         Standard error of the angles in the file.
     noise : AxisNoise, three of them, Noise, or file
-        Noise of the raw readings: as written down (a JSON file), as identified, or a static log to identify it from.
-        Without it, what is seen inside the poses.
+        Noise of the raw readings: from a JSON file, as identified, or a static log to identify it from.
+        Without it, the noise inside the poses.
     frame : "lower" or "symmetric"
         Body frame where there is no reference; with one it is the frame of the reference.
     segments : Segments, optional
@@ -123,7 +123,7 @@ def kalman(
 def _settle_noise(
     noise: NoiseSource | None, recording: Recording
 ) -> tuple[AxisNoise | Sequence[AxisNoise] | None, tuple[Finding, ...], Noise | None]:
-    """Noise in raw units, what was noticed while it was identified, and what was identified from a log."""
+    """Noise in raw units, findings of its identification, and the noise identified from a log."""
     if isinstance(noise, str | os.PathLike):
         if os.fspath(noise).lower().endswith(".json"):
             return read_axis_noise(noise), (), None
@@ -139,7 +139,7 @@ def _settle_noise(
 
 
 def _check_adc(given: Sequence[AxisNoise], recording: Recording, segments: Segments) -> None:
-    """Refuse the noise of a static log that another ADC wrote."""
+    """Raise where the noise is of a static log from another ADC."""
     readings = recording.accelerometer
     if readings is None or not segments.poses:
         return
@@ -147,7 +147,7 @@ def _check_adc(given: Sequence[AxisNoise], recording: Recording, segments: Segme
     if not windows:
         return
     inside = noise_of_poses(readings, recording.rate_hz, windows)
-    # Codes between the poses count too: inside a pose a coarse ADC shows one.
+    # Codes between the poses count too: a coarse ADC shows a single code inside a pose.
     steps = recording.facts.of("accelerometer").step.tolist()
     octaves = [axis.octaves for axis in inside]
     check_same_adc(given, steps, octaves, recording.rate_hz, recording.source)

@@ -1,6 +1,6 @@
-"""Where a guided session stands, by the same verbs as ever: segment, calibrate, and the covariance run ahead.
+"""State of a guided session: segmentation, calibration, and the covariance predicted for further poses.
 
-The one place where the guide meets the estimators: whatever `calibrate` does inside, only its covariances are used.
+Only here the guide uses the estimators, and of `calibrate` only covariances and findings.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ SHORTEST_POSE_S, LONGEST_POSE_S = 3.0, 12.0
 USUAL_POSE_S = 4.0
 _NOT_THE_FIT = (FindingCode.GRAVITY_DEFAULTED, FindingCode.UNIT_CONTRADICTED)
 POSES_PER_GOAL = 2.5
-"""A pose's own error may be so many times the accuracy wanted: a dozen poses average the rest away."""
+"""Allowed error of a single pose in multiples of the target accuracy: averaging over a dozen poses does the rest."""
 
 GYRO_NAMES = tuple(f"scale of {XYZ[i]}" if i == j else f"{XYZ[j]} into {XYZ[i]}" for i in range(3) for j in range(3))
 
@@ -51,9 +51,9 @@ GYRO_NAMES = tuple(f"scale of {XYZ[i]}" if i == j else f"{XYZ[j]} into {XYZ[i]}"
 def examine(
     recording: Recording, accuracy: Accuracy, *, gravity_m_s2: float = STANDARD_GRAVITY_M_S2, look_ahead: bool = True
 ) -> Examination:
-    """Poses so far, every parameter's uncertainty now and after the next pose, and which pose that should be.
+    """Poses so far, every parameter's uncertainty now and after the next pose, and the best next pose.
 
-    ``look_ahead`` also counts the poses that are still needed. Never raises for too few poses: what is unknown is None.
+    ``look_ahead`` also counts the poses still needed. Too few poses raise nothing: unknown values are None.
     """
     segments = segment(recording)
     calibration = _calibration(recording, segments, gravity_m_s2)
@@ -61,7 +61,7 @@ def examine(
     up = _unit((_means(segments) - centre) @ matrix.T)
     known = _known(recording, segments, calibration, up, matrix, gravity_m_s2)
     now_a, now_g = _now(calibration, gravity_m_s2)
-    # What the covariance of the fit adds to the plan's own (noise underrated, correlated poses) goes on to hold.
+    # The ratio of the fit's uncertainty to the planned one (correlated poses, noise too small) is assumed to persist.
     ratio_a = _ratio(now_a, known.accelerometer)
     ratio_g = 1.0 if known.gyroscope is None else _ratio(now_g, known.gyroscope)
     wanted = np.concatenate([np.full(9, accuracy.accelerometer), np.full(9, accuracy.gyroscope)])
@@ -95,7 +95,7 @@ def examine(
 
 
 def part_of(recording: Recording, start_s: float, stop_s: float) -> Recording:
-    """The samples with ``start_s <= time < stop_s``, as a recording of its own that starts at zero."""
+    """The samples with ``start_s <= time < stop_s``, as a recording whose time starts at 0."""
     first, last = (int(i) for i in np.searchsorted(recording.time_s, [start_s, stop_s]))
     rows = slice(first, max(last, first + 1))
 
@@ -122,22 +122,22 @@ def conclude(
     latitude_deg: float | None = None,
     height_m: float | None = None,
 ) -> tuple[CalibrationResult, VerificationResult | None]:
-    """Calibrate from what came before ``cut_s`` and verify on the poses held back after it.
+    """Calibrate from the samples before ``cut_s`` and verify on the later ones.
 
     Raises
     ------
     ValueError
-        When no calibration can be made.
+        When the samples do not determine a calibration.
     """
     before = recording if cut_s is None else part_of(recording, -np.inf, cut_s)
     result = calibrate(before, gravity_m_s2=gravity_m_s2, latitude_deg=latitude_deg, height_m=height_m)
     if cut_s is None or cut_s >= recording.time_s[-1]:
         return result, None
-    # The last pose of the calibration is where the first move of the check starts.
+    # The check includes the last pose of the calibration: its first move starts there.
     last = before.time_s[result.segments.poses[-1].start] + before.time_s[0] if result.segments.n_poses else cut_s
     held_back = part_of(recording, float(last), np.inf)
     segments = segment(held_back)
-    # A check of three poses is no calibration: that it has few is as it should be.
+    # A verification needs few poses, so that the finding about few poses is dropped.
     kept = tuple(finding for finding in segments.findings if finding.code is not FindingCode.FEW_POSES)
     try:
         return result, verify(result.calibration, held_back, segments=replace(segments, findings=kept))
@@ -169,7 +169,7 @@ def _is_determined(calibration: Calibration | None) -> bool:
 def _rough_model(
     recording: Recording, segments: Segments, calibration: Calibration | None
 ) -> tuple[FloatArray, FloatArray]:
-    """(centre (3,), matrix (3, 3)) that turn a raw reading into a vector along up."""
+    """(centre (3,), matrix (3, 3)): matrix · (raw reading − centre) is a vector along up in the body."""
     if calibration is not None and _is_determined(calibration):
         S = calibration.accelerometer.S
         centre: FloatArray = np.asarray(-np.linalg.solve(S, calibration.accelerometer.b), dtype=np.float64)
@@ -180,7 +180,7 @@ def _rough_model(
         return np.zeros(3), np.eye(3)
     lowest, highest = float(np.nanmin(readings)), float(np.nanmax(readings))
     if lowest >= 0.0:
-        # An ADC without sign: zero lies near the middle of its range.
+        # An unsigned ADC: the reading at 0 g is near the middle of its range.
         bits = max(int(np.ceil(np.log2(highest + 1.0))), 1)
         return np.full(3, 2.0 ** (bits - 1)), np.eye(3)
     if len(means) >= 6:
@@ -201,7 +201,7 @@ def _known(
     matrix: FloatArray,
     gravity: float,
 ) -> Known:
-    """The plan's own covariances, from where the poses lie, how the moves went and the noise: known at any moment."""
+    """Planned covariances from the orientations of the poses, the paths of the moves and the noise; no fit needed."""
     relative = np.full(len(up), 1e-3)
     if segments.norm_sigma is not None and len(up):
         length = np.linalg.norm((_means(segments) - _centre_of(segments, up)) @ matrix.T, axis=1)
@@ -236,14 +236,14 @@ def _centre_of(segments: Segments, up: FloatArray) -> FloatArray:
     means = _means(segments)
     if len(means) < 4:
         return np.zeros(3)
-    # Mean reading = centre + size · up: two numbers per axis by least squares.
+    # Mean reading = centre + scale · up, with both equal on all axes, by least squares.
     design = np.column_stack([np.ones(len(up) * 3), up.ravel()])
     offset = np.linalg.lstsq(design, means.ravel(), rcond=None)[0][0]
     return np.full(3, float(offset))
 
 
 def _now(calibration: Calibration | None, gravity: float) -> tuple[FloatArray, FloatArray]:
-    """Relative standard errors by the fit: accelerometer (9,), gyro (9,); NaN where it does not tell."""
+    """Relative standard errors by the fit: accelerometer (9,), gyro (9,); NaN where it determines none."""
     nan = np.full(9, np.nan)
     if calibration is None or not _is_determined(calibration):
         return nan, nan
@@ -290,7 +290,7 @@ def _why(uncertain: tuple[Uncertain, ...]) -> str:
 
 
 def _pose_s(known: Known, accuracy: Accuracy, segments: Segments) -> float:
-    """Long enough that one pose is known to a few times what is wanted; noise falls with the root of the time."""
+    """Duration of a pose [s] for which its error is ``POSES_PER_GOAL`` times the target; noise falls as 1/√time."""
     held = float(np.median(segments.duration_s)) if segments.n_poses else USUAL_POSE_S
     excess = known.pose_sigma / (POSES_PER_GOAL * accuracy.accelerometer)
     return float(np.clip(held * excess**2, SHORTEST_POSE_S, LONGEST_POSE_S))

@@ -33,7 +33,7 @@ from trihedron.units import (
 )
 
 IN_MEMORY_BYTES = 1 << 29
-"""A log up to this size is taken whole even when it is read in pieces: events can then be found and left out."""
+"""Largest log that is read whole into memory: disturbances can then be found and excluded."""
 
 
 def allan(
@@ -59,9 +59,9 @@ def allan(
     clusters : sequence of int, optional
         Readings per cluster of the Allan curve; evenly spaced in the logarithm when not given.
     accelerometer_lsb, gyroscope_lsb : str, optional
-        The size of a count of a log in counts: ``"0.05 deg/s"``.
+        The LSB of a log in counts: ``"0.05 deg/s"``.
     calibration : CalibrationResult, Calibration or path, optional
-        Of the unit: it gives the size of a count of every axis.
+        A calibration of the unit: it gives the LSB of every axis.
 
     Returns
     -------
@@ -101,12 +101,12 @@ def allan(
         clusters=clusters,
         source=recording.source,
     )
-    # What the log is said to be comes before what its noise is.
+    # Findings about the log come before those about its noise.
     return replace(found, findings=(*recording.findings, *doubts, *found.findings))
 
 
 def _in_si(recording: Recording, known: Calibration) -> Recording:
-    """Every axis divided by its sensitivity; the axes are not turned: a converter's steps stay what they are."""
+    """Every axis divided by its sensitivity; axes are not rotated, so that every axis keeps the steps of its ADC."""
     check_units(known, recording)
     accelerometer, gyroscope = (
         readings if sensor is None or readings is None else readings / np.linalg.norm(np.linalg.inv(sensor.S), axis=1)
@@ -137,16 +137,16 @@ def noise_of_file(
     automatic: bool = True,
     checkpoint: str | os.PathLike[str] | None = None,
 ) -> Noise:
-    """Noise of a .npy, Parquet or text log of any size in bounded memory; what its columns are is said, not judged.
+    """Noise of a .npy, Parquet or text log of any size in bounded memory; its columns are as given, not detected.
 
-    Up to half a gigabyte the log is read whole; beyond, it is read in one pass (:func:`stream_noise`), which leaves
-    nothing out. With ``checkpoint`` that file keeps every half a minute how far the pass is; a run that was stopped
-    goes on from it, to the same bits, and the end removes it.
+    Up to half a gigabyte the log is read whole; beyond, in one pass (:func:`stream_noise`) that excludes no
+    disturbance. With ``checkpoint`` that file stores the state of the pass every half a minute; an interrupted run
+    continues from it with bit-identical results, and the end removes it.
 
     Raises
     ------
     ValueError
-        When file, columns, stretches to leave out, sizes of counts or ``checkpoint`` do not fit one another.
+        When file, columns, excluded intervals, LSBs or ``checkpoint`` do not match.
     """
     log = open_chunks(Path(path), columns)
     factor, names, units = [], [], []
@@ -215,10 +215,10 @@ def noise_of_curve(
     accelerometer_unit: str | AccelerationUnit | None = None,
     gyroscope_unit: str | RateUnit | None = None,
 ) -> Noise:
-    """Noise terms of a table of Allan deviations, of which the log is not at hand (docs/noise.md, section 5).
+    """Noise terms from a table of Allan deviations, without its log (docs/noise.md, section 5).
 
     ``rate_hz`` and ``n_samples`` are those of the log behind the curve, where the table does not state them. Channels
-    whose names begin with ``g`` or ``a`` take the unit said for the gyro or the accelerometer.
+    whose names begin with ``g`` or ``a`` have the unit given for the gyro or the accelerometer.
 
     Raises
     ------
@@ -247,12 +247,12 @@ def noise_of_curve(
 
 
 def recording_lengths(noise: Noise, relative: float) -> dict[str, dict[TermName, float | None]]:
-    """Seconds of recording after which each term present in each axis is known to ``relative``; None beyond a month.
+    """Recording time [s] for a relative uncertainty ``relative`` of each term present, by axis; None beyond a month.
 
     Raises
     ------
     ValueError
-        When ``relative`` is no positive share.
+        When ``relative`` is no positive fraction.
     """
     return {
         axis.name: {term: recording_length_s(axis, term, relative) for term in TermName if axis.terms[term].is_present}

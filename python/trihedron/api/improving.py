@@ -1,4 +1,4 @@
-"""A user's scenario against a recording: driven with its motion, compared, and written again with what was found."""
+"""A user's scenario, simulated with a recording's motion, compared with it, and rewritten to match it."""
 
 from __future__ import annotations
 
@@ -36,15 +36,15 @@ from trihedron.simulate import (
 
 FEWEST_OCTAVES = 4
 N_FREQUENCIES = 256
-"""At which a filter is compared with what was seen: a sixteenth of an octave in the middle of the band."""
+"""Number of evenly spaced frequencies up to half the rate at which a filter's gain is compared."""
 
 
 @dataclass(frozen=True)
 class Improvement:
-    """The text of an improved scenario, and what could not be put into it, each with the reason.
+    """The text of an improved scenario, and effects that it cannot represent, each with the reason.
 
-    ``unlike``: what ``poses`` (lengths of gravity) and ``moves`` (gravity carried through them) of the improved
-    scenario miss, rms, over what the recording's do, where that is outside ``AIMED_AT``.
+    ``unlike``: ratio of rms errors, improved scenario over recording, of ``poses`` (gravity error in static poses) and
+    ``moves`` (tilt error after rotations), where outside ``AIMED_AT``.
     """
 
     text: str
@@ -55,10 +55,10 @@ class Improvement:
 def improve(
     scenario: str | Path, found: DiagnosisResult, *, stage: Literal["parameters", "noise", "effects"] = "effects"
 ) -> Improvement:
-    """The user's scenario file with numbers, noise, sampling and physics of the recording.
+    """The user's scenario file with parameters, noise, sampling and effects of the recording.
 
-    Only what differs is replaced, with its comment; all else stays. Effects that only the scenario has are taken out.
-    ``stage`` stops after the numbers, or after noise and sampling.
+    Only entries that differ are replaced, with their comment; all else stays. Effects that only the scenario has are
+    removed. ``stage`` stops after the parameters, or after noise and sampling.
 
     Raises
     ------
@@ -86,8 +86,8 @@ def improve(
     own = found.updated
     if own is not None and own.gyroscope is not None:
         beside = MovedAlike(found.recording, found.segments, own)
-        # What octaves called flicker and poses do not show goes first. Then poses: a force that is another in every
-        # pose also turns the gravity that moves are judged by.
+        # First flicker that octaves show and poses do not. Then poses before moves: an accelerometer bias in a pose
+        # also tilts the gravity by which moves are judged.
         for sensor, table, key, of in (
             ("accelerometer", "noise", "B", flicker_of_poses),
             ("accelerometer", "electronics", "bias_repeatability", bias_of_poses),
@@ -102,7 +102,7 @@ def improve(
 
 
 def _unlike(better: Scenario, beside: MovedAlike) -> dict[str, float]:
-    """What poses and moves of a scenario miss over what the recording's do, where that is not as good as one."""
+    """Ratio of rms pose and move errors, scenario over recording, where outside ``AIMED_AT``."""
     made = dict(zip(("poses", "moves"), beside.missed(better), strict=True))
     seen = {"poses": beside.poses, "moves": beside.moves}
     ratios = {k: math.sqrt(m / s) for k, m in made.items() if m is not None and (s := seen[k]) is not None and s > 0.0}
@@ -110,12 +110,12 @@ def _unlike(better: Scenario, beside: MovedAlike) -> dict[str, float]:
 
 
 def _of_poses(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
-    """Noise inside the recording's poses as terms and a low-pass, sensor by sensor: what its octaves show."""
+    """Noise terms and low-pass of each sensor, fitted to the octaves of the noise inside the recording's poses."""
     recording = found.recording
     seen = sampled(recording, found.segments.poses, model_of_diagnosis(found)).noise
     out = {}
     for name, axes in seen.items():
-        # The same octaves on all axes; at most those below half the rate.
+        # Octaves common to all axes, below half the rate.
         bands = [o for o in axes[0].octaves if o.high_hz <= 0.5 * recording.rate_hz]
         by_axis = [{o.low_hz: o.density for o in axis.octaves} for axis in axes]
         bands = [o for o in bands if all(o.low_hz in one for one in by_axis)]
@@ -137,7 +137,7 @@ def _of_poses(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
 
 
 def white_and_quantisation_of(seen: Sampled, name: str) -> dict[str, list[float]]:
-    """N and Q of all axes of a sensor, as its octaves show them together; empty where some axis tells them not."""
+    """N and Q of all axes of a sensor from one fit to its octaves; empty where some axis does not determine them."""
     axes = [white_and_quantisation(axis) for sensor, each in seen.noise.items() if sensor == name for axis in each]
     known = [one for one in axes if one is not None]
     if len(known) < len(axes):
@@ -149,10 +149,10 @@ def white_and_quantisation_of(seen: Sampled, name: str) -> dict[str, list[float]
 
 
 def _low_pass(axes: Sequence[PoseNoise]) -> Smoother | float | None:
-    """The low-pass whose gain is that of the filter seen on all axes, none where none was seen.
+    """The low-pass whose gain is nearest to the filter detected on all axes; an empty one where none is detected.
 
-    Where axes show unlike ones that colour is a hand's or a stand's too: roughly the corner [Hz] of most of them, for
-    the octaves to tell the shape; ``None`` where most show none.
+    Axes with different corners contain motion of the hand or the support: then the geometric mean of the corners [Hz],
+    near which the octaves determine the filter; ``None`` where half of the axes or more show none.
     """
     rate = axes[0].rate_hz
     seen = [(one.corner_hz.value, one.corner_shape) for one in axes if one.corner_hz is not None]
@@ -168,7 +168,7 @@ def _low_pass(axes: Sequence[PoseNoise]) -> Smoother | float | None:
 def _white(axes: Sequence[PoseNoise]) -> list[tuple[float, float] | None]:
     """N of every axis with its relative error, where all axes show one filter or none.
 
-    What lies below a corner of an axis' own is its motion.
+    Where the corners differ, the noise below them includes motion.
     """
     if len({(one.corner_hz, one.corner_shape) for one in axes}) > 1:
         return [None] * len(axes)
@@ -185,28 +185,28 @@ def _numbers(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosi
     fits = (("accelerometer", "accel", found.extended.accelerometer), ("gyroscope", "gyro", found.extended.gyroscope))
     for name, prefix, fit in fits:
         groups = {f"{prefix}-bias", f"{prefix}-scale", f"{prefix}-misalignment", "triad-alignment"}
-        # S and b of both sensors are in one frame: where one of them is replaced, both are.
+        # S and b of both sensors are in one frame, so that they are replaced together.
         scaled = {n.sensor for n in found.noise_compared if n.term in ("range", "unit") and n.significant}
         if fit is None or not (moved & (groups | {"accel-misalignment", "gravity"}) or scaled):
             continue
         tables[name] |= {"S": np.array(fit["S"]), "b": np.array(fit["b"]), "unit": str(fit["raw_unit"])}
         readings = getattr(found.recording, name)
         if readings is not None and getattr(given, name).unit.value != fit["raw_unit"]:
-            # Codes of another unit: the ADC is that of the recording.
+            # Raw readings are in another unit: the recording's LSB replaces the scenario's.
             tables[name]["adc"] = {"lsb": found.recording.facts.of(name).common_step}
 
 
 def _gravity(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:
-    # Told apart only beyond what a latitude changes in its last printed digit.
+    # Smaller differences are below the last printed digit of a latitude.
     if abs(given.environment.gravity - found.gravity_m_s2) > 1e-4:
         tables["environment"]["gravity_m_s2"] = found.gravity_m_s2
 
 
 def _ranges(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> set[str]:
-    """Ranges of the recording's ADCs, where its readings end at them exactly; the effects that say so already.
+    """Write the exact range limits of the recording's ADCs; returns the ids of effects that these replace.
 
-    An end that no reading came to is where the other one is. Channels with limits of their own, and limits that noise
-    has blurred, are none of an ADC: those stay an effect.
+    A limit that no reading reached is taken as symmetric to the other one. Limits that differ between channels, or are
+    blurred by noise, are not of an ADC: those stay an effect.
     """
     out = set()
     for effect, name in SENSOR.items():
@@ -221,7 +221,7 @@ def _ranges(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosis
         ends = {is_high: [one.value for one in facts.limits if one.is_high == is_high] for is_high in (False, True)}
         if any(max(values) - min(values) > float(facts.step.max()) for values in ends.values() if values):
             continue
-        # A word of bits goes one code further down than up.
+        # Two's complement: the lowest code is one further from 0 than the highest.
         code = float(facts.step.max()) if any(one.is_word for one in facts.limits) else 0.0
         low = min(ends[False], default=-max(ends[True], default=0.0) - code)
         high = max(ends[True], default=-low - code)
@@ -247,7 +247,7 @@ def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisR
                     values[axis] = n.recording
             elif n.term == "resolution" and n.recording is not None:
                 tables[name].setdefault("adc", {})["lsb"] = n.recording
-        # A scenario without noise is wrong where the recording shows some, however its poses happen to be found.
+        # A scenario without noise gets the recording's, whether or not the comparison of noise has a result.
         if name in poses and (not any(had.N) or any(n.term in ("octave", "bandwidth") for n in differing)):
             noise, low_pass = poses[name]
             terms["N"] = list(noise.N)
@@ -258,7 +258,7 @@ def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisR
             if "B" not in terms and any(noise.B):
                 terms["B"] = list(noise.B)
         if "Q" in terms:
-            # What rises with frequency is in the white noise of neighbours: both from one fit, and no low-pass.
+            # N from neighbouring samples includes quantisation noise: N and Q are from one fit, without a low-pass.
             seen = sampled(found.recording, found.segments.poses, model_of_diagnosis(found))
             both = white_and_quantisation_of(seen, name)
             if both:

@@ -1,4 +1,4 @@
-"""Plan: how certain an experiment would be, before it is made."""
+"""Plan: uncertainties to expect from an experiment."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def plan(
     Parameters
     ----------
     turns_deg : sequence of float
-        The turns about each of the three axes [°].
+        Turns about each of the three axes [°].
     turn_s : float
         Duration of one turn [s].
     pose_s : float
@@ -51,7 +51,7 @@ def plan(
     Returns
     -------
     ExperimentPlan
-        Uncertainties that turns, poses and moves would lead to.
+        Uncertainties to expect from turns, poses and moves.
 
     Raises
     ------
@@ -130,15 +130,15 @@ def _poses(name: str, sigma: float, gravity_m_s2: float) -> PosePlan:
 
 
 _SOME_SIGMA = 1e-4
-"""Of a pose, in g: which poses are best does not depend on it."""
+"""Standard error of a pose [g], arbitrary: the best set of poses does not depend on it."""
 
 
 def _best(n: int) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """n of the 26 poses: taken one after another, then exchanged as long as the worst standard error falls."""
+    """n of the 26 poses: added one after another, then exchanged as long as the largest standard error falls."""
 
     def score(rows: list[int]) -> float:
         design = PoseDesign.of(CANDIDATES[rows], np.full(len(rows), _SOME_SIGMA))
-        # What is not seen yet is as uncertain as the thing itself; among equals the smaller sum.
+        # Prior: 100 % relative error of every parameter. The sum of the variances breaks ties.
         covariance = np.linalg.inv(design.information + np.eye(9))
         return float(covariance.diagonal().max() + 1e-3 * np.trace(covariance))
 

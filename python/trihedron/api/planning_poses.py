@@ -1,4 +1,4 @@
-"""Which pose next: covariances run ahead of the data, for every pose that a hand can find."""
+"""Choice of the next pose: covariances predicted for each of 26 candidate poses."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from trihedron.records import Recording, Segments
 from trihedron.transforms import rotation_by
 
 NEAR = 0.9
-"""Cosine above which a pose is no move from the one before."""
+"""Cosine to the previous pose above which a pose is not a candidate: the move would be too small."""
 
 CORNER_PENALTY = 1.15
-"""A board stands on a face, leans on an edge, and is hard to hold on a corner: the corner must be worth it."""
+"""Factor on the cost of a pose on a corner, which is harder to hold still than one on a face or an edge."""
 
 LONGEST_LOOK = 24
 
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """Model covariances in relative units: accelerometer (9, 9) in the order of ``NAMES``, gyro (9, 9) row by row."""
+    """Planned covariances, relative: accelerometer (9, 9) in the order of ``NAMES``, gyro (9, 9) row by row of S."""
 
     up: FloatArray
     accelerometer: FloatArray
@@ -34,7 +34,7 @@ class Known:
 def path_of(
     recording: Recording, segments: Segments, S: FloatArray | None, before: int, after: int, start: int, stop: int
 ) -> FloatArray | None:
-    """(k, 3) small rotation vectors of a move as the gyro saw it, in the body, or None without a scale."""
+    """(k, 3) small rotation vectors of a move from the gyro, in the body, or None without a scale."""
     assert recording.gyroscope is not None
     if S is None or stop - start < 4 or segments.gyroscope_mean is None:
         return None
@@ -46,8 +46,8 @@ def path_of(
 
 
 def shortest_path(start: FloatArray, stop: FloatArray, n: int = 30) -> FloatArray:
-    """(n, 3) rotation vectors of the body that take up from ``start`` to ``stop``, both (3,) in the body."""
-    # Up turns in the body against the body's own turn.
+    """(n, 3) rotation vectors of the body that move up from ``start`` to ``stop``, both (3,) in the body."""
+    # In the body, up rotates opposite to the body's own rotation.
     axis = np.cross(stop, start)
     size = float(np.linalg.norm(axis))
     if size < 1e-9:
@@ -59,9 +59,9 @@ def shortest_path(start: FloatArray, stop: FloatArray, n: int = 30) -> FloatArra
 
 
 def move_rows(path: FloatArray, up_after: FloatArray) -> FloatArray:
-    """(2, 9) derivative of where up is found after a move with respect to the gyro's relative errors, row by row.
+    """(2, 9) derivative of the predicted vertical after a move [rad] by the gyro's relative errors, row by row.
 
-    An error E of the gyro (relative, δω = E ω) turns the attitude by Σ R E ω dt, R from the instant to the end.
+    A relative error E of the gyro (δω = E ω) rotates the attitude by Σ R E ω dt, R from the instant to the end.
     """
     rotation = np.eye(3)
     total = np.zeros((3, 9))
@@ -95,14 +95,14 @@ def _updated(covariance: FloatArray, rows: FloatArray, sigma: float) -> FloatArr
 
 
 def best_next(known: Known, wanted: FloatArray, factor: FloatArray) -> tuple[FloatArray, Known]:
-    """The pose of 26 that leaves the smallest shortfall, reached by the shortest turn from where the board lies."""
+    """The pose of 26 with the smallest remaining shortfall, reached by the shortest turn from the last pose."""
     best: tuple[float, FloatArray, Known] | None = None
     for direction in CANDIDATES:
         if len(known.up) and float(known.up[-1] @ direction) > NEAR:
             continue
         future = _with_pose(known, direction)
         relative = sigma_of(future) * factor / wanted
-        # The worst decides; the rest together break ties, so that no pose is asked for nothing.
+        # The largest ratio decides; the rms of all breaks ties, so that every pose improves something.
         cost = float(np.nanmax(relative)) + 0.3 * float(np.sqrt(np.nanmean(relative**2)))
         cost *= CORNER_PENALTY if np.all(np.abs(direction) > 0.3) else 1.0
         if best is None or cost < best[0]:

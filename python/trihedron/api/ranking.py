@@ -1,4 +1,4 @@
-"""Several calibrations of any maker, put in order by a recording that none of them was made from."""
+"""Rank calibrations of any program on a recording that none of them was made from."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ def rank(
     height_m: float | None = None,
     progress: Progress | None = None,
 ) -> Ranking:
-    """Calibrations of one unit, of ours or of any maker's files, in the order in which they fit a recording.
+    """Calibrations of one unit, from trihedron or any other program, in the order in which they fit a recording.
 
-    Each is judged by gravity in static poses, by tilt after rotations and by the rate at rest; the order is that of
-    their log predictive density. Of one that does not fit, the mistake is named which, undone, makes it fit: the sign
-    or unit of a bias, the direction of a matrix, its axes, the gravity it was made with.
+    Each is judged by gravity in static poses, tilt after rotations and the static rate, and ranked by log predictive
+    density. For one that does not fit, a likely mistake is named, with which corrected it fits: the sign or unit of a
+    bias, the direction of a matrix, its axes, the gravity it was made with.
 
     Parameters
     ----------
     calibrations : sequence of calibration, result or path
     recording : Recording, or what trihedron.read takes
     gravity_m_s2 or latitude_deg, height_m : float
-        As for :func:`calibrate`; else that which the calibrations of ours state.
+        As for :func:`calibrate`; by default that of the trihedron calibrations.
     segments : Segments, optional
         Poses and moves; found when not given.
     progress : callable, optional
@@ -97,7 +97,7 @@ def rank(
         )
         for name, known, verification in judged
     ]
-    # One that is rejected is no measure, however well it fits: it may have been made from this very log.
+    # A rejected calibration is not the best, however well it fits: it may have been made from this very log.
     best = points[min(range(len(out)), key=lambda k: (out[k].is_rejected, -points[k].sum()))]
     lost = [best - own_points for own_points in points]
     out = [
@@ -126,7 +126,7 @@ def _judge(
 
 
 def _on_this_log(known: Calibration, recording: Recording) -> Calibration:
-    """A foreign calibration in the units of the log, and behind what its board had done to the readings."""
+    """A calibration of another program in the units of the log, composed with the board's own corrections."""
     if "maker" not in known.extensions:
         return known
     known = as_logged(known, recording.onboard)

@@ -1,4 +1,4 @@
-"""Log in, audited recording out; recording in, poses out."""
+"""Read a log into an audited recording; segment a recording into poses and moves."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
 
 AnyRecording = object
-"""A recording, a result that holds one, or what :func:`read` takes: a file, arrays, a dictionary, a data frame."""
+"""A recording, a result with one, or an input of :func:`read`: a file, arrays, a dictionary, a data frame."""
 
 
 def read(
@@ -58,11 +58,11 @@ def read(
     device : int
         Which device (from 1) of an archive of several.
     topic : str
-        Which topic, dataset or member of a file that holds several.
+        Which topic, dataset or member of a file with several.
     instance : int or str
-        Which of several IMUs whose readings one file holds.
+        Which of several IMUs in one file.
     progress : callable
-        Called with (done fraction, text).
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------
@@ -142,7 +142,7 @@ def of_arrays(
         if values is not None:
             columns[name] = values
             mapping.append(f"{role}={name}")
-    # A class method stands behind no verb of the package's front, which would say this in Python's words.
+    # Wrapped here: a class method does not go through the argument checks of the package's functions.
     recording: Recording = asked_in_python(read)(
         columns,
         columns=",".join(mapping),
@@ -163,12 +163,12 @@ def _check_even(name: str, given: Any) -> None:
 
 
 def recording_of(given: AnyRecording) -> Recording:
-    """A recording, whether it is one, belongs to a result, or is what :func:`read` takes (a file, arrays, a frame).
+    """A recording: the record itself, that of a result, or one read from an input of :func:`read`.
 
     Raises
     ------
     ReadError
-        (a ``ValueError``) when it cannot be read, is nothing of the kind, or is several recordings.
+        (a ``ValueError``) when it cannot be read, is of another type, or is several recordings.
     """
     if isinstance(given, Recording):
         return given
@@ -190,7 +190,7 @@ def segments_of(given: Segments | None, recording: Recording, progress: Progress
     Raises
     ------
     ValueError
-        When what was given are no segments.
+        When the given value is not a ``Segments``.
     """
     if given is None:
         return segment(recording, progress=progress)
@@ -226,7 +226,7 @@ def segment(recording: AnyRecording, *, progress: Progress | None = None) -> Seg
     True
     """
     recording = recording_of(recording)
-    # Loaded when it is needed: half of what a command that only reads would wait for.
+    # Imported here: it is half of the import time of a command that only reads.
     from trihedron.segment import segment_recording
 
     return segment_recording(recording, progress=progress)

@@ -1,4 +1,4 @@
-"""Several recordings of one unit, each beside known motion: one calibration, and what each reference says."""
+"""Several recordings of one unit, each with a reference: one calibration, and the fit to each reference."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from trihedron.records.reference import AgainstReference, FitToReference
 
 @dataclass(frozen=True, eq=False)
 class ReferencesResult:
-    """The unit's ``calibration``; ``references`` hold what is each of the ``recordings``' own: bias, clock, error."""
+    """The unit's ``calibration``; ``references`` are the fits to each of ``recordings``: bias, clock, error."""
 
     calibration: Calibration
     references: tuple[AgainstReference, ...]
@@ -62,12 +62,12 @@ def calibrate_references(
     Returns
     -------
     ReferencesResult
-        The shared calibration, and what each recording says beside its reference.
+        The shared calibration, and the fit of each recording to its reference.
 
     Raises
     ------
     ValueError
-        When logs and references are not as many, or as :func:`trihedron.diagnose` with a reference.
+        When the numbers of logs and references differ, or as :func:`trihedron.diagnose` with a reference.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def calibrate_references(
 
 
 def _with_repeatability(fits: Sequence[FitToReference]) -> FitToReference:
-    """Shared S and the mean bias; the next recording's bias scatters as those of these."""
+    """Shared S and the mean bias; the spread of the biases is added to the covariance of b."""
     b = np.array([fit.b for fit in fits])
     covariance = np.mean([fit.covariance for fit in fits], axis=0)
     if len(fits) > 1:
@@ -96,7 +96,7 @@ def _with_repeatability(fits: Sequence[FitToReference]) -> FitToReference:
 
 
 def _averaged(found: Sequence[AgainstReference]) -> FitToReference | None:
-    """Weighted mean of S and b, wider by as much as the recordings disagree; the frame is that of the shared gyro."""
+    """Weighted mean of S and b, its covariance widened by their disagreement; the frame is that of the shared gyro."""
     seen = [(one.accelerometer, one.frame_covariance) for one in found if one.accelerometer is not None]
     if not seen:
         return None

@@ -1,4 +1,4 @@
-"""Known motion beside a log: what it says of both sensors, as a calibration and as a diagnosis."""
+"""A log with reference motion: the fit to it as a calibration and as a diagnosis."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from trihedron.units import acceleration_to_si
 AnyReference = ReferenceMotion | Recording | str | os.PathLike[str]
 
 NOMINAL_SCALE, NOMINAL_BIAS_M_S2 = 0.1, 0.5
-"""How wrong an accelerometer is that nobody calibrated: 10 % where only its reading at rest tells the scale."""
+"""Standard uncertainties of an uncalibrated accelerometer: scale (10 %, from |g| in static poses) and bias."""
 
 
 def motion_of(reference: AnyReference, columns: str | None = None) -> ReferenceMotion:
@@ -44,7 +44,7 @@ def motion_of(reference: AnyReference, columns: str | None = None) -> ReferenceM
     Raises
     ------
     ReadError
-        (a ``ValueError``) one sentence: which file, what to do.
+        (a ``ValueError``) with the file and what to do.
     """
     if isinstance(reference, ReferenceMotion):
         return reference
@@ -71,12 +71,12 @@ def held_against(
     columns: str | None = None,
     given: Calibration | None = None,
 ) -> AgainstReference:
-    """Hold a log against a reference; ``given`` is a calibration whose replay is shown beside the reference's.
+    """Fit a log to a reference; ``given`` is a calibration whose replay is added for comparison.
 
     Raises
     ------
     ValueError
-        One sentence: what the two do not share, or what the reference cannot tell.
+        When the two share no time or motion, or the reference does not determine the sensors.
     """
     is_own = not isinstance(reference, ReferenceMotion | Recording) and os.path.abspath(reference) == os.path.abspath(
         recording.source
@@ -92,12 +92,12 @@ def held_against(
 def calibration_by(
     found: AgainstReference, recording: Recording, gravity: float, source: str, frame: Frame | None
 ) -> Calibration:
-    """Both sensors as the reference says, in the lower frame, or (``case``) in the reference's body.
+    """Both sensors from the reference, in the lower-triangular frame, or (``case``) in the reference's body.
 
     Raises
     ------
     ValueError
-        When the log has no accelerometer: a calibration file holds both.
+        When the log has no accelerometer: a calibration file needs both.
     """
     if recording.accelerometer is None:
         raise RefusedError(
@@ -120,7 +120,7 @@ def calibration_by(
     covariance = np.zeros((24, 24))
     covariance[:12, :12], covariance[12:, 12:] = accelerometer.covariance, gyroscope.covariance
     if found.accelerometer is not None:
-        # What is not known of the reference's body turns both sensors at once.
+        # An error of the reference's body frame rotates both sensors alike.
         of_force, of_rate = (turns_of_frame(one.S, one.b) for one in (accelerometer, gyroscope))
         covariance[:12, 12:] = of_force @ found.frame_covariance @ of_rate.T
         covariance[12:, :12] = covariance[:12, 12:].T
@@ -131,7 +131,7 @@ def calibration_by(
 
 
 def _without_rounding(calibration: Calibration) -> Calibration:
-    """Entries of S that the lower frame makes zero have no uncertainty: what is left of one is rounding."""
+    """Entries of S that are 0 in the lower frame get value and uncertainty 0: anything else is rounding."""
     if calibration.frame != "lower" or calibration.gyroscope is None:
         return calibration
     covariance = np.array(calibration.covariance)
@@ -145,7 +145,7 @@ def _without_rounding(calibration: Calibration) -> Calibration:
 
 
 def _nominal(recording: Recording, gravity: float) -> tuple[SensorCalibration, Finding]:
-    """The accelerometer as nobody calibrated it, with uncertainties that say so."""
+    """An uncalibrated accelerometer of nominal scale, with correspondingly large uncertainties."""
     raw = recording.accelerometer
     assert raw is not None
     scale = acceleration_to_si(recording.accelerometer_unit)
@@ -158,7 +158,7 @@ def _nominal(recording: Recording, gravity: float) -> tuple[SensorCalibration, F
 
 
 def effects_of(found: AgainstReference) -> tuple[AcceptedEffect, ...]:
-    """Effects that the evidence names, the strongest first (the Bayes factor bounds p)."""
+    """Effects with a score above ``NAMED_FROM``, the highest first (the Bayes factor bounds p)."""
     named = [(one.score or 0.0, ident, one) for ident, one in found.effects.items()]
     return tuple(_accepted(ident, one) for score, ident, one in sorted(named, reverse=True) if score > NAMED_FROM)
 
@@ -184,7 +184,7 @@ def _accepted(ident: str, one: Estimate) -> AcceptedEffect:
         float(np.exp(-0.5 * one.score)),
         -one.score,
         (),
-        # Stated in the reference's body: another recording of the unit may lie in it otherwise.
+        # Stated in the reference's body: the unit may be mounted differently in another recording.
         model=MappingProxyType(
             {
                 "variant": "both" if ident == "gyro-scale-nonlinearity" else "",
@@ -201,14 +201,14 @@ def _written(ident: str, name: str) -> str:
 
 
 def parameters_of(found: AgainstReference, given: Calibration, alpha: float) -> tuple[ParameterDifference, ...]:
-    """Numbers of a given calibration against those that the reference shows."""
+    """Parameters of a given calibration compared with those from the reference."""
     model = model_of_calibration(given)
     fit, force = found.gyroscope, found.accelerometer
     covariance = np.zeros((24, 24))
     covariance[12:, 12:] = fit.covariance
     covariance[:12, :12] = model.covariance[:12, :12] if force is None else force.covariance
     S, b = (model.accel_S, model.accel_b) if force is None else (force.S, force.b)
-    # Biases wander from one day to the next by what nobody measured here: only the fit's own error is known.
+    # The day-to-day change of the biases is unknown here: only the uncertainty of the fit is used.
     seen = FittedModel(
         S, b, model.accel_unit, fit.S, fit.b, model.gyro_unit or "counts", covariance, np.zeros(3), np.zeros(3)
     )
@@ -219,7 +219,7 @@ def parameters_of(found: AgainstReference, given: Calibration, alpha: float) -> 
 def diagnosis_by(
     found: AgainstReference, recording: Recording, gravity: float, given: Calibration | None, alpha: float
 ) -> dict[str, Any]:
-    """A diagnosis of a log that holds no poses to speak of: what its reference alone says, as fields."""
+    """Fields of a diagnosis by the reference alone, for a log with too few poses."""
     effects = effects_of(found)
     parameters = () if given is None or given.gyroscope is None else parameters_of(found, given, alpha)
     test = _rate(found)
@@ -252,7 +252,7 @@ def diagnosis_by(
 
 
 def _rate(found: AgainstReference) -> DomainTest:
-    """Rate inside the motion: p is that of the effects tried on it, the search paid for."""
+    """Test of the rate during the motion; p from the best score of the effects, corrected for multiple testing."""
     score = max([0.0, *(one.score or 0.0 for one in found.effects.values())])
     return DomainTest(
         "rate", 1.0, float(3 * found.gyroscope.n_rows), float(np.exp(-0.5 * score)), score > NAMED_FROM,

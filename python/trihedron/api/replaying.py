@@ -1,4 +1,4 @@
-"""A log replayed through the guide: what it would have said pose by pose, then the calibration and its check."""
+"""A log replayed through the guide: its instructions pose by pose, then calibration and verification."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from trihedron.records.guiding import Accuracy, Examination, GuideView
 from trihedron.records.results import CalibrationResult, VerificationResult
 
 STEP_S = 0.25
-"""Of a replayed log: as the blocks of a live one."""
+"""Length of a block of a replayed log [s], as in a live session."""
 
 DEFAULT_ACCURACY = "accel 0.1 %, gyro 0.2 %"
 
@@ -29,7 +29,7 @@ Tell = Callable[[GuideView], Any]
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """Where the guide stood at the end, how much of the log it used, and where its check of held-back poses began."""
+    """Final state of the guide, the part of the log that it used, and the start of its verification poses."""
 
     view: GuideView
     recording: Recording
@@ -80,7 +80,7 @@ def guide(
 
 
 def replay(recording: Recording, wanted: Accuracy, *, gravity_m_s2: float, on_pose: Tell | None = None) -> Replay:
-    """Lead the guide through a log, block by block, as if it were live.
+    """Run the guide on a log, block by block, as in a live session.
 
     Raises
     ------

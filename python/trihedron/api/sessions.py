@@ -1,4 +1,4 @@
-"""Many recordings of one unit: each calibrated, then what is common, what repeats how far, and what changed."""
+"""Many recordings of one unit: each calibrated, then common parameters, repeatability and changes."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ BYS: tuple[By, ...] = get_args(By)
 MEDIAN_CHI2 = 0.4549
 """Median of a squared standard normal number."""
 HEATING_DEGC = 1.0
-"""Change of temperature over a recording from which it was made while heating or cooling: the resolution of the
-thermometers in parts is 0.1 to 0.5 °C."""
+"""Change of temperature over a recording from which it counts as heating or cooling: built-in thermometers have a
+resolution of 0.1 to 0.5 °C."""
 
 
 def calibrate_sessions(
@@ -51,10 +51,10 @@ def calibrate_sessions(
     recordings : sequence of Recording, CalibrationResult, or what trihedron.read takes
         Two or more, in their order in time; each is calibrated by :func:`calibrate` where it is not yet.
     by : "session", "date", "device" or "temperature"
-        Groups within which sessions belong together: every recording for itself, those of one day, those of one device;
-        or polynomials of temperature through all of them.
+        Groups of sessions: every recording alone, those of one day, those of one device; or polynomials of temperature
+        through all of them.
     labels : sequence of str, optional
-        One word a recording, instead of its date or device.
+        One word per recording, instead of its date or device.
     gravity_m_s2 or latitude_deg, height_m : float
         As for :func:`calibrate`.
     frame : "lower" or "symmetric"
@@ -67,12 +67,12 @@ def calibrate_sessions(
     Returns
     -------
     SessionsResult
-        ``calibration`` common to all sessions, and in ``model`` what repeats and what changed.
+        ``calibration`` common to all sessions; ``model`` with repeatability and changes.
 
     Raises
     ------
     ValueError
-        When fewer than two recordings can be calibrated, or what they are grouped by is not known.
+        When fewer than two recordings can be calibrated, or their group is unknown.
 
     Examples
     --------
@@ -118,7 +118,7 @@ def calibrate_sessions(
 
 
 def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Words | None:
-    """Why a calibration does not go with the others; None where it does."""
+    """Why a calibration cannot be combined with the others; None where it can."""
     if not result.is_trustworthy:
         serious = next(finding for finding in result.findings if finding.severity.value == "serious")
         return words("not-trusted", seen=serious.seen)
@@ -146,14 +146,14 @@ def _label(recording: Recording, by: By) -> str:
             )
         return datetime.fromtimestamp(recording.start_epoch_s, tz=timezone.utc).date().isoformat()
     if by == "device":
-        # One folder a device is how people keep them; archives of several name the device behind a comma.
+        # Usually one folder per device; archives of several name the device after a comma.
         _name, comma, device = recording.source.rpartition(", ")
         return device if comma and device.startswith("device ") else Path(recording.source).parent.name
     return recording.source
 
 
 def sessions_of(results: Sequence[CalibrationResult], groups: Sequence[str]) -> tuple[Session, ...]:
-    """Calibrations as numbers that do not depend on a frame, counted from the first one's axes."""
+    """Calibrations as frame-independent parameters, relative to the axes of the first one."""
     first = in_frame(results[0].calibration, "lower")
     anchor = anchor_of(first.accelerometer.S, None if first.gyroscope is None else first.gyroscope.S)
     names = distinct_names([result.recording.source for result in results])
@@ -163,7 +163,7 @@ def sessions_of(results: Sequence[CalibrationResult], groups: Sequence[str]) -> 
 
 
 def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str) -> Session:
-    """One calibration as numbers, its error widened where held-out poses and moves miss by more than predicted."""
+    """One calibration as parameters, its covariance widened where cross-validated errors exceed their prediction."""
     calibration = in_frame(result.calibration, "lower")
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     S_g, b_g = (None, None) if gyro is None else (gyro.S, gyro.b)
@@ -187,9 +187,9 @@ def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str)
 
 
 def _excess(sensor: SensorCalibration) -> float:
-    """Held-out variance over predicted, at least 1 (docs/diagnosis-method.md, section 9).
+    """Cross-validated variance over predicted, at least 1 (docs/diagnosis-method.md, section 9).
 
-    By the median: a pushed pose or a clipped move was weighted down by the fit, and must not count here.
+    By the median: a disturbed pose or a clipped move, which the fit weights down, must not count here.
     """
     quality = sensor.quality
     if quality is None or quality.held_out is None or quality.held_out_sigma is None:
@@ -200,7 +200,7 @@ def _excess(sensor: SensorCalibration) -> float:
 
 
 def _bias_drift(result: CalibrationResult, n: int) -> FloatArray:
-    """Variance (n,) by which biases of a session like this differ from one to the next (eq. 9.3)."""
+    """Variance (n,) of the bias change between two sessions like this one (eq. 9.3)."""
     out = np.zeros(n)
     accel, gyro, segments = result.accelerometer, result.gyroscope, result.segments
     quality = accel.quality
@@ -222,7 +222,7 @@ def _bias_drift(result: CalibrationResult, n: int) -> FloatArray:
 
 
 def _shared(away: FloatArray, noise: FloatArray, alike: FloatArray) -> float:
-    """``2 C₁ + (V - C₁)/n``: V of n poses beyond their noise, C₁ of neighbours; ``alike`` their common direction."""
+    """``2 C₁ + (V - C₁)/n``: V of n poses beyond their noise, C₁ of neighbours; ``alike`` cosine of their verticals."""
     n = len(away)
     total = max(float(np.sum(away**2)) / (n - 1) - float(np.mean(noise)), 0.0)
     shared = float(np.sum(away[1:] * away[:-1] * alike) / max(np.sum(alike**2), 1e-12)) + float(np.mean(away**2)) / n
@@ -231,7 +231,7 @@ def _shared(away: FloatArray, noise: FloatArray, alike: FloatArray) -> float:
 
 
 def _temperature(result: CalibrationResult) -> tuple[float, float, float, int]:
-    """Mean, least and largest temperature of the poses, and whether they rise (+1) or fall (-1)."""
+    """Mean, least and largest temperature of the poses, and +1 for heating, -1 for cooling, else 0."""
     T = result.recording.temperature_degc
     if T is None:
         return math.nan, math.nan, math.nan, 0

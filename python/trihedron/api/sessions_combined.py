@@ -1,4 +1,4 @@
-"""Many sessions of one unit as one model: what is common, what repeats how far, what changed."""
+"""Many sessions of one unit as one model: common parameters, repeatability, changes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from trihedron.sensor_model import in_frame
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 ALPHA = 0.01
-"""Chance that any number of a unit that did not change is called changed."""
+"""Probability that any parameter of a unit that did not change is called changed."""
 
 
 def combine(
@@ -64,7 +64,7 @@ def _common(
     first: Calibration,
     anchor: Anchor,
 ) -> Calibration:
-    """The common numbers as S and b, with the covariance of the next session."""
+    """The common parameters as S and b, with the covariance of the next session."""
     value = np.array([one.value for one in repeated])
     spread, error = next_session(sessions, repeated)
     if thermal is not None:
@@ -80,7 +80,7 @@ def _common(
     J = model_jacobian(value, anchor)
     full = J @ covariance @ J.T
     full = 0.5 * (full + full.T)
-    # Frame lower fixes three entries of S: their rows are zero, not rounding.
+    # Frame lower fixes three entries of S at 0: their rows of the covariance are exactly 0.
     for fixed in (1, 2, 5):
         full[fixed], full[:, fixed] = 0.0, 0.0
     sensors: list[SensorCalibration | None] = []
@@ -112,7 +112,7 @@ def _common(
 
 
 def _extensions(model: SessionsModel, anchor: Anchor, kept: Mapping[str, object]) -> dict[str, Any]:
-    """What the calibration file keeps beside S and b (docs/calibration-file.md)."""
+    """Extensions of the calibration file beside S and b (docs/calibration-file.md)."""
     out: dict[str, Any] = {
         **kept,
         "sessions": [
@@ -159,20 +159,20 @@ def _extensions(model: SessionsModel, anchor: Anchor, kept: Mapping[str, object]
     return out
 
 
-# What is said about many recordings of one unit.
+# Findings about many recordings of one unit.
 
 FEW = 5
-"""Below so many groups the 95 % interval of a spread is wider than a factor of five from end to end."""
+"""Number of groups below which the 95 % interval of a spread exceeds a factor of five between its ends."""
 WIDE_RANGE_DEGC = 10.0
-"""Temperatures further apart than this move the biases of parts by more than their other repeatability (0.1 to 1 mg and
-0.01 to 0.05 °/s per °C)."""
+"""Range of temperature beyond which it changes biases by more than their other repeatability (0.1 to 1 mg and 0.01 to
+0.05 °/s per °C)."""
 
 _KINDS = ("bias", "scale", "misalignment", "alignment")
-"""Parameters whose change has a likely cause of its own, by the end of their names."""
+"""Groups of parameters, by the end of their ids, whose change has a specific likely cause."""
 
 
 def findings_about(model: SessionsModel) -> tuple[Finding, ...]:
-    """Sessions left out, changes, few sessions, temperatures."""
+    """Findings: excluded sessions, changes, few sessions, range of temperature."""
     out = [
         Finding.of(FindingCode.SESSION_LEFT_OUT, name=Path(name).name, why=words("because", sentence=why), path=name)
         for name, why in model.left_out

@@ -54,7 +54,7 @@ def simulate(scenario: str | os.PathLike[str] | Scenario, seed: int = 0) -> tupl
 
 
 def scenario_of(scenario: str | os.PathLike[str] | Scenario) -> Scenario:
-    """A scenario as a record, whether it is one, a TOML file or the name of a ready-made one.
+    """The scenario of a TOML file or of the name of a ready-made one, or the record itself.
 
     Raises
     ------
@@ -70,13 +70,13 @@ def scenario_of(scenario: str | os.PathLike[str] | Scenario) -> Scenario:
 
 
 def names_scenario(given: str | os.PathLike[str]) -> bool:
-    """Whether a scenario is named, by its file or as a ready-made one, and no log."""
+    """Whether a name is that of a scenario (a .toml file or a ready-made one) and not of a log."""
     return str(given) in list_scenarios() or Path(given).suffix.lower() == ".toml"
 
 
 @dataclass(frozen=True)
 class WithEffects:
-    """A scenario with the accepted effects of a diagnosis: ids switched on, ids left out with the reason."""
+    """A scenario with the accepted effects of a diagnosis: ids switched on, ids not applied with the reason."""
 
     scenario: Scenario
     applied: tuple[str, ...]
@@ -84,7 +84,7 @@ class WithEffects:
 
 
 def with_effects(scenario: str | os.PathLike[str] | Scenario, effects: Sequence[Mapping[str, Any]]) -> WithEffects:
-    """Switch on in a scenario what a diagnosis accepted (``effects`` of ``Diagnosis.to_dict`` or of its JSON)."""
+    """Switch on the accepted effects of a diagnosis (``effects`` of ``Diagnosis.to_dict`` or of its JSON)."""
     return WithEffects(*with_diagnosed_effects(scenario_of(scenario), effects))
 
 

@@ -1,7 +1,7 @@
 """Logs larger than memory: poses, calibration and corrected readings, a piece of the log at a time.
 
-What stays in memory are the statistics of blocks of a tenth of a second (:func:`segment_file`), the rows of moves and
-of the ends of poses (:func:`calibrate_file`), or one piece (:func:`apply_file`). See docs/larger-than-memory.md.
+Memory holds only the statistics of blocks of a tenth of a second (:func:`segment_file`), the rows of moves and of the
+ends of poses (:func:`calibrate_file`), or one piece (:func:`apply_file`). See docs/larger-than-memory.md.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from trihedron.units import AccelerationUnit, RateUnit
 
 PIECE_ROWS = 1 << 18
 KEPT_S = 60.0
-"""Of a pose longer than twice this, a minute at either end goes into the fit: the mean and its error are those of the
-whole pose, and the bias next to a move is read off the readings next to it."""
+"""A pose longer than twice this keeps only a minute of samples at either end, next to the moves; its mean and the
+standard error of the mean remain those of the whole pose."""
 
 
 @dataclass(frozen=True, eq=False)
 class Triad:
-    """Three columns of a log on disk, read when rows are asked for: stands for an array (n, 3)."""
+    """Three columns of a log on disk as an array (n, 3), whose rows are read on access."""
 
     log: ChunkedLog
     first: int
@@ -51,13 +51,13 @@ class Triad:
         else:
             index = np.asarray(rows)
             part = self.log.rows(int(index[0]), int(index[-1]) + 1)[index - index[0]]
-        # Row by row, as a recording holds them: sums come out the same to the last bit.
+        # C order as in a recording, so that sums are bit-identical.
         return np.ascontiguousarray(part[:, self.first : self.first + 3])
 
 
 @dataclass(frozen=True)
 class EvenTime:
-    """Timestamps of an even clock, made when they are asked for: stands for an array (n,)."""
+    """Timestamps of an even clock as an array (n,), computed on access."""
 
     n: int
     rate_hz: float
@@ -73,7 +73,7 @@ class EvenTime:
 
 @dataclass(frozen=True, eq=False)
 class LogOnDisk:
-    """A log as the segmentation needs it: the attributes of a recording, without its arrays in memory."""
+    """A log for the segmentation: the attributes of a recording, without its arrays in memory."""
 
     time_s: EvenTime
     accelerometer: Triad | None
@@ -91,7 +91,7 @@ class LogOnDisk:
 
     @property
     def duration_s(self) -> float:
-        """As of a recording: from the first to the last row, and one step."""
+        """Time from the first to the last row, plus one sample step, as of a recording."""
         return (self.n_samples - 1) / self.rate_hz + 1.0 / self.rate_hz
 
 
@@ -103,12 +103,12 @@ def log_on_disk(
     accelerometer_unit: str | AccelerationUnit | None = None,
     gyroscope_unit: str | RateUnit | None = None,
 ) -> LogOnDisk:
-    """A .npy, Parquet or text log whose columns, rate and units are said, not judged.
+    """A .npy, Parquet or text log whose columns, rate and units are given, not detected.
 
     Raises
     ------
     ValueError
-        When the file is neither, columns do not fit, or a sensor has not all its axes in the order x y z.
+        When the file has another format, columns do not fit, or a sensor lacks an axis or the order x y z.
     """
     if not (np.isfinite(rate_hz) and rate_hz > 0.0):
         raise RefusedError(f"--rate is a positive number of samples per second, not {rate_hz}.")
@@ -136,18 +136,18 @@ def log_on_disk(
 def segment_file(
     log: LogOnDisk, *, checkpoint: str | os.PathLike[str] | None = None, progress: Progress | None = None
 ) -> Segments:
-    """Poses and moves of a log on disk: the same as :func:`trihedron.segment` finds in the whole of it.
+    """Poses and moves of a log on disk: equal to those of :func:`trihedron.segment` on the whole log.
 
-    With ``checkpoint`` a file keeps every half a minute how far the pass is; a run that was stopped goes on from it, to
-    the same bits, and the end removes it.
+    With ``checkpoint`` a file stores the state of the pass every half a minute; an interrupted run continues from it
+    with bit-identical results, and the end removes it.
 
     Raises
     ------
     ValueError
-        When ``checkpoint`` is a file of something else.
+        When ``checkpoint`` is a file of another kind.
     """
     tell = progress or (lambda _fraction, _text: None)
-    # Types that only read rows: the segmentation asks for no more of a recording.
+    # The segmentation only reads rows, which these types support.
     view = cast("Recording", log)
     sums = BlockSums(view)
     width = sums.length * max(1, PIECE_ROWS // sums.length)
@@ -179,8 +179,8 @@ def calibrate_file(
 ) -> CalibrationResult:
     """Calibrate a log on disk from the statistics of its poses and the rows of its moves; options as for ``calibrate``.
 
-    ``checkpoint`` as in :func:`segment_file`, whose pass over the log is what takes long. The same as
-    :func:`trihedron.calibrate` of the whole, where no hold is longer than two minutes.
+    ``checkpoint`` as in :func:`segment_file`, whose pass over the log takes most of the time. The result is that of
+    :func:`trihedron.calibrate` on the whole log, if no pose is longer than two minutes.
     """
     tell = progress or (lambda _fraction, _text: None)
     segments = segment_file(log, checkpoint=checkpoint, progress=lambda f, text: tell(0.7 * f, text))
@@ -190,9 +190,9 @@ def calibrate_file(
 
 
 def condensed(log: LogOnDisk, segments: Segments) -> tuple[Recording, Segments]:
-    """The rows of moves and of the ends of poses, at their own times, and the segments counted in them.
+    """The rows of moves and of the ends of poses, at their own times, and the segments with indices of these rows.
 
-    Means, errors and durations remain those of whole poses.
+    Means, standard errors and durations remain those of whole poses.
     """
     kept = max(round(KEPT_S * log.rate_hz), 1)
     ranges: list[tuple[int, int]] = []
@@ -266,14 +266,14 @@ def apply_file(
 ) -> int:
     """Correct a log on disk piece by piece into a .npy file (n, 4 or 7): time [s], specific force, angular rate.
 
-    A run that was stopped goes on where it was: ``OUTPUT.part`` grows, ``OUTPUT.part.json`` says how far it is and of
-    what it is made. Returns the rows that were written in this run.
+    An interrupted run continues where it stopped: ``OUTPUT.part`` grows, ``OUTPUT.part.json`` has the number of rows
+    and a hash of the inputs. Returns the number of rows written in this run.
 
     Raises
     ------
     ValueError
-        When the calibration needs a temperature or effects taken off, which this does not; when units differ; when the
-        output exists.
+        When the calibration depends on temperature or has effects, which are not supported here; when units differ;
+        when the output exists.
     """
     target = Path(output)
     known = calibration_of(calibration)
@@ -306,7 +306,7 @@ def apply_file(
             stream.write(np.hstack(columns).tobytes())
             stream.flush()
             written += rows.stop - start
-            # In one step: a run that is killed here leaves the note before.
+            # Replaced atomically: a run that is killed here leaves the previous note.
             next_note.write_text(json.dumps({"made_of": of, "rows": rows.stop}))
             next_note.replace(note)
             if progress is not None:

@@ -28,7 +28,7 @@ def opposite_on_faces(
     up: np.ndarray[tuple[int], np.dtype[np.int64]],
     turns_deg: Sequence[float] | None,
 ) -> OppositeHeadings | None:
-    """What stated whole turns show of the headings that they pass."""
+    """Raw readings half a turn from each pose, predicted from stated whole turns; None where turns do not match."""
     moves = _moves_on_faces(segments, up)
     if turns_deg is None or len(turns_deg) != len(moves):
         return None
@@ -61,5 +61,5 @@ def turns_on_faces(
 
 
 def resting_spans(segments: Segments) -> list[tuple[int, int]]:
-    """Half-open ranges of the static poses: turns by nothing, which tell the bias."""
+    """Half-open ranges of the static poses: turns by 0°, which determine the bias."""
     return [(pose.start, pose.stop) for pose in segments.poses if pose.stop - pose.start >= 2]

@@ -41,15 +41,15 @@ def verify(
     gravity_m_s2 or latitude_deg, height_m : float
         |g| at the place; that of the calibration unless given.
     limit_mg, limit_deg : float, optional
-        Accepted rms of the gravity error [mg] and of the tilt error [°]: beyond one a serious finding says so. Without
-        a limit, errors above ten times those expected are serious; with one that is kept they are a warning.
+        Largest acceptable rms gravity error [mg] and tilt error [°]: beyond one there is a serious finding. Without
+        a limit, errors above ten times those expected are serious; within a limit they are a warning.
     progress : callable, optional
         Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------
     VerificationResult
-        ``is_passed``, errors beside those to be expected, and ``findings``.
+        ``is_passed``, errors with their expected size, and ``findings``.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def verify(
 
 
 def own_calibration(recording: Recording, segments: Segments, gravity_m_s2: float) -> Calibration | None:
-    """What the recording says of the sensor itself; ``None`` where it cannot carry a calibration."""
+    """The recording's own calibration; ``None`` where it does not determine one."""
     try:
         return calibrate(recording, segments=segments, gravity_m_s2=gravity_m_s2).calibration
     except REFUSALS:
@@ -107,6 +107,6 @@ def _limits(judged: Verification, limit_mg: float | None, limit_deg: float | Non
 
 
 def same_recording(known: Calibration, recording: Recording) -> tuple[Finding, ...]:
-    """What is said of a calibration held against the log that it was made from."""
+    """A finding where a calibration is tested on the log that it was made from."""
     is_same = bool(known.recording_sha256) and known.recording_sha256 == recording.sha256
     return (Finding.of(FindingCode.SAME_RECORDING),) if is_same else ()

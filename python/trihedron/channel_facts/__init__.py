@@ -1,4 +1,4 @@
-"""Facts of channels, found in one place by one rule each: a recording carries them (``Recording.facts``)."""
+"""Facts of channels (noise, LSB, limits), found in one place; a recording carries them (``Recording.facts``)."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ __all__ = ["facts_in", "facts_of"]
 
 
 def facts_of(accelerometer: FloatArray | None, gyroscope: FloatArray | None, rate_hz: float) -> RecordingFacts:
-    """What raw readings (n, 3) of the sensors that are there, sampled at a rate, say of their ADCs."""
+    """Noise, LSB and limits in raw readings (n, 3) of the sensors present, sampled at a rate."""
     named = {"accelerometer": accelerometer, "gyroscope": gyroscope}
     present = {name: readings for name, readings in named.items() if readings is not None}
     return facts_in(present, look(present, rate_hz))
 
 
-# Absurd readings (1e300) overflow squares; the noise they are told is infinite then.
+# Absurd readings (1e300) overflow squares; their noise is infinite then.
 @np.errstate(over="ignore", invalid="ignore")
 def facts_in(
     sensors: dict[str, FloatArray], windows: Windows | None, extremes: dict[str, Extremes] | None = None
 ) -> RecordingFacts:
-    """The same of sensors (n, 3) by name whose quiet windows, and perhaps extremes, are known."""
+    """The facts of sensors (n, 3) by name whose quiet windows, and perhaps extremes, are known."""
     facts: dict[str, ChannelFacts] = {}
     for name, readings in sensors.items():
         step = adc_steps(readings)

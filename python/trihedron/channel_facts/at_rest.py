@@ -1,4 +1,4 @@
-"""An axis in stretches of rest: its noise pooled over them, its lines and its spectrum."""
+"""An axis in static intervals: its pooled noise, its spectral lines and its spectrum."""
 
 from __future__ import annotations
 
@@ -19,34 +19,34 @@ from trihedron.records.pose_noise import PoseLine
 from trihedron.transforms import cosine_transform
 
 PROBED = 1 << 14
-"""Readings, evenly spread over a channel, whose values are looked at: sorting them takes half a millisecond."""
+"""Readings, evenly spread over a channel, that are searched for a grid: sorting them takes half a millisecond."""
 TESTABLE = 8
-"""Gaps within reach, of many, that are evidence (``rust/adc_grid.rs``, where the grid's own limits stand)."""
+"""Least number of levels for a test of a grid (``rust/adc_grid.rs``, which has the grid's own limits)."""
 REPEATS = 2
-"""Readings must repeat where they are few, so many times a value."""
+"""Readings per level, at least, where levels are few."""
 SINGLE = 2.0**-23
-"""The last bit of single precision, relative."""
+"""Relative size of the last bit in single precision."""
 PARTS = 8
-"""Where the whole log has no grid its parts may: a range was changed, or another sensor took over."""
+"""Parts of a log without one grid that are tested separately: its range may change, or its sensor."""
 
 
 def probe(readings: FloatArray) -> FloatArray:
-    """The readings (k, ...) of (n, ...) that are looked at."""
+    """The evenly spaced readings (k, ...) of (n, ...) that are searched for a grid."""
     return readings[:: probe_stride(len(readings))]
 
 
 def probe_stride(n: int) -> int:
-    """Every which of n readings is looked at."""
+    """Spacing of these readings in a log of n."""
     return max(1, -(-n // PROBED))
 
 
 def adc_step(readings: FloatArray) -> float:
-    """Spacing of the grid on which readings (n,) lie, in their unit; 0 where they lie on none that can be seen.
+    """LSB of readings (n,), the spacing of the grid they lie on, in their unit; 0 without a visible grid.
 
-    Readings in counts, in units converted from counts, and decimals as written are told alike. Without a code between
-    them visited values are several steps apart; then the step is what all gaps are multiples of. Of a log that changes
-    its step, the one of most of its parts is returned; of two that are multiples of a third, the third. The last bit of
-    readings in single precision is no step of an ADC.
+    Readings in counts, in units converted from counts, and decimals as written are treated alike. Where codes between
+    the levels are missing, the step is the one that all gaps are multiples of. For a log that changes its step, that of
+    most of its parts is returned; of two that are multiples of a third, the third. The last bit of readings in single
+    precision is no step of an ADC.
 
     Examples
     --------
@@ -60,7 +60,7 @@ def adc_step(readings: FloatArray) -> float:
     step = _grid(levels, n)
     if 0.0 < step < 1.0 and step <= SINGLE * np.abs(levels).max() and _is_power_of_two(step):
         return 0.0
-    # Where most values occur once, no step matters beside the noise.
+    # Where most levels occur once, the step is far below the noise and does not matter.
     if step or len(levels) < TESTABLE or REPEATS * len(levels) > n:
         return step
     parts = [_core.levels_of(part) for part in np.array_split(seen, PARTS)]
@@ -74,29 +74,29 @@ def _is_power_of_two(step: float) -> bool:
 
 
 def adc_steps(readings: FloatArray) -> FloatArray:
-    """The same of every column of (n, c), (c,)."""
+    """(c,) LSB of every column of (n, c)."""
     return np.array([adc_step(column) for column in readings.T], dtype=np.float64)
 
 
 def _grid(levels: FloatArray, n: int) -> float:
-    """The step of a grid on which all ``levels`` (k,) of ``n`` readings lie, 0 where they lie on none."""
+    """The step of the grid that all ``levels`` (k,) of ``n`` readings lie on, or 0."""
     return _core.adc_grid(levels, n) or 0.0
 
 
 SHORTEST = 32
-"""Readings of a pose that is used: fewer hold no octave below the uppermost two."""
+"""Readings of a pose that is used: fewer contain no octave below the highest two."""
 LEAST_DITHER = 0.4
-"""Noise over step below which the rounding is not noise of step²/12 any more, and what lies under it is hidden."""
+"""Noise over LSB below which rounding is not noise of LSB²/12 any more, and hides the noise."""
 LAGS = 8
-"""Lags over which squared differences are correlated: filters of a sensor remember no more readings."""
+"""Lags over which squared differences are correlated: filters of a sensor have no longer memory."""
 LONGEST_SEGMENT = 4096
 FEWER = 4.0 / 3.0
-"""So many more readings are worth half the resolution at low frequencies."""
+"""Ratio of readings used that is worth half the resolution at low frequencies."""
 
 
 @dataclass(frozen=True, eq=False)
 class AxisAtRest:
-    """Poses of one axis without disturbed ones and lines, and what is pooled over them."""
+    """Poses of one axis without disturbed ones and lines, and their pooled noise."""
 
     parts: list[FloatArray]
     step: float
@@ -113,13 +113,13 @@ class AxisAtRest:
         power = _Power.of(parts)
         keep = robust_poses(power.variance, power.dof)
         parts = [part for part, kept in zip(parts, keep, strict=True) if kept]
-        # A line is stated as one; it is neither white noise nor a filter's corner.
+        # A line is reported as such; it is neither white noise nor a filter's corner.
         spectrum = _segments(parts, rate_hz)
         lines = lines_of_poses(*spectrum, rate_hz)
         if lines:
             parts = without_lines(parts, lines, rate_hz)
             spectrum = _segments(parts, rate_hz)
-        # Correlation and tails are those of what is kept: a knock would lend its own to all.
+        # Correlation and tails are those of the remaining poses: a disturbed one would change them for all.
         power = _Power.of(parts)
         pooled = pooled_logarithm(power.variance, power.dof)
         whole = Spectrum(*_segments(parts, rate_hz, most=True), step**2 / 12.0 / rate_hz, pooled.scatter)
@@ -137,11 +137,11 @@ class AxisAtRest:
 
     @property
     def is_dithered(self) -> bool:
-        """Whether differences of readings are more than rounding."""
+        """Whether differences of readings contain more than rounding."""
         return self.total > 0.0 and self.dithers(self.total - self.rounding)
 
     def dithers(self, variance: float) -> bool:
-        """Whether a variance of one reading spreads over the LSB."""
+        """Whether noise of this variance dithers the LSB."""
         return self.step == 0.0 or variance > (LEAST_DITHER * self.step) ** 2
 
 
@@ -158,11 +158,11 @@ class _Power:
 
     @classmethod
     def of(cls, parts: Sequence[FloatArray]) -> _Power:
-        """Of holds (n,) each; the correlation and the kurtosis of differences are those of all poses together."""
+        """From poses (n,) each; correlation and kurtosis of differences are pooled over the poses."""
         squares = [np.diff(part) ** 2 for part in parts]
         mean = np.array([float(s.mean()) for s in squares])
         count = np.array([len(s) for s in squares], dtype=np.float64)
-        # Relative to each pose's own level: holds may differ.
+        # Relative to the level of each pose, which may differ.
         about = [s / m - 1.0 for s, m in zip(squares, mean, strict=True) if m > 0.0]
         spread = np.zeros(LAGS + 1)
         for lag in range(LAGS + 1):
@@ -174,9 +174,9 @@ class _Power:
 
 
 def _segments(parts: Sequence[FloatArray], rate_hz: float, *, most: bool = False) -> tuple[FloatArray, FloatArray, int]:
-    """Frequencies (k,), mean power (k,) and number of segments of one length that most poses have.
+    """Frequencies (k,), mean power (k,) and number of segments, of a length that most poses have.
 
-    With ``most``, of half that length where more readings are in such segments by a third.
+    With ``most``, of half that length where this uses a third more readings.
     """
     length = 1 << int(math.log2(max(SHORTEST, min(LONGEST_SEGMENT, float(np.median([len(p) for p in parts]))))))
 
@@ -194,24 +194,24 @@ def _segments(parts: Sequence[FloatArray], rate_hz: float, *, most: bool = False
     return frequency, np.asarray(power), len(rows)
 
 
-# Lines that the poses of a session have in common, and the poses without them.
+# Spectral lines common to the poses of a session, and the poses without them.
 
 LINE_CHANCE = 1e-4
-"""Probability that the poses of one axis show a line by chance."""
+"""False-alarm probability of a line over the poses of one axis."""
 LONGEST_PIECE = 4096
-"""Readings of a piece that a line is taken off at once: the frequency is known to a sixteenth of a period in it."""
+"""Readings of a piece that a line is subtracted from: the frequency error is a sixteenth of a period in it."""
 FINER = 16
-"""Frequencies tried per ordinate: half of one away from its middle a line loses 1/250 of its amplitude at most."""
+"""Frequencies tried per ordinate: half a step off its frequency a line loses at most 1/250 of its amplitude."""
 
 
 def lines_of_poses(frequency: FloatArray, power: FloatArray, count: int, rate_hz: float) -> tuple[PoseLine, ...]:
-    """Ordinates above their neighbourhood, of the lowest eight of which no period was seen often."""
+    """Ordinates above their neighbourhood; the lowest eight, of few periods per segment, are excluded."""
     n = len(power)
     level = np.array([np.median(power[max(0, i - 16) : i + 17]) for i in range(n)])
     centre = (1.0 - 2.0 / (9.0 * count)) ** 3 if count > 1 else 0.4549
     ratio = power * centre / np.maximum(level, 1e-300)
     limit = chdtri(count, LINE_CHANCE / n) / count
-    # The neighbourhood's median is itself known to 1.25/√33 of a deviation.
+    # The relative error of the neighbourhood's median is 1.25/√33 of a deviation.
     limit *= 1.0 + 3.0 * 1.25 * math.sqrt(2.0 / count / 33.0)
     out: list[PoseLine] = []
     taken = np.zeros(n, dtype=bool)
@@ -225,7 +225,7 @@ def lines_of_poses(frequency: FloatArray, power: FloatArray, count: int, rate_hz
         taken[near] = True
         floor = float(level[i] / centre)
         excess = float(np.sum(power[near] - floor))
-        # Power of an ordinate over twice the length of its segment in seconds.
+        # Power of an ordinate over twice the duration of its segment.
         square = 2.0 * max(excess, float(power[i] - floor)) * rate_hz / (n + 1)
         sigma_log = math.sqrt(2.0 / count) * math.sqrt(1.0 + 7.0 * (floor / max(excess, floor)) ** 2)
         amplitude = root_of(as_measured(square, sigma_log, math.inf), 1.0)
@@ -234,9 +234,9 @@ def lines_of_poses(frequency: FloatArray, power: FloatArray, count: int, rate_hz
 
 
 def without_lines(parts: Sequence[FloatArray], lines: Sequence[PoseLine], rate_hz: float) -> list[FloatArray]:
-    """Poses (n,) each, less sinusoids at the frequencies of ``lines``, of each piece's own size and phase.
+    """Poses (n,) each, less sinusoids at the frequencies of ``lines``, with size and phase fitted to each piece.
 
-    What is left is scaled for the two degrees of freedom that a line takes: white noise keeps its power.
+    The residuals are scaled for the two degrees of freedom of a line: white noise keeps its power.
     """
     out = list(parts)
     for line in lines:
@@ -251,12 +251,12 @@ def without_lines(parts: Sequence[FloatArray], lines: Sequence[PoseLine], rate_h
 
 
 def _pieces(part: FloatArray) -> list[FloatArray]:
-    """Nearly equal pieces over which the search still knows a line's phase."""
+    """Nearly equal pieces, short enough for the phase error of the frequency found."""
     return np.array_split(part, -(-len(part) // LONGEST_PIECE))
 
 
 def _explained(part: FloatArray, per_sample: FloatArray) -> FloatArray:
-    """Sum of squares (k,) that a sinusoid explains, at evenly spaced frequencies in periods a sample."""
+    """Sum of squares (k,) that a sinusoid explains, at evenly spaced frequencies in periods per sample."""
     step = float(per_sample[1] - per_sample[0]) if len(per_sample) > 1 else 0.0
     return _core.sinusoid_power(
         np.arange(len(part), dtype=np.float64),

@@ -1,4 +1,4 @@
-"""One end of a channel: its extreme value, the readings on it, and those that lead up to it."""
+"""One extreme of a channel: its value, the readings equal to it, and those next to it."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from trihedron.arrays import FloatArray, IntArray
 from trihedron.quantiles import median
 
 FLAT = 1.5
-"""Steps that a channel at rest between two codes may go to and fro; hands and their tremor are far more."""
+"""Peak-to-peak, in LSB, of a static channel between two codes; hand motion and tremor are far larger."""
 STILL = 8
-"""Readings on an end from which it is asked whether all channels stood still: over fewer a slow motion does."""
+"""Readings on an extreme from which all channels are tested for standstill: slow motion takes fewer."""
 ORDER, GAIN = 4, np.sqrt(70.0)
-"""Differences of this order hold next to nothing of a motion, and so many standard deviations of white noise."""
+"""Order of differences that remove motion, and their standard deviation for white noise of 1."""
 WHITE = 0.2
-"""Part of the noise at rest that they must show: filters leave as much; of a log that never rests it is the motion."""
+"""Least share of the static noise that they must show: filters leave as much; less indicates a noise that is motion."""
 PROBED = 1 << 14
-"""Readings, in so many stretches evenly spread over the log, from which its scatter and its middle are taken."""
+"""Readings, in ``STRETCHES`` parts evenly spread over the log, that give its scatter and its median."""
 STRETCHES = 16
 TO_SIGMA = 1.4826
-"""Standard deviation of a Gaussian over the median of its size."""
+"""Standard deviation of a Gaussian over its median absolute deviation."""
 
 
 @dataclass(frozen=True, eq=False)
 class End:
     """The largest or smallest ``value`` of an axis of ``readings`` (n, 3), read ``count`` times.
 
-    ``span`` is the distance of the axis' two ends, ``noise`` that of one sample at rest, ``steps`` (3,) ADCs'.
+    ``span`` is the range of the axis, ``noise`` that of one static sample, ``steps`` (3,) the LSB of the axes.
     """
 
     readings: FloatArray
@@ -45,7 +45,7 @@ class End:
 
     @property
     def step(self) -> float:
-        """The step of this axis' ADC; too few codes show none, then its neighbours'."""
+        """LSB of this axis; with too few codes to show one, the largest of the others."""
         return float(self.steps[self.axis] or np.max(self.steps))
 
     @property
@@ -54,20 +54,20 @@ class End:
         return self.readings[:, self.axis]
 
     def near(self, depth: float) -> tuple[int, float]:
-        """How many other readings lie within ``depth`` of the end, and how far away the nearest is."""
+        """Number of other readings within ``depth`` of the extreme, and the distance of the nearest."""
         within, width, at = _core.readings_near(self.readings, self.axis, self.value, depth)
         return within - len(at), width
 
     @cached_property
     def runs(self) -> IntArray:
-        """(k, 2) first sample of every run of readings on the end, and the one behind its last."""
+        """(k, 2) first sample of every run of readings on the extreme, and one past its last."""
         at: npt.NDArray[np.int64] = _core.readings_near(self.readings, self.axis, self.value, 0.0)[2]
         breaks = np.flatnonzero(np.diff(at) > 1)
         return np.stack([np.concatenate([at[:1], at[breaks + 1]]), np.concatenate([at[breaks], at[-1:]]) + 1], axis=1)
 
     @cached_property
     def stretches(self) -> list[FloatArray]:
-        """Parts of the column, evenly spread over a long log, that stand for it."""
+        """Parts of the column, evenly spread, that represent a long log."""
         column, length = self.column, PROBED // STRETCHES
         if len(column) <= PROBED:
             return [column]
@@ -76,14 +76,14 @@ class End:
 
     @property
     def middle(self) -> float:
-        """Where the axis mostly is."""
+        """Median of the axis."""
         seen = np.concatenate(self.stretches)
         seen = seen[np.isfinite(seen)]
         return median(seen) if len(seen) else float(np.nanmedian(self.column))
 
     @cached_property
     def dither(self) -> float:
-        """Noise of one sample that carries readings from code to code, 0 where what looks like noise may be motion."""
+        """Noise of one sample that dithers the LSB, 0 where it may be motion."""
         rough = np.abs(np.concatenate([np.diff(part, ORDER) for part in self.stretches]))
         rough = rough[np.isfinite(rough)]
         seen = TO_SIGMA * median(rough) / GAIN if len(rough) else 0.0
@@ -91,15 +91,15 @@ class End:
 
     @property
     def lasts(self) -> bool:
-        """Whether neighbouring samples lie on it."""
+        """Whether neighbouring samples have the extreme value."""
         return self.count > 1 and bool(np.max(np.diff(self.runs, axis=1)) > 1)
 
     @cached_property
     def moving_runs(self) -> IntArray:
-        """The runs (k, 2) without those in which every channel stands still: they are poses, or steady turns.
+        """The runs (k, 2) without those in which every channel stands still: these are poses, or constant rates.
 
-        An ADC coarser than the noise shows either as one code, whatever it is. Whoever drives a sensor beyond its
-        limit moves the other axes meanwhile, and noise that moves their last digit is no standstill.
+        An ADC coarser than the noise shows both as one code of any value. Motion beyond a sensor's range moves the
+        other axes too, and noise that moves their last digit is no standstill.
         """
         others = [k for k in range(3) if k != self.axis]
         keep = np.ones(len(self.runs), dtype=np.bool_)
@@ -109,7 +109,7 @@ class End:
         return self.runs[keep]
 
     def _stands_still(self, first: int, stop: int, others: list[int]) -> bool:
-        # The motion sets in and ends while the axis is at its extreme code already, or still.
+        # Without its edges: the motion begins and ends while the axis is at its extreme code.
         edge = max((stop - first) // 6, 1)
         part = self.readings[first + edge : stop - edge, others]
         return bool(np.all(np.ptp(part, axis=0) < FLAT * float(np.max(self.steps))))

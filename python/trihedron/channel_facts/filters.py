@@ -1,4 +1,4 @@
-"""The low-pass ahead of each channel, from the stretches of a log in which nothing moves."""
+"""The low-pass of each channel, from the static intervals of a log."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from trihedron.ranges import Range, ranges_of
 from trihedron.records.channel_facts import LowPass
 
 IN_A_ROW = 16
-"""Windows that follow one another where a log has too many to be looked at all: stretches of eight seconds."""
+"""Consecutive windows that are taken together from a long log: intervals of eight seconds."""
 
 
 def find_low_passes(sensors: dict[str, FloatArray], rate_hz: float) -> dict[str, tuple[LowPass, ...]]:
-    """Low-passes of the three channels of each sensor (n, 3) by name; none where no quiet stretch is long enough.
+    """Low-passes of the three channels of each sensor (n, 3) by name; none where no quiet interval is long enough.
 
-    The rule is that of poses (:func:`trihedron.channel_facts.low_pass.low_passes`), on the quietest stretches of the
-    log: a filter shows in white noise, where nothing moves.
+    The method is that for poses (:func:`trihedron.channel_facts.low_pass.low_passes`), applied to the quietest
+    intervals of the log: a filter shows in the white noise of a static sensor.
     """
     windows = look(sensors, rate_hz, in_a_row=IN_A_ROW)
     if windows is None:
@@ -31,13 +31,13 @@ def find_low_passes(sensors: dict[str, FloatArray], rate_hz: float) -> dict[str,
         try:
             axes = [AxisAtRest.of(readings[:, c], rate_hz, stretches, name) for c in range(3)]
         except RefusedError:
-            continue  # fewer than 32 readings in a row: nothing is known
+            continue  # fewer than 32 readings in a row
         found[name] = tuple(low_passes([axis.spectrum for axis in axes], rate_hz))
     return found
 
 
 def _stretches(windows: Windows) -> list[Range]:
-    """Rows of quiet windows that follow one another."""
+    """Ranges of consecutive quiet windows."""
     follows = np.diff(windows.start) == windows.length
     number = np.concatenate([[0], np.cumsum(np.where(follows, 1, 2))])
     is_quiet = np.zeros(int(number[-1]) + 1, dtype=np.bool_)

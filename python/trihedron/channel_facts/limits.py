@@ -1,10 +1,9 @@
-"""Limits of an ADC or a sensor: extreme values that readings end at, never a nominal range. The only place that
-looks for them.
+"""Range limits of an ADC or a sensor, detected from extreme values of readings, never from a nominal range. No other
+module searches for them.
 
-A value is a limit by several kinds of evidence that healthy readings give too seldom to matter: peaks that were
-cut, readings that arrive steeply and stay, noise that ends abruptly, codes
-that repeat or are read more often than those before them. From a channel
-that stands still while all others stand still as well nothing follows: it is a pose, or a steady turn.
+Several kinds of evidence make a value a limit, each rare enough in healthy readings: clipped peaks, readings that
+arrive steeply and stay, noise that ends abruptly, codes that repeat or are read more often than those before them.
+A channel that stands still while all others stand still too is no evidence: it is a pose, or a constant rate.
 """
 
 from __future__ import annotations
@@ -23,46 +22,46 @@ from trihedron.quantiles import median
 from trihedron.records.channel_facts import Limit
 
 STEEP = 5.0
-"""The wall is reached by steps this many times the noise: a quiet sensor resting on its largest count is no wall."""
+"""Steps into a limit, in noise, at least: a quiet static sensor at its largest count is no limit."""
 PILED = 3.0
-"""And it holds this many times more samples than the neighbouring values lead up to."""
+"""Factor by which its samples must exceed those that the neighbouring values predict."""
 LEADS_UP = 0.01
-"""Part of the span next to the wall in which those values lie."""
+"""Part of the span next to the limit in which those values lie."""
 
 EQUAL = 0.5 / math.sqrt(math.pi)
-"""Chance, for each LSB over the noise, that neighbours of independent noise are one code."""
+"""Chance, per LSB over noise, that neighbours of independent noise have one code."""
 LEAST_EQUAL = 0.01
-"""Rows are written twice now and then, be it once in a hundred."""
+"""Least such chance: rows may be written twice, up to one in a hundred."""
 
 NOISE_ALONE = 20.0
-"""Standard deviations of the noise within which all readings of a log at rest lie; motion of no more is none."""
+"""Standard deviations of the noise that contain all readings of a static log; less motion than that counts as none."""
 CARRIED = 0.5
-"""Noise over LSB from which it carries the readings from one code to the next: below, a pose or a
-value that is held looks like an end of the noise."""
+"""Noise over LSB from which it moves readings from one code to the next: below, a pose or a constant value looks like a
+limit."""
 ABRUPT = 0.6
-"""A tail thins out towards its end: so much of the readings within a step and a half, on the end, is a cut."""
+"""A tail of noise thins out: this share of the readings within 1.5 LSB of an extreme, on it, indicates clipping."""
 BESIDE = 1.5
 FEWEST_CUT, LEAST_SHARE = 10, 1e-3
-"""Readings on it, and their part of all, from which that can be told."""
+"""Readings on it, and their share of all, that this test needs."""
 
 BY_CHANCE = 1e-6
-"""Chance that readings crowd on the outermost code of a sensor, or repeat there, in a healthy recording."""
+"""False-alarm probability of readings that crowd on the outermost code of a sensor, or repeat there."""
 DITHERED = 1.5
-"""LSB over the noise (rounding in it) up to which the top of a smooth motion spreads over codes."""
+"""LSB over noise (rounding included) up to which the top of a smooth motion spreads over codes."""
 REACHES = (1, 3, 40)
-"""Codes next to the outermost one: a stretch that hardly moves reads the first as often as it, a slow peak the first
-few more often than those far below, a quick one all alike."""
+"""Numbers of codes next to the outermost one: a channel that hardly moves reads the first as often as it, a slow peak
+the first few more often than those far below, a quick one all equally often."""
 UNREAD = 1.0 / 3.0
-"""Readings of a code that are expected where none of its neighbours was read."""
+"""Expected readings of a code where none of its neighbours was read."""
 
 
 def is_wall(end: End, *, is_known: bool) -> bool:
-    """Readings arrive steeply and stay, for more samples than the top of a smooth motion holds."""
+    """Whether readings arrive steeply and stay, for more samples than the top of a smooth motion has."""
     if end.count < 3:
         return False
     depth = LEADS_UP * end.span
     near, width = end.near(depth)
-    # Towards the top of a smooth peak the density grows as one over the root of the distance, so the share of the
+    # Near the top of a smooth peak the density grows as one over the root of the distance, so the share of the
     # topmost level among all within `depth` is the root of its width.
     if end.count <= PILED * near * min(math.sqrt(width / depth), 1.0):
         return False
@@ -71,16 +70,16 @@ def is_wall(end: End, *, is_known: bool) -> bool:
     before = np.abs(values[np.maximum(starts - 1, 0)] - end.value)
     after = np.abs(values[np.minimum(runs[:, 1], len(values) - 1)] - end.value)
     steep = (lengths >= 2) & (np.fmax(before, after) > STEEP * max(end.noise, width))
-    # One stretch alone may be a channel that froze; at the end of an integer's range it is the range.
+    # A single run may be a channel that froze; at the end of an integer's range it is the range limit.
     return int(np.count_nonzero(steep)) >= (1 if is_known else 2)
 
 
 def is_repeated(end: End, *, is_known: bool) -> bool:
-    """Noise that moves the last digit leaves neighbours on the end equal more often than anywhere, however slowly it is
-    reached."""
+    """Whether neighbours on the extreme are equal more often than noise that moves the last digit explains, however
+    slowly it is reached."""
     runs = end.moving_runs
     lengths = runs[:, 1] - runs[:, 0]
-    # One stretch alone may be a channel that froze, as above.
+    # A single run may be a channel that froze, as above.
     if end.dither <= end.step or np.count_nonzero(lengths > 1) < (1 if is_known else 2):
         return False
     n, repeats = int(lengths.sum()), int(np.sum(lengths - 1))
@@ -93,7 +92,7 @@ def is_repeated(end: End, *, is_known: bool) -> bool:
 
 
 def _at_least(k: int, n: int, p: float) -> float:
-    """Chernoff's bound of the chance of k or more of n, each with chance p."""
+    """Chernoff's bound of the probability of k or more of n, each with probability p."""
     share = k / n
     if share <= p:
         return 1.0
@@ -101,7 +100,7 @@ def _at_least(k: int, n: int, p: float) -> float:
 
 
 def is_cut_noise(end: End) -> bool:
-    """A log at rest whose noise ends abruptly: a tail thins out towards its end, a wall does not."""
+    """Whether the noise of a static log ends abruptly: a tail thins out towards its end, clipped noise does not."""
     if end.dither <= CARRIED * end.step or end.span > NOISE_ALONE * end.noise:
         return False
     if end.count <= max(FEWEST_CUT, LEAST_SHARE * len(end.readings)):
@@ -111,15 +110,15 @@ def is_cut_noise(end: End) -> bool:
 
 
 def is_crowded(end: End) -> bool:
-    """One end is read more often than motion reads it (:func:`crowded_together` of one channel)."""
+    """Whether one extreme is read more often than motion explains (:func:`crowded_together` of one channel)."""
     return _chance([end]) < BY_CHANCE
 
 
 def crowded_together(ends: list[End]) -> list[End]:
-    """The ends of one outermost code, the same in size on every channel that comes so far, if readings crowd on it.
+    """The extremes of one outermost code, the same in size on every channel that reaches it, if readings crowd on it.
 
-    A range that ends just above 1 g stops no more than a few readings of each of several channels. Motion reads its
-    outermost code once, and the codes below it at least as often as that one: how many more there are is Poisson's.
+    A range that ends just above 1 g clips no more than a few readings of each of several channels. Motion reads its
+    outermost code once, and the codes below at least as often: the number beyond that has a Poisson distribution.
     """
     if not ends:
         return []
@@ -129,7 +128,7 @@ def crowded_together(ends: list[End]) -> list[End]:
 
 
 def _chance(ends: list[End]) -> float:
-    """Chance that motion reads these ends as often as they are read."""
+    """Probability that motion reads these extremes as often as they are read."""
     told = [end for end in ends if 0.0 < end.step < DITHERED * end.noise]
     if sum(end.count for end in told) <= len(told):
         return 1.0
@@ -138,20 +137,20 @@ def _chance(ends: list[End]) -> float:
     if spare <= 0:
         return 1.0
     expected = sum(max(UNREAD, *(end.near((reach + 0.5) * end.step)[0] / reach for reach in REACHES)) for end in told)
-    # At least so many of a Poisson law: a chi-square of twice as many degrees below twice its mean.
+    # Poisson probability of at least so many: a chi-square of twice as many degrees of freedom below twice its mean.
     return 1.0 - chdtrc(2.0 * spare, 2.0 * expected)
 
 
 FEWEST = 8
-"""Readings from which an end is told."""
+"""Fewest readings of a log that is tested."""
 FEWEST_CODES = 100.0
-"""From so many steps on, two channels end at one code hardly by chance."""
+"""Codes from which two channels hardly have one extreme code by chance."""
 SHORTEST_WORD = 128.0
-"""Codes of a word of seven bits and a sign, the shortest: smaller powers of two are met by chance."""
+"""Codes of a word of seven bits and a sign, the shortest: smaller powers of two occur by chance."""
 
 
 Extremes = list[tuple[float, int, float, int]]
-"""Of every axis: the lowest reading, how often it was read, the highest, how often."""
+"""For every axis: the lowest reading, its count, the highest reading, its count."""
 
 
 def find_limits(
@@ -164,7 +163,7 @@ def find_limits(
     rows = new_readings(readings, noise, step) if found else None
     if rows is None:
         return found
-    # A peak that was written three times over is no plateau.
+    # Repeats of one reading of a peak are no plateau.
     return tuple(
         replace(limit, runs=with_repeats(limit.runs, rows, len(readings)))
         for limit in _limits(readings[rows], noise, step, None)
@@ -183,7 +182,7 @@ def _limits(readings: FloatArray, noise: FloatArray, step: FloatArray, extremes:
     lasting = [end for end in ends if end.lasts]
     found = [end for end in ends if _is_limit(end, lasting)]
     found += [end for end in crowded_together(ends) if end not in found]
-    # Channels of one part that come as far end there too, be it for a single reading.
+    # Channels of one part with the same extreme code have the limit too, even with a single reading.
     found += [end for end in ends if end not in found and any(_is_same_code(end, other) for other in found)]
     return tuple(
         Limit(end.axis, end.value, end.is_high, end.runs, is_word=is_end_of_word(end.value, end.step))
@@ -201,7 +200,7 @@ def share_at_limits(readings: FloatArray, noise: float, step: float) -> float:
 
 
 def is_end_of_word(value: float, step: float) -> bool:
-    """The code at the end of a word of bits: 2^k - 1, or -2^k, in counts; codes of converted units are not known."""
+    """Whether a code is the end of a word: 2^k - 1, or -2^k, in counts; codes of converted units are not known."""
     code = value / step if step >= 1.0 else 0.0
     if code != round(code) or abs(code) < SHORTEST_WORD - 1.0:
         return False
@@ -224,25 +223,25 @@ def _is_limit(end: End, lasting: list[End]) -> bool:
 
 
 def _is_same_code(one: End, other: End) -> bool:
-    """Whether two ends are one limit: both ends of a word are a step apart, ends on one side are the same."""
+    """Whether two extremes are one limit: both ends of a word are an LSB apart in size, ends on one side are equal."""
     if one.step <= 0.0:
         return abs(one.value) == abs(other.value)
     apart = 0.1 if one.value * other.value > 0.0 else 1.1
     return abs(one.value) >= FEWEST_CODES * one.step and abs(abs(one.value) - abs(other.value)) < apart * one.step
 
 
-# Readings that a logger wrote again because its sensor had no new one: each is one reading, however often written.
+# Rows that a logger wrote again without a new reading: each reading counts once, however often it is written.
 
 JUMP_STEPS, JUMP_NOISE = 4.0, 5.0
-"""A change from row to row beyond so many steps, and standard deviations of a reading, is motion."""
+"""LSB and standard deviations of a reading beyond whose sum a change from row to row is motion."""
 OFTEN = 0.2
-"""Part of the jumps that come after a repeated triad. Three axes of a sensor that moves by steps in every row repeat
-together next to never, but in the peaks that all three limits cut at once; a held sensor's do before nearly all."""
+"""Share of the motion steps that follow a repeated triad. Three axes that move in every row hardly repeat together,
+except where all three are clipped; with repeated readings nearly all steps follow a repeat."""
 FEWEST_JUMPS = 20
 
 
 def new_readings(readings: FloatArray, noise: FloatArray, step: FloatArray) -> IntArray | None:
-    """Rows of a triad (n, 3) that hold a new reading, ``None`` where every row does.
+    """Rows of a triad (n, 3) that have a new reading, ``None`` where every row has.
 
     ``noise`` (3,) of one sample at rest and ``step`` (3,) of the ADC, in the unit of the readings.
     """
@@ -261,30 +260,30 @@ def with_repeats(limit_runs: IntArray, rows: IntArray, n: int) -> IntArray:
     return np.stack([rows[limit_runs[:, 0]], ends[limit_runs[:, 1]]], axis=1)
 
 
-# Peaks that a limit has cut: readings jump to it and from it further than a smooth peak inside one code would.
+# Clipped peaks: readings step to the limit and from it further than a smooth peak inside one code would.
 
 FAR = 0.3
-"""Part of an axis' span that lies between a limit and where the sensor mostly is."""
+"""Least distance of a limit from the median of the axis, as a share of its span."""
 TOP = 3.0
-"""Sharper by this much than that parabola falls a peak upon which a tremor rides."""
+"""Factor on the curvature of a smooth peak that allows for a tremor on it."""
 PAIR_BEND = 8.0
-"""Bend, in steps, that two equal samples are allowed: more is no evidence by itself."""
+"""Curvature, in LSB, that two equal samples are allowed; more is no evidence alone."""
 NOISE_JUMP = 5.0
-"""Standard deviations of a reading that noise alone may jump at the two ends of a peak's top, in all peaks of a log."""
+"""Standard deviations of a reading that noise alone may step at both ends of a peak's top, over all peaks of a log."""
 MOST_RUNS = 1000
-"""Runs that are looked at, evenly spread where there are more."""
+"""Runs that are tested, evenly spread where there are more."""
 
 
 def is_cut(end: End, *, is_known: bool, is_word: bool = False) -> bool:
-    """Some of the runs on an end far from where the axis mostly is are no smooth peak that happens to share a code.
+    """Whether some runs on an extreme far from the median of the axis are no smooth peak that falls into one code.
 
     A parabola of which n samples stay within a step q has a curvature of at most 8 q/((n − 1)² − 1), n even, or
     8 q/(n − 1)², n odd. One sample further it has fallen by half of that times n, two further by that times n + 1;
-    a tremor makes it steeper (``TOP``), rounding may add a step, and noise its own jumps. The readings fall by more at
-    *both* ends of a run that was cut: a turn at a steady rate begins and ends steeply and meanwhile wavers about its
-    extreme. Two equal samples may lie on either side of any peak: they are the limit's only where it ``is_known``
-    otherwise, or two peaks end at it. Standing still at the end of a word is the limit's too; on a code that another
-    channel ends at as well it may be a table's steady turn one way and the other.
+    a tremor makes it steeper (``TOP``), rounding may add a step, and noise its own. The readings fall by more at *both*
+    ends of a clipped run; a rotation at a constant rate begins and ends steeply too, but varies about its extreme in
+    between. Two equal samples may lie on either side of any peak: they count only where the limit ``is_known``
+    otherwise, or two peaks end at it. Standstill at the end of a word counts as the limit too; on a code that is
+    another channel's extreme as well it may be a table's constant rate in both directions.
     """
     column = end.column
     if not end.lasts or abs(end.value - end.middle) <= FAR * end.span:

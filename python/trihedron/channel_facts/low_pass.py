@@ -1,4 +1,4 @@
-"""The low-pass of a sensor in the spectra of its axes at rest."""
+"""The low-pass of a sensor in the spectra of its static axes."""
 
 from __future__ import annotations
 
@@ -15,42 +15,42 @@ from trihedron.records.channel_facts import LowPass
 from trihedron.records.pose_noise import Measured
 
 EARNED = 16.0
-"""Drop of the deviance that a corner must earn: it is searched over a grid and five shapes."""
+"""Decrease of the deviance that a corner requires: it is searched over a grid and five shapes."""
 RISE = 4.6
-"""Rise at the ends of its 95 % interval, other terms on the edge of what can be (docs/noise.md, 3)."""
+"""Rise at the ends of its 95 % interval, where other terms are at a bound (docs/noise.md, 3)."""
 TOLERANCE = 0.03
-"""No band of the spectrum is believed to better: no nearer is real noise flat, or a filter one of the shapes."""
+"""Relative error of every band of the spectrum, at least: noise is not exactly flat, nor a filter exactly a shape."""
 SHAPE = 0.05
-"""By how much, in the logarithm, half the power of running means two to four times over lies from that of the nearest
-shape (4 %): the interval reaches that much further. Of one that peaks, or of equal poles, it can lie a third away."""
+"""Log ratio of the -3 dB frequency of two to four cascaded running means to that of the nearest shape (4 %), by which
+the interval is widened. For a filter that peaks, or with equal poles, it can be a third."""
 ORDERS = (1, 2, 3, 4)
-"""Of Butterworth filters; beside them a Gaussian, which cascades of running means (CIC) come to."""
+"""Orders of Butterworth filters; also a Gaussian, the limit of cascaded running means (CIC), is tried."""
 FLICKER_AND_WALK = (1, 2)
 LEAKAGE = (4, 8)
-"""Above a ringing that is cut off: its resonance falls with the fourth power of frequency, steeper next to it."""
+"""Powers of frequency above ringing that is cut off: its resonance falls with the fourth power, faster next to it."""
 FINE = 16
-"""Lowest ordinates that stay single; above, neighbours within ``WIDTH`` of their frequency are taken together."""
+"""Lowest ordinates that stay single; above, neighbours within ``WIDTH`` of their frequency are averaged."""
 WIDTH = 0.04
 LEAST_GAIN = 1e-9
-"""A Gaussian far above its corner is nothing that numbers hold."""
+"""Least gain: that of a Gaussian far above its corner underflows."""
 HUMP = 0.25
-"""In the logarithm, on either side of a line: a resonance of quality 2 has fallen to its half there."""
+"""Half-width around a line, in the logarithm: a resonance of quality 2 has fallen to half there."""
 FINER = 8
 """Corners tried on either side of the best of the grid, up to its neighbours."""
 SAME = 1e-9
 HIGHEST_FLOOR = 0.125
-"""Of the rate: a quarter of the spectrum below Nyquist may be taken for disturbance, no more."""
+"""Of the rate: at most a quarter of the spectrum below Nyquist may be excluded as disturbance."""
 MODEL_PARAMETERS = 5
 MISFIT = 3.0
-"""Standard deviations of the deviance beyond which a spectrum is more than filtered noise, flicker and walk."""
+"""Standard deviations of the deviance above which a spectrum contains more than filtered noise, flicker and walk."""
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
     """Mean power (k,) at frequencies (k,) of ``count`` segments of one axis, two-sided densities.
 
-    ``rounding`` is the density that the LSB add, ``scatter`` by how much the poses' power differs;
-    ``slow`` are the powers of 1/f that lie beneath: flicker and walk, or what leaks from below where that was cut off.
+    ``rounding`` is the density of the rounding, ``scatter`` that of the poses' power;
+    ``slow`` are the powers of 1/f of slow noise: flicker and walk, or leakage from below where that was cut off.
     """
 
     frequency_hz: FloatArray
@@ -73,37 +73,37 @@ class Spectrum:
         return frequency, np.add.reduceat(self.power, starts) / size, size * self.count
 
     def above(self, lowest_hz: float) -> Spectrum:
-        """What lies at and above a frequency; the whole for zero."""
+        """The part at and above a frequency; all of it for zero."""
         if lowest_hz == 0.0:
             return self
         high = self.frequency_hz >= lowest_hz
         return replace(self, frequency_hz=self.frequency_hz[high], power=self.power[high], slow=LEAKAGE)
 
     def beside(self, lines_hz: Sequence[float]) -> Spectrum:
-        """Without what lies near a line: the hump of a stand or a hand that rings there is no floor of a sensor."""
+        """The spectrum without the neighbourhood of lines, where a stand or a hand rings."""
         near = np.zeros(len(self.frequency_hz), dtype=bool)
         for line in lines_hz:
             near |= np.abs(np.log(self.frequency_hz / line)) < HUMP
-        # Lines everywhere leave no other floor to be seen.
+        # Where lines are everywhere, no other part remains.
         if 2 * np.count_nonzero(near) > len(near):
             return self
         return replace(self, frequency_hz=self.frequency_hz[~near], power=self.power[~near])
 
     def beneath(self, frequency_hz: FloatArray) -> FloatArray:
-        """(k, m) shapes of slow noise, one at the lowest frequency."""
+        """(k, terms) shapes of slow noise at ``frequency_hz`` (k,), 1 at the lowest frequency of the spectrum."""
         return np.stack([(self.frequency_hz[0] / frequency_hz) ** power for power in self.slow], axis=1)
 
     def weights(self, axes: int) -> FloatArray:
-        """Ordinates of each bin, but for what is believed of a model's shape; its error is that of all ``axes``."""
+        """Weight of each bin: its ordinates, limited by the error of the model's shape, which all ``axes`` share."""
         _, _, count = self.bins
-        # Bands of an eighth of the spectrum weigh no more than the tolerance and the scatter of poses allow.
+        # An eighth of the spectrum weighs no more than the tolerance and the scatter of poses allow.
         error = TOLERANCE**2 * axes + self.scatter**2 / max(self.count, 1)
         cap = 2.0 / error / (len(self.power) / 8.0)
         return np.minimum(count, cap * count / self.count)
 
     @property
     def rounding_share(self) -> float:
-        """Of the level of the lower quarter of the spectrum."""
+        """Rounding over the level of the lower quarter of the spectrum."""
         frequency, power, _ = self.bins
         low = power[frequency <= 0.25 * frequency[-1]]
         level = float(np.median(low)) if len(low) else 0.0
@@ -111,10 +111,10 @@ class Spectrum:
 
 
 def low_passes(spectra: Sequence[Spectrum], rate_hz: float) -> list[LowPass]:
-    """The filter of each axis of a sensor: one for all where no axis speaks against it.
+    """The filter of each axis of a sensor: one for all where no axis contradicts it.
 
-    The spectrum of an axis is a filtered white one over flicker and walk, rounding unfiltered beneath, from the lowest
-    frequency on above which that accounts for it: a stand that rings after every turn is no filter.
+    The model of an axis is filtered white noise, flicker and walk, and unfiltered rounding, from the lowest frequency
+    on above which it fits: a stand that rings after every rotation is no filter.
     """
     grid = corners_tried(spectra, rate_hz)
     tables = [_deviances(s, grid, rate_hz, len(spectra)) for s in spectra]
@@ -138,15 +138,15 @@ def low_passes(spectra: Sequence[Spectrum], rate_hz: float) -> list[LowPass]:
 
 
 def corners_tried(spectra: Sequence[Spectrum], rate_hz: float) -> FloatArray:
-    """Corners [Hz] from four periods a segment, or a 64th of Nyquist, to four times Nyquist."""
+    """Corners [Hz] from four periods per segment, or a 64th of Nyquist, to four times Nyquist."""
     floor = max((4.0 * float(s.frequency_hz[0]) for s in spectra), default=0.0)
     return np.geomspace(max(rate_hz / 128.0, floor), 2.0 * rate_hz, 49)
 
 
 def undisturbed(spectrum: Spectrum, rate_hz: float) -> Spectrum:
-    """The spectrum from the lowest octave on above which a filter, flicker and walk account for it; all, if none does.
+    """The spectrum from the lowest octave on above which filter, flicker and walk explain it; all of it, if none does.
 
-    Knocks that ring, a swaying stand and a trembling hand fill the lowest octaves of many poses, and only those.
+    Disturbances that ring, a swaying stand and a trembling hand fill the lowest octaves of many poses, and only those.
     """
     grid = corners_tried([spectrum], rate_hz)[::2]
     lowest = 0.0
@@ -186,13 +186,13 @@ def _deviances(spectrum: Spectrum, grid: FloatArray, rate_hz: float, axes: int) 
 
 @lru_cache(maxsize=8)
 def _gains(frequency_hz: bytes, corners_hz: bytes, rate_hz: float) -> FloatArray:
-    """Gains (shapes, corners, bins) of all filters that are tried: the axes of a sensor, and its logs, ask alike."""
+    """Gains (shapes, corners, bins) of all filters tried; cached, as the axes and logs of a sensor share them."""
     frequency, corners = np.frombuffer(frequency_hz), np.frombuffer(corners_hz)
     return np.array([[gain_of(frequency, float(c), shape, rate_hz) for c in corners] for shape in (0, *ORDERS)])
 
 
 def _around(grid: FloatArray, table: FloatArray) -> FloatArray:
-    """Corners between the best of the grid and its neighbours, which are further apart than corners can be told."""
+    """Corners between the best of the grid and its neighbours, whose distance exceeds the uncertainty of a corner."""
     place = int(np.argmin(table.min(axis=0)))
     ends = grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)]
     fine = np.geomspace(*ends, 2 * FINER + 1)
@@ -215,7 +215,7 @@ def _settled(table: FloatArray, flat: float, grid: FloatArray) -> LowPass:
 
 
 def _crossing(grid: FloatArray, rise: FloatArray, last: int, step: int) -> float:
-    """Where the deviance crosses its limit beyond the ``last`` corner inside, straight between two corners."""
+    """Corner where the deviance crosses its limit beyond the ``last`` corner inside, by interpolation."""
     beyond = last + step
     if not 0 <= beyond < len(grid):
         return float(grid[last])
@@ -224,9 +224,9 @@ def _crossing(grid: FloatArray, rise: FloatArray, last: int, step: int) -> float
 
 
 def gain_of(frequency_hz: FloatArray, corner_hz: float, shape: int, rate_hz: float) -> FloatArray:
-    """Power gain of a filter ahead of the sampling, what lies above Nyquist folded back; 1 at zero.
+    """Power gain of a filter before sampling, with aliasing from above Nyquist; 1 at zero frequency.
 
-    Butterworth of order ``shape``, Gaussian for 0; half the power at ``corner_hz``.
+    Butterworth of order ``shape``, Gaussian for 0; -3 dB at ``corner_hz``.
     """
     fold: FloatArray = rate_hz * np.arange(-8.0, 9.0)
 

@@ -1,4 +1,4 @@
-"""Figures of many poses in one, and the ratio of two such figures."""
+"""Pooling of figures over many poses, and the ratio of two such figures."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from trihedron.records.pose_noise import Measured, Ratio
 MOST_LEFT_OUT = 0.25
 """Share of poses that may be excluded for noise far above the rest's: a disturbed pose, not another sensor."""
 UNKNOWN = 50.0
-"""Logarithm beyond which an interval says no more: 21 decades either way."""
+"""Logarithm at which an interval ends: 21 decades either way."""
 FAR = 5.0
-"""Robust standard deviations beyond which a pose is disturbed: one clean hold in a million."""
+"""Robust standard deviations beyond which a pose is disturbed: one undisturbed pose in a million."""
 
 
 @dataclass(frozen=True)
 class Pooled:
-    """Mean logarithm over poses, its standard error with the degrees of freedom of that, and the poses' own scatter."""
+    """Mean logarithm over poses, its standard error with its degrees of freedom, and the scatter of the poses."""
 
     mean: float
     sigma: float
@@ -31,7 +31,7 @@ class Pooled:
 
 
 def robust_poses(variance: FloatArray, dof: FloatArray) -> npt.NDArray[np.bool_]:
-    """(k,) holds whose noise is not far above the rest's; at most a quarter is excluded, the worst first."""
+    """(k,) poses whose noise is not far above that of the others; at most a quarter is excluded, the worst first."""
     keep = np.asarray(variance > 0.0)
     if np.count_nonzero(keep) < 4:
         return keep if keep.any() else np.ones(len(variance), dtype=bool)
@@ -45,10 +45,10 @@ def robust_poses(variance: FloatArray, dof: FloatArray) -> npt.NDArray[np.bool_]
 
 
 def pooled_logarithm(values: FloatArray, dof: FloatArray) -> Pooled:
-    """Mean logarithm of chi-squared ``values`` (k,) over ``dof`` (k,), holds differing by a scatter of their own.
+    """Mean logarithm of chi-squared ``values`` (k,) over ``dof`` (k,), with a scatter of the poses.
 
-    The scatter is that of DerSimonian and Laird (1986). Where it shows, the standard error is known from the k holds
-    alone, and a t distribution belongs to it.
+    The scatter is that of DerSimonian and Laird (1986). Where it is positive, the standard error is estimated from the
+    k poses alone and has a t distribution.
     """
     from scipy.special import digamma, polygamma
 
@@ -66,7 +66,7 @@ def pooled_logarithm(values: FloatArray, dof: FloatArray) -> Pooled:
     weight = 1.0 / (own + between)
     mean = float(weight @ logs / weight.sum())
     sigma = 1.0 / math.sqrt(float(weight.sum()))
-    # Of the error what the scatter makes is known from k - 1 numbers.
+    # The part of the error due to the scatter is estimated from k - 1 numbers.
     share = between / (between + 1.0 / float(np.mean(1.0 / own)))
     degrees = (k - 1) / share**2 if share > 0.0 else math.inf
     if not np.isfinite(sigma):
@@ -81,7 +81,7 @@ def as_measured(value: float, sigma_log: float, dof: float) -> Measured:
 
 
 def ratio_of(one: Measured, other: Measured) -> Ratio:
-    """One figure over the other; errors of unlike certainty after Welch and Satterthwaite.
+    """Ratio of two figures; degrees of freedom after Welch and Satterthwaite.
 
     Raises
     ------
@@ -110,6 +110,6 @@ def _quantile(dof: float) -> float:
 
 
 def root_of(power: Measured, factor: float) -> Measured:
-    """The amplitude of a power times ``factor``."""
+    """The amplitude whose square is a power times ``factor``."""
     value, lower, upper = (math.sqrt(factor * p) for p in (power.value, power.lower, power.upper))
     return Measured(value, lower, upper, 0.5 * power.sigma_log, power.dof)

@@ -1,4 +1,4 @@
-"""Limits that noise covers: what ends ahead of the ADC (a pickup, an amplifier) has no last code."""
+"""Range limits blurred by noise: clipping before the ADC (pickup, amplifier) has no exact code."""
 
 from __future__ import annotations
 
@@ -11,39 +11,38 @@ from trihedron.ranges import edges_of
 from trihedron.records.channel_facts import Limit, RecordingFacts
 
 BAND_SIGMA = 4.0
-"""A plateau is a run of samples within four standard deviations of the limit."""
+"""Half-width of a plateau, in standard deviations: its samples lie this near to the limit."""
 BELOW_TOP = (2, 11)
 """Standard deviations below the largest reading between which the limit is tried: its own noise lies above it."""
 REACH = 4
-"""Samples before and behind a plateau from which the slope of arrival and departure is taken."""
+"""Samples before and behind a plateau from which the slopes of arrival and departure are computed."""
 MIN_RUN = 4
 MIN_PLATEAUS = 3
-"""Smooth peaks differ in height from move to move; three that end on one level within noise do not happen by chance."""
+"""Smooth peaks differ in height from move to move; three on one level within noise do not occur by chance."""
 LONG_RUN, HIGH = 8, 15.0
-"""One plateau is enough if it is this long and the parabola cut off by it would reach this many sigma higher."""
+"""A single plateau is enough with this length, if the parabola it clips would rise by this many sigma above it."""
 STEEP = 6.0
-"""Height in sigma that a parabola with the slopes at both ends of a plateau would reach: it would not look flat."""
+"""Height in sigma of a parabola with the slopes at both ends of a plateau: below it the top of a peak looks flat."""
 AGREE, HALF_STEP = 4.0, 0.5
-"""Errors of its mean, and noises of a sample, by which a run may differ from the level of the others."""
+"""Standard errors of its mean, plus noise of a sample, by which a run may differ from the level of the others."""
 FEWEST_FOR_CURVE, SPREAD = 4, 5.0
 """Samples from which slope and curvature are fitted; fewer are flat if they spread by less than five sigma."""
 FLAT = 18.0
 """Chi-square of slope and curvature (2): one flat run in ten thousand exceeds it."""
 MOVES_SIGMA = 10.0
-"""Standard deviations that another channel must pass over: the noise of a thousand samples spans seven."""
+"""Peak-to-peak, in standard deviations, of another channel that moves: the noise of a thousand samples spans seven."""
 PARTS = 3
-"""Equal parts of a plateau in each of which another channel must move: a turn begun from rest holds a rest."""
+"""Equal parts of a plateau in each of which another channel must move, as a pose before a move must not count."""
 SHARED_SIGMA = 4.0
-"""Levels of several channels within this many of their errors are one limit of the part."""
+"""Standard uncertainties within which levels of several channels are one limit of the part."""
 
 
 def find_possible_limits(sensors: dict[str, FloatArray], facts: RecordingFacts) -> dict[str, tuple[Limit, ...]]:
     """Limits by sensor of readings (n, 3), on the sides of channels where no code is one.
 
-    A reading that stands still on the level that nothing exceeds, while the sensor moves: a channel that reads one
-    value because everything else stands still too is in a pose. A level that only noise tells takes the exact code of
-    another channel, or the mean of all, where it agrees with it; both sides of a channel count as one limit where they
-    agree in size.
+    Evidence is a constant reading on a level that nothing exceeds while the sensor moves: where everything else stands
+    still too it is a pose. A level blurred by noise takes the exact code of another channel, or the mean of all, where
+    it agrees with it; both sides of a channel count as one limit where they agree in size.
     """
     noise = {name: np.maximum(facts.of(name).noise, 0.5 * facts.of(name).step) for name in sensors}
     scaled = {
@@ -72,27 +71,27 @@ def find_possible_limits(sensors: dict[str, FloatArray], facts: RecordingFacts) 
 
 
 def _level(x: FloatArray, others: list[FloatArray]) -> tuple[float, float, IntArray]:
-    """Level that readings (n,), in units of their noise, end on, its error, and the runs there: none, where none is."""
+    """Level at which readings (n,), in units of their noise, are clipped, its error, and the runs there, if any."""
     none = np.zeros((0, 2), dtype=np.int64)
     if not np.isfinite(x).any():
         return 0.0, 0.0, none
     top = float(np.nanmax(x))
     best = (0.0, 0.0, none)
-    # All that is looked at lies in a few bands below the top: most logs have next to nothing there.
+    # Only a few bands below the top are searched: most logs have almost no readings there.
     with np.errstate(invalid="ignore"):
         if np.count_nonzero(x > top - BELOW_TOP[1] - BAND_SIGMA) < MIN_RUN:
             return best
     for below in range(*BELOW_TOP):
         level, error, runs = _on_level(x, top - below, others)
-        # Nothing is read beyond a limit but noise.
+        # Only noise exceeds a limit.
         if len(runs) > len(best[2]) and top <= level + BAND_SIGMA:
             best = level, error, runs
     return best
 
 
 def _on_level(x: FloatArray, level: float, others: list[FloatArray]) -> tuple[float, float, IntArray]:
-    """Mean, its error and runs that arrive steeply at a level, stay flat on it while others move, leave it steeply, and
-    agree about it."""
+    """Mean, its error, and runs that arrive steeply at a level, stay flat on it while others move, leave it steeply,
+    and have consistent means."""
     none = (0.0, 0.0, np.zeros((0, 2), dtype=np.int64))
     with np.errstate(invalid="ignore"):
         begins, ends = edges_of(np.abs(x - level) <= BAND_SIGMA).T
@@ -114,7 +113,7 @@ def _on_level(x: FloatArray, level: float, others: list[FloatArray]) -> tuple[fl
         errors.append(1.0 / np.sqrt(len(middle)))
     if len(runs) < MIN_PLATEAUS and not any(clear):
         return none
-    # Peaks that merely end in one band differ by more than the error of their means.
+    # Peaks that merely end in one band differ by more than the errors of their means.
     weights = 1.0 / np.square(errors)
     common = float(np.average(means, weights=weights))
     agree = np.abs(np.array(means) - common) < AGREE * np.array(errors) + HALF_STEP
@@ -125,7 +124,7 @@ def _on_level(x: FloatArray, level: float, others: list[FloatArray]) -> tuple[fl
 
 
 def _others_move(others: list[FloatArray], first: int, last: int) -> bool:
-    """Whether in every part of a run some other channel moves."""
+    """Whether some other channel moves in every part of a run."""
     parts = PARTS if last - first >= PARTS * MIN_RUN else 1
     edges = np.linspace(first, last, parts + 1).astype(int)
     return all(
@@ -135,13 +134,13 @@ def _others_move(others: list[FloatArray], first: int, last: int) -> bool:
 
 
 def _middle(run: FloatArray) -> FloatArray:
-    """A run without the ends that still arrive and already leave."""
+    """A run without its ends, where the reading still arrives or already leaves."""
     cut = max(len(run) // 6, 1)
     return run[cut:-cut]
 
 
 def _is_flat(run: FloatArray) -> bool:
-    """Whether a slope and a curvature explain no more of a run (in units of its noise) than chance does."""
+    """Whether slope and curvature of a run (in units of its noise) are within chance."""
     n = len(run)
     if n < FEWEST_FOR_CURVE:
         return float(np.ptp(run)) < SPREAD

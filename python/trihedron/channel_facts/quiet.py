@@ -1,6 +1,6 @@
-"""Short windows of a log and which of them are quiet: what units and column order are judged by.
+"""Short windows of a log and which of them are quiet: the basis for recognising units and column order.
 
-This is a first look for recognising units, not the segmentation: no pose is accepted or refused here.
+This is not the segmentation: no pose is accepted or excluded here.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Windows:
 
     ``mean`` and ``noise`` map a sensor's name to (m, 3): mean reading and white noise of one sample (standard deviation
     of the first difference over √2) of each window; ``start`` (m,) is its first sample, ``length`` its samples;
-    ``quiet`` (m,) says which are near the log's own noise floor in every sensor.
+    ``quiet`` (m,) marks those near the log's own noise floor in every sensor.
     """
 
     start: npt.NDArray[np.int64]
@@ -44,7 +44,7 @@ class Windows:
 
 
 def look(sensors: dict[str, FloatArray], rate_hz: float, *, in_a_row: int = 1) -> Windows | None:
-    """Windows of a log, so many ``in_a_row`` where they are spread; None where none without missing values exists."""
+    """Windows of a log, ``in_a_row`` consecutive ones where they are spread; ``None`` if all lack values."""
     n = min(len(a) for a in sensors.values())
     length = int(min(max(round(WINDOW_S * rate_hz), 8), max(n, 1)))
     n_windows = n // length
@@ -58,7 +58,7 @@ def look(sensors: dict[str, FloatArray], rate_hz: float, *, in_a_row: int = 1) -
     spread: dict[str, FloatArray] = {}
     found = {name: _core.window_statistics(array, start, length) for name, array in sensors.items()}
     if any(whole is None for whole in found.values()):
-        # Half of a window may be missing; fewer readings tell nothing about its noise.
+        # Half of a window may be missing; fewer readings do not determine its noise.
         enough = np.ones(len(start), dtype=bool)
         for array in sensors.values():
             pairs = np.isfinite(np.diff(array[start[:, None] + np.arange(length)], axis=1)).all(axis=2)
@@ -78,7 +78,7 @@ def look(sensors: dict[str, FloatArray], rate_hz: float, *, in_a_row: int = 1) -
         spread[name] = np.linalg.norm(np.nanstd(block, axis=1), axis=1)
     quiet = np.ones(len(start), dtype=bool)
     for value in spread.values():
-        # The quietest tenth shows the sensor's own noise; three times that still is no hand motion.
+        # The quietest tenth has the sensor's own noise; up to three times that is no hand motion.
         quiet &= value <= 3.0 * quantile(value, 0.1)
     if not quiet.any():
         total = np.sum([v / max(median(v), 1e-300) for v in spread.values()], axis=0)
@@ -89,9 +89,9 @@ def look(sensors: dict[str, FloatArray], rate_hz: float, *, in_a_row: int = 1) -
 
 
 def is_integer(array: FloatArray) -> bool:
-    """All readings (of a sample of up to about 20000 rows) are whole numbers."""
+    """Whether all readings (of a sample of up to about 20000 rows) are whole numbers."""
     probe = array[:: max(1, len(array) // 20000)]
-    # In pieces: most logs show in their first rows that they are none, and memory for all at once costs time too.
+    # In pieces: most logs show in their first rows that they are not, and all at once needs time and memory.
     pieces = (probe[k : k + _ROWS_AT_ONCE] for k in range(0, len(probe), _ROWS_AT_ONCE))
     return all(_is_whole(piece) for piece in pieces) and bool(np.isfinite(probe).any())
 

@@ -1,8 +1,8 @@
-"""COMMAND LINE: arguments to one verb of `api`, nothing else.
+"""Command line: each command passes its arguments to one function of `api`.
 
-Results go to stdout, progress to stderr. Exit status: 0 fine; 1 could not run (one sentence says what, where and what
-to do); 2 ran, but the answer is not to be trusted; 130 and 143 interrupted by Ctrl-C and SIGTERM. One
-file per command; options that several commands share are in ``options.py``.
+Results go to stdout, progress to stderr. Exit status: 0 success; 1 could not run (one sentence: cause, place, remedy);
+2 ran, but the answer is not to be trusted; 130 and 143 interrupted by Ctrl-C and SIGTERM. One file per command; options
+that several commands share are in ``options.py``.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ _OF_ONE_LOG = {"check", "segment", "allan", "noise", "kalman", "diagnose"}
 COULD_NOT_RUN = 1
 _INTERRUPTED = 130
 
-# Typer has its own copy of click's exceptions in some versions; both hang below the one it makes public.
+# Some versions of typer have their own copy of click's exceptions; both are bases of the public typer.BadParameter.
 _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 
 
@@ -120,7 +120,7 @@ def trihedron(
 
 
 def _a_reference_each(words: list[str]) -> list[str]:
-    """``A B --reference TA TB`` as an option for each: as many names behind the option as logs before it."""
+    """``A B --reference TA TB`` as one option per reference: as many names after the option as logs before it."""
     if words.count("--reference") != 1:
         return words
     at = words.index("--reference")
@@ -133,7 +133,7 @@ def _a_reference_each(words: list[str]) -> list[str]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit status; never a traceback for a question that cannot be answered."""
+    """Run the command line and return its exit status; an input error gives one sentence, never a traceback."""
     words = _with_stdout_as_default(list(sys.argv[1:] if arguments is None else arguments)) or ["--help"]
     words = _a_reference_each(words)
     spell_out()
@@ -141,10 +141,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         _make_writable()
         status = typer.main.get_command(build_app()).main(words, prog_name="trihedron", standalone_mode=False)
-        # Here and not when the interpreter ends: a full disk must be the command's failure.
+        # Flushed here, not at interpreter exit, so that a full disk makes the command fail.
         sys.stdout.flush()
         if status == _INTERRUPTED:
-            # Where typer took a Ctrl-C for its own.
+            # Typer handled the Ctrl-C itself.
             _refuse(SENTENCE)
         return int(status or 0)
     except _UsageError as error:
@@ -153,8 +153,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _refuse(SENTENCE)
         return status_of(error)
     except (BrokenPipeError, SystemExit) as error:
-        # Whoever read the output has left (`| head`); nothing is wrong, and nothing more can be said. Where the pipe
-        # broke inside a command, typer has made an exit of it.
+        # The reader closed the pipe (`| head`), which is no error. Where that happens inside a command, typer raises
+        # SystemExit.
         if isinstance(error, SystemExit):
             sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__
         silence_stdout()
@@ -173,12 +173,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         return _refuse(str(error))
     except Exception as error:
-        # The last net: a defect is said to be one, in one line, and never looks like an answer.
+        # A defect of the program is reported as such, in one line.
         if os.environ.get("TRIHEDRON_TRACEBACK"):
             raise
         return _refuse(_defect_sentence(error))
     except BaseException as error:
-        # Libraries in Rust panic with exceptions that are no Exception.
+        # A panic in Rust raises PanicException, which does not derive from Exception.
         if type(error).__name__ != "PanicException" or os.environ.get("TRIHEDRON_TRACEBACK"):
             raise
         return _refuse(_defect_sentence(error))
@@ -188,18 +188,18 @@ _OF_STDOUT = (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EDQUOT, errno.EFBIG)
 
 
 class _Closed(io.TextIOBase):
-    """Standard output of a process that was started without one."""
+    """Standard output of a process started without one: writing raises OSError."""
 
     def write(self, _text: str) -> int:
         raise OSError(errno.EBADF, os.strerror(errno.EBADF))
 
 
 def _make_writable() -> None:
-    """Output that any result can be written to: names of files may hold what the terminal's encoding does not."""
+    """Make stdout and stderr accept any text: file names may have characters that the terminal's encoding lacks."""
     if sys.stdout is None:
         sys.stdout = _Closed()
     if sys.stderr is None:
-        # What would be said to nobody must not end a command that can give its result.
+        # Missing stderr must not end a command that can still write its result.
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

@@ -181,7 +181,7 @@ def one_of(option: str, value: str, allowed: tuple[str, ...]) -> str:
     Raises
     ------
     typer.BadParameter
-        Naming the words there are.
+        When it is not in the list; the message lists the words.
     """
     if value not in allowed:
         raise typer.BadParameter(f"{option} is one of {', '.join(allowed)}, not {value!r}")
@@ -189,12 +189,12 @@ def one_of(option: str, value: str, allowed: tuple[str, ...]) -> str:
 
 
 def numbers(option: str, text: str) -> list[float]:
-    """Numbers with commas between.
+    """Numbers separated by commas.
 
     Raises
     ------
     typer.BadParameter
-        When they are not.
+        When a part is not a number.
     """
     try:
         return [float(word) for word in text.split(",")]

@@ -39,7 +39,7 @@ def calibrate_beside(
     frame: Any,
     ending: Ending,
 ) -> None:
-    """Calibrate one unit from several logs, each beside its own reference, and print what is shared and what is not."""
+    """Calibrate one unit from several logs with a reference each; print shared and individual parameters."""
     given = sources.each()
     if len(given) != len(references):
         raise typer.BadParameter(f"{len(given)} logs need as many references, not {len(references)}")
@@ -72,7 +72,7 @@ def calibrate_many(
     frame: Any,
     ending: Ending,
 ) -> None:
-    """Calibrate every log and print what is common and what repeats how far."""
+    """Calibrate every log; print common parameters and their repeatability."""
     how = by or "session"
     if how not in ("session", "date", "device", "temperature"):
         raise typer.BadParameter(f"--by is one of session, date, device, temperature, not {how!r}")
@@ -83,7 +83,7 @@ def calibrate_many(
     words = None if labels is None else [word.strip() for word in labels.split(",")]
     given = sources.each()
     with progress("calibrating") as tell:
-        # A log that cannot be read stops at once: a wrong name is not a bad recording.
+        # An unreadable log stops the command, unlike a recording that cannot be calibrated.
         recordings = list(_recordings(given, how))
         if words is not None and len(words) == len(given) < len(recordings):
             raise typer.BadParameter("--labels name logs; the devices of an archive have their own names")
@@ -101,7 +101,7 @@ def calibrate_many(
 
 
 def _recordings(sources: list[LogSource], by: str) -> Iterator[Recording]:
-    """Every log; by device, every device of an archive of several."""
+    """Every log; with ``by`` device, every device of an archive."""
     from trihedron.read import devices_of
 
     for source in sources:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SAY_EVERY_S = 1.0
 LOSSES_NOT_TRUSTED = 0.05
-"""Share of lost frames above which `read` calls a log's gaps serious."""
+"""Fraction of lost frames above which `read` makes a log's gaps a serious finding."""
 
 
 Port = Annotated[
@@ -128,7 +128,7 @@ def capture(
 
 
 def record(recorder: Recorder, output: Path, seconds: float | None) -> None:
-    """Run a recorder to its end and say what was saved; status 2 where that is not what was wanted."""
+    """Run a recorder to its end and report what was saved; status 2 where the recording is incomplete."""
     stop_on_signals(recorder)
     progress = Progress()
     with full_disk_is_status_2():
@@ -142,7 +142,7 @@ def record(recorder: Recorder, output: Path, seconds: float | None) -> None:
 
 @contextmanager
 def full_disk_is_status_2() -> Iterator[None]:
-    """A recording that a disk ended has saved something: not what was wanted, and not nothing."""
+    """Exit status 2 for a recording that ends because the disk is full: part of it is saved."""
     from trihedron.capture.errors import DiskError
 
     try:
@@ -153,7 +153,7 @@ def full_disk_is_status_2() -> Iterator[None]:
 
 
 def conclude(recorder: Recorder, output: Path, n: int, *, is_ended_well: bool = False) -> None:
-    """What was saved, from which clock, and whether that is to be trusted."""
+    """Report what was saved and the clock of its timestamps; status 2 where it is not to be trusted."""
     count = recorder.count
     typer.echo(f"{output}: {n} frames; {count.sentence().replace(' / ', ', ')}")
     if recorder.clock is not None:
@@ -178,7 +178,7 @@ def stop_on_signals(recorder: Recorder) -> None:
 
 
 class Progress:
-    """One line on stderr, once a second; nothing where stderr is no terminal but at changes."""
+    """One line on stderr once a second; where stderr is no terminal, only at changes."""
 
     def __init__(self) -> None:
         self.n = 0
@@ -188,11 +188,11 @@ class Progress:
 
     @property
     def elapsed_s(self) -> float:
-        """Since the recording began."""
+        """Time since the recording began [s]."""
         return time.monotonic() - self._start_s
 
     def show(self, recorder: Recorder, block: Block) -> None:
-        """Count a block, and say where things stand."""
+        """Count a block and print the state."""
         self.n += len(block.time_s)
         for remark in block.remarks:
             if "lost" not in remark:
@@ -206,7 +206,7 @@ class Progress:
             sys.stderr.flush()
 
     def clear(self) -> None:
-        """Leave no half line behind."""
+        """Erase the progress line."""
         if self._is_terminal and self._said_s > 0.0:
             sys.stderr.write("\r" + " " * 70 + "\r")
             sys.stderr.flush()

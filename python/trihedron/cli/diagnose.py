@@ -118,12 +118,12 @@ def diagnose(
     if known is not None:
         from trihedron.api.applying import doubted
 
-        # What a model that nobody should trust differs by says nothing of the physics.
+        # Differences to an untrustworthy model are no evidence of missing effects.
         leave(doubted(known))
 
 
 def _diagnose_many(sources: LogsSource, place: GravitySource, alpha: float, results: Results) -> None:
-    """Every log by itself, and what all of one unit share."""
+    """Diagnose every log alone, and the effects that all share."""
     from trihedron.api import diagnosing_sessions
     from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
 
@@ -134,7 +134,7 @@ def _diagnose_many(sources: LogsSource, place: GravitySource, alpha: float, resu
 
 
 def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -> None:
-    """The scenario with the parameters of the log, and what could not be put into it."""
+    """Write the scenario with the parameters of the log; report effects that it cannot represent."""
     from trihedron.api import improving
     from trihedron.files.scenario import write_scenario
 
@@ -153,7 +153,7 @@ def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -
 
 
 def _point_to_more(result: DiagnosisResult) -> None:
-    """Where the rest is, and how much of it are warnings."""
+    """Point to the full report, with the number of warnings."""
     from trihedron.records import Severity
 
     doubts = sum(finding.severity is Severity.WARNING for finding in result.findings)

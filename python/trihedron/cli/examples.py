@@ -1,4 +1,4 @@
-"""Commands to copy, for every command's help: what each is for, and the line."""
+"""Examples for every command's help: purpose and command line."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from trihedron.cli.options import Force
 from trihedron.cli.output import check_outputs, leave, say
 
 LOSSES = ("lost", "Not in this file", "upper limit", "NOT TO BE TRUSTED")
-"""Words by which a file says what it cannot hold."""
+"""Words that mark lines of a file about information that the format cannot represent."""
 
 
 def export(
@@ -79,14 +79,14 @@ def export(
         _put(made, place, to, force, (*calibration, noise))
         texts |= dict.fromkeys(line for text in made.values() for line in text.splitlines())
     for line in texts:
-        # What the file cannot hold stands in it; said here too, where the person looks.
+        # Comments of the file about lost information are repeated on stderr.
         if any(word in line for word in LOSSES):
             say(line.strip(' #/*%",'))
     leave(tuple(finding for one in known for finding in one.findings))
 
 
 def _names(paths: list[Path]) -> list[str]:
-    """Of the files in a folder of several: that of each calibration, with its folder's where two are called alike."""
+    """File names in the output folder, one per calibration, with the parent folder where two names are equal."""
     stems = [path.stem for path in paths]
     names = [
         path.stem if stems.count(path.stem) == 1 else f"{path.resolve().parent.name}_{path.stem}" for path in paths

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from trihedron.records.guiding import GuideView
 
 MOST_COLUMNS = 120
-"""A wider screen only draws the eye apart."""
+"""Largest width of the screen, in columns."""
 
 DEFAULT_ACCURACY = "accel 0.1 %, gyro 0.2 %"
 Show = Callable[["GuideView"], None]
@@ -59,7 +59,7 @@ def guide(
 
 
 def _size() -> tuple[int, int]:
-    """Columns and lines of the terminal; what COLUMNS and LINES say, or 80 x 24, elsewhere."""
+    """Columns and lines of the terminal; elsewhere COLUMNS and LINES, or 80 x 24."""
     size = shutil.get_terminal_size((80, 24))
     return max(60, min(size.columns, MOST_COLUMNS)), max(size.lines, 24)
 
@@ -82,7 +82,7 @@ def _line(view: GuideView) -> str:
 def finish(
     recording: Recording, cut_s: float | None, place: GravitySource, output: Path | None, *, force: bool
 ) -> None:
-    """Calibrate, verify on the poses held back, report; status 2 where the answer is not to be trusted."""
+    """Calibrate, verify on the poses held out, report; status 2 where the answer is not to be trusted."""
     from trihedron.api.guiding import conclude
     from trihedron.cli.output import leave, put, say, style
     from trihedron.files.calibration import write_calibration
@@ -112,7 +112,7 @@ def run_guided(
     open_browser: bool,
     seconds: float | None,
 ) -> Any:
-    """Capture with the guide beside it; returns the guide, which knows where the check begins."""
+    """Capture with the guide; returns the guide, which has the start of the verification."""
     from trihedron.api.guiding import examine
     from trihedron.api.reading import read
     from trihedron.records.guiding import Accuracy
@@ -137,14 +137,14 @@ def run_guided(
 
 
 def sensor_columns(block: Block) -> list[int]:
-    """Which columns of a stream are the accelerometer and the gyro, as the log's reader sees them."""
+    """Indices of the accelerometer's and the gyro's columns of a stream, as the log's reader assigns them."""
     from trihedron.api.capturing import sensor_columns as of
 
     return of(block.columns)
 
 
 class _Shown:
-    """A screen on a terminal, a line per change elsewhere, the page besides where it is wanted."""
+    """Display of the guide: a screen on a terminal, a line per change elsewhere; optionally the page."""
 
     def __init__(self, recorder: Recorder, started: float, *, browser: bool, bell: bool, open_browser: bool) -> None:
         self._recorder, self._started = recorder, started

@@ -1,4 +1,4 @@
-"""Help that reads as a page: commands in the order of the work, options by what they are about, examples to copy."""
+"""Layout of the help: commands in the order of the workflow, options by subject, examples."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ OPTION_GROUPS: tuple[tuple[str, frozenset[str]], ...] = (
     ("Output", frozenset(_OF_OUTPUT)),
 )
 WIDEST = 120
-"""Columns beyond which lines of help are no longer easy to read."""
+"""Largest width of the help, in columns."""
 
 
 class Command(typer.core.TyperCommand):
@@ -49,7 +49,7 @@ class Command(typer.core.TyperCommand):
                     formatter.write_dl(members)
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        """Commands to copy, each with what it is for."""
+        """Example commands, each with its purpose."""
         del ctx
         examples = EXAMPLES.get(self.name or "", ())
         if not examples:
@@ -57,7 +57,7 @@ class Command(typer.core.TyperCommand):
         with formatter.section("Examples"):
             for words, line in examples:
                 formatter.write_text(words)
-                # Not wrapped: it is there to be copied.
+                # Not wrapped, so that it can be copied.
                 formatter.write(f"{'':{formatter.current_indent + 2}}$ {line}\n")
 
 
@@ -77,14 +77,14 @@ class Group(typer.core.TyperGroup):
                     formatter.write_dl(rows)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Commands first: that is what people look for."""
+        """Commands first, then options."""
         self.format_commands(ctx, formatter)
         records = [r for p in self.get_params(ctx) if (r := p.get_help_record(ctx)) is not None]
         with formatter.section("Options"):
             formatter.write_dl(records)
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        """Where to begin."""
+        """The first commands to run."""
         del ctx
         with formatter.section("Begin with"):
             formatter.write_dl([(line, words) for words, line in EXAMPLES[""]])

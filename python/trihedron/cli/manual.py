@@ -1,4 +1,4 @@
-"""The manual page: what ``--help`` knows of every command, set for ``man``."""
+"""The manual page: the help of every command in roff, for ``man``."""
 
 from __future__ import annotations
 
@@ -46,6 +46,6 @@ def _first(text: str | None) -> str:
 
 
 def _set(text: str) -> str:
-    """Words as roff prints them: one line, hyphens that can be copied, nothing taken for a request."""
+    """Text escaped for roff: one line, hyphens that can be copied, no line that begins as a request."""
     line = " ".join(text.split()).replace("\\", "\\e").replace("-", "\\-")
     return f"\\&{line}" if line[:1] in {".", "'"} else line

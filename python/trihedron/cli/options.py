@@ -1,4 +1,4 @@
-"""Options that several commands share, and the decorators that give them to a command."""
+"""Options that several commands share, and the decorator that adds them to a command."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Report = Annotated[
 
 @dataclass(frozen=True)
 class ReadingOptions:
-    """How a log is to be understood, where it does not say so itself."""
+    """How to read a log that does not state its columns, rate or units."""
 
     columns: Annotated[
         str | None,
@@ -69,7 +69,7 @@ class ReadingOptions:
 
 @dataclass(frozen=True)
 class LogSource(ReadingOptions):
-    """Where the readings come from, as said on the command line."""
+    """The log, as given on the command line."""
 
     log: Annotated[
         Path | None,
@@ -87,14 +87,14 @@ class LogSource(ReadingOptions):
 
     @property
     def files(self) -> tuple[Path | None, ...]:
-        """What is read: no output may lie there."""
+        """Input files, which no output may overwrite."""
         return self.log, self.accel, self.gyro
 
     def read(self) -> Recording:
-        """The audited recording, with progress shown when it takes long."""
+        """The audited recording, with a progress bar for long logs."""
         if self.log is None and self.accel is None and self.gyro is None:
             raise typer.BadParameter("no log was named: give LOG, or --accel F and --gyro F")
-        # Not a verb of `api`: here sentences name flags, there parameters.
+        # Not a function of `api`: error messages here name flags, there parameters.
         from trihedron.read import read_recording
 
         with progress("reading") as report:
@@ -118,7 +118,7 @@ class LogSource(ReadingOptions):
 
 @dataclass(frozen=True)
 class LogsSource(ReadingOptions):
-    """One log or several, as said on the command line."""
+    """One log or several, as given on the command line."""
 
     log: Annotated[
         list[Path] | None,
@@ -139,11 +139,11 @@ class LogsSource(ReadingOptions):
 
     @property
     def files(self) -> tuple[Path | None, ...]:
-        """What is read: no output may lie there."""
+        """Input files, which no output may overwrite."""
         return tuple(path for paths in (self.log, self.accel, self.gyro) for path in paths or ())
 
     def are_many(self, by: str | None) -> bool:
-        """Whether several logs were named, or grouping was asked for."""
+        """Whether several logs, or a grouping, are given."""
         return by is not None or any(len(files or []) > 1 for files in (self.log, self.accel, self.gyro))
 
     def one(self) -> LogSource:
@@ -151,12 +151,12 @@ class LogsSource(ReadingOptions):
         return self.each()[0]
 
     def each(self) -> list[LogSource]:
-        """One source a log.
+        """One source per log.
 
         Raises
         ------
         typer.BadParameter
-            When accelerometer and gyro logs do not pair.
+            When the numbers of accelerometer and gyro logs differ.
         """
         log, accel, gyro = (list(files or []) for files in (self.log, self.accel, self.gyro))
         rest: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(ReadingOptions)}
@@ -176,7 +176,7 @@ class LogsSource(ReadingOptions):
 
 @dataclass(frozen=True)
 class GravitySource:
-    """|g| at the place of the recording, as said on the command line."""
+    """|g| at the place of the recording, as given on the command line."""
 
     gravity: Annotated[
         float | None, typer.Option("--gravity", metavar="m/s^2", help="Local gravity, a factor of every scale.")
@@ -190,21 +190,21 @@ class GravitySource:
 
     @property
     def said(self) -> dict[str, Any]:
-        """As the verbs of ``api`` take it."""
+        """Keyword arguments for the functions of ``api``."""
         return {"gravity_m_s2": self.gravity, "latitude_deg": self.latitude, "height_m": self.height}
 
     @property
     def gravity_m_s2(self) -> float:
-        """The number, given in either way or standard."""
+        """|g| [m/s²]: as given, by latitude and height, or standard."""
         from trihedron.api.choices import settle_gravity
 
         return settle_gravity(**self.said)[0]
 
 
 def with_options(**groups: type) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Give a command the fields of option groups as its own options: ``source=LogSource`` fills argument ``source``.
+    """Add the fields of option groups to a command's options: ``source=LogSource`` fills argument ``source``.
 
-    One place states an option; a command names the group.
+    An option is defined once, in its group.
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
@@ -241,7 +241,7 @@ def with_options(**groups: type) -> Callable[[Callable[..., None]], Callable[...
 
 @contextmanager
 def progress(task: str, after_s: float = 1.0) -> Iterator[Callable[[float, str], None]]:
-    """A bar on stderr with rate and time left for what takes longer than ``after_s``; silent before, and in a pipe."""
+    """A progress bar on stderr with rate and time left, after ``after_s`` seconds; none in a pipe."""
     began = time.monotonic()
     bar: Any = None
     handle: Any = None
@@ -250,7 +250,7 @@ def progress(task: str, after_s: float = 1.0) -> Iterator[Callable[[float, str],
     def report(done: float, text: str) -> None:
         nonlocal bar, handle
         if bar is None:
-            # A bar in a file or a pipe would be garbage.
+            # No bar in a file or a pipe.
             if not is_seen or time.monotonic() - began < after_s:
                 return
             bar = _bar()
@@ -266,7 +266,7 @@ def progress(task: str, after_s: float = 1.0) -> Iterator[Callable[[float, str],
 
 
 def _bar() -> Any:
-    """What, how far, how fast, how long still."""
+    """Columns of the bar: task, fraction done, rate, time left."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, ProgressColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
     from rich.text import Text

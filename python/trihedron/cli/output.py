@@ -1,4 +1,4 @@
-"""Where results go: text to stdout, JSON and reports to files (or '-'), and the exit status."""
+"""Output of results: text to stdout, JSON and reports to files (or '-'), and the exit status."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ NOT_TO_BE_TRUSTED = 2
 def check_outputs(
     *paths: Path | None, force: bool, report: Path | None = None, inputs: Iterable[Path | None] = ()
 ) -> None:
-    """Refuse outputs that would be refused later, before minutes of work; ``inputs`` are what they are made from.
+    """Check that outputs can be written, before minutes of work; ``inputs`` are files that they must not overwrite.
 
     Raises
     ------
     OutputError
-        As :func:`trihedron.files.output.check_free`, or when a report has an ending that names no format.
+        As :func:`trihedron.files.output.check_free`, or when the ending of a report is no known format.
     """
     if report is not None:
         check_report(report)
@@ -45,7 +45,7 @@ def check_outputs(
 
 
 def write_report(document: Document, machine: dict[str, Any], report: Path | None, *, force: bool) -> None:
-    """The report in the format that its name asks for."""
+    """Write the report in the format of its file's ending."""
     if report is None:
         return
     from trihedron.report.saved import written
@@ -56,14 +56,14 @@ def write_report(document: Document, machine: dict[str, Any], report: Path | Non
 
 
 def _with_provenance(document: Document) -> Document:
-    """How a report was made; one that is laid out again keeps how it was."""
+    """The document with its provenance; a saved one keeps its own."""
     return document if document.provenance else with_provenance(document)
 
 
 def write_json(machine: dict[str, Any], target: Path | None, *, force: bool, document: Document | None = None) -> None:
-    """The result for machines, to a file or ('-') to stdout; a file holds the report too, for ``trihedron report``.
+    """Write the JSON to a file or ('-') stdout; a file includes the report, for ``trihedron report``.
 
-    Comes after every other file: who reads stdout may have left.
+    Called after every other file is written, since the reader of stdout may have closed the pipe.
     """
     if target is None:
         return
@@ -82,7 +82,7 @@ def write_json(machine: dict[str, Any], target: Path | None, *, force: bool, doc
 
 @dataclass(frozen=True)
 class Results:
-    """Where a result goes beside the screen, as said on the command line."""
+    """Output files of a result, as given on the command line."""
 
     json: Json = None
     report: Report = None
@@ -93,19 +93,19 @@ class Results:
         check_outputs(*more, self.json, force=self.force, report=self.report, inputs=inputs)
 
     def tell(self, document: Document, machine: dict[str, Any], sections: int | None = None) -> None:
-        """On stdout (its first ``sections``), as JSON and as a report, where these are asked for."""
+        """Print the first ``sections`` on stdout; write JSON and report where requested."""
         show(document, self.json, sections=sections)
         self.write(document, machine)
 
     def write(self, document: Document, machine: dict[str, Any]) -> None:
-        """As a report and as JSON, where these are asked for."""
+        """Write report and JSON where requested."""
         write_report(document, machine, self.report, force=self.force)
         write_json(machine, self.json, force=self.force, document=document)
 
 
 @dataclass(frozen=True)
 class Ending:
-    """Where a calibration goes, and how much of its report is printed."""
+    """Output files of a calibration, and how much of its report is printed."""
 
     output: Path | None
     results: Results
@@ -119,9 +119,9 @@ class Ending:
         sections: int,
         more: str = "",
     ) -> None:
-        """The report, the files that were asked for, what ``more`` there is; status 2 where it is not to be trusted.
+        """Print the report and ``more``, write the requested files; status 2 where it is not to be trusted.
 
-        ``machine`` makes the result for machines, where one is asked for.
+        ``machine`` makes the JSON, and is called only where that is requested.
         """
         from trihedron.files.calibration import write_calibration
 
@@ -138,7 +138,7 @@ class Ending:
 
 
 def show(document: Document, json_target: Path | None, *, sections: int | None) -> None:
-    """The report on stdout, unless stdout carries JSON."""
+    """Print the report on stdout, unless that is for JSON."""
     if json_target is None or str(json_target) != "-":
         from trihedron.report import to_text
 
@@ -146,9 +146,9 @@ def show(document: Document, json_target: Path | None, *, sections: int | None) 
 
 
 def style() -> Style:
-    """What stdout can show: the terminal's columns, colour where it is one and NO_COLOR is unset, ASCII where it must.
+    """Style for stdout: the terminal's columns, colour on a terminal without NO_COLOR, ASCII where needed.
 
-    A pipe has the columns of a file; ``COLUMNS`` overrides both.
+    A pipe has the width of a file; ``COLUMNS`` overrides both.
     """
     from trihedron.report.text import WIDTH, Style
 
@@ -159,14 +159,14 @@ def style() -> Style:
 
 
 def has_colour() -> bool:
-    """A terminal that shows colours, and nobody who does not want them (no-color.org)."""
+    """Whether stdout is a terminal with colours and NO_COLOR is unset (no-color.org)."""
     return sys.stdout.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 
 def put(text: str) -> None:
-    """Text for people on stdout, with its colours where it has any.
+    """Print text on stdout, with colours where supported.
 
-    A reader who has left (`| head`) does not cost the files that were asked for beside it.
+    A closed pipe (`| head`) does not prevent the requested files from being written.
     """
     try:
         typer.echo(text, nl=False, color=has_colour())
@@ -177,13 +177,13 @@ def put(text: str) -> None:
 
 
 def silence_stdout() -> None:
-    """Let nothing of what could not be written be tried again, not even when the interpreter ends."""
+    """Redirect stdout to null, so that the interpreter does not flush it again at exit."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def say(sentence: str) -> None:
-    """To stderr: what was done, not what was found."""
+    """Print on stderr what was done; results go to stdout."""
     text = printable(sentence)
     if sys.stderr.isatty():
         text = textwrap.fill(text, shutil.get_terminal_size().columns, break_long_words=False, break_on_hyphens=False)
@@ -197,7 +197,7 @@ def say(sentence: str) -> None:
 
 
 def step(sentence: str) -> None:
-    """To a terminal: what is being done now. A pipe is told results only."""
+    """Print the current step on stderr, only on a terminal."""
     if sys.stderr.isatty():
         say(sentence)
 

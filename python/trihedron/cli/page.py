@@ -1,4 +1,4 @@
-"""The guide as a page in a browser: a server on 127.0.0.1, a token that works once, no network."""
+"""The guide as a page in a browser: a server on 127.0.0.1 with a single-use token."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ KEEP_ALIVE_S = 5.0
 
 
 def view_as_json(view: GuideView, lost: int = 0) -> str:
-    """Everything that the page shows, as strict JSON: what is not finite is ``null``."""
+    """The content of the page as strict JSON; non-finite numbers are ``null``."""
     known = view.examination
 
     def vector(values: Any) -> list[float] | None:
@@ -63,15 +63,15 @@ class _QuietServer(ThreadingHTTPServer):
     daemon_threads = True
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A page that was closed in the middle of an answer is no error to print over the guide."""
+        """Print nothing: a page closed during a response is no error."""
 
 
 class Page:
-    """Serves the page until closed; ``address`` holds the token and opens it once.
+    """Serves the page until closed; ``address`` includes a token that is valid once.
 
-    The token is exchanged for a cookie at the first visit and refused from then on, so that a link seen over a
-    shoulder, in a list of processes or in a history opens nothing. Requests that name another host are refused: a
-    page of the internet cannot reach this one through a name that points here.
+    The token is exchanged for a cookie at the first visit and then invalid, so that a link seen over a shoulder, in a
+    list of processes or in a history opens nothing. Requests for another host name are refused: this prevents DNS
+    rebinding by a page of the internet.
     """
 
     def __init__(self, port: int = 0) -> None:
@@ -90,7 +90,7 @@ class Page:
                 page._answer(self)
 
             def log_message(self, *_args: object) -> None:
-                """Nothing: the terminal belongs to the guide."""
+                """Print nothing: the terminal shows the guide."""
 
         self._server = _QuietServer(("127.0.0.1", port), Handler)
         self._host = f"127.0.0.1:{self._server.server_address[1]}"
@@ -98,7 +98,7 @@ class Page:
         threading.Thread(target=self._server.serve_forever, name="guide page", daemon=True).start()
 
     def show(self, view: GuideView, lost: int = 0) -> None:
-        """Tell every open page."""
+        """Send the view to every open page."""
         text = view_as_json(view, lost)
         with self._changed:
             self._latest = text
@@ -106,7 +106,7 @@ class Page:
             self._changed.notify_all()
 
     def close(self) -> None:
-        """Say good-bye to open pages and stop."""
+        """End the streams of open pages and stop the server."""
         with self._changed:
             self._is_closed = True
             self._changed.notify_all()

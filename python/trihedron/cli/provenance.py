@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from trihedron.report import Document
 
 typed: ContextVar[tuple[str, ...]] = ContextVar("typed", default=())
-"""The words after ``trihedron``, for one run."""
+"""The command-line arguments of this run."""
 _options: ContextVar[Mapping[str, Any]] = ContextVar("options", default=MappingProxyType({}))
 _inputs: ContextVar[tuple[tuple[str, str], ...]] = ContextVar("inputs", default=())
 
-# What says where results go, and not what they are.
+# Options that choose where results go and do not affect them.
 _NOT_OPTIONS = {
     "json",
     "report",
@@ -39,27 +39,27 @@ _NOT_OPTIONS = {
 
 
 def begin(words: Sequence[str]) -> None:
-    """A run begins with these words."""
+    """Start a run with these arguments."""
     typed.set(tuple(words))
     _options.set({})
     _inputs.set(())
 
 
 def note_options(given: Mapping[str, Any]) -> None:
-    """The options of the command, defaults among them."""
+    """Store the options of the command, including defaults."""
     _options.set({key: value for key, value in given.items() if key not in _NOT_OPTIONS})
 
 
 def note_input(recording: Recording) -> None:
-    """A recording was read."""
+    """Store source and hash of a recording that was read."""
     _inputs.set((*_inputs.get(), (recording.source, recording.sha256)))
 
 
 def with_provenance(document: Document) -> Document:
-    """The document with what this run was."""
+    """The document with the provenance of this run."""
     rows = [("command", shlex.join(["trihedron", *typed.get()]))] if typed.get() else []
     rows.append(("date", datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC")))
-    # Slow to load: a command that ends in words on a screen does without it.
+    # Imported here: slow, and not needed for text on the screen.
     from importlib.metadata import version as installed
 
     rows.append(("version", f"trihedron {installed('trihedron')}, Python {platform.python_version()}"))

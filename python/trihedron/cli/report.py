@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from trihedron.report import Document
 
 MOST_BYTES = 200_000_000
-"""Of a saved result; no report comes near it."""
+"""Largest saved result in bytes, far above any real one."""
 
 
 def report(
@@ -32,11 +32,11 @@ def report(
 
 
 def _read(path: Path) -> tuple[Document, dict[str, Any]]:
-    """The report and what it was saved with; that of a bare calibration file is made from its numbers."""
+    """The report and the JSON of a saved result; for a calibration file without one the report is built from it."""
     from trihedron.report.saved import KEY, report_of
 
     try:
-        # A pipe without a writer would be waited for.
+        # Opening a pipe without a writer would block.
         if path.exists() and not path.is_file():
             raise RefusedError(f"{path}: this is no plain file; name a saved result.")
         if path.stat().st_size > MOST_BYTES:

@@ -1,4 +1,4 @@
-"""The guide on a terminal: one screen of 80 × 24, more where there is room; plain marks, readable in light and dark."""
+"""The guide on a terminal: a screen of 80 × 24 or larger, in plain characters for light and dark themes."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from trihedron.arrays import FloatArray
 from trihedron.records.guiding import Examination, GuideView, Phase, Uncertain
 from trihedron.report.numbers import how_many
 
-# Names of the sixteen ANSI colours: the terminal's own theme decides what is readable on its background.
+# Names of the sixteen ANSI colours, which follow the terminal's theme.
 GOOD, BAD, DIM, STRONG = "green", "red", "dim", "bold"
 
 POSE, HERE, TARGET = "o", "@", "X"
 
 
 def hemispheres(view: GuideView, width: int = 17, height: int = 9) -> list[str]:
-    """Where up pointed in the body: two discs seen from Z, its upper half left and its lower half right."""
+    """Directions of the vertical in the body on two discs seen from Z: upper hemisphere left, lower right."""
     discs = [[[" "] * width for _ in range(height)] for _ in range(2)]
     for disc in discs:
         for i in range(height):
@@ -34,7 +34,7 @@ def hemispheres(view: GuideView, width: int = 17, height: int = 9) -> list[str]:
 
     def put(up: FloatArray, mark: str) -> None:
         which = 0 if up[2] >= 0.0 else 1
-        # Equal areas: as many poses on paper as on the sphere.
+        # Equal-area projection.
         radius = math.sqrt(max(1.0 - abs(float(up[2])), 0.0))
         length = math.hypot(float(up[0]), float(up[1])) or 1.0
         j = round((float(up[0]) / length * radius + 1.0) / 2.0 * (width - 1))
@@ -64,7 +64,7 @@ def percent(value: float | None) -> str:
 
 
 def screen(view: GuideView, width: int = 80, height: int = 24, *, lost: int = 0, seconds: float | None = None) -> Group:
-    """The whole screen as something that rich prints."""
+    """The whole screen as a rich renderable."""
     inner = width - 4
     state = Text("STILL " if view.is_still else "MOVING", style=f"{STRONG} {GOOD if view.is_still else DIM}")
     head = Text.assemble(state, "  ", Text(view.instruction, style=STRONG))
@@ -82,7 +82,7 @@ def screen(view: GuideView, width: int = 80, height: int = 24, *, lost: int = 0,
     legend = f"{POSE} taken  {HERE} now  {TARGET} next"
     body.add_row(Text("\n".join([*sphere, legend])), _parameters(view.examination, tall=tall))
     known = view.examination
-    # What has no room is left out whole, the last first.
+    # Facts that do not fit are omitted, the last first.
     facts = [how_many(view.n_poses, "pose"), *([] if known is None else [_to_go(known)]), f"{lost} lost"]
     facts += [] if seconds is None else [f"{seconds:.0f} s"]
     if known is not None:
@@ -97,7 +97,7 @@ def screen(view: GuideView, width: int = 80, height: int = 24, *, lost: int = 0,
 
 
 def _in_lines(warnings: Sequence[str], width: int, room: int) -> list[str]:
-    """The first warnings whole, as many lines as there is room for; what is cut says so."""
+    """The first warnings in at most ``room`` lines; a cut is marked by dots."""
     lines = [line for text in warnings for line in wrap(f"! {text}", width, subsequent_indent="  ")]
     if len(lines) > room:
         lines[room - 1 :] = [f"{lines[room - 1][: width - 4].rstrip()} ..."]
@@ -113,7 +113,7 @@ def _to_go(known: Examination) -> str:
 
 
 def _parameters(known: Examination | None, *, tall: bool) -> Text:
-    """Uncertainties now, after the next pose and as wanted: all of them where there is room, else the worst of each."""
+    """Uncertainties now, after the next pose and wanted: all parameters if ``tall``, else the worst of each kind."""
     if known is None:
         return Text("after the first poses", style=DIM)
     room = 32 if tall else 14
@@ -153,5 +153,5 @@ def as_text(view: GuideView, width: int = 80, height: int = 24) -> str:
 
 
 def bell(rings: int) -> str:
-    """The terminal's bell, for eyes on the board."""
+    """The characters that ring the terminal's bell."""
     return "\a" * rings

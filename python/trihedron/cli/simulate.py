@@ -31,7 +31,7 @@ def serve_recording(
     baud: int,
     link: Path | None,
 ) -> None:
-    """Send a recording over a pseudo-terminal or a socket until it ends; says where on stdout first."""
+    """Send a recording over a pseudo-terminal or a socket until it ends; prints the address on stdout first."""
     from trihedron.api.capturing import protocol_of
     from trihedron.simulate.device.faults import Sent, parse_faults
     from trihedron.simulate.device.serving import Device, PseudoTerminal, TcpServer, scales_of, serve
@@ -48,7 +48,7 @@ def serve_recording(
         baud=baud,
         scales=scales_of(recording, truth),
     )
-    # The protocol must be known before somebody opens the port.
+    # Check the protocol before the port is opened.
     next(device.pieces(Sent()))
     line = PseudoTerminal(link, baud) if kind.upper() == "PTY" else TcpServer(int(port or 0))
     typer.echo(line.name)
@@ -193,7 +193,7 @@ def _check_endings(output: Path | None, truth: Path | None) -> None:
 
 
 def _show(output: Path | None, recording: Recording, known: Truth) -> None:
-    """What was made, in a few lines."""
+    """Print a summary of the simulated log."""
     from trihedron.report.numbers import how_many
     from trihedron.report.simulation import in_rows
 

@@ -1,4 +1,4 @@
-"""Streams that know no more than ASCII, or a code page of Windows: words arrive spelt out instead of failing."""
+"""Output to streams in ASCII or a Windows code page: unsupported characters are spelt out."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def speaks_unicode(stream: TextIO) -> bool:
 
 
 def spell_out() -> None:
-    """What stdout and stderr cannot encode, they write in ASCII: ``σ`` as ``sigma``."""
+    """Make stdout and stderr write characters that they cannot encode in ASCII: ``σ`` as ``sigma``."""
     codecs.register_error(ERRORS, _spelt)
     for stream in (sys.stdout, sys.stderr):
         if not speaks_unicode(stream) and hasattr(stream, "reconfigure"):

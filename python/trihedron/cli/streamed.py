@@ -34,7 +34,7 @@ Kept = Annotated[
 
 
 def needs_stream(checkpoint: Path | None, *, stream: bool) -> None:
-    """Refuse a checkpoint of what is read whole.
+    """Check that a checkpoint is given only with ``--stream``.
 
     Raises
     ------
@@ -51,13 +51,13 @@ def opened(source: LogSource) -> LogOnDisk:
     Raises
     ------
     typer.BadParameter
-        When what a log in pieces needs was not said.
+        When an option that streaming needs is missing.
     """
     if source.log is None or source.columns is None or source.rate is None:
         raise typer.BadParameter("--stream needs LOG, --columns (as in ax,ay,az,gx,gy,gz) and --rate")
     from trihedron.api.streaming import log_on_disk
 
-    # A text is made a table first, which takes its time.
+    # A text log is first converted to a table, which takes time.
     with progress("opening"):
         return log_on_disk(
             source.log,
@@ -77,7 +77,7 @@ def segment_stream(source: LogSource, results: Results, checkpoint: Path | None)
 
     with progress("segmenting") as tell:
         segments = segment_file(log, checkpoint=checkpoint, progress=tell)
-    # Figures and times come from the rows of moves and of the ends of poses.
+    # Figures and times are from the rows of moves and of the ends of poses.
     recording, shown = condensed(log, segments)
     document, machine = segments_report(shown, recording), segments_record(shown, recording)
     results.tell(document, machine)

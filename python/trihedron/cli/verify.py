@@ -82,14 +82,14 @@ def verify(
 
 
 def _parted(source: Tested) -> tuple[list[Path], LogSource]:
-    """Calibrations and the one log among the files that were named, told by content."""
+    """Calibrations and the one log among the given files, distinguished by content."""
     from trihedron.files.formats import is_calibration
 
     named = list(source.log or [])
     logs = [path for path in named if not is_calibration(path)]
     beside = source.accel is not None or source.gyro is not None
     if len(logs) == len(named):
-        # None is one: the first was meant as one, and its reader says what is wrong with it.
+        # No file is a calibration: the first is read as one, and its reader reports the error.
         logs = named[1:]
     if len(logs) > 1 or (beside and logs):
         logs, extra = ([], logs) if beside else (logs[:1], logs[1:])

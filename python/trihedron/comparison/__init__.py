@@ -1,1 +1,1 @@
-"""COMPARISON: a given model held against a recording, parameter by parameter, noise term by noise term."""
+"""COMPARISON: a given model compared with a recording, parameter by parameter, noise term by noise term."""

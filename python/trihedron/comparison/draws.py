@@ -1,4 +1,4 @@
-"""How a simulation draws the numbers of its noise: from which distribution, and for each axis its own."""
+"""How a simulation draws its noise: from which distribution, and whether separately for each axis."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Sensor = Literal["accelerometer", "gyroscope"]
 NORMAL_EXCESS, UNIFORM_EXCESS = 0.0, -0.6
 """Excess kurtosis of differences of two normal and of two uniform numbers."""
 ONE_DRAW, OWN_DRAWS = 0.75, 0.5
-"""Correlations from which on three axes have one noise (steps of twice its size leave so much of one draw), and up to
-which they have their own. Independent ones reach neither; of ``FEWEST`` differences they reach 0.2."""
+"""Smallest correlation of axes with one noise common to all (an LSB of twice the noise leaves as much), and the largest
+of axes with noise of their own. Independent noise reaches neither; with ``FEWEST`` differences it reaches 0.2."""
 FEWEST = 256
 _NAMES = {"accelerometer": "accelerometer", "gyroscope": "gyro"}
 
@@ -24,10 +24,10 @@ _NAMES = {"accelerometer": "accelerometer", "gyroscope": "gyro"}
 def uniform_for_normal(
     sensor: Sensor, model: FloatArray, recording: FloatArray, n: int, noise: Sequence[PoseNoise]
 ) -> Iterator[NoiseDifference]:
-    """Uniform noise for normal: the excess kurtosis (3,) of ``n`` differences tells, where steps are finer."""
+    """Uniform noise in place of normal: by the excess kurtosis (3,) of ``n`` differences, where the LSB is finer."""
     middle = 0.5 * (NORMAL_EXCESS + UNIFORM_EXCESS)
     is_fine = all(axis.reading_sigma > axis.step for axis in noise)
-    # Four standard errors of a kurtosis of n correlated differences must fit between the two.
+    # Four standard errors of a kurtosis of n correlated differences must fit between the two values.
     if not is_fine or 4.0 * math.sqrt(48.0 / max(n, 1)) > -middle:
         return
     m, r = float(model.mean()), float(recording.mean())
@@ -37,9 +37,9 @@ def uniform_for_normal(
 
 
 def one_draw_for_all(sensor: Sensor, model: float, recording: float, n: int) -> Iterator[NoiseDifference]:
-    """The same random numbers on all three axes, where the recording's go their own ways.
+    """The same random numbers on all three axes, where the recording's axes are independent.
 
-    ``model`` and ``recording`` are the smallest correlations, in size, of two axes' ``n`` differences at rest.
+    ``model`` and ``recording`` are the smallest absolute correlations of two axes' ``n`` static differences.
     """
     if n < FEWEST or not (model > ONE_DRAW and recording < OWN_DRAWS):
         return

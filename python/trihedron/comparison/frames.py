@@ -1,4 +1,4 @@
-"""Axes along which a simulated log reads (rates of the world, gravity upside down), and gravity missed in motion."""
+"""Frame of a simulated log's readings (rates in the world frame, gravity upside down), and its errors in motion."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ from trihedron.simulate import Scenario
 from trihedron.units import degrees_from_radians, rate_to_si
 
 AIMED_AT = (0.9, 1.1)
-"""Ratio of what poses and moves miss, simulation over recording, within which the two are called alike."""
+"""Ratio of the gravity errors in poses and moves, simulation over recording, within which the two are alike."""
 FIRST_SEED = 60
-"""None of those by which scatter is matched: a scenario is not judged by the draws that it was made to fit."""
+"""Not among the seeds that the scatter is matched with: a scenario is not tested on the draws it was fitted to."""
 FEW, MANY = 8, 24
-"""Simulations drawn, and those drawn where the first few leave it open: their spread is then known to a seventh."""
+"""Simulations at first, and in total where these do not decide: the error of their spread is then a seventh."""
 OPEN_P = 0.1
-"""Chance of so large a ratio, from few simulations, above which no further ones are drawn."""
+"""p-value from few simulations above which no further ones are drawn."""
 
 What = Literal["poses", "moves"]
 
 
 class Moved(Protocol):
-    """What poses [(m/s²)²] and moves [rad²] of a recording miss, and of a scenario that is moved as it was."""
+    """Mean square errors of a recording's poses [(m/s²)²] and moves [rad²], and of scenarios with its motion."""
 
     poses: float | None
     moves: float | None
 
     def missed_by(self, scenario: Scenario, seed: int) -> tuple[float | None, float | None]:
-        """The same of one simulation with its own calibration."""
+        """The same errors for one simulation with its own calibration."""
 
 
 def judged_by_motion(found: Diagnosis, scenario: Scenario, beside: Moved, alpha: float) -> Diagnosis:
-    """A ``consistent`` diagnosis of a scenario, held against simulations of its instrument moved as the recording was.
+    """A ``consistent`` diagnosis of a scenario, tested against simulations with the recording's motion.
 
-    Noise inside poses says nothing of what happens between them. A ratio that chance does not explain makes it
-    ``parameters-differ``; other verdicts stand, and are not held up by simulations.
+    Noise inside poses does not show bias changes between them. A ratio that chance does not explain makes the verdict
+    ``parameters-differ``; other verdicts remain, and need no simulations.
     """
     if found.verdict != "consistent":
         return found
@@ -55,12 +55,12 @@ def judged_by_motion(found: Diagnosis, scenario: Scenario, beside: Moved, alpha:
 
 
 def missed_alike(scenario: Scenario, beside: Moved, alpha: float) -> tuple[NoiseDifference, ...]:
-    """What poses and moves of a scenario miss over what the recording's do, each with its interval.
+    """Ratios of the errors of poses and moves, scenario over recording, each with its interval.
 
-    The recording is one draw more of the same kind where both are alike: the logarithm of its root mean square then
-    lies from the mean of K simulations by s √(1 + 1/K) times Student's t of K − 1 degrees of freedom, s their standard
-    deviation. ``p_value``: one-sided, against the nearer end of ``AIMED_AT``; ``interval``: of 1 − 2 ``alpha``, so that
-    a ratio is significant exactly where its interval lies outside.
+    If both are alike the recording is one more draw: the logarithm of its root mean square then differs from the mean
+    of K simulations by s √(1 + 1/K) times Student's t of K − 1 degrees of freedom, s their standard deviation.
+    ``p_value``: one-sided, against the nearer end of ``AIMED_AT``; ``interval``: of 1 − 2 ``alpha``, so that a ratio is
+    significant exactly where its interval lies outside.
     """
     made = [beside.missed_by(scenario, FIRST_SEED + k) for k in range(FEW)]
     rows = _rows(made, beside, alpha)
@@ -78,7 +78,7 @@ def _rows(made: list[tuple[float | None, float | None]], beside: Moved, alpha: f
 
 def _row(what: What, squares: list[float | None], seen: float | None, alpha: float) -> NoiseDifference | None:
     known = [one for one in squares if one is not None and one > 0.0]
-    # As many as were refused are unlike the recording in another way than this one.
+    # Where half of the simulations have no value, the model differs from the recording in another way.
     if seen is None or seen <= 0.0 or 2 * len(known) <= len(squares):
         return None
     logs = 0.5 * np.log(known)
@@ -120,11 +120,11 @@ def _remark(what: What, ratio: float, interval: tuple[float, float], k: int, alp
 
 
 OPPOSITE = -0.9
-"""Mean cosine between gravity in the poses of both logs below which they are one protocol with the sign turned."""
+"""Mean cosine between gravity in the poses of both logs, below which they are one protocol with opposite signs."""
 
 
 def rates_of_world(recording: Recording, segments: Segments) -> NoiseDifference | None:
-    """The statement that a simulated log's rates are the world's, ``None`` where they are not."""
+    """The finding that a simulated log's rates are in the world frame, or ``None``."""
     seen: CarriedGravity | None = carried_gravity(recording, segments)
     if seen is None or not seen.is_of_world:
         return None
@@ -140,7 +140,7 @@ def rates_of_world(recording: Recording, segments: Segments) -> NoiseDifference 
 def sign_of_gravity(
     simulated: tuple[Segments, Calibration], recording: tuple[Segments, Calibration]
 ) -> NoiseDifference | None:
-    """The statement that gravity has opposite signs in two logs of one protocol, pose by pose, ``None`` elsewhere."""
+    """The finding that gravity has opposite signs in two logs of one protocol, pose by pose, or ``None``."""
     ours, theirs = _gravity(*recording), _gravity(*simulated)
     if ours is None or theirs is None or len(ours) != len(theirs):
         return None
@@ -163,34 +163,34 @@ def _gravity(segments: Segments, calibration: Calibration) -> npt.NDArray[np.flo
     return out
 
 
-# Rates along the axes of the world where those of the body are wanted: told by gravity before and after the moves.
+# Rates in the world frame in place of the body frame: detected by gravity before and after the moves.
 
 FEWEST_MOVES = 4
-"""Three unknown angles of the first attitude and some moves to spare."""
+"""Three unknown angles of the first attitude, and one move more."""
 MISSED_RAD = 0.3
-"""Gravity carried by body rates misses by less than this after any move, scales and biases of cheap parts included."""
+"""Largest tilt error after any move by body rates, scale errors and biases of cheap parts included."""
 BETTER = 0.3
-"""World rates explain what body rates do not where their error is less than this share of it."""
+"""Error by world rates over that by body rates, below which the rates are the world's."""
 
 
 @dataclass(frozen=True)
 class CarriedGravity:
-    """Rms angle [rad] by which gravity is missed after the moves, rates taken as the body's and as the world's."""
+    """Rms tilt error after the moves [rad], with rates in the body frame and in the world frame."""
 
     body_rad: float
     world_rad: float
 
     @property
     def is_of_world(self) -> bool:
-        """Whether the rates are the world's."""
+        """Whether the rates are in the world frame."""
         return self.body_rad > MISSED_RAD and self.world_rad < BETTER * self.body_rad
 
 
 def carried_gravity(recording: Recording, segments: Segments) -> CarriedGravity | None:
-    """Gravity carried through the moves by the rates, as if of the body and as if of the world.
+    """Gravity predicted after the moves from the rates, taken in the body frame and in the world frame.
 
-    Of the body: ``u₊ = ΔRᵀ u``. Of the world: ``R₊ = ΔR R``, so ``u_n = R₀ᵀ (ΔR_n … ΔR_1)ᵀ e_z``, with R₀ from all
-    poses (Wahba's problem). Rates are read by their unit, biases off by the rest before and after each move; ``None``
+    Body: ``u₊ = ΔRᵀ u``. World: ``R₊ = ΔR R``, so ``u_n = R₀ᵀ (ΔR_n … ΔR_1)ᵀ e_z``, with R₀ from all poses (Wahba's
+    problem). Rates are scaled by their unit, biases are those of the poses before and after each move; ``None``
     without a unit or with fewer than four moves in a row.
     """
     scale = rate_to_si(recording.gyroscope_unit)

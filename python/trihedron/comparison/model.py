@@ -1,4 +1,4 @@
-"""A given model against a recording: both fitted freely, then compared; physics competes on top of freed numbers."""
+"""A given model against a recording: both are fitted freely, then compared; effects beside free parameters."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from trihedron.records.pose_noise import PoseNoise
 
 DECIBEL = 20.0 / math.log(10.0)
 FEWEST_POSES = 4
-"""Two holds for either half."""
+"""Two poses in either half."""
 NOISE_IN_POSES = frozenset({"N", "B", "Q", "octave", "bandwidth", "resolution", "line"})
-"""Terms of the comparison that change what the octaves of a pose show."""
+"""Noise terms that change the octaves of a pose."""
 
 
 def with_noise_stage(
@@ -42,12 +42,12 @@ def with_noise_stage(
     fit: FittedModel,
     compared: Sequence[NoiseDifference],
 ) -> tuple[Stage, ...]:
-    """The stages with the misfit of the noise in each, and the stage ``noise`` after ``numbers``.
+    """The stages with the misfit of the noise in each, and the stage ``noise`` after ``parameters``.
 
-    Every second hold is predicted: by the given model until its noise is replaced, from then on by the recording's
-    other poses. A model whose noise differs nowhere in ``compared`` keeps it: half the poses know it less well. The
+    Every second pose is predicted: by the given model until its noise is replaced, then by the recording's other poses.
+    A model whose noise differs nowhere in ``compared`` keeps it, because half of the poses determine it less well. The
     misfit is the rms over sensors, axes and octaves of 20 log10 of the ratio of densities [dB]; a stage has none where
-    that is no number, as of a model without any noise.
+    it is not finite, as for a model without noise.
     """
     given = own = None
     if segments.n_poses >= FEWEST_POSES:
@@ -71,7 +71,7 @@ def _with(stage: Stage, misfit: float | None) -> Stage:
 
 
 def _misfit(model: Sampled, seen: Sampled) -> float | None:
-    """Rms of the logarithm of all densities that both sides have, in dB."""
+    """Rms of 20 log10 of the ratio of all densities that both sides have, in dB."""
     sensors: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
     squares = [
         (DECIBEL * math.log(ratio)) ** 2
@@ -83,7 +83,7 @@ def _misfit(model: Sampled, seen: Sampled) -> float | None:
 
 
 def _ratios(model: PoseNoise, seen: PoseNoise) -> list[float]:
-    """Root of the ratio of densities, octave by octave."""
+    """Square root of the ratio of power densities, octave by octave."""
     by_low = {octave.low_hz: octave.density.value for octave in model.octaves}
     return [
         math.sqrt(by_low[octave.low_hz] / octave.density.value)
@@ -101,10 +101,10 @@ def compared(
     segments: Segments,
     alpha: float,
 ) -> Diagnosis:
-    """The free diagnosis of a recording as the answer to: where does the given model differ?
+    """The diagnosis of a recording, extended by its differences to the given model.
 
-    ``simulated`` is the user's simulated log with its free diagnosis, where that is the model; else ``given`` is.
-    ``noise`` is what was compared of noise and sampling beside it.
+    ``simulated`` is the user's simulated log with its own diagnosis, where that is the model; otherwise ``given`` is.
+    ``noise`` are the differences of noise and sampling.
     """
     own = model_of_diagnosis(found)
     model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated[0])
@@ -120,7 +120,7 @@ def compared(
         model,
         own,
         alpha=alpha,
-        # A linear calibration was fitted beside effects that it does not know: it is also held against such a fit.
+        # A linear calibration absorbs effects that it does not contain: it is compared with a fit without effects too.
         linear=model_of_diagnosis(found, with_effects=False) if simulated is None and found.effects else None,
         left_open=left_open_by((*found.effects, *given_effects), _span_k(recording, simulated)),
     )
@@ -149,7 +149,7 @@ def compared(
 
 
 def _with_shared_effects(found: Diagnosis) -> Diagnosis:
-    """Stages and residuals of a recording whose effects the model has all: new numbers take none of them away."""
+    """Stages and residuals of a recording whose effects the model has too: every stage includes these effects."""
     with_effects = next((stage.domains for stage in found.stages if stage.stage == "effects"), ())
     return replace(
         found,
@@ -164,7 +164,7 @@ def _with_shared_effects(found: Diagnosis) -> Diagnosis:
 def _without_walk(
     effects: tuple[AcceptedEffect, ...], noise: tuple[NoiseDifference, ...]
 ) -> tuple[AcceptedEffect, ...]:
-    """Effects of a simulation less a free curve through zeros of a sensor whose slow noise is larger: that draws it."""
+    """Effects of a simulation, less a free curve through biases of a sensor whose larger slow noise explains it."""
     drawn = set()
     for sensor, drift in (("gyroscope", "gyro-bias-drift"), ("accelerometer", "accel-bias-drift")):
         slow = [n.ratio for n in noise if n.significant and n.sensor == sensor and n.term in ("B", "K") and n.ratio]
@@ -174,7 +174,7 @@ def _without_walk(
 
 
 def _span_k(recording: Recording, simulated: tuple[Diagnosis, Recording] | None) -> float | None:
-    """From the lowest to the highest temperature of both logs [K]; ``None`` where one has none."""
+    """Range of the temperatures of both logs [K]; ``None`` where one has none."""
     logs = (recording,) if simulated is None else (recording, simulated[1])
     seen = [log.temperature_degc[np.isfinite(log.temperature_degc)] for log in logs if log.temperature_degc is not None]
     if simulated is None or len(seen) < len(logs) or not all(len(one) for one in seen):
@@ -184,7 +184,7 @@ def _span_k(recording: Recording, simulated: tuple[Diagnosis, Recording] | None)
 
 
 def _numbers_test(parameters: tuple[ParameterDifference, ...]) -> DomainTest:
-    """All groups as one domain: the largest squared deviation per degree of freedom and its group's p."""
+    """All groups as one domain: F of the most significant group, per degree of freedom, and its p-value."""
     worst = min(parameters, key=lambda p: p.p_value)
     members = [p for p in parameters if p.id == worst.id]
     n = len(members)
@@ -215,7 +215,7 @@ def _factor(one: CommonFactor) -> NoiseDifference:
 
 
 def _as_given(given: Calibration, recording: Recording, segments: Segments) -> Stage:
-    """The given numbers with one bias for the session, nothing fitted: what the recording looks like to them."""
+    """Errors of the given parameters with one bias for the session, nothing fitted."""
     checked = verify_calibration(given, recording, segments, given.gravity_m_s2, given.gravity_source)
     domains = [
         StageDomain(

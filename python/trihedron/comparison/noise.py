@@ -1,4 +1,4 @@
-"""Noise and sampling of a simulated log against those of a recording, axis by axis, and what a ratio resembles."""
+"""Noise and sampling of a simulated log against those of a recording, axis by axis, and likely causes of a ratio."""
 
 from __future__ import annotations
 
@@ -24,39 +24,39 @@ from trihedron.records.sampling import TimestampKind
 Sensor = Literal["accelerometer", "gyroscope"]
 
 SHARE = 0.125
-"""Of alpha, for each kind of figure (white densities, corners, octaves of both sensors): half of alpha is spent on the
-numbers, a twelfth on slow noise."""
+"""Share of alpha for each kind of figure (white densities, corners, octaves of both sensors): half of alpha is used for
+the parameters, a twelfth for slow noise."""
 LEAST_RATIO = 1.05
-"""White noise of one part differs by 5 % over 30 K (its resistors' noise goes with the root of temperature)."""
+"""White noise of one part differs by 5 % over 30 K (thermal noise is proportional to the root of temperature)."""
 LEAST_STEP_RATIO = math.sqrt(2.0)
-"""Ranges of an ADC come in powers of two: halfway between two of them."""
+"""Ranges of an ADC are powers of two: halfway between two of them."""
 DIGITS = 0.1
-"""Steps of a tenth of the noise add a thousandth to its variance: whether they are an ADC's changes nothing."""
+"""LSB over noise below which it is ignored: a tenth adds a thousandth to the variance of the noise."""
 LEAST_SEEN_STEP = 1e-2
-"""Of the noise: hardly an ADC has a hundred codes to a standard deviation; sums of readings and what was taken off
-them come that near to a grid, and steps as fine cannot be told from the digits of a file."""
+"""LSB over noise below which it is not seen: hardly an ADC has a hundred codes in a standard deviation, sums of
+readings and compensated readings come that near to a grid, and the digits of a file are as fine."""
 FEWEST_ALIKE = 2
-"""Axes with one step, of which an ADC shows."""
+"""Axes with one common step, from which it is an ADC's."""
 LEAST_CORNER_RATIO = 1.2
 """Filters are chosen from lists whose neighbours differ by 1.5 to 2; within a fifth they are the same entry."""
 LEAST_RATE_RATIO = 1.02
 """Oscillators of cheap parts are specified to 1 to 2 %."""
 LEAST_OCTAVE_RATIO = 1.5
-"""Octaves below the white floor hold a few periods a pose each: smaller differences belong to the day."""
+"""Octaves below the white noise floor contain few periods per pose: smaller differences change from day to day."""
 LEAST_JITTER = 0.05
-"""Scatter of the timestamps, in steps, from which on it matters to a session (0.05 of 10 ms is 0.5 ms)."""
+"""Scatter of the timestamps, in sample intervals, from which it matters to a session (0.05 of 10 ms is 0.5 ms)."""
 PERFECT_CLOCK = 1e-6
-"""Scatter of the timestamps, in steps, that only a clock without any has: what is left is rounding of the file."""
+"""Scatter of the timestamps, in sample intervals, of a perfect clock: the rest is rounding of the file."""
 SAME_ON_ALL_AXES = 1.05
-"""Three axes of a real part agree within 5 % by chance in a few of a hundred parts."""
+"""Ratio within which three axes of a real part agree by chance in a few of a hundred parts."""
 UNLIKE_AXES = 1.1
-"""Beyond this, and beyond chance, axes are unlike each other."""
+"""Ratio beyond which axes differ, if chance does not explain it."""
 UNLIKE_BY_CHANCE = 0.01
-"""Equal densities that were each measured to a per cent or two spread beyond 3 % often, beyond this seldom."""
+"""p-value above which densities count as equal: measured to one or two per cent, equal ones often spread by 3 %."""
 RESEMBLES = 1.06
-"""A ratio this near to √rate, or to its inverse, is taken for it."""
+"""A ratio this near to √rate, or to its inverse, is identified with it."""
 SHOWS = 0.5
-"""Noise of half an ADC step moves its last digit in every third reading: it cannot be overlooked."""
+"""Noise over LSB from which readings show it: at one half the last digit changes in every third reading."""
 _SCATTERED = (TimestampKind.LATE, TimestampKind.SCATTERED)
 
 
@@ -64,7 +64,7 @@ _SCATTERED = (TimestampKind.LATE, TimestampKind.SCATTERED)
 class Sampled:
     """Noise of both sensors in SI along their own axes, and the clock.
 
-    ``likeness`` is the smallest correlation, in size, of the noise of any two axes.
+    ``likeness`` is the smallest absolute correlation of the noise of any two axes.
     """
 
     noise: dict[Sensor, tuple[PoseNoise, ...]]
@@ -77,7 +77,7 @@ class Sampled:
 
 
 def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> Sampled:
-    """Noise inside poses of a recording, by the scale of its own fit."""
+    """Noise inside poses of a recording, scaled by its own fit."""
     ranges = [(pose.start, pose.stop) for pose in poses]
     noise: dict[Sensor, tuple[PoseNoise, ...]] = {}
     excess: dict[Sensor, FloatArray] = {}
@@ -94,7 +94,7 @@ def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> 
         try:
             noise[sensor] = noise_of_poses(si, recording.rate_hz, ranges)
         except REFUSALS:
-            continue  # no hold is long enough: nothing to compare
+            continue  # no pose is long enough: nothing to compare
         differences = np.concatenate([np.diff(si[a:b], axis=0) for a, b in ranges if b - a > 2])
         differences = differences[np.isfinite(differences).all(axis=1)]
         centred = differences - differences.mean(axis=0)
@@ -110,13 +110,13 @@ def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> 
     clock = recording.sampling
     has_timestamps = clock.kind is not TimestampKind.NONE or jitter > PERFECT_CLOCK
     if clock.is_even and clock.kind in _SCATTERED:
-        # Reading put the samples on the even clock behind their timestamps: what these scattered by is in its report.
+        # The reader replaced the timestamps by an even clock: their scatter is in its report.
         jitter = max(jitter, clock.timestamp_error_s * recording.rate_hz)
     return Sampled(noise, excess, count, likeness, recording.rate_hz, jitter, has_timestamps)
 
 
 def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
-    """Every figure that both logs have, ratio model over recording; significant beyond chance and beyond what parts do.
+    """Every figure that both logs have, ratio model over recording; significant beyond chance and the spread of parts.
 
     ``alpha``: chance that anything of two logs of one unit is called different; three eighths of it are spent here.
     """
@@ -135,7 +135,7 @@ def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[
         )
         for axis, m, r in pairs:
             out += _step(sensor, axis, (m, model.noise[sensor]), (r, recording.noise[sensor]))
-            # Axes that share a filter have one corner, measured on all of them: one question.
+            # Axes that share a filter have one corner, measured on all of them: one test.
             corners = [] if is_one_part and axis != AXES[0] else [*_corner(sensor, axis, m, r, alpha * SHARE / 6.0)]
             out += [replace(row, axis="") if is_one_part else row for row in corners]
             out += _octaves(sensor, axis, m, r, alpha * SHARE / max(n_octaves, 1))
@@ -172,7 +172,7 @@ def _white(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) 
 
 
 def _hidden(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, unit: str) -> NoiseDifference:
-    """One side shows no noise: hidden by its ADC, or, where noise like the other's would show, not there."""
+    """One side shows no noise: its LSB hides it, or it has none where noise like the other's would show."""
     quiet, loud = (m, r) if m.white is None or not m.white.value > 0.0 else (r, m)
     side, other = ("model", "recording") if quiet is m else ("recording", "model")
     assert loud.white is not None
@@ -191,7 +191,7 @@ def _resembling(
     rate_hz: float,
     only_model_is_even: bool,
 ) -> list[NoiseDifference]:
-    """White densities with what their ratio resembles: mistakes that simulators have made."""
+    """White densities with the likely cause of their ratio: known mistakes of simulators."""
     name = "accelerometer" if sensor == "accelerometer" else "gyro"
     known = [w for w in white if w.ratio is not None]
     out = list(white)
@@ -223,7 +223,7 @@ def _resembling(
 
 
 def _are_even(white: Sequence[Measured | None]) -> bool:
-    """Whether densities of three axes are one, but for how well each is known and 5 %."""
+    """Whether the densities of three axes agree within their uncertainty and 5 %."""
     known = [w for w in white if w is not None and w.value > 0.0]
     if len(known) < len(AXES):
         return False
@@ -242,7 +242,7 @@ def _step(
     model: tuple[PoseNoise, Sequence[PoseNoise]],
     recording: tuple[PoseNoise, Sequence[PoseNoise]],
 ) -> Iterator[NoiseDifference]:
-    """One axis of either side, with all axes of its sensor."""
+    """Difference of the LSB of one axis, each side given with all axes of its sensor."""
     m, r = model[0], recording[0]
     unit = "m/s^2" if sensor == "accelerometer" else "rad/s"
     name = "accelerometer" if sensor == "accelerometer" else "gyro"
@@ -250,7 +250,7 @@ def _step(
     if not (m_shows or r_shows):
         return
     if not (m_shows and r_shows):
-        # Readings finer than their noise shows: only a step that matters beside the noise is missed.
+        # Readings finer than their noise shows: only an LSB larger than the noise is missed.
         coarse = m if m_shows else r
         matters = coarse.step > coarse.reading_sigma
         side = "recording" if m_shows else "model"
@@ -259,7 +259,7 @@ def _step(
         return
     ratio = m.step / r.step
     levels = [one.reading_sigma for one in (m, r) if one.reading_sigma > 0.0]
-    # Steps far below the noise are as likely the digits of a file as an ADC's.
+    # Steps far below the noise may be the digits of a file.
     is_seen = not levels or max(m.step, r.step) > DIGITS * min(levels)
     is_far = max(ratio, 1.0 / ratio) > LEAST_STEP_RATIO and is_seen
     remark = f"The resolution (LSB) of the {name} is {ratio:.3g} times the recording's." if is_far else ""
@@ -267,9 +267,9 @@ def _step(
 
 
 def _shows_steps(one: PoseNoise, axes: Sequence[PoseNoise]) -> bool:
-    """Whether readings go in steps: a distance of numbers far below the noise is that of chance, not of an ADC.
+    """Whether readings show an LSB: a step far below the noise is chance, not an ADC.
 
-    Nor is one that no other axis has: the axes of a sensor share an ADC.
+    So is one that no other axis has: the axes of a sensor share an ADC.
     """
     alike = sum(max(one.step, other.step) < LEAST_STEP_RATIO * min(one.step, other.step) for other in axes)
     if one.step > 0.0 and alike < min(FEWEST_ALIKE, len(axes)):
@@ -295,7 +295,7 @@ def _corner(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float)
 
 
 def _octaves(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> Iterator[NoiseDifference]:
-    """Octave by octave; significant where it differs otherwise than white noise and filter do."""
+    """Octave by octave; significant where the ratio differs from that of the white noise and filter."""
     if m.white is None or r.white is None:
         return
     white = ratio_of(m.white, r.white)
@@ -310,7 +310,7 @@ def _octaves(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float
         beyond = ratio.value / white.value**2
         is_far = max(beyond, 1.0 / beyond) > LEAST_OCTAVE_RATIO**2
         is_off = ratio.p_value < alpha and not ratio.lower < white.value**2 < ratio.upper
-        # Above the corner it is the filter that differs, and that is said.
+        # Above the corner the filter differs, which is reported by itself.
         is_off = is_off and not (filters_differ and octave.high_hz > min(corners))
         band = f"{octave.low_hz:g} to {octave.high_hz:g} Hz"
         name = "accelerometer" if sensor == "accelerometer" else "gyro"

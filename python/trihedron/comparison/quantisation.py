@@ -1,4 +1,4 @@
-"""Quantisation noise Q of a simulation against the recording's, axis by axis: what rises with frequency at rest."""
+"""Quantisation noise Q of a simulation against the recording's, by axis: static noise that rises with frequency."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from trihedron.records.diagnosis import NoiseDifference
 from trihedron.records.pose_noise import Measured, PoseNoise
 
 SHARE = 1.0 / 24.0
-"""Of alpha: what white noise, corners, octaves, slow noise and the numbers leave."""
+"""Share of alpha that white noise, corners, octaves, slow noise and the parameters leave."""
 STANDS_OUT = 4.0
 """Standard errors of Q² above zero from which an axis shows it."""
 LEAST_RATIO = 1.5
-"""In Q, as an octave's density must differ by."""
+"""Ratio of Q from which it differs, as of an octave's density."""
 FEWEST_OCTAVES = 4
 _ROUNDS = 5
 
@@ -34,11 +34,11 @@ class WhiteAndQuantisation:
 
     @property
     def is_shown(self) -> bool:
-        """Whether Q stands out of its error."""
+        """Whether Q² exceeds zero by ``STANDS_OUT`` standard errors."""
         return self.quantisation > STANDS_OUT * self.sigma
 
     def measured(self) -> Measured:
-        """Q with its interval, where it is shown."""
+        """Q with its 95 % interval, where it is shown."""
         value, log = math.sqrt(self.quantisation), 0.5 * self.sigma / self.quantisation
         return Measured(value, value * math.exp(-1.96 * log), value * math.exp(1.96 * log), log)
 
@@ -46,12 +46,12 @@ class WhiteAndQuantisation:
 def white_and_quantisation(axis: PoseNoise) -> WhiteAndQuantisation | None:
     """Least squares of N² + 4 Q² rate sin²(πf/rate) to the densities of the octaves, errors relative to the model.
 
-    The first difference over the time step of white noise of variance Q² is what rounding of an integral leaves: an
-    Allan variance of 3 Q²/τ² (docs/noise.md, 8).
-    ``None`` where a low-pass colours the axis, or octaves are too few.
+    Rounding of an integral leaves the first difference over the time step of white noise of variance Q², with an Allan
+    variance of 3 Q²/τ² (docs/noise.md, 8).
+    ``None`` where a low-pass filters the axis, or octaves are too few.
     """
     octaves = [o for o in axis.octaves if o.high_hz <= 0.5 * axis.rate_hz * (1.0 + 1e-9)]
-    # A corner above half the rate is no low-pass: the shape that comes nearest to a rise.
+    # A corner above half the rate is no low-pass, but the shape nearest to a rise.
     is_filtered = axis.corner_hz is not None and axis.corner_hz.value < 0.5 * axis.rate_hz
     if len(octaves) < FEWEST_OCTAVES or is_filtered:
         return None
@@ -67,7 +67,7 @@ def white_and_quantisation(axis: PoseNoise) -> WhiteAndQuantisation | None:
         norms = np.linalg.norm(scaled, axis=0)
         solution = np.linalg.lstsq(scaled / norms, density * weight, rcond=None)[0] / norms
         inverse = np.linalg.pinv((scaled / norms).T @ (scaled / norms))
-        # Misfit of the shape widens the error, as it does that of any number.
+        # The misfit of the shape widens the error.
         spread = (density - design @ solution) * weight
         excess = max(float(spread @ spread) / max(len(octaves) - 2, 1), 1.0)
         sigma = math.sqrt(excess * float(inverse[1, 1])) / float(norms[1])
@@ -82,7 +82,7 @@ def _mean_sin2(low_hz: float, high_hz: float, rate_hz: float) -> float:
 
 
 def quantisation_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
-    """Rows of the term Q where either side shows it; ``alpha`` is the chance that anything of one unit differs."""
+    """Rows of the term Q where either side shows it; ``alpha`` is the chance that any figure of one unit differs."""
     sensors: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
     return tuple(
         row

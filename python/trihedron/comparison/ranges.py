@@ -1,4 +1,4 @@
-"""Ranges that a scenario states, beside those that a recording ends at."""
+"""Range limits that a scenario states, against those that a recording reaches."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from trihedron.sensor_model import correct
 from trihedron.simulate import Scenario
 
 SENSOR = {"accel-saturation": "accelerometer", "gyro-saturation": "gyroscope"}
-"""Whose range an effect is the end of."""
+"""Sensor whose range limit an effect is."""
 
 
 def stated_ranges(
     scenario: Scenario, effects: Iterable[AcceptedEffect], recording: Recording
 ) -> tuple[AcceptedEffect, ...]:
-    """Those of a ``recording``'s effects that are the range limit which the scenario states too.
+    """Those of a ``recording``'s effects that are a range limit which the scenario states too.
 
-    A peak of one sample that was cut is not driven again: samples fall elsewhere on it. What the scenario says of its
-    ADC and of its saturation needs no peak to show it.
+    A clipped peak of one sample is not clipped again in a simulation, whose samples fall elsewhere on it. The limits
+    that the scenario states for its ADC and saturation count without such a peak.
     """
     return tuple(e for e in effects if e.id in SENSOR and _states(scenario, e, recording))
 
 
 def _states(scenario: Scenario, effect: AcceptedEffect, recording: Recording) -> bool:
-    """Whether every limit of the effect lies where the scenario's does: the same code, or on each side's own axes."""
+    """Whether every limit of the effect is the scenario's: the same code, or the same value along the sensor axes."""
     name = SENSOR[effect.id]
     part = getattr(scenario, name)
     is_same_unit = part.unit is getattr(recording, f"{name}_unit")

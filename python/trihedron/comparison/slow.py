@@ -23,16 +23,16 @@ from trihedron.segment import resegment
 from trihedron.sensor_model import correct
 
 TESTS = 48.0
-"""Shares of alpha: what numbers (a half), noise (three eighths) and slow noise (a twelfth) leave, for two sensors."""
+"""Divisor of alpha: a half goes to parameters, three eighths to noise, a twelfth to slow noise, for two sensors."""
 LEAST_TIME_RATIO = 2.0
-"""Times of parts of one reel differ by half; makers state none."""
+"""Correlation times of parts of one reel differ by half; makers state none."""
 ALIKE = 1.25
-"""Two sensors of one part whose times agree within a quarter have one and the same."""
+"""Two sensors of one part whose correlation times agree within a quarter have one common time."""
 SENSORS: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
 
 
 def correlation_times(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
-    """A row for each sensor whose noise forgets within the poses of both logs; a time used for both is named."""
+    """A row for each sensor with a correlation time in the poses of both logs; one time used for both is named."""
     times = {
         sensor: (correlation_time(model.noise[sensor]), correlation_time(recording.noise[sensor]))
         for sensor in SENSORS
@@ -56,7 +56,7 @@ def correlation_times(model: Sampled, recording: Sampled, *, alpha: float) -> tu
 
 
 def _one_for_both(both: Mapping[Sensor, tuple[Measured, Measured]], alpha: float) -> str:
-    """The words for a simulation that gives both sensors one time where the recording's differ; empty elsewhere."""
+    """The sentence for a simulation with one time for both sensors where the recording's differ; else empty."""
     if len(both) < len(SENSORS):
         return ""
     (m_a, r_a), (m_g, r_g) = (both[sensor] for sensor in SENSORS)
@@ -73,26 +73,26 @@ def _one_for_both(both: Mapping[Sensor, tuple[Measured, Measured]], alpha: float
 
 
 LEAST_SLOW_RATIO = 2.0
-"""Bias instability differs by half from one part of a reel to the next and with the day; makers state no spread."""
+"""Bias instability differs by half between parts of a reel and from day to day; makers state no spread."""
 RESEMBLES_SLOW = 1.5
-"""A session tells a walk to some 30 %: a ratio this near to the root of the rate is taken for it."""
+"""A session determines a walk to some 30 %: a ratio this near to the root of the rate is identified with it."""
 OF_ALPHA = 24.0
-"""Shares of alpha: a twelfth is spent on slow noise, half of it on either sensor."""
+"""Divisor of alpha: a twelfth is used for slow noise, half of it for either sensor."""
 NO_SHAPE = frozenset({"gyro-bias-repeatability", "accel-bias-repeatability", "disturbed-pose", "periodic-interference"})
-"""Effects that leave the course of a bias from pose to pose as it is."""
+"""Effects that do not change the course of a bias from pose to pose."""
 DOMAINS: Mapping[str, Domain] = MappingProxyType({"gyroscope": "static-gyro", "accelerometer": "static-accel"})
 Side = tuple[Diagnosis, Recording, Segments]
 
 
 def slow_noise(model: Side, recording: Side, *, alpha: float) -> tuple[NoiseDifference, ...]:
-    """B and K of both sensors, axis by axis, where both logs have poses enough.
+    """B and K of both sensors, axis by axis, where both logs have enough poses.
 
-    The gyro shows its biases at rest, the accelerometer the part of its biases along gravity. Significant where chance
-    makes such a difference in fewer than ``alpha``/24 and the ratio is beyond a factor of two; never where a drift of
-    the recording has a name of its own, or disagrees and has none: a walk would be a second name for it.
+    For the gyro from the biases of poses, for the accelerometer from their part along gravity. Significant where the
+    p-value is below ``alpha``/24 and the ratio beyond a factor of two; never where a drift of the recording was named
+    as an effect, or disagrees without one: a walk would then describe the same drift twice.
     """
     out: list[NoiseDifference] = []
-    # A free curve through a simulation's biases is no mechanism: its walk is. A recording's may be one.
+    # A free curve through a simulation's biases is its walk and no mechanism. A recording's may be one.
     biases = gyro_biases(*model, with_curve=True), gyro_biases(*recording, with_curve=_has_curve(model[0]))
     rate_hz = model[1].rate_hz
     if biases[0] and biases[1]:
@@ -133,9 +133,9 @@ def _rows(
 
 
 def _drifts(found: Diagnosis, sensor: Sensor, *, but_curve: bool = False) -> bool:
-    """Whether the biases of a recording's sensor move in a way that has another name, or that nothing explains.
+    """Whether an effect explains the bias changes of a recording's sensor, or these disagree without one.
 
-    ``but_curve``: a free curve through them is compared as the walk that the other side's is.
+    ``but_curve``: a free curve through them counts as a walk, like that of the other side.
     """
     domain = DOMAINS[sensor]
     if any(test.disagrees for test in found.remaining if test.domain == domain):
@@ -147,7 +147,7 @@ def _drifts(found: Diagnosis, sensor: Sensor, *, but_curve: bool = False) -> boo
 
 
 def _has_curve(found: Diagnosis, sensor: Sensor = "gyroscope") -> bool:
-    """Whether the one effect on a sensor's biases, beside their scatter, is a drift along a curve of any shape."""
+    """Whether the only effect on a sensor's biases, beside their scatter, is a drift along a free curve."""
     domain, drift = DOMAINS[sensor], f"{'gyro' if sensor == 'gyroscope' else 'accel'}-bias-drift"
     of_biases = [e for e in found.effects if any(h.domain == domain for h in e.held_out) and e.id not in NO_SHAPE]
     return len(of_biases) == 1 and of_biases[0].id == drift and of_biases[0].model.get("variant") in FREE_CURVES
@@ -156,9 +156,9 @@ def _has_curve(found: Diagnosis, sensor: Sensor = "gyroscope") -> bool:
 def gyro_biases(
     found: Diagnosis, recording: Recording, segments: Segments, *, with_curve: bool = False
 ) -> tuple[PoseBiases, ...]:
-    """Zeros of a session's poses per axis, what effects make of them taken off; none without a gyro.
+    """Biases of a session's poses per axis, the effects on them compensated; none without a gyro.
 
-    ``with_curve``: a drift along a free curve stays on them where nothing else was taken off.
+    ``with_curve``: a drift along a free curve is not compensated where it is the only effect.
     """
     shown = _shown(found, "gyroscope", with_curve=with_curve)
     if shown is None:
@@ -171,7 +171,7 @@ def gyro_biases(
 def accel_norms(
     found: Diagnosis, recording: Recording, segments: Segments, *, with_curve: bool = False
 ) -> tuple[PoseBiases, ...]:
-    """Lengths of gravity in a session's poses, with its directions; otherwise like :func:`gyro_biases`."""
+    """Norms of gravity in a session's poses, with their directions; otherwise like :func:`gyro_biases`."""
     shown = _shown(found, "accelerometer", with_curve=with_curve)
     if shown is None:
         return ()
@@ -200,16 +200,16 @@ def _shown(found: Diagnosis, sensor: Sensor, *, with_curve: bool) -> tuple[Float
 
 @dataclass(frozen=True, eq=False)
 class _Poses:
-    """Lengths (n,) [s] and mean readings (n, 3) of the poses that a diagnosis shows."""
+    """Durations (n,) [s] and mean readings (n, 3) of the poses in a diagnosis."""
 
     length_s: FloatArray
     means: FloatArray | None
 
 
 def _poses(shown_s: FloatArray, recording: Recording, segments: Segments) -> _Poses:
-    """The poses that a diagnosis shows: cut where they were bumped, or left whole.
+    """The poses in a diagnosis: cut where they were disturbed, or whole.
 
-    Pieces of a pose with the length of all of it would overlap: no covariance of means then, and too small an error.
+    Pieces with the duration of the whole pose would overlap: no covariance of their means, and too small an error.
     """
     cut = resegment(recording, segments)
     t = recording.time_s

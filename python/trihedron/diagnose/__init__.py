@@ -1,4 +1,4 @@
-"""Where simulation and recording differ, which physics was left out, and the proof that adding it helps."""
+"""Diagnosis: where model and recording differ, which physical effects are missing, and whether adding them helps."""
 
 from trihedron.diagnose.application import TakenOff, take_off
 from trihedron.diagnose.diagnosis import diagnose_recording, diagnose_recordings

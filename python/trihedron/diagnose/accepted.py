@@ -1,4 +1,4 @@
-"""What was accepted, as the record that reports and files show."""
+"""Accepted effects, candidates and stages as the records that reports and files show."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectCurve, 
 from trihedron.records.domains import DomainResiduals, HeldOut
 
 HEADLINE = 0.5
-"""What carries less than half of the samples' own variance (a faint line) or poses (one bump) follows behind whatever
-explains poses and moves."""
+"""Share of the misfit below which an effect of single samples or poses (a faint line, one disturbed pose) is listed
+after the effects that explain poses and moves."""
 LEAST_P = 1e-300
-"""The rarest chance that a double holds with all its digits."""
+"""Smallest p-value that a double holds with full precision."""
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Everything that was accepted: effects with columns, processes of the bias, what the samples show.
+    """Everything accepted: effects with columns, bias processes, effects found by tests on the samples.
 
-    ``numbers`` is the hypothesis that parameters and their errors are taken from, its shapes being unknowns too.
+    ``numbers`` is the hypothesis that parameters and uncertainties come from; its shape parameters are unknowns too.
     """
 
     found: Found
@@ -43,17 +43,17 @@ class Answer:
     biases: Sequence[BiasStrength]
     seen: Sequence[Seen]
     judged: Fit
-    """The session with all that, in the noise that was predicted: what remains is judged there."""
+    """Fit with all accepted effects, noise strengths bounded to the part's noise; remaining misfit is judged on it."""
 
     @property
     def ids(self) -> set[str]:
-        """All that has a name."""
+        """Ids of everything accepted."""
         terms = {term.effect.id for term in self.found.model.terms}
         return terms | {one.effect.id for one in self.biases} | {one.effect.id for one in self.seen}
 
     @property
     def gains(self) -> list[tuple[Effect, float, float | None]]:
-        """Every effect with its gain in twice a log-likelihood and, where it states that itself, its share."""
+        """Every effect, its gain (twice a log-likelihood) and the share that its own test states, or ``None``."""
         out: list[tuple[Effect, float, float | None]] = [
             (term.effect, gain, None) for term, gain in zip(self.found.model.terms, self.found.gains, strict=True)
         ]
@@ -62,15 +62,15 @@ class Answer:
 
     @property
     def shares(self) -> list[float]:
-        """Part of the misfit that each explains: its gain over all gains and what is left unexplained."""
+        """Share of the misfit explained by each: its gain over the sum of all gains and the remaining ``excess``."""
         gains = self.gains
         whole = max(sum(max(gain, 0.0) for _, gain, own in gains if own is None) + excess(self.judged), 1e-9)
         return [max(gain, 0.0) / whole if own is None else own for _, gain, own in gains]
 
     @property
     def are_footnotes(self) -> bool:
-        """Whether nothing accepted is an answer: single poses, a faint line, biases that scatter, what is seen in the
-        samples and changes nothing in the fit."""
+        """Whether only minor effects were accepted: disturbed poses, a faint line, bias repeatability, and effects of
+        the samples that change nothing in the fit."""
         beside = {one.effect.id for one in self.seen if not one.reobserves}
         return all(
             share < HEADLINE and (own is not None or effect.is_spread or effect.is_local or effect.id in beside)
@@ -79,12 +79,12 @@ class Answer:
 
     @property
     def are_spread(self) -> bool:
-        """Whether all that was accepted says how far something scatters, or where one pose was pushed: not why."""
+        """Whether every accepted effect is a scatter or a disturbed pose, which names no mechanism."""
         return all(effect.is_spread or effect.is_local for effect, *_ in self.gains)
 
 
 def excess(fitted: Fit) -> float:
-    """Chi-square beyond its degrees of freedom, over the domains that have more than they should."""
+    """Chi-square beyond the degrees of freedom, summed over the domains where it is positive."""
     used, out = fitted.leverage, 0.0
     for domain in ROW_DOMAINS:
         rows = fitted.system.domain == domain
@@ -93,9 +93,9 @@ def excess(fitted: Fit) -> float:
 
 
 def accepted_effects(answer: Answer, residuals: Sequence[DomainResiduals]) -> tuple[AcceptedEffect, ...]:
-    """Every accepted effect with its parameters, the one that explains most of the misfit first.
+    """Every accepted effect with its parameters, the largest share of the misfit first, minor effects last.
 
-    ``residuals`` of poses with all of them stand beside their curves.
+    ``residuals`` of the poses, in the fit with all effects, are stored with each effect's curve.
     """
     made = [*_of_terms(answer, residuals), *_of_biases(answer, residuals), *_of_samples(answer)]
     rows = []
@@ -140,7 +140,7 @@ def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[dic
                 "sigma": [[float(s)] * obs.n_poses for s in one.std], "unit": one.effect.unit,
             }  # fmt: skip
             curves = bias_curves(model.context, one.effect.sensor, path, one.std, residuals)
-        # Half of a chi-square with one degree of freedom: the strength lies at its boundary without it.
+        # An upper bound: at its boundary a strength gains half a chi-square with one degree of freedom.
         p = float(np.exp(-0.5 * max(one.gain, 0.0)))
         held = held_out_records(one.without, model)
         rivals = tuple(other.term.effect.id for other in explain_as_much(one, model, answer.found.tried.values()))
@@ -198,7 +198,7 @@ def _record(
 
 
 def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ...]:
-    """Held-out chi-square and physical rms per domain of two hypotheses, the largest gain first."""
+    """Held-out chi-square per row and rms [SI] of two hypotheses, per domain, the largest decrease of the rms first."""
     was, now = before.prediction, after.prediction
     rms_before, unit = physical_rms(before.fitted, was.innovation)
     rms_after, _ = physical_rms(after.fitted, now.innovation)
@@ -207,7 +207,7 @@ def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ..
         if was.n_rows[d] < LEAST_DOF or now.n_rows[d] < LEAST_DOF or d not in rms_before or d not in rms_after:
             continue
         gain = float(np.log(rms_before[d] / max(rms_after[d], LEAST_P)))
-        # Both over one noise: strengths that are free would take up what the effect explains.
+        # Both use the noise strengths of ``after``: those fitted without the effect absorb part of what it explains.
         left = float(now.chi2[d] / now.n_rows[d])
         before_over_it = left * (rms_before[d] / max(rms_after[d], LEAST_P)) ** 2
         out.append((gain, HeldOut(name, before_over_it, left, rms_before[d], rms_after[d], unit[d])))
@@ -215,7 +215,7 @@ def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ..
 
 
 def held_out_stages(bare: Hypothesis, answer: Answer) -> tuple[Stage, ...]:
-    """The recording predicted by its own numbers, and, where effects were accepted, by numbers and effects."""
+    """The recording predicted by the linear parameters and, where effects were accepted, by parameters and effects."""
     stages = (Stage("parameters", _stage(bare)),)
     return (*stages, Stage("effects", _stage(answer.found.model))) if answer.ids else stages
 
@@ -231,7 +231,7 @@ def _stage(model: Hypothesis) -> tuple[StageDomain, ...]:
 
 
 def candidates(answer: Answer, known: dict[str, Candidate], asked: dict[str, BiasStrength]) -> tuple[Candidate, ...]:
-    """Every effect that was tried, accepted or not: its score, its size, the limit on it, and what stood against it."""
+    """Every effect tried, accepted or not: score, size, upper limit, and the effect that took its place."""
     found, out = answer.found, dict(known)
     out |= {key: Candidate(key, None, False, reason) for key, reason in found.missing.items() if key not in known}
     for key, one in found.tried.items():
@@ -254,7 +254,7 @@ def candidates(answer: Answer, known: dict[str, Candidate], asked: dict[str, Bia
 def _candidate(one: Tried, against: str | None) -> Candidate:
     term, asked = one.term, one.asked
     size = term.effect.parameters(term.variant, asked.value, asked.covariance)
-    # What is reported in other numbers (an angle for a direction) has no largest size.
+    # A parameter reported in another unit (an angle for a direction) has no upper limit here.
     linear = [p for p in size if p.name in term.variant.names and p.unit == size[0].unit]
     limit = max((abs(p.value) + 1.96 * p.std for p in linear), default=None)
     return Candidate(term.effect.id, one.p_value, True, "", one.score, size, limit, against)

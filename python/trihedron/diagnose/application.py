@@ -1,7 +1,7 @@
-"""Accepted effects taken off another recording of the same sensor, sample by sample.
+"""Compensation of accepted effects in another recording of the same sensor, sample by sample.
 
-The effects' own forward models are used (their ``variants``): here every sample is a point, and the motion is what the
-sensor itself reads, corrected by S and b.
+The effects' own forward models (``variants``) are evaluated with every sample as a point. The motion is the sensor's
+own reading, corrected by S and b.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from trihedron.records import Recording
 from trihedron.records.words import words
 
 N_ITERATIONS = 2
-"""Effects are per mille of the motion: the second pass of the fixed point leaves their square."""
+"""Fixed-point iterations: effects are about 10⁻³ of the motion, so two leave an error of their square."""
 
 
 class SignalMissing(RefusedError):
-    """The recording lacks a channel that an effect follows."""
+    """The recording lacks a channel that an effect depends on."""
 
 
 @dataclass(frozen=True, eq=False)
 class SampleContext(Context):
-    """What an effect may look at when it is taken off: every sample is a point, poses and moves are not known."""
+    """Context of an effect that is compensated: every sample is a point; poses and moves are not known."""
 
     recording: Recording = field(kw_only=True)
     given_force: FloatArray = field(kw_only=True)
@@ -103,7 +103,7 @@ class SampleContext(Context):
 
 @dataclass(frozen=True, eq=False)
 class TakenOff:
-    """Raw readings without the effects, (n, 3) or ``None``; ``applied`` ids, ``left_out`` id → why not."""
+    """Raw readings (n, 3) with effects compensated, or ``None``; ``applied`` ids; ``left_out`` id → reason."""
 
     accelerometer: FloatArray | None
     gyroscope: FloatArray | None
@@ -118,10 +118,10 @@ def take_off(
     accelerometer: tuple[FloatArray, FloatArray],
     gyroscope: tuple[FloatArray, FloatArray] | None,
 ) -> TakenOff:
-    """Take accepted effects off raw readings: ``a' − S⁻¹ D(f) p``, with f the motion without them (eq. 11.3).
+    """Compensate accepted effects in raw readings: ``a' − S⁻¹ D(f) p``, with f the motion without them (eq. 11.3).
 
     ``effects`` and ``references`` are those of a diagnosis (``Diagnosis.to_dict``), ``accelerometer`` and
-    ``gyroscope`` the extended model's ``(S, b)``. What cannot be taken off is left, and said.
+    ``gyroscope`` the extended model's ``(S, b)``. Effects that cannot be compensated are listed in ``left_out``.
 
     Raises
     ------

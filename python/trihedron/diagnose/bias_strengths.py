@@ -1,7 +1,7 @@
 """Bias drift and bias repeatability, from the strengths of the session's noise (eq. 11.20).
 
-Both are processes that every hypothesis allows, of any strength: what is asked is whether the session is less likely
-with that strength no larger than the part's own noise makes it.
+Every hypothesis contains both processes with free strengths. A process is named where the session is much less likely
+with that strength bounded to what the part's own noise explains.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, Bounds, scatter_un
 from trihedron.threads import side_by_side
 
 LEAST_TIMES = 1.5
-"""Rms of a bias over the error of a pose's mean from which what it does has a name. 1/f noise that hides under the
-white noise inside poses carries it as far as that error, or a little farther: of 220 healthy sessions of three grades,
-60 of them with the 1/f noise of consumer parts, 1.3 was the most."""
+"""Rms of the bias changes, in standard errors of a pose mean, above which a bias process is named. 1/f noise below the
+white noise inside poses causes changes of about one such error: at most 1.3 in 220 healthy sessions of three grades,
+60 of them with the 1/f noise of consumer parts."""
 FLICKER_WITHIN = 1.5
-"""Factor within which the scatter that 1/f noise makes is told from inside the poses."""
+"""Factor by which the pose-to-pose scatter predicted from 1/f noise inside the poses may be too small."""
 
 
 @dataclass(frozen=True, eq=False)
 class BiasStrength:
-    """One process that is stronger than noise makes it: ``gain`` in twice the log-evidence over the strongest that
-    noise makes, ``score`` what counts of that, ``size`` and ``std`` (3,) SI by axis."""
+    """One bias process: ``gain`` in twice the log-evidence over its strength bounded to the part's noise, ``score`` the
+    gain less the penalty for further axes, ``size`` and ``std`` (3,) SI by axis."""
 
     effect: BiasProcess
     gain: float
@@ -43,15 +43,15 @@ class BiasStrength:
     statement: Words
     without: Hypothesis
     price: float
-    """What an effect of the catalogue pays for being chosen, and a process that is named owes."""
+    """Selection penalty of a catalogue effect, in twice a log-likelihood; it applies to a named process too."""
     is_large: bool
-    """Whether it carries the bias farther than 1/f noise does that no pose shows."""
+    """Whether the bias changes exceed those that undetected 1/f noise causes (``LEAST_TIMES``)."""
 
 
 def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength], dict[str, BiasStrength]]:
-    """The processes that are called by a name, largest gain first; and all that could be asked, by id."""
+    """The processes that are named, largest gain first; and all that were tested, by id."""
     held = {term.effect.id for term in model.terms}
-    # Twice the logarithm of odds of (1 - α)/α: a strength is there or is not, and nothing else was searched for.
+    # Twice the logarithm of odds of (1 - α)/α: the strength is large or not, no search to correct for.
     limit = 2.0 * float(np.log((1.0 - alpha) / alpha))
     processes = [one for one in catalogue() if isinstance(one, BiasProcess) and one.id not in held]
     applying = [one for one in processes if one.unavailable(model.context) is None]
@@ -60,7 +60,7 @@ def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength],
     for sensor in range(2):
         both = [one for one in asked.values() if one.effect.sensor == sensor and one.is_large]
         if len(both) == 2 and not any(one in named for one in both):
-            # Each makes up for the other: which of them it is the session does not tell, that it is one of them it may.
+            # Drift and scatter can absorb each other: bound both; where that is unlikely the likelier one is named.
             corner, scatter, excess = model.within
             bounds = noise_bounds(model)
             of = [
@@ -76,7 +76,7 @@ def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength],
 
 
 def noise_bounds(model: Hypothesis, but: tuple[BiasProcess, ...] = ()) -> Bounds:
-    """The strengths that the part's noise makes at most, but for some processes."""
+    """Bounds of the noise strengths that the part's own noise explains; the processes ``but`` stay unbounded."""
     free = {(one.sensor, one.walks) for one in but}
     expected = _flicker(model)
     corner = [ANYTHING[0][s] if (s, True) in free else NOISE_CORNER_S for s in range(2)]
@@ -85,7 +85,7 @@ def noise_bounds(model: Hypothesis, but: tuple[BiasProcess, ...] = ()) -> Bounds
 
 
 def bounds_without(model: Hypothesis, effect: BiasProcess) -> Bounds:
-    """The hypothesis' bounds of strengths, that of one process no larger than the part's noise makes it."""
+    """Bounds of the hypothesis, with the strength of ``effect`` bounded to what the part's own noise explains."""
     s = effect.sensor
     corner, scatter = list(model.within[0]), list(model.within[1])
     if effect.walks:
@@ -101,8 +101,8 @@ def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
     size, std = _size(model, effect)
     is_large = _times_error(model, effect) > LEAST_TIMES
     parameters, statement = effect.of_strength(size, std)
-    # Strengths of noise are in every hypothesis: none is searched for among mechanisms. Each axis beyond the first is
-    # one more that was fitted, known to 1/sqrt(2n) in its logarithm: it pays for that as a parameter does.
+    # Noise strengths are in every hypothesis, so no selection penalty applies. Each axis beyond the first is one more
+    # fitted strength, with a relative uncertainty of 1/sqrt(2n), and has the penalty of a parameter.
     n_strengths = 3 if effect.sensor == 1 and not effect.walks else 1
     paid = (n_strengths - 1) * float(np.log(2.0 * max(model.obs.n_poses, 1)))
     price = price_of_choice(other.unavailable(model.context) for other in catalogue())
@@ -110,7 +110,7 @@ def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
 
 
 def _flicker(model: Hypothesis) -> FloatArray:
-    """(2,) the scatter from pose to pose that 1/f noise inside the poses lets expect, in the session's units."""
+    """(2,) largest scatter from pose to pose that 1/f noise inside the poses explains, in units of ``scatter_unit``."""
     obs = model.obs
     unit = _units(model)
     expected = np.array([obs.force_scatter, obs.rate_scatter])
@@ -118,7 +118,7 @@ def _flicker(model: Hypothesis) -> FloatArray:
 
 
 def _times_error(model: Hypothesis, effect: BiasProcess) -> float:
-    """Rms of a bias about its mean over the poses over the error of a pose's mean."""
+    """Rms of the bias about its mean over the poses, in standard errors of a pose mean."""
     sensor, scatter = effect.sensor, model.strengths[1]
     if not effect.walks:
         return float(max(scatter[1:] if sensor else scatter[:1]))
@@ -134,7 +134,7 @@ def _units(model: Hypothesis) -> FloatArray:
 
 
 def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArray]:
-    """(3,) SI by axis, and its standard error: one sigma of a scatter, the range that a drift runs through."""
+    """(3,) SI by axis, and its standard uncertainty: one sigma of a scatter, the peak-to-peak range of a drift."""
     sensor = ("accelerometer", "gyroscope")[effect.sensor]
     n = model.obs.n_poses
     if not effect.walks:
@@ -152,17 +152,17 @@ def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArra
 
 
 def explain_as_much(one: BiasStrength, model: Hypothesis, tried: Iterable[Tried]) -> list[Tried]:
-    """Effects of the same sensor that explain as much while the process is no stronger than the part's noise, at odds
-    of twenty to one or better; likeliest first.
+    """Effects of the same sensor that explain as much as the process, with its strength bounded to the part's noise:
+    odds no worse than 1 to 20, likeliest first.
 
-    A process that is named was chosen from the catalogue as an effect is, and owes the same price for it.
+    The process was selected from the catalogue like an effect, so the same selection penalty applies to it.
     """
 
     def acts(other: Tried) -> bool:
         columns = other.term.distortion
         return (columns.force, columns.rate)[one.effect.sensor] is not None and other.term.effect.id != one.effect.id
 
-    # Bounds make nothing likelier: only what comes near without them is asked.
+    # Bounds can only lower the evidence: only candidates that are near without them are evaluated.
     near = [other for other in tried if acts(other) and other.score + one.price > -NEAR]
     asked = model.asked([other.term for other in near], bounds_without(model, one.effect)) if near else []
     found = [

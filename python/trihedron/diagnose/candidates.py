@@ -1,4 +1,4 @@
-"""The whole catalogue beside a hypothesis: which effects gain, by how much, at which size and shape (eq. 11.19)."""
+"""Every effect of the catalogue added to a hypothesis: which gain, how much, at which size and shape (eq. 11.19)."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.hypothesis import Asked, Hypothesis, Look, Term
 
 PRIOR_SCALES = (1.0, 0.3, 0.1)
-"""Parts differ by ten from what data sheets of their kind say: the size expected is one of these times that."""
+"""Prior widths tried, as factors on the data-sheet size of an effect: parts of a kind differ tenfold."""
 RESCALED = (3.0, 0.3)
-"""What leads is asked at the sizes next to the one that a look at fixed strengths took it to have."""
+"""Factors on the prior width at which the leading candidates are evaluated again, with noise strengths refitted."""
 N_LEADERS = 3
-"""Effects taken from every look at the whole catalogue to the full evidence."""
+"""Effects of each screening at fixed noise strengths that are evaluated with noise strengths refitted."""
 SHAPES_KEPT = 2
-"""Shapes of one effect that go along, of those that its size so far makes possible and of those that it does not."""
+"""Shapes kept per effect, counted separately for those with a plausible and those with an implausible size."""
 N_RESIZED = 3
-"""Candidates whose expected size is asked anew."""
+"""Candidates whose prior width is tried at other values."""
 NEAR = 6.0
 """Difference of scores below which two explanations are named together: odds of twenty to one."""
 FAMILY = NEAR
-"""What a shape that stands for a family (a filter of any order) pays besides: odds of twenty to one."""
+"""Extra penalty of a shape that represents a family (a filter of any order): odds of twenty to one."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A candidate beside a hypothesis: its score, and what it comes to there."""
+    """A candidate added to a hypothesis: its score, its evidence and its parameters."""
 
     term: Term
     score: float
@@ -38,14 +38,14 @@ class Tried:
 
     @property
     def p_value(self) -> float:
-        """Wald's test of its parameters, in the noise found beside them."""
+        """Wald test of its parameters, with the noise strengths refitted beside it."""
         value, covariance = self.asked.value, self.asked.covariance
         wald = float(value @ np.linalg.solve(covariance, value))
         return float(max(chdtrc(len(value), max(wald, 0.0)), 1e-300))
 
 
 def all_beside(model: Hypothesis) -> tuple[list[Tried], dict[str, str]]:
-    """The whole catalogue beside a hypothesis, its noise as strong as it is there; and why others do not apply."""
+    """Every effect added to the hypothesis at its noise strengths; and the reasons why others do not apply."""
     terms, missing = terms_beside(model, ())
     looks = model.looked_at(terms, PRIOR_SCALES) if terms else []
     asked = [
@@ -56,13 +56,13 @@ def all_beside(model: Hypothesis) -> tuple[list[Tried], dict[str, str]]:
 
 
 def candidates_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Tried], dict[str, str]]:
-    """Candidates beside a hypothesis, best first, one an effect; and why others do not apply."""
+    """Candidates to add to a hypothesis, best first, one per effect; and the reasons why others do not apply."""
     terms, missing = terms_beside(model, exclude)
     if not terms:
         return [], missing
     leading = _leaders(model, terms)
     asked = model.asked(leading)
-    # Columns made for one size (a delay) are made again for the size that they come out with.
+    # Columns that depend on the size (a delay) are computed again for the fitted size.
     sized = {
         k: replace(term, variant=made)
         for k, (term, one) in enumerate(zip(leading, asked, strict=True))
@@ -72,7 +72,7 @@ def candidates_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list
         leading[k], asked[k] = sized[k], one
     plain = model.plain([one.strengths for one in asked])
     best = _best_of_each(leading, asked, plain)
-    # What leads may be larger or smaller than the look at fixed strengths took it to be.
+    # The screening at fixed noise strengths may have chosen a prior width that is too small or too large.
     first = [one.term for one in best[:N_RESIZED]]
     other = [replace(t, sizes=t.sizes * scale) for t in first for scale in RESCALED]
     found = _best_of_each([*leading, *other], [*asked, *(model.asked(other) if other else [])], plain)
@@ -80,7 +80,7 @@ def candidates_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list
 
 
 def _best_of_each(terms: Sequence[Term], asked: Sequence[Asked], plain: float) -> list[Tried]:
-    """The best shape of every effect that is a possible one, best effect first."""
+    """The best shape with a plausible size of every effect, best effect first."""
     best: dict[str, Tried] = {}
     for term, one in zip(terms, asked, strict=True):
         score = 2.0 * (one.log_evidence - plain) - term.paid
@@ -91,7 +91,7 @@ def _best_of_each(terms: Sequence[Term], asked: Sequence[Asked], plain: float) -
 
 
 def terms_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term], dict[str, str]]:
-    """Every shape of every effect that applies and is not there yet."""
+    """Every shape of every effect that applies and is not included; and the reasons why others do not apply."""
     context = model.context
     held = {t.effect.id for t in model.terms if not t.effect.repeatable} | set(exclude)
     places = {(t.effect.id, t.variant.label) for t in model.terms}
@@ -103,19 +103,19 @@ def terms_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term
             continue
         variants = [v for v in effect.variants(context) if (effect.id, v.label) not in places]
         paid = price + 2.0 * float(np.log(max(len(variants), 1) * len(PRIOR_SCALES)))
-        # A shape that stands for a family, a filter of any order, costs as much again as one that stands for itself.
+        # A shape that represents a family, a filter of any order, has an extra penalty.
         terms += [Term(effect, v, effect.sizes(context, v), paid + FAMILY * v.stands_for_many) for v in variants]
     return terms, missing
 
 
 def price_of_choice(reasons: Iterable[str | None]) -> float:
-    """What one effect pays for being chosen from those that apply, in twice a log-likelihood: alike for all of them,
-    in whatever order they are asked."""
+    """Selection penalty of one effect, in twice a log-likelihood: 2 ln of the number of effects that apply. It is the
+    same for all of them and independent of their order."""
     return 2.0 * float(np.log(max(sum(reason is None for reason in reasons), 1)))
 
 
 def _leaders(model: Hypothesis, terms: list[Term]) -> list[Term]:
-    """The candidates that gain most one linear step from the fit, at its strengths and at others, as large as fits."""
+    """Candidates that gain most one linear step from the fit, at its noise strengths and others, at their best size."""
     looks = model.looked_at(terms, PRIOR_SCALES)
     gains = np.stack([look.gain for look in looks], axis=1)
     possible = [_can_be(model, term, look) for term, look in zip(terms, looks, strict=True)]
@@ -134,7 +134,7 @@ def _leaders(model: Hypothesis, terms: list[Term]) -> list[Term]:
 
 
 def _can_be(model: Hypothesis, term: Term, look: Look) -> bool:
-    """Whether an effect can have the size that it has in a look, or would in columns made for that size."""
+    """Whether the size found in a look is plausible, or columns can be computed anew for that size."""
     effect = term.effect
     is_plausible = effect.is_plausible_variant(term.variant, look.value, look.covariance)
     return is_plausible or effect.rescaled(model.context, term.variant, look.value) is not None

@@ -1,4 +1,4 @@
-"""What an effect may look at: the motion as the twin sees it, along every sensor axis, with the auxiliary channels."""
+"""Signals that effects are computed from: the motion of the fitted session along every sensor axis, and logged ones."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.session.state import smoothed_slope
 
 TEMPERATURE_WINDOW_S = 10.0
-"""Over which a logged temperature is smoothed before its rate of change is taken: its steps are a tenth of a kelvin."""
+"""Smoothing of a logged temperature before its rate of change is taken: its resolution is about a tenth of a kelvin."""
 VIBRATION_WINDOW_S = 0.25
-"""Stretch over which a parabola follows the motion while vibration is measured in a move."""
+"""Window of the parabola that follows the motion while vibration is measured in a move."""
 LEAST_SWING_K = 0.2
-"""A logged temperature that changes by less explains nothing: thermometers of chips step by 0.002 to 0.1 °C."""
+"""A logged temperature that changes by less is ignored: the resolution of on-chip thermometers is 0.002 to 0.1 °C."""
 LEAST_SWING_V = 1e-4
-"""A logged supply that changes by less is digits: a tenth of a millivolt is far below any regulator's noise."""
+"""A logged supply that changes by less is ignored: a tenth of a millivolt is far below any regulator's noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """Signals at the twin's points (one per pose, then every sample of every move), SI, instrument frame.
+    """Signals at the points of the session (one per pose, then every sample of every move), SI, body frame.
 
-    Everything is computed from the fitted twin when first asked for. ``latitude_deg`` is the user's, if given.
+    Everything is computed from the fitted session when first used. ``latitude_deg`` is the user's, if given.
     """
 
     obs: Observations
@@ -49,7 +49,7 @@ class Context:
 
     @cached_property
     def move_edges(self) -> npt.NDArray[np.int64]:
-        """(moves, 2) first point of each move and the one behind its last."""
+        """(moves, 2) first point of each move and one past its last."""
         return np.array([(where.start, where.stop) for where in self.moves], dtype=np.int64).reshape(-1, 2)
 
     @cached_property
@@ -92,7 +92,7 @@ class Context:
 
     @cached_property
     def gravity_in_moves(self) -> FloatArray:
-        """(points, 3) minus gravity in the body, carried by the gyro from each move's start; the force in poses."""
+        """(points, 3) minus gravity in the body, propagated by the gyro from each move's start; ``force`` in poses."""
         path, state, h = self.fitted.line.path, self.fitted.state, self.obs.n_poses
         out = self.force.copy()
         for where, (before, _) in zip(self.moves, self.obs.move_poses, strict=True):
@@ -109,7 +109,7 @@ class Context:
 
     @cached_property
     def gyro_axes(self) -> FloatArray:
-        """(3, 3) columns: the same for gyros."""
+        """(3, 3) columns: change of corrected rate when gyro j alone reads 1 rad/s more along its own axis."""
         S = self.fitted.state.gyro_S
         out: FloatArray = S * np.linalg.norm(np.linalg.inv(S), axis=1)
         return out
@@ -141,7 +141,7 @@ class Context:
 
     @cached_property
     def history(self) -> FloatArray:
-        """(n, 3) specific force along each accelerometer's axis at every sample: the fitted pose in poses."""
+        """(n, 3) specific force along the accelerometer axes at every sample; in poses that of the fitted vertical."""
         obs, state = self.obs, self.fitted.state
         force = obs.raw_force @ state.accel_S.T + state.accel_b
         for i, pose in enumerate(obs.segments.poses):
@@ -162,7 +162,7 @@ class Context:
 
     @cached_property
     def temperature_rate(self) -> FloatArray | None:
-        """(points,) rate of change of the logged temperature, smoothed over ten seconds, K/s."""
+        """(points,) rate of change of the logged temperature, smoothed over ``TEMPERATURE_WINDOW_S``, K/s."""
         recording = self.obs.recording
         logged = recording.temperature_degc
         if logged is None or not np.isfinite(logged).any():
@@ -173,7 +173,7 @@ class Context:
 
     @cached_property
     def supply(self) -> FloatArray | None:
-        """(points,) logged supply voltage over its mean, minus one."""
+        """(points,) relative deviation of the logged supply voltage from its mean."""
         logged = self.obs.recording.supply_v
         if logged is None or not np.isfinite(logged).any():
             return None
@@ -183,7 +183,7 @@ class Context:
 
     @property
     def references(self) -> dict[str, float]:
-        """Means that centred signals are taken from: needed to apply the model to another recording."""
+        """Means subtracted from (or dividing) the logged signals: needed to apply the model to another recording."""
         recording, out = self.obs.recording, {}
         for name, logged in (("temperature_degc", recording.temperature_degc), ("supply_v", recording.supply_v)):
             if logged is not None and np.isfinite(logged).any():
@@ -192,7 +192,7 @@ class Context:
 
     @cached_property
     def pose_power(self) -> FloatArray:
-        """(poses, 3) variance of the accelerometer inside each pose, SI², along the instrument axes."""
+        """(poses, 3) variance of the accelerometer inside each pose, SI², along the body axes."""
         obs, S = self.obs, self.fitted.state.accel_S
         out: FloatArray = np.einsum("ij,hjk,ik->hi", S, obs.pose_scatter, S)
         for i in np.flatnonzero(np.isnan(out).any(axis=1)):
@@ -200,7 +200,7 @@ class Context:
         return out
 
     def si_per_raw(self, sensor: str) -> FloatArray:
-        """(3,) size of one raw unit along each axis of the ``"accelerometer"`` or ``"gyroscope"``, SI."""
+        """(3,) SI size of one raw unit along each axis of the ``"accelerometer"`` or ``"gyroscope"``."""
         state = self.fitted.state
         S = state.accel_S if sensor == "accelerometer" else state.gyro_S
         out: FloatArray = 1.0 / np.linalg.norm(np.linalg.inv(S), axis=1)
@@ -208,10 +208,10 @@ class Context:
 
     @cached_property
     def vibration_power(self) -> FloatArray:
-        """(points, 3) power of vibration above the quiet floor, SI²: of a pose its variance, in moves a running one.
+        """(points, 3) vibration power above the quiet floor, SI²: variance in a pose, running mean square in a move.
 
-        In moves the slow motion is taken out by a local parabola; what a parabola takes out of the vibration itself is
-        made good by the ratio that the shaken holds show.
+        In moves the slow motion is removed by a local parabola. The part of the vibration that the parabola removes
+        too is restored by the ratio found in the vibrating poses.
         """
         obs = self.obs
         poses = self.pose_power
@@ -220,7 +220,7 @@ class Context:
         out[: obs.n_poses] = np.maximum(poses - floor, 0.0)
         width = max(round(VIBRATION_WINDOW_S * obs.recording.rate_hz), 7) | 1
 
-        # What a parabola by least squares has in the middle (the filter of Savitzky and Golay).
+        # Weights of the least-squares parabola at the middle of the window (Savitzky-Golay filter).
         parabola = np.linalg.pinv(np.vander(np.arange(width) - width // 2, 3))[2]
 
         def rough(force: FloatArray) -> FloatArray:
@@ -240,7 +240,7 @@ class Context:
         return out
 
     def between_poses(self, per_pose: FloatArray) -> FloatArray:
-        """(points, ...) a quantity of the poses, carried through the moves as far as the angle has been turned."""
+        """(points, ...) a quantity of the poses, interpolated in moves by the fraction of the angle turned so far."""
         out = np.zeros((self.n_points, *per_pose.shape[1:]))
         out[: self.obs.n_poses] = per_pose
         for where, (before, after) in zip(self.moves, self.obs.move_poses, strict=True):
@@ -252,9 +252,9 @@ class Context:
 
     @cached_property
     def pose_attitude(self) -> FloatArray:
-        """(poses, 3, 3) local level (z up, arbitrary azimuth) → body, chained through the moves and levelled at holds.
+        """(poses, 3, 3) local level (z up, arbitrary azimuth) → body, chained through the moves, levelled in each pose.
 
-        Holds that no chain of moves reaches keep NaN.
+        Poses that no chain of moves reaches keep NaN.
         """
         obs, state, path = self.obs, self.fitted.state, self.fitted.line.path
         out = np.full((obs.n_poses, 3, 3), np.nan)
@@ -285,7 +285,7 @@ class Context:
 
 
 def _on_axes(axes: FloatArray, values: FloatArray) -> FloatArray:
-    """(n, 3, 3) ``axes[i, j] · values[:, j]``, as one product of matrices: rows of three are slow one by one."""
+    """(n, 3, 3) ``axes[i, j] · values[:, j]`` as one matrix product, which is faster than row by row."""
     spread = np.zeros((3, 3, 3))
     spread[range(3), :, range(3)] = axes.T
     return (values @ spread.reshape(3, 9)).reshape(-1, 3, 3)

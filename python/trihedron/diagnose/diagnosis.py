@@ -1,4 +1,4 @@
-"""The four steps: locate, say what was left out, model it, show the fit improve."""
+"""The diagnosis of recordings: locate the disagreement, search for missing effects, fit them, test the improvement."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from trihedron.session.noise import Strengths
 
 FEWEST_RECORDINGS = 2
 LARGEST_ALPHA = 0.5
-"""A false-alarm rate of a half or more is a coin, not a test."""
+"""A test with a false-alarm rate of one half or more carries no information."""
 
 
 def diagnose_recording(
@@ -52,15 +52,15 @@ def diagnose_recording(
     alpha: float = 0.01,
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """Hold a digital twin against a recording and say which physics it lacks (docs/diagnosis.md).
+    """Fit the sensor model to a recording and report the physical effects that it lacks (docs/diagnosis.md).
 
     Parameters
     ----------
     recording, segments : Recording, Segments
         Raw readings with their poses and moves.
     calibration : Calibration
-        Linear model of both sensors: the start of the fit; with ``calibration_is_given`` also its prior, so that the
-        recording is held against that calibration and not against one fitted to it.
+            Linear model of both sensors: the start of the fit; with ``calibration_is_given`` also its prior, so that
+            the recording is compared with that calibration and not with one fitted to it.
     alpha : float
         Chance that a healthy recording is called anything but consistent.
     progress : callable (fraction, text), optional
@@ -69,7 +69,7 @@ def diagnose_recording(
     Raises
     ------
     ValueError
-        When there is nothing to hold a model against: no accelerometer, fewer than two poses.
+            When there is nothing to compare a model with: no accelerometer, fewer than two poses.
     """
     return diagnosed(
         recording, segments, calibration, calibration_is_given=calibration_is_given, alpha=alpha, progress=progress
@@ -79,7 +79,7 @@ def diagnose_recording(
 def diagnose_recordings(
     given: Sequence[tuple[Recording, Segments, Calibration]], *, alpha: float = 0.01, progress: Progress | None = None
 ) -> SharedDiagnosis:
-    """Every recording of one unit by itself, and the effects that all demand together with one size (eq. 11.21).
+    """Diagnose every recording of one unit, and find the effects with one size common to all of them (eq. 11.21).
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def diagnose_recordings(
     Raises
     ------
     ValueError
-        When there are fewer than two, or there is nothing to hold a model against.
+            When there are fewer than two, or nothing to compare a model with.
     """
     if len(given) < FEWEST_RECORDINGS:
         raise RefusedError(f"what recordings share needs two or more, got {len(given)}.")
@@ -117,7 +117,7 @@ def diagnosed(
     alpha: float = 0.01,
     progress: Progress | None = None,
 ) -> tuple[Diagnosis, Hypothesis]:
-    """The same as :func:`diagnose_recording`, with the hypothesis that the search ended at."""
+    """As :func:`diagnose_recording`, and the final hypothesis of the search."""
     tell = progress or (lambda _fraction, _text: None)
     if not 0.0 < alpha < LARGEST_ALPHA:
         raise RefusedError(f"alpha is a small probability such as 0.01, got {alpha}")
@@ -131,7 +131,7 @@ def diagnosed(
     model = answer.found.model
     relations = records(answer.found.related)
     verdict = verdict_of(answer, run.domains, run.remaining, has_relations=bool(relations))
-    # Without anything missing the numbers are those of a calibration of this recording.
+    # Without missing effects S and b are those of a calibration of this recording.
     base = run.bare.fitted
     final = base if verdict == "consistent" else answer.numbers.fitted
     residuals = residuals_before_after(run.predicted, answer.judged, {one.effect.sensor for one in answer.biases})
@@ -158,7 +158,7 @@ def diagnosed(
 
 
 def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
-    """White noise, and what the bias does, of both sensors."""
+    """White noise density, noise corner time and bias changes of both sensors."""
     state, obs = model.fitted.state, model.obs
     accel, gyro = hidden_biases(model.fitted)
     return MappingProxyType(
@@ -179,7 +179,7 @@ def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """The session in predicted noise and in noise of any strength without effects, and the answer."""
+    """Fits of the session in the part's noise and, without effects, in noise of free strength; and the answer."""
 
     predicted: Fit
     bare: Hypothesis
@@ -199,14 +199,14 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     domains = _all_domains(context, alpha, observed.refused)
     tell(0.3, "letting effects compete")
     bare, found = _searched(observed, prior, alpha)
-    # What another effect had hidden, or what was mistaken for it, is looked for once more.
+    # Effects hidden by another effect, or mistaken for it, are tested once more.
     sought = {one.id for one in catalogue() if isinstance(one, DirectEffect) and one.is_sought_again}
     more, _ = look(observed, found.model.context, alpha, start, prior, sought)
     if len(more.seen) > len(observed.seen):
         observed = more
         bare, found = _searched(observed, prior, alpha)
     tell(0.8, "asking what biases do by themselves")
-    # What follows something is no bias that wanders.
+    # Bias processes are tested beside the relations: a bias that follows a variable does not drift at random.
     biases, asked = bias_strengths(found.related.model, alpha)
     tell(0.9, "checking what remains")
     judged = again(found.model, found.model.terms, noise_bounds(found.model, tuple(one.effect for one in biases)))
@@ -215,7 +215,7 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     remaining = _all_domains(judged.context, alpha, observed.refused | (sought - named))
     remaining = accounted_for(answer, remaining)
     if not answer.ids and not any(one.disagrees for one in remaining):
-        domains = remaining  # what 1/f noise inside the poses accounts for is noise
+        domains = remaining  # 1/f noise inside the poses explains the disagreement
     return _Run(predicted, bare, answer, domains, remaining, known, asked)
 
 
@@ -224,14 +224,14 @@ LOUD: Strengths = ((2.0, 2.0), (5.0,) * 4, (1.0, 1.0), (5.0, 5.0))
 
 def _searched(observed: Observed, prior: Prior | None, alpha: float) -> tuple[Hypothesis, Found]:
     first = hypothesis(observed.obs, replace(observed.fitted.state, effect=np.zeros(0)), prior)
-    # From quiet noise and from loud: what strengths explain may have another optimum.
+    # Two starts, low and high noise strengths: the evidence may have an optimum at each.
     loud = hypothesis(observed.obs, first.fitted.state, prior, strengths=LOUD)
     bare = max(first, loud, key=lambda one: one.log_evidence)
     return bare, search(bare, alpha)
 
 
 def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None) -> Fit:
-    """The session with rates at rest and moves that allow for poses which turn while they settle, where they do."""
+    """The fit, with the noise of static rates and moves widened where settling of poses is detected (eq. 8.7f)."""
     rates = [one for one in judge_rows(predicted, CREEP_ALPHA) if one.domain == "static-gyro"]
     if not any(one.disagrees for one in rates):
         return predicted
@@ -241,7 +241,7 @@ def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None) -> 
 
 
 CREEP_ALPHA = 0.01
-"""False alarms of the rates at rest above which creep is looked for at all."""
+"""False-alarm rate of the test of static rates that triggers the test for settling."""
 
 
 def _all_domains(context: Context, alpha: float, refused: Collection[str] = ()) -> tuple[DomainTest, ...]:
@@ -254,24 +254,24 @@ def _all_domains(context: Context, alpha: float, refused: Collection[str] = ()) 
 
 
 def _found(context: Context, refused: Collection[str]) -> list[Evidence]:
-    """What the sharper looks at the sampling find; ``refused`` are ids of effects that did not predict held-out moves
-    any better: jolts look like lost samples."""
+    """Evidence for lost samples and jitter; ``refused`` are ids of effects that did not improve the prediction of
+    held-out moves: jolts look like lost samples."""
     looks = [effect for effect in (DroppedSamples(), TimingJitter()) if effect.id not in refused]
     return [evidence for look in looks if (evidence := look.find(context)) is not None]
 
 
-# What the whole comes to: which domains could be tested at all, what is left, and the one word for it.
+# The verdict: which domains could be tested, which disagree still, and one word.
 
 SAMPLE_DOMAINS = ("within-static", "timing")
-"""Domains of the samples themselves, which no parameter of the model is fitted to."""
+"""Domains of the samples themselves, to which no parameter of the model is fitted."""
 POSE_DOMAINS = ("static-accel", "moves", "dynamics")
-"""Domains that hold the model against gravity or rest: without one of them there is nothing to contradict it."""
+"""Domains that compare the model with gravity or zero velocity: without them nothing can contradict it."""
 LEAST_DOF = 1.0
-"""Degrees of freedom below which a domain's rows are used up by the fit itself."""
+"""Degrees of freedom below which the fit has used up a domain's rows."""
 
 
 def accounted_for(answer: Answer, remaining: tuple[DomainTest, ...]) -> tuple[DomainTest, ...]:
-    """Sample-level domains whose disagreement an accepted effect is, seen from another side, agree afterwards."""
+    """The domains, where those of the samples agree once an accepted effect explains their disagreement."""
     explained = {one.evidence.domain for one in answer.seen}
     explained |= {domain for one in catalogue() if one.id in answer.ids for domain in one.accounts_for}
     return tuple(
@@ -286,9 +286,9 @@ def verdict_of(
     *,
     has_relations: bool = False,
 ) -> Verdict:
-    """One word; ``not-testable`` where neither gravity nor rest had a say and the samples show nothing either.
+    """One word; ``not-testable`` where no pose domain could be tested and the samples show nothing either.
 
-    Footnotes (one pushed pose, a faint line) are no answer while something else disagrees.
+    Minor effects (a disturbed pose, a faint line) leave it at ``unexplained`` while something else disagrees.
     """
     if answer.ids:
         is_left = has_relations or any(d.disagrees for d in remaining)
@@ -296,7 +296,7 @@ def verdict_of(
         return "missing-physics" if says_why or not is_left else "unexplained"
     if has_relations or any(d.disagrees for d in domains):
         return "unexplained"
-    # A weak prior fills what the poses leave open; rows that it alone decides test nothing.
+    # A weak prior fills undetermined directions; rows that it alone determines test nothing.
     if not any(d.domain in POSE_DOMAINS and d.dof >= LEAST_DOF for d in domains):
         return "not-testable"
     return "consistent"

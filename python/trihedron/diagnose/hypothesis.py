@@ -1,4 +1,4 @@
-"""A hypothesis: the session with some effects, its noise of unknown strength, and how likely that is (eq. 11.18)."""
+"""A hypothesis: a session fitted with some effects and free noise strengths, and its evidence (eq. 11.18)."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ ELSEWHERE: tuple[Strengths, ...] = (
     ((300.0, 300.0), (3.0,) * 4, (0.5, 0.5), (2.0, 2.0)),
     ((2.0, 2.0), (NO_SCATTER,) * 4, (1.0, 1.0), (5.0, 5.0)),
 )
-"""A quiet part, biases that scatter, that walk: where strengths have swallowed an effect it is seen elsewhere."""
+"""Low noise, biases that scatter, biases that walk: large noise strengths can absorb an effect that these show."""
 
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """One effect of a hypothesis: its columns, how large each parameter is expected to be (one sigma), and what its
-    choice among shapes and effects has ``paid``, in twice a log-likelihood."""
+    """One effect of a hypothesis: its columns, the prior σ of each parameter, and ``paid``, the correction for its
+    choice among shapes and effects, in twice a log-likelihood."""
 
     effect: Effect
     variant: Variant
@@ -48,13 +48,13 @@ class Term:
 
     @property
     def distortion(self) -> Distortion:
-        """What it adds to the readings per unit of each parameter."""
+        """What it adds to the readings, per unit of each parameter."""
         return self.variant.distortion
 
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """What adding columns to a hypothesis comes to, one linear step from its fit.
+    """Result of adding columns to a hypothesis, one linear step from its fit, noise strengths refitted.
 
     ``log_evidence`` with everything but the strengths integrated out, at the ``strengths`` that make it largest;
     ``value`` (k,) and ``covariance`` (k, k) of the new parameters.
@@ -68,7 +68,7 @@ class Asked:
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """What adding columns gains in log-evidence at fixed strengths, ``gain`` (scales of its size, strengths); ``value``
+    """Result of adding columns at fixed noise strengths: ``gain`` (prior scales, strengths) in log-evidence; ``value``
     (k,) and ``covariance`` (k, k) at the first strengths and their best scale."""
 
     gain: FloatArray
@@ -78,7 +78,7 @@ class Look:
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """A session fitted with the effects of its ``terms``; the strengths of noise lie ``within`` their bounds."""
+    """A session fitted with the effects of its ``terms``; its noise strengths are bounded by ``within``."""
 
     obs: Observations
     prior: Prior | None
@@ -88,26 +88,26 @@ class Hypothesis:
 
     @property
     def log_evidence(self) -> float:
-        """Log-likelihood with everything but the strengths of noise integrated out, up to a constant."""
+        """Log-likelihood with everything but the noise strengths integrated out, up to a constant."""
         return self.fitted.line.core.log_marginal
 
     @property
     def strengths(self) -> Strengths:
-        """Corner times [s], scatter and straying in their units, excess of moves."""
+        """Corner times [s], scatter and its departure during moves in their units, factors on the noise of moves."""
         return self.fitted.line.core.strengths
 
     @cached_property
     def context(self) -> Context:
-        """What effects may look at."""
+        """The signals that effects are computed from, in this fit."""
         return Context(self.obs, self.fitted)
 
     @cached_property
     def prediction(self) -> Prediction:
-        """Blocks of poses and moves predicted from all others."""
+        """Blocks of poses and moves, each predicted from all others."""
         return predict_held_out(self.fitted, folds_of(self.fitted))
 
     def asked(self, terms: Sequence[Term], within: Bounds | None = None) -> list[Asked]:
-        """What every one of some terms would come to beside those that are there, its noise ``within`` bounds."""
+        """Evidence of the hypothesis with each of some terms added, noise strengths refitted ``within`` bounds."""
         bounds = self.within if within is None else within
         found = self.fitted.line.core.evidence(_columns(terms), [self.strengths, *ELSEWHERE], bounds)
         return [Asked(*one) for one in found]
@@ -115,20 +115,20 @@ class Hypothesis:
     def looked_at(
         self, terms: Sequence[Term], scales: Sequence[float], parts: Sequence[Sequence[int]] | None = None
     ) -> list[Look]:
-        """What each of some terms gains at the strengths found here and elsewhere, sizes times each of ``scales``.
+        """Gain of each of some terms at the strengths found and at ``ELSEWHERE``, prior sizes times each of ``scales``.
 
-        With ``parts``, numbers of columns, each of these by itself.
+        With ``parts``, lists of column numbers, the gain of each of these subsets.
         """
         found = self.fitted.line.core.looks(_columns(terms), list(scales), [self.strengths, *ELSEWHERE], parts)
         return [Look(*one) for one in found]
 
     def plain(self, strengths: Sequence[Strengths]) -> float:
-        """Log-evidence without another term, at the best of its strengths sought from some."""
+        """Log-evidence without another term, noise strengths refitted from each of ``strengths``."""
         ((found, *_),) = self.fitted.line.core.evidence([NOTHING], [self.strengths, *strengths], self.within)
         return max(self.log_evidence, float(found))
 
     def span(self, k: int) -> slice:
-        """Where the parameters of term ``k`` lie among those of all effects."""
+        """Place of term ``k``'s parameters among those of all effects."""
         first = sum(term.distortion.n_parameters for term in self.terms[:k])
         return slice(first, first + self.terms[k].distortion.n_parameters)
 
@@ -152,7 +152,7 @@ def hypothesis(
     within: Bounds = ANYTHING,
     strengths: Strengths = START_STRENGTHS,
 ) -> Hypothesis:
-    """The session fitted with some effects, and the strengths of its noise that make it likeliest, in turns."""
+    """The session fitted with some effects, alternating with its noise strengths of maximum evidence."""
     distortion = stacked([term.distortion for term in terms])
     sizes = np.concatenate([term.sizes for term in terms]) if terms else np.zeros(0)
     if len(start.effect) != len(sizes):
@@ -167,7 +167,7 @@ def hypothesis(
 
 
 def again(known: Hypothesis, terms: Sequence[Term], within: Bounds | None = None) -> Hypothesis:
-    """The same observations with other effects or bounds, from where they were fitted."""
+    """The same observations fitted with other effects or bounds, started from the known fit."""
     state = replace(known.fitted.state, effect=np.zeros(0))
     within = known.within if within is None else within
     return hypothesis(known.obs, state, known.prior, terms, within, known.strengths)

@@ -1,4 +1,4 @@
-"""Relations as the record that reports and files show."""
+"""Empirical relations as the records that reports and files show."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ IN_MOTION: dict[str, Domain] = {"gyroscope": "moves", "accelerometer": "dynamics
 EARTH_RATE_RAD_S = 7.292115e-5
 """WGS 84."""
 ROOM_SIGMAS = 3.0
-"""Standard errors within which a coupling is that of the Earth's own rotation."""
+"""Standard uncertainties within which a coupling is that of Earth rate."""
 
 
 def records(found: Related) -> tuple[Relation, ...]:
-    """Every relation with its coefficients and what it predicts on poses and moves left out, largest share first."""
+    """Every relation with its coefficients and its held-out prediction of poses and moves, largest share first."""
     models = [*found.steps[1:], found.model] if found.relations else []
     first = len(found.model.terms) - len(found.relations)
     out = []
@@ -36,7 +36,7 @@ def records(found: Related) -> tuple[Relation, ...]:
 
 
 def _share(held: HeldOut | None) -> float:
-    """Of the held-out sum of squares in a domain, what the relation removes."""
+    """Share of the held-out sum of squares of a domain that the relation removes."""
     if held is None or not held.rms_before > 0.0:
         return 0.0
     return float(np.clip(1.0 - (held.rms_after / held.rms_before) ** 2, 0.0, 1.0))
@@ -44,7 +44,7 @@ def _share(held: HeldOut | None) -> float:
 
 def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, held: HeldOut | None) -> Relation:
     signal, sigma = one.signal, np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    # What poses held of it that no rotation led to is no coefficient.
+    # The column of poses without a known previous rotation is no coefficient of the relation.
     told = [k for k, name in enumerate(signal.names) if name != NOT_TURNED]
     size, error = (x.reshape(len(one.axes), -1)[:, told] for x in (value, sigma))
     names = tuple(signal.names[k] for k in told)
@@ -72,7 +72,7 @@ def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, held: He
 
 
 def _of_room(value: FloatArray, covariance: FloatArray, held: HeldOut | None) -> Relation:
-    """``bias = K Rᵀ m``: the coefficients are K times the parts of m along the level axes, of which m is one vector."""
+    """``bias = K Rᵀ m``: the coefficients are the products of K with the one vector m along the level axes."""
     coupling, inclination = _coupling(value.reshape(9, 3))
     rng = np.random.default_rng(0)
     drawn = [_coupling(v.reshape(9, 3), coupling) for v in rng.multivariate_normal(value, covariance, 200)]
@@ -104,7 +104,7 @@ def _of_room(value: FloatArray, covariance: FloatArray, held: HeldOut | None) ->
 
 
 def _coupling(parts: FloatArray, like: FloatArray | None = None) -> tuple[FloatArray, float]:
-    """K (3, 3) and the angle of m to the vertical [deg]: the nearest product of both, up to one sign of the two."""
+    """K (3, 3) and the angle of m to the vertical [deg]: the nearest product of rank one, up to one sign of the two."""
     left, size, right = np.linalg.svd(parts, full_matrices=False)
     coupling, vector = size[0] * left[:, 0].reshape(3, 3), right[0]
     if (coupling * like).sum() < 0.0 if like is not None else np.trace(coupling) < 0.0:

@@ -1,4 +1,4 @@
-"""Effects with evidence in the samples: what their own tests find joins the hypothesis, each held to its promise."""
+"""Effects detected by their own tests on the samples: each correction is kept only if it improves the prediction."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from trihedron.diagnose.session.state import DYNAMICS, MOVES, NO_DISTORTION, Pri
 from trihedron.records.diagnosis import Candidate
 
 VISIBLE = 0.98
-"""Readings that were changed must lower the held-out misfit of some domain by at least this factor."""
+"""A correction of the readings must lower the held-out misfit of some domain by at least this factor."""
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """One effect that its own test finds in the samples; ``gain`` in twice a log-likelihood."""
+    """One effect detected by its own test on the samples; ``gain`` in twice a log-likelihood."""
 
     effect: DirectEffect
     evidence: Evidence
@@ -30,14 +30,14 @@ class Seen:
 
     @property
     def reobserves(self) -> bool:
-        """Whether it changes what the observations claim (samples put back, moves left out, noise of a coarse code)."""
+        """Whether it changes the observations (samples inserted, moves excluded, noise of a coarse resolution)."""
         return self.evidence.reweigh is not None
 
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """Observations as what was seen in the samples changes them, fitted in predicted noise; ``refused`` are ids of
-    effects whose mending did not predict held-out moves any better."""
+    """Observations corrected for the effects detected in the samples, fitted in predicted noise; ``refused`` are ids of
+    effects whose correction did not improve the prediction of held-out moves."""
 
     bare: Observations
     fitted: Fit
@@ -46,7 +46,7 @@ class Observed:
 
     @property
     def obs(self) -> Observations:
-        """The observations as they now are."""
+        """The observations as corrected."""
         return self.fitted.line.obs
 
 
@@ -58,7 +58,7 @@ def look(
     prior: Prior | None,
     only: Collection[str] = (),
 ) -> tuple[Observed, dict[str, Candidate]]:
-    """Observations with every effect whose own test finds it in a context, and what every such test said."""
+    """Observations corrected for every effect that its own test detects, and the result of every test."""
     held = {one.effect.id for one in observed.seen if not one.effect.repeatable} | observed.refused
     candidates: dict[str, Candidate] = {}
     found: list[tuple[DirectEffect, Evidence]] = []
@@ -72,7 +72,7 @@ def look(
         evidence = effect.find(context)
         if not effect.repeatable or evidence is not None:
             candidates[effect.id] = Candidate(effect.id, 1.0 if evidence is None else evidence.p_value, True)
-        # Half of the rate of false alarms is theirs, half the search's.
+        # Half of the false-alarm rate is for these tests, half for the search.
         if evidence is not None and evidence.p_value * len(catalogue()) < alpha / 2.0:
             found.append((effect, evidence))
     for effect, evidence in sorted(found, key=lambda pair: -pair[1].strength):
@@ -98,25 +98,25 @@ def _with_one(
 
 
 def _explained(before: Fit, after: Fit) -> float:
-    """Twice the log-likelihood gained by readings that were changed, every domain's noise being of free strength."""
+    """Gain of a correction in twice the log-likelihood, the noise strength of every domain being free."""
     gain = 0.0
     for domain in ROW_DOMAINS:
         (was, n), (now, left) = (_per_row(fitted, domain) for fitted in (before, after))
-        # Rows that were left out speak for themselves alone.
+        # Excluded rows alone count where a correction removes rows.
         of = n - left if n - left >= 1.0 else n
         gain += of * float(np.log(max(was, 1.0) / max(now, 1.0)))
     return max(gain, 0.0)
 
 
 def _per_row(fitted: Fit, domain: int) -> tuple[float, float]:
-    """Chi-square per degree of freedom of one domain, and those degrees."""
+    """Chi-square per degree of freedom of one domain, and its degrees of freedom."""
     rows = fitted.system.domain == domain
     dof = float((1.0 - fitted.leverage[rows]).sum())
     return float((fitted.system.residual[rows] ** 2).sum()) / max(dof, 1.0), dof
 
 
 def _changed(bare: Observations, found: list[Evidence]) -> Observations:
-    """The bare observations as what was found changes them; samples are put back first, for that makes them anew."""
+    """The bare observations with all corrections; inserted samples come first, as they rebuild the observations."""
     for evidence in sorted(found, key=lambda one: one.touched is None):
         if evidence.reweigh is not None:
             bare = evidence.reweigh(bare)
@@ -124,10 +124,10 @@ def _changed(bare: Observations, found: list[Evidence]) -> Observations:
 
 
 def _mends(before: Fit, after: Fit, touched: tuple[int, ...] | None) -> bool:
-    """Whether readings that were changed (samples put back, timestamps made even) are predicted better when held out.
+    """Whether corrected readings (samples inserted, timestamps made even) are predicted better when held out.
 
-    Where only some moves were ``touched``, gravity and rest after those very moves must say so, in the dispersion that
-    the others have: a jolt that looks like a loss leaves them as they were.
+    Where only some moves were ``touched``, the misfit of gravity and velocity after these must fall, in units of the
+    dispersion of the other moves: after a jolt that looks like a loss it does not.
     """
     was, now = (predict_held_out(fitted, folds_of(fitted)) for fitted in (before, after))
     stays = np.maximum(now.per_row, 1.0)

@@ -1,7 +1,7 @@
-"""The one search: effects are added, dropped and swapped by one score (eq. 11.19).
+"""The search for effects: they are added, removed and exchanged by one score (eq. 11.19).
 
-Score of an effect: twice the log-evidence that it gains, all strengths of noise found anew beside it, less what trying
-its shapes and the whole catalogue costs. It stands where that is more than the odds that the false-alarm rate asks for.
+Score of an effect: twice the log-evidence that it gains, noise strengths refitted beside it, less the correction for
+the shapes and effects tried. It is accepted above the threshold that the false-alarm rate sets.
 """
 
 from __future__ import annotations
@@ -29,31 +29,31 @@ from trihedron.diagnose.shapes import as_fits_best
 from trihedron.threads import side_by_side
 
 WORTH_FITTING, OF_THE_BEST = 20.0, 0.5
-"""Difference of scores, one linear step from the fit, within which rivals are fitted in full; and the part of the best
-score from which they are: the larger an effect, the farther off is what one step says of it."""
+"""Rivals are fitted in full within this difference of scores, one linear step from the fit, or from this share of the
+best score on: one step predicts a large effect poorly."""
 N_RIVALS = 3
 """Rivals fitted in full."""
 N_SENSORS = 2
 MOST_EFFECTS = 4
-"""Mechanisms of one session at most; poses that were pushed are none."""
+"""Largest number of mechanisms in one session; disturbed poses do not count."""
 MOST_STEPS = 8
-"""Effects and pushed poses together, at most."""
+"""Largest number of effects and disturbed poses together."""
 OWN_DOMAINS = {"force": (STATIC_ACCEL, DYNAMICS), "rate": (STATIC_GYRO, MOVES, DYNAMICS)}
-"""Where a flaw of one sensor must show: velocity needs both, a tilted force being half of it."""
+"""Row domains of one sensor's effects. Velocity depends on both sensors: a tilt error adds a component of gravity."""
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Where the search ended.
+    """Result of the search.
 
-    ``tried`` are, by id, candidates beside the final hypothesis, ``against`` what took the place of those that had
-    stood, ``missing`` why others do not apply; ``gains`` twice the log-evidence of every term, ``scores`` what is left
-    of that after its price, ``without`` the final hypothesis without it, ``rivals`` effects that explain as much.
+    By id: ``tried`` candidates beside the final hypothesis, ``against`` what took the place of those once above the
+    threshold, ``missing`` why others do not apply. Per term: ``gains`` twice the log-evidence, ``scores`` the gain less
+    its penalty, ``without`` the final hypothesis without it, ``rivals`` effects that explain as much.
     """
 
     model: Hypothesis
     related: Related
-    """The final hypothesis with what else it follows."""
+    """The final hypothesis with the empirical relations found beside it."""
     tried: dict[str, Tried] = field(default_factory=dict)
     against: dict[str, str] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
@@ -63,21 +63,21 @@ class Found:
 
     @property
     def scores(self) -> tuple[float, ...]:
-        """What is left of every term's gain."""
+        """Gain of every term less its penalty for the choice among shapes and effects."""
         return tuple(gain - term.paid for gain, term in zip(self.gains, self.model.terms, strict=True))
 
 
 def threshold(alpha: float) -> float:
-    """Score from which an effect stands: twice the logarithm of odds of 1/2α, half of the false alarms being the
+    """Score above which an effect is accepted: twice the logarithm of odds of 1/2α, half of the false alarms being the
     search's.
 
-    In 40 sessions with every small fault of real ones but no effect none came above -7 (benches/blind_nuisances.py).
+    In 40 sessions with every small error of real ones but no effect no score is above -7 (benches/blind_nuisances.py).
     """
     return float(-2.0 * np.log(2.0 * alpha))
 
 
 def search(base: Hypothesis, alpha: float) -> Found:
-    """The effects that a session demands: the best is added, again; then each is dropped, or swapped, if that gains."""
+    """The effects of a session: the best is added repeatedly, then each is removed or exchanged if that is better."""
     found = _sought(_State(_Judged(base, ())), alpha)
     for _ in range(N_SENSORS):
         instead = _instead_of_a_process(found, alpha)
@@ -90,14 +90,14 @@ def search(base: Hypothesis, alpha: float) -> Found:
 def _sought(state: _State, alpha: float) -> Found:
     drifts = {one.id for one in catalogue() if isinstance(one, BiasProcess)}
     mechanisms = _added(state, alpha, drifts)
-    # A bias that drifts is in every hypothesis as a walk: a smooth curve is asked beside what explains more than time.
+    # Every hypothesis contains bias drift as a walk: a smooth curve is tried after the effects that explain more.
     return _concluded(_added(mechanisms, alpha, {one.id for one in catalogue()} - drifts), alpha)
 
 
 def _instead_of_a_process(found: Found, alpha: float) -> _State | None:
-    """The hypothesis with an effect in the place of a process of the bias that would be named, where that is likelier.
+    """The hypothesis with an effect in place of a bias process that would be named, where that is likelier.
 
-    Beside an effect that explains what a bias does by itself the bias does no more than the part's noise makes it do.
+    With such an effect the bias process is no stronger than the part's own noise explains.
     """
     model = found.model
     tried = [one for one in found.tried.values() if not isinstance(one.term.effect, BiasProcess)]
@@ -121,7 +121,7 @@ def _instead_of_a_process(found: Found, alpha: float) -> _State | None:
 
 
 def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
-    """Effects added one at a time until none is demanded, those that become needless dropped at once."""
+    """Add effects one at a time until none scores above the threshold; one that lowers no held-out rms is dropped."""
     limit, judged = threshold(alpha), state.judged
     tried, missing = candidates_beside(judged.model, exclude)
     for _ in range(MOST_STEPS):
@@ -140,14 +140,14 @@ def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
         state.against.update({one.term.effect.id: chosen.effect.id for one in standing})
         tried, missing = candidates_beside(judged.model, exclude)
     if judged is not state.judged:
-        state.tried.clear()  # what was tried before was tried beside another hypothesis
+        state.tried.clear()  # these were tried beside another hypothesis
     state.tried.update({one.term.effect.id: one for one in reversed(tried)})
     state.missing.update(missing)
     return replace(state, judged=judged)
 
 
 def _concluded(state: _State, alpha: float) -> Found:
-    """Every effect the best of its rivals; and what all that was tried comes to beside the answer."""
+    """Exchange every effect for the best of its rivals, and score all candidates beside the answer."""
     judged = state.judged
     if len(judged.model.terms) > 1:
         judged = _pruned(judged.model, threshold(alpha))
@@ -157,7 +157,7 @@ def _concluded(state: _State, alpha: float) -> Found:
     judged, beside = _beside_relations(judged, threshold(alpha))
     model = judged.model
     tried, missing = all_beside(model)
-    # What was asked with the noise found anew is worth more than a look in the noise of the answer.
+    # Results with noise strengths refitted replace those at the strengths of the answer.
     beside_it = {one.term.effect.id: one for one in tried} | (state.tried if model is state.judged.model else {})
     held = {term.effect.id for term in model.terms}
     return Found(
@@ -169,12 +169,12 @@ def _concluded(state: _State, alpha: float) -> Found:
 
 
 def _beside_relations(judged: _Judged, limit: float) -> tuple[_Judged, Related]:
-    """What follows something without a name; a name goes where relations explain clearly more without it."""
+    """Relations without a mechanism; an effect is dropped where relations explain clearly more without it."""
     best = related(judged.model, limit)
     if not best.relations:
         return judged, best
     for k, fewer in enumerate(judged.without):
-        # What stands beside the relations is not theirs.
+        # An effect that scores beside the relations too is kept.
         without = again(best.model, [t for j, t in enumerate(best.model.terms) if j != k])
         gained = 2.0 * (best.model.log_evidence - without.log_evidence) - judged.model.terms[k].paid
         if gained > limit:
@@ -187,7 +187,7 @@ def _beside_relations(judged: _Judged, limit: float) -> tuple[_Judged, Related]:
 
 @dataclass(frozen=True, eq=False)
 class _Judged:
-    """A hypothesis, and what it is without each of its terms."""
+    """A hypothesis, and the hypotheses without each of its terms."""
 
     model: Hypothesis
     without: tuple[Hypothesis, ...]
@@ -195,7 +195,7 @@ class _Judged:
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """Where a search stands: its hypothesis, what went, what came near every term, what was tried last."""
+    """State of the search: its hypothesis, ids dropped, rivals of every term, candidates last tried."""
 
     judged: _Judged
     dropped: set[str] = field(default_factory=set)
@@ -206,7 +206,7 @@ class _State:
 
 
 def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Term | None]:
-    """The hypothesis with the best of the candidates that come near the first, each fitted in full."""
+    """The hypothesis with the best of the candidates near the first, each fitted in full."""
     first = standing[0].score
     near = [one for one in standing if one.score > min(first - WORTH_FITTING, OF_THE_BEST * first)][:N_RIVALS]
     best: tuple[float, Hypothesis, Term] | None = None
@@ -229,7 +229,7 @@ def _fitted_beside(model: Hypothesis, tried: Tried) -> tuple[Term, Hypothesis]:
 
 
 def _pruned(model: Hypothesis, limit: float) -> _Judged:
-    """The hypothesis without terms that the others have made needless, the one with least to show first."""
+    """The hypothesis without terms that the others made redundant, the lowest score removed first."""
     while True:
         without = without_each(model)
         scores = [
@@ -242,7 +242,7 @@ def _pruned(model: Hypothesis, limit: float) -> _Judged:
 
 
 def _is_shown(model: Hypothesis, without: Hypothesis, k: int) -> bool:
-    """Whether an effect has a size, and lowers the held-out rms, in physical units, of a domain of its own sensor."""
+    """Whether a parameter exceeds its own σ and the held-out rms [SI] falls in a domain of the effect's own sensor."""
     value, covariance = model.value(k)
     if not (np.abs(value) > np.sqrt(np.maximum(np.diag(covariance), 0.0))).any():
         return False
@@ -252,13 +252,13 @@ def _is_shown(model: Hypothesis, without: Hypothesis, k: int) -> bool:
 
 
 def own_domains(distortion: Distortion) -> tuple[int, ...]:
-    """Row domains of the sensors that an effect adds to."""
+    """Row domains of the sensors whose readings an effect changes."""
     sides = [own for side, own in OWN_DOMAINS.items() if getattr(distortion, side) is not None]
     return tuple(dict.fromkeys(d for own in sides for d in own))
 
 
 def _swapped(judged: _Judged, rivals: dict[str, list[Tried]]) -> tuple[Hypothesis, dict[str, list[str]]]:
-    """Every term the best of those that might stand in its place, beside all others; and which explain as much."""
+    """Exchange every term for its best rival beside all others; and list the rivals that explain as much."""
     model = judged.model
     named: dict[str, list[str]] = {}
     for k, without in enumerate(judged.without):
@@ -278,6 +278,6 @@ def _swapped(judged: _Judged, rivals: dict[str, list[Tried]]) -> tuple[Hypothesi
 
 
 def _others(rivals: Iterable[Tried], held: set[str]) -> list[Tried]:
-    """Rivals that are not in the hypothesis, those that came near."""
+    """Rivals that are not in the hypothesis and score near the first of them."""
     free = [one for one in rivals if one.term.effect.id not in held]
     return [one for one in free if one.score > free[0].score - WORTH_FITTING] if free else []

@@ -1,4 +1,4 @@
-"""The shape numbers of an effect (a time constant, a delay): found, and carried as unknowns."""
+"""Shape parameters of an effect (a time constant, a delay): fitted, then carried as unknowns."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from trihedron.diagnose.hypothesis import Hypothesis, Term, again
 from trihedron.diagnose.session.state import Distortion
 
 SHAPE_STEPS = np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
-"""Logarithms of a shape number about the grid's best, over which a parabola is laid."""
+"""Steps of the logarithm of a shape parameter about the grid's best, to which a parabola is fitted."""
 N_RESHAPED = 2
-"""Rounds of sizes and shapes: the second changes them by a tenth of what the first did."""
+"""Iterations of size and shape: the second changes them by a tenth of what the first does."""
 STEP_LOG = 0.02
-"""Half-step of the derivative by the logarithm of a shape."""
+"""Half-step of the numerical derivative by the logarithm of a shape parameter."""
 
 
 def as_fits_best(model: Hypothesis, tried: Tried) -> Term:
-    """A candidate with its expected size, its own size and its shape as they fit best."""
+    """A candidate with its columns computed for its fitted size, at its shape of maximum evidence."""
     term, asked = tried.term, tried.asked
     for _ in range(N_RESHAPED):
         made = term.effect.rescaled(model.context, term.variant, asked.value)
@@ -33,7 +33,7 @@ def as_fits_best(model: Hypothesis, tried: Tried) -> Term:
 
 
 def _reshaped(model: Hypothesis, term: Term) -> Term:
-    """A term at the shape number of the largest evidence, with the standard error that its curvature gives."""
+    """A term at the shape parameter of maximum evidence, with the standard uncertainty from the curvature."""
     if len(term.variant.shape) != 1:
         return term
     ((name, (value, unit)),) = term.variant.shape.items()
@@ -59,9 +59,9 @@ def _reshaped(model: Hypothesis, term: Term) -> Term:
 
 
 def with_shapes(model: Hypothesis) -> Hypothesis:
-    """The hypothesis whose shape numbers are unknowns too: one more column each, p D'(ln shape).
+    """The hypothesis with its shape parameters as unknowns: one more column each, p D'(ln shape).
 
-    With a shape held fixed S, b and p would claim to be known better than they are.
+    With fixed shapes the uncertainties of S, b and p would be too small.
     """
     more = [term for k in range(len(model.terms)) if (term := _by_shape(model, k)) is not None]
     return again(model, [*model.terms, *more]) if more else model

@@ -1,7 +1,7 @@
-"""Several recordings of one unit in one evidence: an effect of the instrument has the same size in all (eq. 11.21).
+"""Several recordings of one unit: effects of the instrument with one common size, by their joint evidence (eq. 11.21).
 
-What one recording says of an effect's parameters, everything else integrated out, is Gaussian: a constant, a slope and
-a precision. Those of several recordings add. Bias, S and strengths of noise are each recording's own.
+The likelihood of an effect's parameters in one recording, everything else integrated out, is Gaussian: a constant, a
+slope and a precision. These add over recordings. Bias, S and noise strengths are those of each recording.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.shared_effects import SharedCandidate, SharedEffect
 
 N_LEADERS = 4
-"""Candidates, best at fixed strengths, whose strengths are found anew."""
+"""Candidates, best at fixed noise strengths, that are evaluated with the strengths refitted."""
 KNOWN = 1e-6
-"""Share of the best-known direction's precision below which a recording knows nothing of a direction."""
+"""Relative precision, to that of the best direction, below which a recording does not determine a direction."""
 
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """What one recording says of parameters ``q``, in units of their expected size: a log-likelihood
-    ``constant + slope·q - q·precision·q/2``, over that without the effect."""
+    """Likelihood of parameters ``q`` in one recording, in units of their expected size: a log-likelihood
+    ``constant + slope·q - q·precision·q/2``, relative to that without the effect."""
 
     constant: float
     slope: FloatArray
@@ -40,11 +40,11 @@ class Information:
 
     @classmethod
     def of(cls, asked: Asked, term: Term, unit: FloatArray, plain: float) -> Information:
-        """From the answer under a prior of standard deviations ``term.sizes``, ``unit`` the sizes of ``q``."""
+        """From the posterior under a prior of standard deviations ``term.sizes``; ``unit`` is the unit of ``q``."""
         posterior = np.linalg.inv(asked.covariance / np.outer(unit, unit))
         prior = np.diag((unit / term.sizes) ** 2)
         slope = posterior @ (asked.value / unit)
-        # Rounding makes a direction that the data say nothing of seem less known than beforehand.
+        # Rounding can make the precision of an undetermined direction negative.
         values, vectors = np.linalg.eigh(posterior - prior)
         precision = (vectors * np.maximum(values, 0.0)) @ vectors.T
         gain = asked.log_evidence - plain
@@ -53,20 +53,20 @@ class Information:
 
     @property
     def known(self) -> tuple[FloatArray, FloatArray]:
-        """Eigenvalues and vectors of what this recording knows."""
+        """Eigenvalues and eigenvectors of the precision for the directions that this recording determines."""
         values, vectors = np.linalg.eigh(self.precision)
         keeps = values > KNOWN * max(float(values[-1]), 1e-300)
         return values[keeps], vectors[:, keeps]
 
     @property
     def peak(self) -> float:
-        """``slope·precision⁻¹·slope`` over the directions that are known."""
+        """``slope·precision⁻¹·slope`` over the determined directions."""
         values, vectors = self.known
         return float(((vectors.T @ self.slope) ** 2 / values).sum())
 
 
 def together(parts: Sequence[Information], scale: float) -> tuple[float, FloatArray, FloatArray]:
-    """Log-evidence gained by one common ``q``, ``scale`` its standard deviation beforehand; ``q``, its covariance."""
+    """Log-evidence gained by one common ``q`` with prior standard deviation ``scale``; ``q`` and its covariance."""
     precision = sum((one.precision for one in parts), np.eye(len(parts[0].slope)) / scale**2)
     slope = np.sum([one.slope for one in parts], axis=0)
     covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
@@ -76,7 +76,7 @@ def together(parts: Sequence[Information], scale: float) -> tuple[float, FloatAr
 
 
 def agreement(parts: Sequence[Information]) -> float:
-    """Chance that values of one size differ between recordings as much as these do (χ², no prior)."""
+    """p-value of the differences between the recordings' sizes of one effect (χ², no prior)."""
     whole = Information(0.0, np.sum([p.slope for p in parts], axis=0), np.sum([p.precision for p in parts], axis=0))
     dof = sum(len(one.known[0]) for one in parts) - len(whole.known[0])
     return float(chdtrc(dof, max(sum(one.peak for one in parts) - whole.peak, 0.0))) if dof > 0 else 1.0
@@ -84,7 +84,7 @@ def agreement(parts: Sequence[Information]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Joint:
-    """One candidate in all recordings: its terms, what each says, and the score of a common size."""
+    """One candidate in all recordings: its terms, its likelihood in each, and the score of a common size."""
 
     terms: tuple[Term, ...]
     parts: tuple[Information, ...]
@@ -107,9 +107,9 @@ def may_be_shared(effect: Effect) -> bool:
 def shared_effects(
     models: Sequence[Hypothesis], alpha: float
 ) -> tuple[tuple[SharedEffect, ...], tuple[SharedCandidate, ...]]:
-    """The effects that all recordings of one unit demand together, by the score of one common size; and what was tried.
+    """Effects accepted for all recordings of one unit together, by the score of one common size; and all candidates.
 
-    ``models`` are what each recording demands by itself; what may be the instrument's is asked anew.
+    ``models`` are the results of each recording alone; effects that may be the instrument's are tested anew.
     """
     bare = [again(m, [t for t in m.terms if not may_be_shared(t.effect)]) for m in models]
     held, tried = _added(list(bare), threshold(alpha))
@@ -125,7 +125,7 @@ def shared_effects(
 
 @dataclass(frozen=True, eq=False)
 class _Held:
-    """Every recording with the effects that are shared, behind those of its own."""
+    """Every recording with its own effects, followed by the shared ones."""
 
     models: tuple[Hypothesis, ...]
     n_added: int
@@ -183,7 +183,7 @@ def _judged(held: _Held, k: int, alpha: float) -> tuple[float, SharedEffect]:
 
 
 def _tried(models: Sequence[Hypothesis], exclude: Collection[str]) -> list[_Joint]:
-    """Effects beside the hypotheses of all recordings, best first, one shape each."""
+    """Effects that can be added to the hypotheses of all recordings, best first, one shape each."""
     ids = {one.id for one in catalogue() if not may_be_shared(one)} | set(exclude)
     found = [{_key(t): t for t in terms_beside(m, ids)[0]} for m in models]
     common = [key for key in found[0] if all(key in one for one in found)]
@@ -215,14 +215,14 @@ def _best_of_each(all_of: Sequence[_Joint]) -> list[_Joint]:
 
 
 def _full(models: Sequence[Hypothesis], terms: tuple[Term, ...]) -> _Joint:
-    """A candidate with the strengths of every recording found anew beside it."""
+    """A candidate evaluated with the noise strengths of every recording refitted."""
     asked = [m.asked([t])[0] for m, t in zip(models, terms, strict=True)]
     return _joint(terms, asked, [m.plain([a.strengths]) for m, a in zip(models, asked, strict=True)])
 
 
 def _joint(terms: tuple[Term, ...], asked: Sequence[Asked], plain: Sequence[float]) -> _Joint:
     unit = terms[0].sizes
-    # One of a column may stand for another number of the reported unit.
+    # The columns of recordings may have different scales to the reported unit.
     units = [unit * terms[0].variant.scale / t.variant.scale for t in terms]
     parts = tuple(Information.of(a, t, u, p) for a, t, u, p in zip(asked, terms, units, plain, strict=True))
     made = [(scale, *together(parts, scale)) for scale in PRIOR_SCALES]

@@ -1,4 +1,4 @@
-"""FLEET: many logs of many devices, each calibrated and diagnosed, spread over workers; one table and one page."""
+"""Fleet: many logs of many devices, calibrated and diagnosed by parallel workers; one table and one page."""
 
 from trihedron.fleet.logs import Job, find_jobs
 from trihedron.fleet.running import fleet

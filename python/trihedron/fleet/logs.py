@@ -1,4 +1,4 @@
-"""Which logs there are, which device each belongs to, and what makes a result stale."""
+"""Discovery of logs, their devices, and the key by which an earlier result is recognised."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ENDINGS = (
     *(".csv", ".tsv", ".txt", ".log", ".dat", ".npz", ".npy", ".parquet", ".zip", ".gz", ".bag", ".mcap", ".db3"),
     *(".ulg", ".bin", ".h5", ".hdf5", ".mat"),
 )
-"""Files of a folder that may be logs; every other is passed over. A file that is named is taken whatever its ending."""
+"""Endings of files in a folder that may be logs; others are ignored. A file given by name may have any ending."""
 BLOCK = 1 << 20
 
 
@@ -35,7 +35,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """For people."""
+        """Name of the log and its device for display."""
         return Path(self.path).name + ("" if self.device is None else f", device {self.device}")
 
 
@@ -46,15 +46,15 @@ def find_jobs(
     serial: str | None = None,
     apart_from: Path | None = None,
 ) -> list[Job]:
-    """Every log of a folder (and the folders in it), of a pattern or of a list, one job a device.
+    """Every log of a folder (and its subfolders), of a pattern or of a list, one job per device.
 
     ``serial`` is a regular expression whose first group, found in a log's path, names its device; without it devices
-    are those of an archive, or else the folder that the log lies in. ``apart_from`` is excluded: our own output.
+    are those of an archive, or else the log's folder. ``apart_from`` is excluded: the output of the fleet.
 
     Raises
     ------
     ValueError
-        When there is none, a named log is missing, or the expression does not fit.
+        When there is no log, a named log is missing, or the expression does not match.
     """
     paths = [
         path for path in _paths(source) if apart_from is None or apart_from.resolve() not in path.resolve().parents
@@ -86,7 +86,7 @@ def _paths(source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) ->
     if not isinstance(source, str | os.PathLike):
         return [path for one in source for path in _paths(one)]
     if not os.fspath(source):
-        # What a shell makes of a variable that is not set would be every log below here.
+        # An unset shell variable gives an empty name, which must not mean every log below the current folder.
         raise RefusedError(
             "the name of the logs is empty; name a folder, a file or a pattern ('.' for the folder here)."
         )
@@ -102,7 +102,7 @@ def _paths(source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) ->
         below = [p for p in path.rglob("*") if not p.name.startswith(".")]
         files = [p for p in below if not p.is_dir()]
         logs = [p for p in files if p.suffix.lower() in ENDINGS]
-        # A folder that is named like a log holds logs, or is one that cannot be read: none is passed over unsaid.
+        # A folder with the ending of a log contains logs or is an unreadable log; none is skipped silently.
         empty = [
             p for p in below if p.is_dir() and p.suffix.lower() in ENDINGS and not any(p in q.parents for q in logs)
         ]
@@ -130,14 +130,14 @@ def _serial(path: Path, device: int | None, pattern: re.Pattern[str] | None, roo
 def _digest(path: Path) -> str:
     digest = hashlib.sha256()
     if path.exists() and not path.is_file():
-        # Of a pipe that is opened nothing may ever come.
+        # Reading a pipe could block for ever.
         return f"not a file {path}"
     try:
         with path.open("rb") as stream:
             while block := stream.read(BLOCK):
                 digest.update(block)
     except OSError:
-        # It will fail when it is read, with its reason; the key only has to stay the same until it is mended.
+        # The reader reports the error; the key only has to stay the same until the file is readable.
         return f"unreadable {path}"
     return digest.hexdigest()
 
@@ -148,7 +148,7 @@ def _key(digest: str, device: int | None, options: Mapping[str, Any]) -> str:
 
 
 def program() -> str:
-    """Name and version, a part of every key: results of another version are made anew."""
+    """Name and version, a part of every key, so that results of another version are recomputed."""
     try:
         return f"trihedron {version('trihedron')}"
     except PackageNotFoundError:

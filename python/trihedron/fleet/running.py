@@ -1,4 +1,4 @@
-"""Logs handed to workers, results kept as they come, so that nothing is done twice and nothing is lost."""
+"""Runs logs on workers and stores each result as it arrives, so that an interrupted run continues."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from trihedron.records.progress import Progress
 
 RESULTS = "results"
 DEATHS = 3
-"""Workers that one log may take with it before it is given up: once can be the machine, three times is the log."""
+"""Number of workers killed by one log after which it is given up: one may be chance, three are the log."""
 By = Literal["session", "date"]
 
 
@@ -48,13 +48,13 @@ def fleet(
     Parameters
     ----------
     logs : folder, pattern, file, or a list of them
-        An archive of several devices is one log a device.
+        An archive of several devices is one log per device.
     out : folder
-        Where results go. Logs whose result is there already (same bytes, options and version) are not done again.
+        Where results go. Logs with a result there (same bytes, options and version) are not processed again.
     scheduler : str, optional
         Address of a Dask scheduler, ``tcp://host:8786``: its workers must see the same paths and have trihedron.
     workers : int, optional
-        Processes of the local cluster, as many as processors unless said; 0 works in this process, without Dask.
+        Processes of the local cluster, by default one per processor; 0 works in this process, without Dask.
     diagnose : bool
         Without it logs are calibrated only, which is several times faster.
     serial : str, optional
@@ -67,7 +67,7 @@ def fleet(
     Returns
     -------
     FleetResult
-        One row a log (``rows``, ``to_dataframe``) and the ``summary`` over devices.
+        One row per log (``rows``, ``to_dataframe``) and the ``summary`` over devices.
 
     Raises
     ------
@@ -118,12 +118,12 @@ def fleet(
 
 
 def _of_table(row: Row) -> Row:
-    """A result without its calibration, of which thousands would stand in memory."""
+    """A result without its calibration, to save memory with thousands of logs."""
     return {name: value for name, value in row.items() if name != "calibration"}
 
 
 def _kept(folder: Path, job: Job) -> Row | None:
-    """The result of an earlier run; one that crashed is tried again."""
+    """The result of an earlier run; None for one that crashed, which is tried again."""
     path = folder / RESULTS / f"{job.key}.json"
     try:
         row: Row = json.loads(path.read_text(encoding="utf-8"))
@@ -133,7 +133,7 @@ def _kept(folder: Path, job: Job) -> Row | None:
 
 
 def _keep(folder: Path, job: Job, row: Row) -> None:
-    """One file a result, put in place in one step: a run that is killed leaves whole results only."""
+    """Write one file per result, atomically: a killed run leaves no partial result."""
     text = json.dumps(plain(row), allow_nan=False)
     write_whole(folder / RESULTS / f"{job.key}.json", text, overwrite=True)
 
@@ -186,11 +186,11 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             "several workers need Dask, which is not installed: pip install 'trihedron[fleet]', or say --workers 0 to "
             "do one log after the other in this process."
         ) from None
-    # One log is one task of one thread: linear algebra that starts threads of its own would fight over processors.
+    # One log is one task on one thread: further threads of the linear algebra would compete for processors.
     settings = {
         "distributed.scheduler.allowed-failures": DEATHS - 1,
         "distributed.admin.tick.limit": "60s",
-        # Dask watches itself a hundred times a second in every process: time that two workers of two processors miss.
+        # Dask's profiler samples every process a hundred times a second, which costs too much on two processors.
         "distributed.worker.profile.enabled": False,
         "distributed.admin.system-monitor.interval": "5s",
         "distributed.admin.system-monitor.gil.enabled": False,
@@ -222,13 +222,13 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             yield client
 
 
-# The calibration of every log of a fleet as a file of its own, which `export`, `verify` and `apply` take.
+# The calibration of every log of a fleet as its own file, for `export`, `verify` and `apply`.
 
 CALIBRATIONS = "calibrations"
 
 
 def write_calibrations(jobs: Sequence[Job], results: Path, folder: Path) -> None:
-    """``DEVICE_LOG_KEY.json`` of every log whose result in ``results`` holds a calibration; what is there stays."""
+    """Write ``DEVICE_LOG_KEY.json`` for every log with a calibration in ``results``; existing files are kept."""
     target = folder / CALIBRATIONS
     for job in jobs:
         path = target / f"{_plain(job.serial)}_{_plain(Path(job.path).stem)}_{job.key[:6]}.json"
@@ -241,5 +241,5 @@ def write_calibrations(jobs: Sequence[Job], results: Path, folder: Path) -> None
 
 
 def _plain(name: str) -> str:
-    """A name of what every file system takes."""
+    """A name in characters that every file system accepts."""
     return re.sub(r"[^\w.-]+", "-", name) or "log"

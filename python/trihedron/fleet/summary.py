@@ -1,4 +1,4 @@
-"""Rows of all logs into what a fleet says: spreads, outliers, shared physics, drift of single devices."""
+"""Summary of a fleet from the rows of all logs: spreads, outliers, shared effects, changes of single devices."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from trihedron.records.fleet import FleetLog, FleetSummary, MixedLogs, Outlier, 
 from trihedron.records.sessions import PARAMETERS, Session
 
 ALPHA = 0.01
-"""Chance that a sound fleet is told to have any outlier, or any device that changed."""
+"""Probability that a healthy fleet is reported with any outlier, or any device that changed."""
 FEWEST = 4
-"""Devices below which none is called an outlier: the spread of the others would rest on two."""
+"""Fewest devices for outliers: with three, the spread of the others would be from two."""
 ONE_UNIT = 0.01
-"""Relative scale, or angle [rad], by which two logs of one unit can differ: 0.03 %/K over 30 K; units differ by several
-per cent (data sheets of consumer parts: 3 %)."""
+"""Largest difference in relative scale, or angle [rad], between two logs of one unit: 0.03 %/K over 30 K; units differ
+by several per cent (data sheets of consumer parts: 3 %)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FleetResult:
-    """What was made of every log (``rows``, plain types), the summary, and the folder with table and page."""
+    """The result of every log (``rows``, plain types), the summary, and the folder with table and page."""
 
     folder: Path
     rows: tuple[dict[str, Any], ...]
@@ -42,7 +42,7 @@ class FleetResult:
         return sum(row["status"] == "done" for row in self.rows)
 
     def to_dataframe(self) -> Any:
-        """One row a log (polars)."""
+        """One row per log (polars)."""
         return frame_of(self.rows)
 
     def __repr__(self) -> str:
@@ -111,7 +111,7 @@ def _log(row: dict[str, Any]) -> FleetLog:
 
 
 def _comparable(rows: Sequence[dict[str, Any]]) -> tuple[list[dict[str, Any]], str]:
-    """Trustworthy calibrations in the commonest units and sensors, in their order in time, and who is missing."""
+    """Trustworthy calibrations with the commonest units and sensors, in order of time; and why others are excluded."""
     sound = [row for row in rows if row["status"] == "done" and row.get("is_trustworthy")]
     kind = Counter((row["accelerometer_unit"], row["gyroscope_unit"], len(row["parameters"])) for row in sound)
     if not kind:
@@ -150,9 +150,9 @@ def _by_device(sessions: Sequence[Session]) -> dict[str, list[Session]]:
 
 
 def _outliers(by_device: dict[str, list[Session]]) -> tuple[Outlier, ...]:
-    """Devices whose mean lies beyond the others': moderated deleted residual, by Bonferroni over devices and numbers.
+    """Outlying devices: moderated deleted residual of each mean, Bonferroni-corrected over devices and parameters.
 
-    One at a time, the farthest first, each left out before the next is looked at: two strays do not hide each other.
+    One at a time, the farthest first, each excluded before the next test, so that two outliers do not mask each other.
     """
     if len(by_device) < FEWEST:
         return ()
@@ -170,7 +170,7 @@ def _outliers(by_device: dict[str, list[Session]]) -> tuple[Outlier, ...]:
             others = np.delete(column, worst)
             dof = len(others) - 1
             variance = (prior_dof * prior[k] + dof * float(others.var(ddof=1))) / (prior_dof + dof)
-            # A device that was measured worse than the others may lie farther away.
+            # Allow for a device that was measured less accurately than the others.
             worse = max(own[kept[worst], k] - float(np.delete(own[kept, k], worst).mean()), 0.0)
             spread = float(np.sqrt(variance * (1.0 + 1.0 / len(others)) + worse))
             sigmas = float(column[worst] - others.mean()) / max(spread, 1e-300)
@@ -185,17 +185,17 @@ def _outliers(by_device: dict[str, list[Session]]) -> tuple[Outlier, ...]:
 
 
 def _spread_of_axes(means: FloatArray) -> tuple[FloatArray, float]:
-    """What the other axes of its kind say of each number's variance (k,), and the degrees of freedom of that.
+    """Prior of each parameter's variance (k,) from the other axes of its triad, and its degrees of freedom.
 
-    Few devices say little of one axis' spread; that three axes of a triad are made alike says more. How much alike they
-    are is told by how far their variances differ, over all kinds of numbers (after Smyth 2004, moderated t).
+    Few devices determine the spread of one axis poorly; the axes of one triad have similar spreads. How similar is
+    estimated from the differences of their variances over all kinds of parameters (after Smyth 2004, moderated t).
     """
     n, k = means.shape
     log = (np.log(np.maximum(means.var(axis=0, ddof=1), 1e-300)) + _log_bias(n - 1)).reshape(-1, 3)
-    # The median, for a stray device is in one of the kinds; of χ² with two degrees of freedom it is ln 2 of the mean.
+    # The median is robust against an outlying device; for χ² with two degrees of freedom it is ln 2 times the mean.
     of_axes = float(np.median(log.var(axis=1, ddof=1))) / np.log(2.0)
     apart = max(of_axes - _log_variance(n - 1), 0.0)
-    # A mean of two others, each with its own error and both unlike this one.
+    # Variance of the mean of two other axes: half of their sampling variance, 1.5 times the variance between axes.
     variance = 0.5 * _log_variance(n - 1) + 1.5 * apart
     dof = (1.0 + np.sqrt(1.0 + 2.0 * variance)) / variance
     others = (log.sum(axis=1, keepdims=True) - log) / 2.0
@@ -208,12 +208,12 @@ def _log_variance(dof: float) -> float:
 
 
 def _log_bias(dof: float) -> float:
-    """By how much the mean logarithm of a variance estimate is too small: log(d/2) less digamma(d/2)."""
+    """Bias of the logarithm of a variance estimate (too small by): log(d/2) less digamma(d/2)."""
     return 1.0 / dof + 1.0 / (3.0 * dof**2)
 
 
 def _not_one_unit(by_device: dict[str, list[Session]]) -> tuple[MixedLogs, ...]:
-    """Groups of logs whose scales or directions of axes differ by more than one unit's ever do, beyond their errors."""
+    """Groups of logs whose scales or axis angles differ significantly by more than ``ONE_UNIT``: not of one device."""
     fixed = [k for k, parameter in enumerate(PARAMETERS) if not parameter.id.endswith("bias")]
     found = []
     for serial, sessions in by_device.items():
@@ -234,7 +234,7 @@ def _not_one_unit(by_device: dict[str, list[Session]]) -> tuple[MixedLogs, ...]:
 
 
 def _shared(diagnosed: Sequence[dict[str, Any]]) -> tuple[SharedEffect, ...]:
-    """Every effect found, the commonest first; Clopper and Pearson's interval of the share of devices."""
+    """Every effect found, the commonest first; Clopper-Pearson interval of the fraction of devices."""
     logs: Counter[str] = Counter()
     devices: dict[str, set[str]] = {}
     for row in diagnosed:

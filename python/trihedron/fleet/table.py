@@ -1,4 +1,4 @@
-"""The fleet as a table: one row a log."""
+"""The fleet as a table: one row per log."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PLAIN = (
 
 
 def write_tables(rows: Sequence[dict[str, Any]], summary: FleetSummary, folder: Path) -> None:
-    """``fleet.parquet``, ``fleet.csv`` and ``fleet.html`` in the folder of the results; those of an earlier run go."""
+    """Write ``fleet.parquet``, ``fleet.csv`` and ``fleet.html`` to the folder; those of an earlier run are replaced."""
     from trihedron.report.fleet import fleet_report
     from trihedron.report.page import to_html
 
@@ -45,9 +45,9 @@ def write_tables(rows: Sequence[dict[str, Any]], summary: FleetSummary, folder: 
 
 
 def frame_of(rows: Sequence[dict[str, Any]]) -> polars.DataFrame:
-    """One row a log: what it is, what came of it, and the 21 numbers with their standard errors (SI in the names).
+    """One row per log: its name, its result, and the 21 parameters with their standard errors (units in the names).
 
-    Control characters of names are spelled out: a table is shown on terminals.
+    Control characters in names are escaped, since a table is shown on terminals.
     """
     import polars
 

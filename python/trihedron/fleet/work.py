@@ -1,4 +1,4 @@
-"""One log, calibrated and diagnosed: what a worker does. Plain types go in and come out."""
+"""The task of a worker: calibrate and diagnose one log, with plain types as input and output."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from trihedron.records.checked import WrongTypeError
 
 Row = dict[str, Any]
 REFUSED: tuple[type[Exception], ...] = (*REFUSALS, WrongTypeError, OSError)
-"""What says of a log, a file or an option that it will not do."""
+"""Exceptions that mean an unusable log, file or option, not a defect."""
 
 
 def work(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
-    """The row of one log; never an exception: its reason stands in the row.
+    """The row of one log; raises nothing: the reason of a failure is in the row.
 
-    ``status`` is ``done``, ``refused`` (the log does not allow it: one sentence says why) or ``crashed`` (a defect of
-    the program or a machine without memory; tried again by the next run).
+    ``status`` is ``done``, ``refused`` (the log is unusable, with the reason) or ``crashed`` (a defect of the program
+    or lack of memory; tried again by the next run).
     """
     began = time.monotonic()
     row: Row = {"version": program(), "worker": os.getpid()}
@@ -41,7 +41,7 @@ def work(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
 
 
 def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
-    # Imported by the worker: the process that only hands out logs needs none of it.
+    # Imported in the worker: the process that distributes logs does not need it.
     from trihedron.api import calibrating, diagnosing, reading
     from trihedron.records.results import CalibrationResult
 

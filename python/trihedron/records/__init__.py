@@ -1,6 +1,6 @@
-"""The nouns of the workflow: frozen, validated when made, understood by every stage.
+"""Records that the stages exchange: frozen dataclasses, validated when made.
 
-One file per noun. A stage takes records and returns records; it never imports another stage.
+One file per subject. A stage takes records and returns records; it never imports another stage.
 """
 
 from trihedron.records.calibration import (

@@ -1,4 +1,4 @@
-"""A calibration: the linear model of both sensors with the certainty of every number."""
+"""A calibration: the linear model of both sensors with the covariance of its parameters."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from trihedron.records.presented import Presented
 from trihedron.sanitise import one_line
 
 Frame = Literal["lower", "symmetric", "case"]
-"""Body frame Mz: ``lower`` (S_f lower triangular), ``symmetric`` (S_f symmetric), ``case`` (S_f full)."""
+"""Body frame: ``lower`` (S_f lower triangular), ``symmetric`` (S_f symmetric), ``case`` (S_f full)."""
 
 PARAMETER_NAMES: tuple[str, ...] = (*(f"S_{i}{j}" for i in AXES for j in AXES), "b_x", "b_y", "b_z")
 """Order of a sensor's 12 parameters in every covariance: S row by row, then b."""
@@ -28,8 +28,8 @@ class Observability(Frozen):
     """How well the motion determines the parameters.
 
     ``singular_values`` of the whitened, column-scaled Jacobian (largest first), ``condition`` their ratio, ``rank`` the
-    number above rounding, ``n_parameters`` how many were asked for; ``weakest`` says in words what is seen worst and
-    ``advice`` which poses or turns to add. ``correlated`` lists parameter pairs with |correlation| > 0.9.
+    number above rounding, ``n_parameters`` the number of free parameters; ``weakest`` names the worst determined one in
+    words and ``advice`` poses or turns to add. ``correlated`` lists parameter pairs with |correlation| > 0.9.
     """
 
     rank: int
@@ -43,7 +43,7 @@ class Observability(Frozen):
 
 @dataclass(frozen=True, eq=False)
 class FitQuality(Frozen):
-    """Residuals of one sensor's fit, in sample and held out, next to the predicted noise.
+    """Residuals of one sensor's fit, in sample and cross-validated (held out), with the predicted noise.
 
     ``residual`` (m,) or (m, k) in ``unit`` per pose (accelerometer: norm minus |g|) or per move (gyro: predicted minus
     measured gravity, 3 components); ``sigma`` of the same shape is what the noise alone predicts for it.
@@ -87,7 +87,7 @@ class SensorCalibration(Frozen):
         In the order of :data:`PARAMETER_NAMES`; rows of parameters fixed by the choice of frame are zero. ``sigma_S``
         (3, 3) and ``sigma_b`` (3,) are its diagonal's roots.
     bias : (3,)
-        What the axes read too much, in SI: opposite in sign to b.
+        Reading of each axis at zero input, in SI: opposite in sign to b.
     raw_unit, si_unit, method : str
         Units before and after, and how S and b were found.
     quality, observability : FitQuality, Observability or None
@@ -139,7 +139,7 @@ class SensorCalibration(Frozen):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Presented):
-    """Both sensors in one body frame (instrument frame), with what they were determined from.
+    """Both sensors in one body frame (instrument frame), with gravity, source recording and findings.
 
     Attributes
     ----------
@@ -152,16 +152,16 @@ class Calibration(Presented):
     frame : "lower", "symmetric" or "case"
         The body frame of S and b.
     gravity_m_s2, gravity_source : float, str
-        |g| at the place and where it is from.
+        |g| at the place of the recording, and the source of that value.
     recording_source, recording_sha256 : str
         The log that it was made from.
     findings : tuple of Finding
-        What was noticed; ``is_trustworthy`` where none is serious.
+        Problems found; ``is_trustworthy`` where none is serious.
     extensions : mapping
         Effects and temperature models beside S and b (``calibrate --extended``).
     averaging : float
         0 for a sensor that samples points, 1 for one that averages over its sample interval (docs/model-session.md,
-        11.6d); between them as far as its rotations show.
+        11.6d); fractions between them are estimates from the rotations.
     """
 
     accelerometer: SensorCalibration
@@ -198,7 +198,7 @@ class Calibration(Presented):
 
     @property
     def is_trustworthy(self) -> bool:
-        """No finding says that the answer is not to be trusted."""
+        """True without a serious finding."""
         return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""What a log's readings say of the ADCs that wrote them, measured once."""
+"""Properties of the ADCs behind a log, measured from its readings: resolution, noise, range limits, low-pass."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from trihedron.records.frozen import Frozen
 from trihedron.records.pose_noise import Measured
 
 SAME_STEP = 0.02
-"""Part by which one step of three ADCs may be measured differently where text has cut its digits."""
+"""Relative difference within which the resolutions of three axes count as equal: text truncates digits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Limit(Frozen):
-    """One channel's end of range: ``value`` in raw units and its standard error ``sigma``, 0 where readings show it
-    exactly; ``runs`` (k, 2) of readings that lie there, the first sample of each and the one behind its last.
-    ``is_word``: the value is the code at the end of an ADC's word."""
+    """Range limit of one channel: ``value`` in raw units and its standard error ``sigma``, 0 where readings show it
+    exactly; ``runs`` (k, 2) of readings at the limit as half-open ranges of samples.
+    ``is_word``: the value is the largest or smallest code of the ADC's word."""
 
     axis: int
     value: float
@@ -36,9 +36,9 @@ class Limit(Frozen):
 
 @dataclass(frozen=True)
 class LowPass:
-    """The filter ahead of a channel's samples.
+    """The low-pass filter ahead of a channel's samples.
 
-    ``corner_hz`` where one shows, what it lies ``above_hz`` where none does; ``shape``: its order, 0 a Gaussian.
+    ``corner_hz`` if it is detected, else ``above_hz`` is its lower bound; ``shape``: its order, 0 for a Gaussian.
     """
 
     corner_hz: Measured | None
@@ -48,10 +48,10 @@ class LowPass:
 
 @dataclass(frozen=True, eq=False)
 class ChannelFacts(Frozen):
-    """One sensor's three channels, raw units.
+    """Properties of one sensor's three channels, raw units.
 
-    ``step`` (3,) of the ADC, 0 where readings lie on no grid; ``noise`` (3,) of one sample in the quietest half
-    seconds of the log, 0 where it has none; ``limits`` that readings were cut off at.
+    ``step`` (3,) is the resolution (LSB), 0 where readings lie on no grid; ``noise`` (3,) the standard deviation of one
+    sample in the quietest half seconds of the log, 0 where it has none; ``limits`` at which readings were clipped.
     """
 
     step: FloatArray
@@ -59,7 +59,7 @@ class ChannelFacts(Frozen):
     limits: tuple[Limit, ...]
 
     def at_limits(self, n: int) -> BoolArray:
-        """(n, 3) which of the channel's n readings lie at a limit."""
+        """(n, 3) True for readings at a range limit; n is the number of samples."""
         out = np.zeros((n, 3), dtype=np.bool_)
         for limit in self.limits:
             for first, stop in limit.runs.tolist():
@@ -67,7 +67,7 @@ class ChannelFacts(Frozen):
         return out
 
     def moved(self, to: IntArray) -> ChannelFacts:
-        """The facts of a log into which samples were put: ``to`` (n,) are the places of its own among them."""
+        """The same for a log with samples inserted: ``to`` (n,) are the new indices of its own samples."""
         limits = tuple(
             replace(limit, runs=np.stack([to[limit.runs[:, 0]], to[limit.runs[:, 1] - 1] + 1], axis=1))
             for limit in self.limits
@@ -76,34 +76,34 @@ class ChannelFacts(Frozen):
 
     @property
     def common_step(self) -> float:
-        """The step of all three channels, 0 where they have not the same."""
+        """The resolution that all three channels share, 0 where they differ."""
         step = float(np.median(self.step))
         return step if bool(np.all(np.abs(self.step - step) <= SAME_STEP * step)) else 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class RecordingFacts(Frozen):
-    """The facts of both sensors; ``None`` for one that the recording has not."""
+    """The channel properties of both sensors; ``None`` for a sensor that the recording lacks."""
 
     accelerometer: ChannelFacts | None
     gyroscope: ChannelFacts | None
 
     @property
     def steps(self) -> FloatArray:
-        """(3,) or (6,) steps of all channels that there are, the accelerometer's first."""
+        """(3,) or (6,) resolutions of all channels present, the accelerometer's first."""
         return np.concatenate([one.step for one in (self.accelerometer, self.gyroscope) if one is not None])
 
     def moved(self, to: IntArray) -> RecordingFacts:
-        """The facts of a log into which samples were put (:meth:`ChannelFacts.moved`)."""
+        """The same for a log with samples inserted (:meth:`ChannelFacts.moved`)."""
         return RecordingFacts(*(one and one.moved(to) for one in (self.accelerometer, self.gyroscope)))
 
     def of(self, sensor: str) -> ChannelFacts:
-        """The facts of one sensor.
+        """The channel properties of one sensor.
 
         Raises
         ------
         ValueError
-            When the recording has it not.
+            When the recording lacks that sensor.
         """
         facts = {"accelerometer": self.accelerometer, "gyroscope": self.gyroscope}[sensor]
         if facts is None:

@@ -1,4 +1,4 @@
-"""What a public record is given by hand, checked where it is made: one sentence instead of an error of a library."""
+"""Type checks for arguments of public records: one clear sentence instead of a library's error."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ import numpy.typing as npt
 from trihedron.errors import RefusedError
 
 LONGEST_SHOWN = 60
-"""Characters of a wrong value that a sentence repeats."""
+"""Longest text of a wrong value that an error message repeats, in characters."""
 
 Word = TypeVar("Word", bound=Enum)
 
 
 class WrongTypeError(TypeError, ValueError):
-    """An argument of a type that is not taken: which, what it is, what it should be."""
+    """An argument of the wrong type; the message names the argument, its value and the expected type."""
 
 
 def said(value: Any) -> str:
-    """A value as a sentence can hold it."""
+    """A value in short form for an error message."""
     kind = type(value)
     text = ""
     if kind.__module__ in ("builtins", "numpy", "decimal", "fractions"):
-        # A whole number of more than 4300 digits has no text.
+        # repr raises for an integer of more than 4300 digits.
         with suppress(ValueError):
             text = repr(value)
     is_short = 0 < len(text) <= LONGEST_SHOWN and "\n" not in text and " at 0x" not in text
@@ -36,18 +36,18 @@ def said(value: Any) -> str:
 
 
 def numbers_of(name: str, value: Any) -> npt.NDArray[Any]:
-    """An array of real numbers of any shape; what a mask hides is missing (NaN).
+    """An array of real numbers of any shape; masked entries become NaN (missing).
 
     Raises
     ------
     WrongTypeError
-        When it is none.
+        When it is not an array of numbers.
     """
     try:
         array = np.ma.filled(value.astype(np.float64), np.nan) if np.ma.isMaskedArray(value) else np.asarray(value)
     except (TypeError, ValueError, OverflowError):
         raise WrongTypeError(f"{name} is an array of numbers, not {said(value)}.") from None
-    # An empty list has no numbers that could be of another kind.
+    # An empty array passes whatever its type.
     if array.dtype.kind not in "iuf" or array.ndim == 0:
         raise WrongTypeError(f"{name} is an array of numbers, not {said(value)}.")
     return array
@@ -59,7 +59,7 @@ def number_of(name: str, value: Any) -> float:
     Raises
     ------
     WrongTypeError, ValueError
-        When it is none, or not finite.
+        When it is not a number, or not finite.
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise WrongTypeError(f"{name} is a number, not {said(value)}.")
@@ -73,12 +73,12 @@ def number_of(name: str, value: Any) -> float:
 
 
 def word_of(name: str, value: Any, kind: type[Word]) -> Word:
-    """One of a closed list.
+    """A member of the enumeration ``kind``.
 
     Raises
     ------
     WrongTypeError
-        When it is none; the list is in the sentence while it is short.
+        When it is not a member; the message lists the members while the list is short.
     """
     with suppress(ValueError, TypeError):
         return kind(value)
@@ -88,7 +88,7 @@ def word_of(name: str, value: Any, kind: type[Word]) -> Word:
 
 
 def kind_of(name: str, value: Any, *kinds: type) -> None:
-    """Refuse a value of another class.
+    """Raise unless the value is an instance of one of the classes.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def kind_of(name: str, value: Any, *kinds: type) -> None:
 
 
 def all_of(name: str, values: Any, kind: type) -> None:
-    """Refuse anything but a tuple (or list) of a class.
+    """Raise unless the value is a tuple or list of instances of one class.
 
     Raises
     ------

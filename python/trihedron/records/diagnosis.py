@@ -1,4 +1,4 @@
-"""A diagnosis: where recording and model differ, which physics explains it, and what remains."""
+"""A diagnosis: where recording and model differ, which effects explain it, and which residuals stay unexplained."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class EffectParameter(Plain):
 
 @dataclass(frozen=True, eq=False)
 class EffectCurve(Frozen):
-    """What an effect adds to one sensor's reading along one axis, as a function of one variable, and poses beside it.
+    """Error that an effect adds to one axis of a sensor, as a function of one variable, with the data of single poses.
 
     ``driver`` is ``force``, ``rate`` (of ``driver_axis``), ``temperature``, ``supply``, ``vibration`` or ``time``, SI.
     ``value`` (m,) at ``x`` (m,) with ``sigma`` (m,): m/s² or rad/s, or, with ``is_relative``, part of the reading.
-    ``data`` (n,) at ``data_x`` (n,) of ``poses`` (n,), counted from 0: what is left of each and the curve; none where
-    poses do not show it.
+    ``data`` (n,) at ``data_x`` (n,) of ``poses`` (n,), counted from 0: the curve plus the residual of each pose; empty
+    where poses do not show the effect.
     """
 
     sensor: Literal["accelerometer", "gyroscope"]
@@ -51,9 +51,9 @@ class EffectCurve(Frozen):
 
 @dataclass(frozen=True)
 class AcceptedEffect(Frozen, Plain):
-    """An effect the recording demands, or, with ``side`` ``model``, one that only the given model has.
+    """An effect accepted for the recording, or, with ``side`` ``model``, one that only the given model has.
 
-    ``share`` is the part of the misfit of the recording that it removes, 0 to 1; ``None`` where that was not computed.
+    ``share`` is the fraction of the recording's misfit that it removes, 0 to 1; ``None`` where that was not computed.
     """
 
     id: str
@@ -81,11 +81,11 @@ class AcceptedEffect(Frozen, Plain):
 
 @dataclass(frozen=True)
 class ParameterDifference(Plain):
-    """One parameter of a given model against the value that the recording has.
+    """One parameter of a given model compared with its value in the recording.
 
     ``id`` is the group (``gyro-bias``, ``accel-scale``, ...), ``name`` the component. ``difference`` is recording minus
     model; ``p_value`` and ``significant`` are those of the group, corrected for multiple testing over all groups.
-    ``remark`` says in words what the parameters resemble (biases that were drawn and never applied).
+    ``remark`` names a likely mistake in words (biases that were drawn and never applied).
     """
 
     id: str
@@ -109,13 +109,13 @@ NoiseTerm = Literal[
 
 @dataclass(frozen=True)
 class NoiseDifference(Plain):
-    """One figure of noise or sampling of a given model against the recording's.
+    """One figure of noise or sampling of a given model compared with the recording's.
 
-    ``ratio`` is model over recording with its 95 % ``interval``; ``axis`` is empty for what all axes share; ``remark``
-    says in words what the number resembles (a density scaled by the rate twice). ``term`` ``unit`` is a reading written
-    in another unit than it says, ``frame`` one along other axes (gravity's sign, rates of the world).
-    ``band_hz`` is where an octave begins and ends. ``poses`` and ``moves``: gravity error and tilt error, rms, of
-    simulations moved as the recording was; their interval is of 1 − 2 alpha.
+    ``ratio`` is model over recording with its 95 % ``interval``; ``axis`` is empty for a figure common to all axes;
+    ``remark`` names a likely mistake in words (a density scaled by the rate twice). ``term`` ``unit``: readings are in
+    another unit than stated; ``frame``: along other axes (sign of gravity, rates in the world frame).
+    ``band_hz`` are the limits of an octave. ``poses`` and ``moves``: rms gravity error and tilt error of simulations
+    with the recording's motion; their interval is of 1 − 2 alpha.
     """
 
     sensor: Literal["accelerometer", "gyroscope", "both"]
@@ -134,7 +134,7 @@ class NoiseDifference(Plain):
 
 @dataclass(frozen=True)
 class Relation(Plain):
-    """An empirical relation: what a misfit without a known mechanism depends on, and how much of it that predicts."""
+    """An empirical relation: variables on which an unexplained misfit depends, and the fraction that they predict."""
 
     sensor: Literal["accelerometer", "gyroscope"]
     depends_on: tuple[str, ...]
@@ -155,7 +155,7 @@ class Relation(Plain):
 
 @dataclass(frozen=True)
 class StageDomain(Plain):
-    """One domain at one stage, on poses and moves that the stage's fit did not see."""
+    """Residuals of one domain at one stage, on poses and moves held out of the stage's fit."""
 
     domain: Domain
     rms: float
@@ -165,7 +165,7 @@ class StageDomain(Plain):
 
 @dataclass(frozen=True)
 class Stage(Plain):
-    """How well the recording is predicted: as given, with numbers, noise, effects re-estimated one after the other."""
+    """Prediction errors of the model as given, then with parameters, noise and effects re-estimated in turn."""
 
     stage: Literal["as-given", "parameters", "noise", "effects"]
     domains: tuple[StageDomain, ...]
@@ -173,11 +173,11 @@ class Stage(Plain):
 
 @dataclass(frozen=True)
 class Candidate(Plain):
-    """One catalogue effect that was tried, accepted or not, or why it does not apply.
+    """One effect of the catalogue that was tried, accepted or not, or the reason why it does not apply.
 
-    ``score`` is twice the log-evidence that it gains beside what was accepted, corrected for multiple testing; ``size``
-    its parameters there, ``limit95`` what the largest of them is at most (95 %), in its unit; ``superseded_by``
-    the accepted effect beside which it is needless, where it would stand without that one.
+    ``score`` is twice its gain in log-evidence beside the accepted effects, corrected for multiple testing; ``size``
+    its parameters there, ``limit95`` the 95 % upper limit on the largest of them, in its unit; ``superseded_by`` the
+    accepted effect that makes it redundant, where it would be accepted without that one.
     """
 
     id: str
@@ -213,23 +213,23 @@ class Diagnosis(Frozen, Plain):
     domains, remaining : tuple of DomainTest
         χ² of every kind of residual with the linear model, and with the effects.
     effects, candidates : tuple of AcceptedEffect, tuple of Candidate
-        Accepted, largest share of the misfit first; and every effect that was tried, with why it was not accepted.
+        Accepted effects, largest share of the misfit first; every effect tried, with the reason where not accepted.
     baseline, extended : LinearModel
         S and b with uncertainties, without and with the effects.
     noise : mapping
-        Noise densities and bias changes that the model took, by sensor.
+        Noise densities and bias changes that the model uses, by sensor.
     gravity_m_s2, alpha : float
-        |g|, and the chance that a healthy log is called anything but consistent.
+        |g|, and the probability that a healthy log is called anything but consistent.
     recording_source, recording_sha256 : str
         The log.
     references : mapping of name to float
-        Figures of known motion beside the log.
+        Figures from the reference motion recorded beside the log.
     residuals : tuple of DomainResiduals
         Pose by pose and move by move, without and with the effects.
     parameters, noise_compared : tuple of ParameterDifference, tuple of NoiseDifference
         A given model's parameters and noise beside the recording's; empty without one.
     relations, stages : tuple of Relation, tuple of Stage
-        Empirical relations of what no effect explains; residuals stage by stage.
+        Empirical relations in residuals that no effect explains; prediction errors stage by stage.
     """
 
     verdict: Verdict

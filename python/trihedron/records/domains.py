@@ -1,4 +1,4 @@
-"""Domains in which residuals are looked at, their tests, and how well each is predicted where no fit looked."""
+"""Domains of residuals, their tests against noise, and their cross-validated prediction."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DOMAINS: tuple[Domain, ...] = ("static-accel", "static-gyro", "moves", "dynamics
 
 @dataclass(frozen=True)
 class Where(Plain):
-    """What carries a disagreement: channels, segments (``hold 3``, ``move 7``), stretches of time, frequencies."""
+    """Where a disagreement is: channels, segments (``pose 3``, ``move 7``), intervals of time, frequencies."""
 
     channels: tuple[str, ...] = ()
     segments: tuple[str, ...] = ()
@@ -27,10 +27,10 @@ class Where(Plain):
 
 @dataclass(frozen=True)
 class DomainTest(Plain):
-    """Residuals of one domain, whitened by the predicted noise, against what a healthy recording gives.
+    """Test of one domain's residuals, whitened by the predicted noise, against noise alone.
 
-    ``limit`` is the χ² per degree of freedom up to which the domain agrees; ``None`` where something else decides: its
-    loudest pose, line or time.
+    ``limit`` is the χ² per degree of freedom up to which the domain agrees; ``None`` where another statistic decides:
+    its noisiest pose, strongest line or worst time.
     """
 
     domain: Domain
@@ -46,13 +46,13 @@ class DomainTest(Plain):
 
 @dataclass(frozen=True, eq=False)
 class DomainResiduals(Frozen, Plain):
-    """What one domain looks like before and after the accepted effects, pose by pose or move by move, SI or degrees.
+    """Residuals of one domain before and after the accepted effects, pose by pose or move by move, SI or degrees.
 
     ``before`` (n, k) and ``after`` (m, k) at ``time_before_s`` (n,), ``time_after_s`` (m,) (middle of pose or move),
-    with ``sigma_before`` (n,), ``sigma_after`` (m,) the noise predicted for one number. An effect that leaves moves
-    out or splits poses makes n and m differ. ``channels`` (k,) names the columns, ``kind`` is ``pose`` or ``move``.
-    ``names_before`` (n,) and ``names_after`` (m,) say which pose or move of the recording a row is: a pose that was
-    disturbed has an interval on each side, both with its name.
+    with ``sigma_before`` (n,), ``sigma_after`` (m,) the standard deviation predicted for one number. n and m differ
+    where an effect excludes moves or splits poses. ``channels`` (k,) names the columns, ``kind`` is ``pose`` or
+    ``move``. ``names_before`` (n,) and ``names_after`` (m,) name the pose or move of each row: a disturbed pose has an
+    interval on each side of the disturbance, both with its name.
     """
 
     domain: Domain
@@ -77,7 +77,7 @@ class DomainResiduals(Frozen, Plain):
 
 @dataclass(frozen=True)
 class HeldOut(Plain):
-    """Prediction of poses and moves the fit did not see, without and with the effect, in the domain it helps most."""
+    """Cross-validated prediction of one domain, without and with the effect."""
 
     domain: Domain
     chi2_per_dof_before: float

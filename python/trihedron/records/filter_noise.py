@@ -1,4 +1,4 @@
-"""Noise for a filter: what a log's errors over some time are made of, and the N and K that predict them."""
+"""Process noise of a filter: causes of a log's integrated errors, and the N and K that predict these errors."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from trihedron.records.presented import Presented
 
 Cause = Literal["rest", "vibration", "bias", "temperature", "calibration", "g-sensitivity", "reference"]
 CAUSES: tuple[Cause, ...] = ("rest", "vibration", "bias", "temperature", "calibration", "g-sensitivity", "reference")
-"""Noise as at rest, vibration, wandering bias, its part along a logged temperature,
-what S and g-sensitivity would leave, the reference's own error."""
+"""Noise as in static intervals, vibration, bias drift, its part that follows a logged temperature,
+errors of S, errors by g-sensitivity, the reference's own error."""
 
 
 @dataclass(frozen=True)
 class Bounded(Plain):
-    """A number with its 95 % interval; ``is_limit``: what was seen allows none of it, ``upper`` bounds it."""
+    """A number with its 95 % interval; ``is_limit``: the data are consistent with 0 and ``upper`` is the limit."""
 
     value: float
     lower: float
@@ -26,13 +26,13 @@ class Bounded(Plain):
 
     @property
     def filter_value(self) -> float:
-        """What a filter is given: the value, or the limit where there is no more."""
+        """The value for a filter's configuration: the estimate, or ``upper`` where only a limit is known."""
         return self.upper if self.is_limit else self.value
 
 
 @dataclass(frozen=True)
 class StaticNoise(Plain):
-    """White density N [SI/√Hz] and random walk K [SI/√s] of a sensor at rest, the mean square of its axes."""
+    """White density N [SI/√Hz] and random walk K [SI/√s] of a static sensor, rms over its axes."""
 
     N: Bounded
     K: Bounded
@@ -40,7 +40,7 @@ class StaticNoise(Plain):
 
 @dataclass(frozen=True)
 class BiasModel(Plain):
-    """Random walk, or Gauss-Markov where the evidence prefers it by ``gain`` (2 ln): σ [SI] and time constant [s]."""
+    """Bias process: random walk, or Gauss-Markov (σ [SI], time constant [s]); ``gain`` is 2 ln evidence for it."""
 
     kind: Literal["walk", "gauss-markov"]
     gain: float
@@ -50,7 +50,7 @@ class BiasModel(Plain):
 
 @dataclass(frozen=True)
 class Share(Plain):
-    """Part of the mean square error over ``horizon_s`` that has one cause, of a filter without that calibration."""
+    """Fraction of the mean square error over ``horizon_s`` that has one cause, in a filter without a calibration."""
 
     cause: Cause
     horizon_s: float
@@ -59,10 +59,10 @@ class Share(Plain):
 
 @dataclass(frozen=True)
 class Consistency(Plain):
-    """Error over a horizon on a part that the fit did not see: squared in units of what was predicted (NEES, 3 wanted).
+    """Cross-validated error over a horizon, squared and normalised by the predicted covariance (NEES, ideally 3).
 
-    ``predicted``, ``actual`` rms over the three axes together [rad, or m/s]; ``static_*`` the same of a filter that has
-    the static values and takes the reference for exact; ``n`` starts, of which ``n_apart`` do not overlap.
+    ``predicted``, ``actual`` rms over the three axes together [rad, or m/s]; ``static_*`` the same for a filter with
+    the static values and an error-free reference; ``n`` starts, of which ``n_apart`` do not overlap.
     """
 
     horizon_s: float
@@ -78,9 +78,9 @@ class Consistency(Plain):
 
 @dataclass(frozen=True)
 class ReferenceWorth(Plain):
-    """A reference's own error: of a block, and the slow one with its time constant [rad; m for ``white`` of a path].
+    """A reference's own error: ``white`` per block [rad; m for a path], ``slow`` with time constant ``slow_s``.
 
-    ``follows`` the sensor's own noise, as an attitude computed from it does: noise is then that at rest.
+    ``follows``: it repeats the sensor's own noise, as an attitude computed from it does; noise is then the static one.
     """
 
     white: Bounded
@@ -91,10 +91,10 @@ class ReferenceWorth(Plain):
 
 @dataclass(frozen=True)
 class SensorFilterNoise(Plain):
-    """One sensor: the filter's ``N`` and ``K``, static values beside them, shares, and what was tested.
+    """One sensor: the filter's ``N`` and ``K``, static values, shares by cause, and consistency tests.
 
-    ``N`` holds noise at rest and vibration; ``axes_N`` the density of X, Y and Z where they differ. Intervals hold
-    where ``is_settled``: enough draws of the posterior count.
+    ``N`` includes static noise and vibration; ``axes_N`` is the density of X, Y and Z where they differ. Intervals are
+    valid where ``is_settled``: the posterior has enough effective draws.
     """
 
     sensor: Literal["gyroscope", "accelerometer"]
@@ -124,8 +124,8 @@ class TiltCheck(Plain):
 
 @dataclass(frozen=True)
 class IntervalCheck(Plain):
-    """Without a reference: change of the gyro's bias between neighbouring static intervals, rms of an axis [rad/s], and
-    what N and K at rest predict of it; scatter of the length of gravity over ``n`` intervals as a part of it."""
+    """Without a reference: change of the gyro's bias between neighbouring static intervals, rms per axis [rad/s], and
+    its prediction from static N and K; relative scatter of |gravity| over ``n`` intervals."""
 
     n: int
     longest_s: float
@@ -136,7 +136,7 @@ class IntervalCheck(Plain):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FilterNoise(Presented):
-    """Noise for a filter, of a log: its sensors, and without a reference what its static intervals show."""
+    """Filter noise of a log: its sensors, and without a reference the checks on its static intervals."""
 
     sensors: tuple[SensorFilterNoise, ...]
     source: str

@@ -1,4 +1,4 @@
-"""Findings: what the tool noticed, as a closed list of codes, each with its likely cause and the next action."""
+"""Findings: problems and remarks from a closed list of codes, each with its likely cause and the next action."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from trihedron.records.plain import Plain
 
 
 class Severity(str, Enum):
-    """How far a finding reaches.
+    """Effect of a finding on the result.
 
-    ``NOTE``: stated so that nobody has to guess. ``WARNING``: the answer stands, with less weight than it looks.
-    ``SERIOUS``: the answer is not to be trusted (exit status 2 on the command line).
+    ``NOTE``: information, for example an assumed value. ``WARNING``: the result is usable, but less reliable than it
+    looks. ``SERIOUS``: the result is not to be trusted (exit status 2 on the command line).
     """
 
     NOTE = "note"
@@ -29,7 +29,7 @@ class Severity(str, Enum):
 
 
 class FindingCode(str, Enum):
-    """The closed list. A code once published keeps its meaning. Sorted by the stage that reports it."""
+    """All finding codes, sorted by the stage that reports them. A published code keeps its meaning."""
 
     # read
     UNIT_ASSUMED = "unit-assumed"
@@ -159,7 +159,7 @@ class FindingCode(str, Enum):
 
 @dataclass(frozen=True)
 class Finding(Frozen, Plain):
-    """One thing noticed.
+    """One problem or remark about a log or a result.
 
     Attributes
     ----------
@@ -168,7 +168,7 @@ class Finding(Frozen, Plain):
     severity : Severity
         ``note``, ``warning`` or ``serious`` (not to be trusted).
     seen, cause, action : str
-        One sentence with the number and the place; the likely reason; what to do next.
+        One sentence with number and place; the likely cause; what to do next.
     numbers : mapping of name to float
         The figures of the sentence for machines (SI units, the unit ends the key: ``gap_s``).
     """
@@ -199,20 +199,20 @@ class Finding(Frozen, Plain):
         numbers: Mapping[str, float] | None = None,
         **values: Any,
     ) -> Finding:
-        """A finding by code and values (SI); severity and sentences are the catalogue's (``report/findings``).
+        """A finding by code and values (SI); severity and sentences are from the catalogue (``report/findings``).
 
-        ``case`` separates occasions of one code, ``severity`` replaces the usual one where the catalogue allows two,
-        ``numbers`` are figures for machines whose names depend on the recording. A stage writes no sentences: this is
-        the one place where a record asks the catalogue for them.
+        ``case`` selects between the sentences of one code, ``severity`` replaces the default where the catalogue allows
+        two, ``numbers`` are figures for machines whose names depend on the recording. A stage writes no sentences: they
+        are looked up here.
 
         Raises
         ------
         KeyError
-            When the catalogue does not know the case, or a place of its sentences has no value.
+            When the catalogue lacks the case, or a placeholder of its sentences has no value.
         """
         severity, seen, cause, action = ask("words_of", code, case, severity, values)
         told = {name: float(v) for name, v in values.items() if isinstance(v, Real) and not isinstance(v, bool)}
-        # What could not be estimated is infinite or none: no figure, and no file could hold it.
+        # An infinite value or NaN means not estimated, and JSON cannot hold it.
         figures = {name: v for name, v in (told | dict(numbers or {})).items() if math.isfinite(v)}
         return cls(code, severity, seen, cause, action, MappingProxyType(figures))
 

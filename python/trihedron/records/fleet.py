@@ -1,4 +1,4 @@
-"""Many devices: every log with what came of it, how devices differ, which physics they share."""
+"""Many devices: the result of every log, how far devices differ, which effects they share."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from trihedron.records.sessions import Change, Parameter, Repeated
 @dataclass(frozen=True, eq=False)
 class FleetLog:
     """One log: ``status`` with its ``reason``, the diagnosis' ``verdict`` and effects, the codes of the ``serious``
-    findings, its numbers (9,) or (21,) with their errors; ``None`` where it was not calibrated."""
+    findings, parameters ``numbers`` (9,) or (21,) with standard errors ``std``; ``None`` where it was not calibrated."""
 
     name: str
     serial: str
@@ -32,8 +32,8 @@ class FleetLog:
 
 @dataclass(frozen=True)
 class Outlier:
-    """A device whose number lies outside what the others make likely: ``deviation`` from their median, in ``sigmas``
-    of their spread, ``p_adjusted`` over all devices and numbers."""
+    """A device with an outlying parameter: ``deviation`` from the median of the devices, in ``sigmas`` of their spread,
+    ``p_adjusted`` for the number of devices and parameters."""
 
     serial: str
     parameter: Parameter
@@ -45,7 +45,7 @@ class Outlier:
 
 @dataclass(frozen=True)
 class MixedLogs:
-    """Logs taken for one device that are not: ``parameter`` differs between two of them by ``difference``."""
+    """Logs under one serial number that are of different devices: ``parameter`` differs by ``difference``."""
 
     serial: str
     n_logs: int
@@ -55,8 +55,8 @@ class MixedLogs:
 
 @dataclass(frozen=True)
 class SharedEffect:
-    """An effect of the catalogue: in how many logs and devices it was found, and the 95 % interval of the share of
-    devices that have it."""
+    """An effect of the catalogue: number of logs and devices in which it was found, and the 95 % interval of the
+    fraction of devices that have it."""
 
     id: str
     n_logs: int
@@ -67,8 +67,8 @@ class SharedEffect:
 
 @dataclass(frozen=True, eq=False)
 class FleetSummary:
-    """The fleet in figures. ``repeated`` holds the spread from device to device and from session to session of one;
-    ``None`` where there are too few logs. ``n_before`` results were there from an earlier run."""
+    """Statistics of the fleet. ``repeated`` is the spread between devices and between sessions of one device;
+    ``None`` where there are too few logs. ``n_before`` results are from an earlier run."""
 
     logs: tuple[FleetLog, ...]
     n_before: int

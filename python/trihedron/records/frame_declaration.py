@@ -1,4 +1,4 @@
-"""The frame of a binary protocol, as its user declares it."""
+"""The frame of a binary protocol, as declared by its user."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Role = Literal["value", "counter", "clock"]
 
 @dataclass(frozen=True)
 class FrameField:
-    """One number of the frame, ``at`` bytes from its start; what is logged is ``scale`` times the number, in ``unit``.
+    """One number of the frame, ``at`` bytes from its start; the log gets ``scale`` times the number, in ``unit``.
 
     A ``counter`` counts frames; a ``clock`` counts ``tick_s`` seconds. Both may wrap at the range of their type.
     """
@@ -52,7 +52,7 @@ class FrameDeclaration:
     Raises
     ------
     ValueError
-        One sentence, when the parts do not make a frame.
+        When the parts do not make a frame.
     """
 
     name: str

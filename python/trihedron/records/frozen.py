@@ -1,4 +1,4 @@
-"""Frozen means frozen: whatever a record holds, nobody writes to it, also after a journey through pickle."""
+"""Immutable records: arrays and containers in their fields are read-only, also after pickling."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 _NEVER_WRITTEN = frozenset({type(None), bool, int, float, str})
-"""Kinds of most fields, told without a look at arrays and containers."""
+"""Immutable types of most fields, recognised before arrays and containers are examined."""
 
 
 class Frozen:
@@ -19,13 +19,13 @@ class Frozen:
         freeze(self)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        # Pickle and deepcopy give back arrays that can be written to.
+        # Pickle and deepcopy return writable arrays.
         self.__dict__.update(state)
         freeze(self)
 
 
 def freeze(record: Any) -> None:
-    """Freeze every field of a dataclass in place; for the ``__post_init__`` of one that checks more."""
+    """Freeze every field of a dataclass in place; for a ``__post_init__`` that has checks of its own."""
     for field in fields(record):
         value = getattr(record, field.name, None)
         held = frozen(value)
@@ -34,7 +34,7 @@ def freeze(record: Any) -> None:
 
 
 def frozen(value: Any) -> Any:
-    """The value that cannot be written to: the same one where it cannot be anyway."""
+    """A read-only version of the value; the same object where it is immutable already."""
     if type(value) in _NEVER_WRITTEN:
         return value
     if isinstance(value, np.ndarray):
@@ -57,7 +57,7 @@ def frozen(value: Any) -> Any:
 
 
 def thawed(value: Any) -> Any:
-    """A document as JSON writes it: dictionaries and lists of one's own."""
+    """A writable copy for JSON: plain dictionaries and lists."""
     if isinstance(value, dict | MappingProxyType):
         return {key: thawed(held) for key, held in value.items()}
     if isinstance(value, list | tuple):

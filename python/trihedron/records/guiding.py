@@ -1,4 +1,4 @@
-"""What a guided session wants, knows and shows: nouns that the guide, its screens and the page share."""
+"""Records of a guided session: target accuracy, progress, and the view that screens and the page show."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 
 LEAST_POSES = 12
-"""Nine numbers of the accelerometer, and three poses more than numbers: residuals that can contradict it."""
+"""Nine parameters of the accelerometer and three poses more: residuals with three degrees of freedom."""
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Good enough: every scale and cross term of a sensor within this fraction of its scale (standard error), and the
-    accelerometer's biases within the same fraction of gravity."""
+    """Target accuracy: standard error of every scale and cross term of a sensor as a fraction of its scale, and of the
+    accelerometer's biases as a fraction of gravity."""
 
     accelerometer: float = 1e-3
     gyroscope: float = 2e-3
 
     @classmethod
     def parse(cls, text: str) -> Accuracy:
-        """From ``"accel 0.05 %, gyro 0.1 %"``; what is not said keeps its default.
+        """From ``"accel 0.05 %, gyro 0.1 %"``; a sensor that is not named keeps its default.
 
         Raises
         ------
@@ -47,13 +47,13 @@ class Accuracy:
         return cls(**chosen)
 
     def sentence(self) -> str:
-        """For people."""
+        """The accuracy as text."""
         return f"accelerometer {100 * self.accelerometer:g} %, gyro {100 * self.gyroscope:g} %"
 
 
 @dataclass(frozen=True)
 class Uncertain:
-    """One parameter: standard error ``now`` and after the next pose, and what is ``wanted``; fractions, or None."""
+    """One parameter: standard error ``now``, ``after_next`` pose and ``wanted``; fractions, None where undetermined."""
 
     sensor: str
     name: str
@@ -64,10 +64,10 @@ class Uncertain:
 
 @dataclass(frozen=True, eq=False)
 class Examination:
-    """Where a session stands: poses (n, 3) as unit vectors of the body that point up, what is known, what comes next.
+    """State of a session: poses (n, 3) as unit vectors along up in the body, uncertainties, the next pose.
 
-    ``shortfall`` is the largest standard error over what is wanted (1 or less: good enough). ``next_up`` (3,) is the
-    pose that helps most; ``poses_needed`` how many more at least, None where no number of poses would do.
+    ``shortfall`` is the largest ratio of standard error to target (1 or less: reached). ``next_up`` (3,) is the
+    most useful next pose; ``poses_needed`` the least number of further poses, None where no number suffices.
     """
 
     poses_up: FloatArray
@@ -81,7 +81,7 @@ class Examination:
     warnings: tuple[str, ...] = ()
     rate_hz: float = 0.0
     noise: str = ""
-    # Raw accelerometer reading → up in the body: (reading - centre), turned by the rough model.
+    # Raw accelerometer reading → vector along up in the body: matrix · (reading − centre).
     centre: FloatArray = field(default_factory=lambda: np.zeros(3))
     matrix: FloatArray = field(default_factory=lambda: np.eye(3))
 
@@ -89,12 +89,12 @@ class Examination:
 
     @property
     def is_good_enough(self) -> bool:
-        """Whether the wanted accuracy is reached, by poses enough to judge the fit and without a serious finding."""
+        """Whether the target is reached, with enough poses to judge the fit and no serious finding."""
         return self.shortfall <= 1.0 and len(self.poses_up) >= LEAST_POSES and not self.doubts
 
 
 class Phase(Enum):
-    """What the guide waits for."""
+    """The step that the guide waits for."""
 
     BEGIN = "begin"
     POSE = "pose"
@@ -105,7 +105,7 @@ class Phase(Enum):
 
 @dataclass(frozen=True, eq=False)
 class GuideView:
-    """Everything that a screen shows, words included; made anew with every block of readings."""
+    """Everything that a screen shows, texts included; rebuilt with every block of readings."""
 
     phase: Phase
     instruction: str
@@ -125,7 +125,7 @@ class GuideView:
 
     @property
     def degrees_to_target(self) -> float | None:
-        """Angle between where up is and where it should be in the body."""
+        """Angle between the vertical and its target in the body [°]."""
         if self.up_now is None or self.target_up is None:
             return None
         return float(np.degrees(np.arccos(np.clip(self.up_now @ self.target_up, -1.0, 1.0))))

@@ -1,4 +1,4 @@
-"""Nouns of calibration by Kalman filter: noise of an axis, reference attitudes, what the filter said."""
+"""Records of calibration by Kalman filter: noise of an axis, reference attitudes, the filter's results."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class AxisNoise:
     """Noise of one axis by its Allan coefficients, in the raw unit ``u`` of the axis (docs/kalman.md, eq. 3).
 
     ``quantisation`` Q [u·s] of the integrated output, ``white`` N [u/√Hz], ``flicker`` B [u], ``walk`` K [u/√s],
-    ``ramp`` R [u/s]; ``gauss_markov`` [u] is the standard deviation of a first-order process seen as such, with
-    correlation time ``gauss_markov_time_s``. ``resolution`` is one LSB [u] and ``sample_sigma`` the
-    noise of one sample before it [u], which decides how much of the rounding error averages out (0: none of it).
+    ``ramp`` R [u/s]; ``gauss_markov`` [u] is the standard deviation of a first-order Gauss-Markov process with
+    correlation time ``gauss_markov_time_s``. ``resolution`` is one LSB [u] and ``sample_sigma`` [u] the noise of one
+    sample before rounding: it dithers the ADC, so that the rounding error averages out (0: it does not).
     """
 
     quantisation: float = 0.0
@@ -66,9 +66,9 @@ DIVIDING_HEAD_ANGLES_DEG: FloatArray = _dividing_head()
 class PoseTable:
     """Known attitudes: specific force (n, 3) [m/s²] along the reference axes while the sensor stands still.
 
-    ``sigma_m_s2`` is the uncertainty of each component (angle errors of the head times g). ``source`` says where the
-    table came from. ``pose`` (n,) says which pose of the log each row belongs to, ``start_s``, ``stop_s`` (n,)
-    when it was held; without either the rows are the poses in order.
+    ``sigma_m_s2`` is the uncertainty of each component (angle errors of the head times g). ``source`` names the origin
+    of the table. ``pose`` (n,) is the pose of the log that each row belongs to, ``start_s``, ``stop_s`` (n,) its
+    interval; without either the rows are the poses in order.
     """
 
     specific_force: FloatArray
@@ -147,13 +147,13 @@ class ConstantsTrack:
 
 @dataclass(frozen=True, eq=False)
 class AxisKalmanResult:
-    """One axis: final constants (4,) with covariance (4, 4), the tracks of all methods, and what was left over.
+    """One axis: final constants (4,) with covariance (4, 4), the tracks of all methods, and innovations.
 
-    ``innovation``, ``innovation_sigma`` (n,) [raw] are one-step predictions; ``nis`` their squared ratio, which is
-    chi-square with one degree of freedom when the noise model is right, where ``is_settled`` (n,) (elsewhere the
-    diffuse start predicted nothing). ``drift``, ``drift_sigma`` (n,) is the slow noise at the end of each pose given
-    the readings so far, ``smoothed_drift`` given all of them. ``batch`` holds the one-shot solutions as ``(constants,
-    sigma)``.
+    ``innovation``, ``innovation_sigma`` (n,) [raw] are reading minus one-step prediction and its standard deviation;
+    ``nis``, their squared ratio, is chi-square with one degree of freedom where the noise model is right and
+    ``is_settled`` (n,) (before, the diffuse prior predicts nothing). ``drift``, ``drift_sigma`` (n,) is the slow noise
+    at the end of each pose given the readings so far, ``smoothed_drift`` given all of them. ``batch`` holds the batch
+    solutions as ``(constants, sigma)``.
     """
 
     axis: int
@@ -191,7 +191,7 @@ class AxisKalmanResult:
 
 @dataclass(frozen=True)
 class Consistency:
-    """Whether innovations behave as the filter said: mean of NIS with its 99 % limits, and a whiteness test.
+    """Consistency of the innovations with the filter's model: mean of NIS with its 99 % limits, and a whiteness test.
 
     ``whiteness_p`` is the Ljung-Box probability that white innovations look as correlated as these in ``n_lags`` lags.
     """
@@ -209,8 +209,8 @@ class Consistency:
 class KalmanCalibration(Frozen):
     """Calibration of a triad by Kalman filter.
 
-    ``axes`` hold ``raw = U f + U0`` of every axis; ``accelerometer`` is the direct form ``f = S raw + b`` with its
-    covariance, in the frame of the references. ``residual_m_s2`` (n, 3) is corrected minus reference specific force.
+    ``axes`` are ``raw = U f + U0`` of every axis; ``accelerometer`` is the direct form ``f = S raw + b`` with its
+    covariance, in the frame of the references. ``residual_m_s2`` (n, 3) is calibrated minus reference specific force.
     """
 
     axes: tuple[AxisKalmanResult, ...]
@@ -225,7 +225,7 @@ class KalmanCalibration(Frozen):
 
     @property
     def residual_without_drift_m_s2(self) -> FloatArray:
-        """(n, 3) the same after the smoothed slow noise was taken out of the readings."""
+        """(n, 3) calibrated minus reference specific force with the smoothed slow noise subtracted [m/s²]."""
         drift = np.column_stack([axis.smoothed_drift for axis in self.axes])
         return self.residual_m_s2 - drift @ self.accelerometer.S.T
 
@@ -236,17 +236,17 @@ class KalmanCalibration(Frozen):
 
     @property
     def is_trustworthy(self) -> bool:
-        """No finding says that the answer is not to be trusted."""
+        """True without a serious finding."""
         return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
 
 
 @dataclass(frozen=True, eq=False)
 class NormKalmanCalibration(Frozen):
-    """Calibration of a triad by the filter that knows only the length of gravity.
+    """Calibration of a triad by the filter that uses only |g|, without reference attitudes.
 
-    ``parameters``, ``sigma`` (n, 12) are S row by row, then b, after every pose, as they stood then; ``accelerometer``
-    holds the final ones. ``innovation``, ``innovation_sigma`` (n,) [m/s²] belong to the last of ``n_runs`` runs over
-    all poses (0: not converged, and a finding says so). ``residual_m_s2`` (n,) is the corrected length minus |g|.
+    ``parameters``, ``sigma`` (n, 12) are S row by row, then b, as estimated after every pose; ``accelerometer`` holds
+    the final ones. ``innovation``, ``innovation_sigma`` (n,) [m/s²] are of the last of ``n_runs`` runs over all poses
+    (0: not converged, with a finding). ``residual_m_s2`` (n,) is the calibrated norm minus |g|.
     """
 
     accelerometer: SensorCalibration

@@ -1,4 +1,4 @@
-"""Nouns of noise: the Allan curve, and the noise terms of an axis with the certainty of each."""
+"""Records of noise: the Allan curve, and the noise terms of an axis with their uncertainties."""
 
 from __future__ import annotations
 
@@ -36,19 +36,19 @@ _PER_CHANNEL = ("deviation", "n_terms", "weight", "edf", "lower", "upper")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AllanCurve(Presented):
-    """Allan deviations of one or more channels against averaging time. Of a series alone all arrays are (k,).
+    """Allan deviations of one or more channels against averaging time. For a single series all arrays are (k,).
 
     Attributes
     ----------
     clusters, tau_s : (k,)
         Readings per cluster, and the same in seconds.
     deviation, lower, upper : (k, channels)
-        In the readings' unit, NaN where none remain, with the chi-square interval of ``confidence`` (0 to 1).
+        In the readings' unit, NaN without readings, with the chi-square interval of ``confidence`` (0 to 1).
     edf, n_terms, weight : (k, channels)
-        Equivalent degrees of freedom; terms summed, and the sum of their weights (equal without missing readings).
+        Equivalent degrees of freedom; number of terms summed, and the sum of their weights (equal without gaps).
     kind, rate_hz, n_samples, names, units
-        The estimator (overlapping or not) and the log; ``names`` and ``units`` by channel. ``stride`` is 1 unless the
-        log was streamed: the distance of the starts of clusters too long for the memory.
+        The estimator (overlapping or not) and the log; ``names`` and ``units`` by channel. ``stride`` is the distance
+        in readings between the starts of clusters: 1, except for long clusters of a streamed log.
     """
 
     kind: AllanKind
@@ -91,7 +91,7 @@ class AllanCurve(Presented):
         return int(self.deviation.shape[1]) if self.deviation.ndim == 2 else 1
 
     def of_one_series(self) -> AllanCurve:
-        """The curve of one channel with arrays (k,) instead of (k, 1); a ``ValueError`` where it is of several."""
+        """The curve of one channel with arrays (k,) instead of (k, 1); a ``ValueError`` for several channels."""
         if self.n_channels > 1:
             raise RefusedError(f"this curve is of {self.n_channels} channels, not of one series")
         flat = {name: getattr(self, name).reshape(-1) for name in _PER_CHANNEL}
@@ -105,14 +105,13 @@ class AllanCurve(Presented):
 
 @dataclass(frozen=True)
 class NoiseTerm:
-    """One term of IEEE 952: what the log says of it, whatever else it may hold.
+    """One noise term of IEEE 952, estimated with all other terms free.
 
-    ``lower`` and ``upper`` are the 95 % interval with every other term free; ``limit`` is its upper end. Both hold
-    whether the term is named or not. ``is_present`` says that the log shows the term by itself; ``value`` is zero where
-    it does not, otherwise ``estimate``: the most likely value of Q and N, the median of what the likelihood allows of
-    B, K and R. ``sigma`` is the spread about it. ``fitted`` is the term's share in the most likely sum of all terms,
-    from which variances of means are made. ``evidence`` is the rise of the deviance (twice the log likelihood) without
-    the term.
+    ``lower`` and ``upper`` are the 95 % interval; ``limit`` is its upper end. Both are valid whether the term is
+    detected or not. ``is_present``: the log determines the term by itself; ``value`` is 0 where it does not, otherwise
+    ``estimate``: the maximum of the likelihood for Q and N, the median of the likelihood for B, K and R. ``sigma`` is
+    its standard uncertainty. ``fitted`` is the term's value in the most likely sum of all terms, from which variances
+    of means are computed. ``evidence`` is the rise of the deviance (−2 ln likelihood) without the term.
     """
 
     symbol: TermName
@@ -129,9 +128,9 @@ class NoiseTerm:
 
 @dataclass(frozen=True)
 class SlowPair:
-    """Whether the log shows slow noise at all: ``evidence`` is the rise of the deviance without B and K together.
+    """Detection of slow noise: ``evidence`` is the rise of the deviance without B and K together.
 
-    ``is_present`` without either of the two being named: slow noise is there, flicker and walk cannot be separated.
+    ``is_present`` while neither B nor K is: slow noise is detected, but flicker and walk cannot be separated.
     """
 
     evidence: float
@@ -154,7 +153,7 @@ class GaussMarkov:
 class SpectralLine:
     """A sinusoid ``amplitude · sin(2π frequency t)`` found above the noise, with standard errors.
 
-    ``width_hz`` above zero: not one frequency but a resonance, whose power is spread over that width.
+    ``width_hz`` > 0: a resonance, whose power is spread over that width.
     """
 
     frequency_hz: float
@@ -166,13 +165,13 @@ class SpectralLine:
 
 @dataclass(frozen=True)
 class NoiseAxis(Frozen):
-    """What one axis' noise is made of.
+    """The noise of one axis.
 
-    All values are in ``unit`` (the SI unit, or the raw unit where the log does not tell the scale) and seconds: Q
-    [unit·s], N [unit·√s = unit/√Hz], B [unit], K [unit/√s], R [unit/s]. ``lowest_hz`` … ``highest_hz`` is the part of
-    the spectrum that the terms describe. ``longest_tau_s`` is the longest averaging time at which the log determines an
-    Allan deviation to 25 %. ``covariance_scale`` multiplies the variances because the spectrum scatters more than its
-    terms explain; 1 when it does not.
+    All values are in ``unit`` (the SI unit, or the raw unit where the scale is unknown) and seconds: Q [unit·s],
+    N [unit·√s = unit/√Hz], B [unit], K [unit/√s], R [unit/s]. ``lowest_hz`` … ``highest_hz`` is the fit band.
+    ``longest_tau_s`` is the longest averaging time at which the log determines an Allan deviation to 25 %.
+    ``covariance_scale`` multiplies the variances where the spectrum scatters more than its terms explain; 1 where it
+    does not.
     """
 
     name: str
@@ -204,19 +203,19 @@ class NoiseAxis(Frozen):
         return self.terms[TermName(symbol)].value
 
     def fitted(self, symbol: TermName | str) -> float:
-        """Share of a term in the most likely sum of all terms; of B and K also where only their sum shows."""
+        """Value of a term in the most likely sum of all terms; also of B and K where only their sum is detected."""
         return self.terms[TermName(symbol)].fitted
 
     @property
     def is_slow_noise_unresolved(self) -> bool:
-        """Slow noise shows, and whether it is B or K does not."""
+        """Slow noise is detected, but B and K cannot be separated."""
         named = (TermName.BIAS_INSTABILITY, TermName.RATE_RANDOM_WALK)
         pair = self.slow_pair
         return pair is not None and pair.is_present and not any(self.terms[term].is_present for term in named)
 
     @property
     def shortest_described_s(self) -> float:
-        """Shortest averaging time that the terms describe, s: a reading, or half the period of ``highest_hz``."""
+        """Shortest averaging time of the fit band [s]: one sample, or half a period of ``highest_hz`` if longer."""
         return max(1.0 / self.rate_hz, 0.5 / self.highest_hz if self.highest_hz > 0.0 else 0.0)
 
     def allan_variance(self, tau_s: npt.ArrayLike) -> FloatArray:
@@ -228,7 +227,7 @@ class NoiseAxis(Frozen):
         return total
 
     def allan_parts(self, tau_s: FloatArray) -> dict[str, FloatArray]:
-        """What the sum is made of: Allan variance (k,) of every part, by a term's symbol, "Gauss-Markov" or "lines"."""
+        """Allan variance (k,) of every part of the sum, by a term's symbol, "Gauss-Markov" or "lines"."""
         tau = tau_s
         of_one = {
             TermName.QUANTISATION: 3.0 / tau**2,
@@ -249,9 +248,9 @@ class NoiseAxis(Frozen):
     def variance_of_mean(self, window_s: float, session_s: float | None = None) -> float:
         """Variance of the mean of ``window_s`` seconds (docs/noise.md, eq. 11).
 
-        Without ``session_s`` half the variance of the difference to the next such mean (the Allan variance): the
-        uncertainty when the bias is taken next to the window. With it the variance about the mean of a session
-        of that length: the weight of one pose when one bias is fitted to all of them.
+        Without ``session_s``: half the variance of the difference to the next such mean (the Allan variance), for a
+        bias that is estimated next to the window. With it: the variance about the mean of a session of that length,
+        for one bias that is fitted to all poses.
         """
         if not window_s > 0:
             raise RefusedError(f"a window must last longer than 0 s, got {window_s}")
@@ -268,14 +267,14 @@ class NoiseAxis(Frozen):
         return total
 
     def optimal_averaging(self) -> tuple[float, float] | None:
-        """Averaging time of least Allan deviation and that deviation; None when it falls on to the end of the log.
+        """Averaging time of least Allan deviation and that deviation; None when it still falls at the end of the log.
 
-        The minimum is that of the fitted terms, not of the scattered curve. It is not the bias instability: white noise
-        and random walk make a minimum of their own.
+        It is the minimum of the fitted terms, not of the scattered curve, and not the bias instability: white noise
+        and random walk alone also give a minimum.
         """
         shortest = self.shortest_described_s
         tau = np.geomspace(shortest, max(self.duration_s / 2.0, 2.0 * shortest), 2000)
-        # Sinusoids make minima at their periods that hold for no other purpose than theirs.
+        # Sinusoids are excluded: they give minima at multiples of their periods.
         variance = NoiseAxis(**{**self.__dict__, "lines": ()}).allan_variance(tau)
         place = int(np.argmin(variance))
         if place == len(tau) - 1 or variance[-1] < 1.02 * variance[place]:
@@ -284,7 +283,7 @@ class NoiseAxis(Frozen):
 
     @property
     def is_trustworthy(self) -> bool:
-        """No finding says that the terms are not to be trusted."""
+        """True without a serious finding."""
         return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
 
 
@@ -302,17 +301,17 @@ def _gauss_markov_allan(process: GaussMarkov, tau: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Noise(Presented):
-    """The noise of a log: its axes, the Allan curve as the picture, and what is wrong with the log.
+    """The noise of a log: its axes, the Allan curve, and problems of the log.
 
     Attributes
     ----------
     axes : tuple of NoiseAxis
-        Of each channel ``terms``: Q, N, B, K, R with σ and 95 % interval, SI (or the log's unit where none is known).
+        ``terms`` of each channel: Q, N, B, K, R with σ and 95 % interval, SI (or the log's unit, scale unknown).
     curve : AllanCurve
     excluded_s, breaks_s
-        Stretches [s] that were excluded; instants [s] where the level jumped and the fit starts anew.
+        Intervals [s] that were excluded; instants [s] where the level jumped and the fit starts anew.
     source, findings, extensions
-        The log, what was noticed in it, what goes beyond the five terms.
+        The log, its findings, and results beyond the five terms.
     """
 
     axes: tuple[NoiseAxis, ...]
@@ -332,7 +331,7 @@ class Noise(Presented):
         Raises
         ------
         KeyError
-            Naming the axes there are.
+            When there is no such axis; the message lists the axes.
         """
         for axis in self.axes:
             if axis.name == name:
@@ -341,6 +340,6 @@ class Noise(Presented):
 
     @property
     def is_trustworthy(self) -> bool:
-        """No finding says that the answer is not to be trusted."""
+        """True without a serious finding, also of any axis."""
         every = (*self.findings, *(finding for axis in self.axes for finding in axis.findings))
         return not any(finding.severity is Severity.SERIOUS for finding in every)

@@ -1,4 +1,4 @@
-"""What a flight controller did to its readings before it logged them."""
+"""Corrections that a flight controller applies to its readings before it logs them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ Stage = Literal["raw", "corrected", "body"]
 
 @dataclass(frozen=True)
 class Onboard:
-    """The parameters of the controller's sensors while the log was made, as the log states them.
+    """The sensor parameters of the controller while the log was made, as the log states them.
 
-    ``accel`` and ``gyro`` are the numbers of the sensors in the names of the parameters, from 0. ``stage`` says what
-    the logged readings have been through: ``raw`` (nothing), ``corrected`` (offset and scale, in the sensor's axes),
-    ``body`` (the same, then turned into the axes of the board). ``changed`` names parameters that changed while
+    ``accel`` and ``gyro`` are the indices of the sensors in the names of the parameters, from 0. ``stage`` is the
+    processing of the logged readings: ``raw`` (none), ``corrected`` (offset and scale, in the sensor's axes),
+    ``body`` (the same, then rotated into the axes of the board). ``changed`` names parameters that changed while
     readings were logged.
     """
 

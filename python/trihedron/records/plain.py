@@ -1,7 +1,7 @@
-"""Records as plain JSON types and back: cattrs reads the fields off the dataclasses, here stands what it cannot know.
+"""Records as plain JSON types and back, by cattrs from the fields of the dataclasses.
 
-That is: arrays are nested lists, read-only mappings are dictionaries, and a few documents name or arrange their entries
-otherwise than the record (``in`` for ``side``). The documents are described by the schemas in ``files/schema/``.
+Added to cattrs here: arrays are nested lists, read-only mappings are dictionaries, and some documents name or order
+their entries differently from the record (``in`` for ``side``). The schemas are in ``files/schema/``.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ Record = TypeVar("Record")
 
 @dataclass(frozen=True)
 class Layout:
-    """How a document's entry differs from its record: ``names`` of fields, ``added`` entries, and which in what order.
+    """How a document's entry differs from its record: ``names`` of fields, ``added`` entries, ``order`` of all entries.
 
-    ``added`` is given the record and its fields as plain types.
+    ``added`` is called with the record and its fields as plain types.
     """
 
     names: Mapping[str, str]
@@ -37,7 +37,7 @@ class Layout:
 
 
 class Plain:
-    """Base of a dataclass that documents hold."""
+    """Base of a dataclass that is written to documents."""
 
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types."""
@@ -45,18 +45,18 @@ class Plain:
 
 
 def as_plain(record: object, kind: type | None = None) -> dict[str, Any]:
-    """The fields of a dataclass as plain JSON types; of a subclass only those of ``kind`` when that is given."""
+    """The fields of a dataclass as plain JSON types; with ``kind``, a base class, only the fields of that class."""
     made: dict[str, Any] = _converter().unstructure(record, unstructure_as=kind)
     return made
 
 
 def from_plain(document: dict[str, Any], kind: type[Record]) -> Record:
-    """A record of a document's entry. ``null`` where a number belongs was not a finite one: it is read as NaN.
+    """A record from a document's entry. ``null`` in place of a number, written for a non-finite one, is read as NaN.
 
     Raises
     ------
     ValueError, TypeError, KeyError
-        When the entry lacks a field or holds what the field cannot.
+        When the entry lacks a field or has a value of the wrong type.
     """
     from cattrs.errors import ForbiddenExtraKeysError
 
@@ -68,7 +68,7 @@ def from_plain(document: dict[str, Any], kind: type[Record]) -> Record:
 
 @cache
 def _converter() -> Converter:
-    # Imported here: a command that writes no document does without it.
+    # Imported here to spare commands that write no document the import time.
     from cattrs import Converter
     from cattrs.gen import make_dict_unstructure_fn, override
 
@@ -101,7 +101,7 @@ def _converter() -> Converter:
 
 
 def is_array(kind: Any) -> bool:
-    """Whether a type is an array of NumPy, of any element."""
+    """Whether a type is a NumPy array, of any dtype."""
     return kind is np.ndarray or get_origin(kind) is np.ndarray
 
 

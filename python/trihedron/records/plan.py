@@ -1,4 +1,4 @@
-"""An experiment before it is made: how certain its answer would be."""
+"""A planned experiment: the uncertainties to expect from it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from trihedron.records.presented import Presented
 
 @dataclass(frozen=True)
 class TurnPlan:
-    """Standard errors from known turns: relative ``scale`` of each turned axis, ``bias`` [rad/s]; all rows at once
-    (least squares), and the bias from static stretches of ``static_s`` first. ``n_turns`` about every axis."""
+    """Standard errors from known turns: relative ``scale`` of each turned axis, ``bias`` [rad/s]; by least squares over
+    all rows, and with the bias from static intervals of ``static_s`` first. ``n_turns`` about every axis."""
 
     n_turns: int
     angles_deg: tuple[float, ...]
@@ -24,7 +24,7 @@ class TurnPlan:
 
 @dataclass(frozen=True)
 class PoseWorth:
-    """One pose of a set, in words, and by which factor the worst standard error of the nine grows without it
+    """One pose of a set, in words, and the factor by which the largest of the nine standard errors grows without it
     (infinite: not determined)."""
 
     pose: str
@@ -34,7 +34,7 @@ class PoseWorth:
 @dataclass(frozen=True)
 class PosePlan:
     """Standard errors of a set of poses by method 2: relative ``scale``, ``angle`` between axes [rad], ``bias`` [m/s²],
-    the largest of three each; ``rank`` of nine; ``worth`` the poses by what they are worth, most first."""
+    the largest of three each; ``rank`` of nine; ``worth`` the poses in order of their ``loss``, largest first."""
 
     name: str
     n_poses: int
@@ -47,7 +47,7 @@ class PosePlan:
 
 @dataclass(frozen=True)
 class MovePlan:
-    """Gyro by moves (method 2): how many of the nine numbers of scale a set of moves determines, and the largest
+    """Gyro by moves (method 2): ``rank``, how many of the nine elements of S a set of moves determines, and the largest
     relative standard error among them (infinite: not determined)."""
 
     name: str
@@ -58,7 +58,7 @@ class MovePlan:
 
 @dataclass(frozen=True)
 class ExperimentPlan(Presented):
-    """What known turns, poses and moves would tell; noise densities in rad/s/√Hz and m/s²/√Hz."""
+    """Uncertainties to expect from known turns, poses and moves; noise densities in rad/s/√Hz and m/s²/√Hz."""
 
     gyroscope_density: float
     accelerometer_density: float

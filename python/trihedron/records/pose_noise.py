@@ -1,4 +1,4 @@
-"""Nouns of noise inside the poses of a session: each figure with the interval that two logs are compared by."""
+"""Records of noise inside the poses of a session: each figure with the interval used to compare two logs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 class Measured:
     """A positive figure: ``value`` with its 95 % interval.
 
-    ``sigma_log`` is the standard error of its logarithm, known from ``dof`` degrees of freedom (infinite where it
+    ``sigma_log`` is the standard error of its logarithm, estimated with ``dof`` degrees of freedom (infinite where it
     follows from the number of readings alone).
     """
 
@@ -23,7 +23,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class OctaveNoise:
-    """Two-sided density [u²/Hz] between ``low_hz`` and ``high_hz``, as the mean over the poses."""
+    """Two-sided density [u²/Hz] between ``low_hz`` and ``high_hz``, mean over the poses."""
 
     low_hz: float
     high_hz: float
@@ -32,7 +32,7 @@ class OctaveNoise:
 
 @dataclass(frozen=True)
 class PoseLine:
-    """A line of ``amplitude`` [u] at ``frequency_hz`` that the poses have in common, over ``limit`` times its level."""
+    """A line of ``amplitude`` [u] at ``frequency_hz`` common to the poses; ``excess``: power over the local level."""
 
     frequency_hz: float
     amplitude: Measured
@@ -43,13 +43,13 @@ class PoseLine:
 class PoseNoise:
     """Noise of one axis inside the poses of a session; u is the unit of the raw readings.
 
-    ``white`` is the density N [u/√Hz] of the white noise ahead of the sensor's filter, freed of the rounding of the
-    ADC, ``None`` where the ADC hides it; ``reading_sigma`` [u] the noise from reading to reading (that of
-    their differences over √2, rounding taken off; zero where it is hidden), which is N times the root of the rate
-    where there is no filter. ``step`` [u] is the resolution, zero where the readings are finer than their noise shows.
-    ``corner_hz`` is the corner of a low-pass filter where one shows, ``corner_above_hz`` what it lies above where none
-    does; ``corner_shape`` is the order of the Butterworth filter that it resembles, 0 for a Gaussian. ``scatter`` is by
-    how much the noise differs from pose to pose beyond chance (standard deviation of the logarithm of its power).
+    ``white`` is the density N [u/√Hz] of the white noise ahead of the sensor's filter, less the ADC's rounding error,
+    ``None`` where rounding hides it; ``reading_sigma`` [u] the noise from reading to reading (standard deviation of
+    their differences over √2, less the rounding error; 0 where that hides it), which is N √rate without a filter.
+    ``step`` [u] is the resolution (LSB), 0 where it is too fine to show in the noise. ``corner_hz`` is the corner of a
+    low-pass filter if one is detected, else ``corner_above_hz`` is its lower bound; ``corner_shape`` is the order of
+    the Butterworth filter that it resembles, 0 for a Gaussian. ``scatter`` is how far the noise differs from pose to
+    pose beyond chance (standard deviation of the logarithm of its power).
     """
 
     rate_hz: float
@@ -67,7 +67,7 @@ class PoseNoise:
 
 @dataclass(frozen=True)
 class Ratio:
-    """One figure over another with its 95 % interval, and the chance of such a difference where there is none."""
+    """Ratio of two figures with its 95 % interval, and the p-value of the hypothesis that they are equal."""
 
     value: float
     lower: float

@@ -1,4 +1,4 @@
-"""What every result can be asked for: plain types, a data frame, a figure, a report; and how it crosses processes."""
+"""Methods of every result: plain types, a data frame, a figure, a report; and pickling."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Library = Literal["polars", "pandas"]
 
 
 class Presented(Frozen):
-    """A record that can be shown. Words, tables and figures are made where they live, when they are asked for."""
+    """A record that can be shown; words, tables and figures are made on demand by ``report/``."""
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types, as ``--json`` of the command gives it; what is not a finite number is None."""
+        """As plain JSON types, like ``--json`` of the command; non-finite numbers are None."""
         record: dict[str, Any] = ask("as_dict", self)
         return record
 
@@ -40,14 +40,14 @@ class Presented(Frozen):
         return ask("as_frame", self, library)
 
     def plot(self, name: str | None = None, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
-        """A matplotlib figure of the report: the first, or the one of that name. A notebook shows it.
+        """A matplotlib figure of the report: the first, or the one of that name.
 
         Parameters
         ----------
         name : str, optional
-            Which figure; a wrong name lists those that there are.
+            Which figure; the error for a wrong name lists the figures.
         ax : matplotlib Axes, or one for each panel
-            Where to draw; a figure of its own when not given.
+            Where to draw; a new figure when not given.
 
         Raises
         ------
@@ -62,7 +62,7 @@ class Presented(Frozen):
 
 
 class Printed(Presented):
-    """One of which ``print`` gives the report."""
+    """A result whose ``print`` shows the report."""
 
     def __str__(self) -> str:
         return self.as_text()
@@ -76,5 +76,5 @@ def _reduced(mapping: MappingProxyType[Any, Any]) -> tuple[Any, tuple[dict[Any, 
     return _read_only, (dict(mapping),)
 
 
-# Records are frozen, and so are their dictionaries; pickle and deepcopy do not know read-only views by themselves.
+# Pickle and deepcopy do not support read-only views of dictionaries without this.
 copyreg.pickle(MappingProxyType, _reduced)

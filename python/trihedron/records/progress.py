@@ -1,8 +1,8 @@
-"""How a long step tells how far it is."""
+"""Callback by which a long step reports its progress."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 Progress = Callable[[float, str], None]
-"""Called with the share that is done (0 to 1) and a few words on what is being done."""
+"""Called with the fraction done (0 to 1) and a few words on the current step."""

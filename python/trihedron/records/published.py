@@ -1,4 +1,4 @@
-"""The figures that a calibration publishes, each under one definition wherever it is printed or written."""
+"""Figures of merit of a calibration, with one definition for print and files."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from trihedron.records.calibration import Calibration, FitQuality
 
 AT_REST = "one bias for the session"
 AFTER_MOVES = "bias refitted per pose"
-"""In words: which bias the saved S and b are given before the figure is taken."""
+"""The bias used with the saved S for the tilt error after rotations, in words."""
 
 
 def counted_moves(quality: FitQuality) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
@@ -24,9 +24,9 @@ def counted_moves(quality: FitQuality) -> np.ndarray[tuple[int], np.dtype[np.boo
 
 def published_figures(calibration: Calibration) -> dict[str, dict[str, Any]]:
     """Gravity error in static poses, rms [m/s²], and tilt error after rotations, rms [°], in sample and
-    held out, as plain JSON types.
+    cross-validated, as plain JSON types.
 
-    ``None`` stands for what could not be held out.
+    ``None`` where a figure cannot be cross-validated.
     """
     out: dict[str, dict[str, Any]] = {}
     at_rest = calibration.accelerometer.quality

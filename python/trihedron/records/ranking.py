@@ -14,10 +14,10 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class Suspicion:
-    """One mistake which, undone, makes a calibration fit: ``kind`` of the list of mistakes that reports have words for.
+    """A likely mistake in a calibration, which fits once it is corrected: ``kind`` from the list in ``report/``.
 
-    ``rms`` and ``rms_undone`` are the misses before and after, [m/s²] of gravity at rest, [deg] of tilt or [rad/s] of
-    the rate at rest; ``factor`` belongs to a wrong gravity or unit.
+    ``rms`` and ``rms_undone`` are the errors before and after: gravity error in static poses [m/s²], tilt error after
+    rotations [deg] or rate in static poses [rad/s]; ``factor`` is that of a wrong gravity or unit.
     """
 
     kind: str
@@ -28,10 +28,10 @@ class Suspicion:
 
 @dataclass(frozen=True)
 class Ranked:
-    """One calibration: ``behind`` the best by so much log predictive density, ``behind_sigma`` the standard error.
+    """One calibration: ``behind`` is its deficit in log predictive density to the best, with ``behind_sigma``.
 
     Intervals are of 95 % (bootstrap of poses and moves): gravity error in static poses [m/s²], tilt error after a
-    rotation [deg]. ``without_bias`` names sensors whose bias the file does not hold, for which this log's was taken.
+    rotation [deg]. ``without_bias`` names sensors whose bias the file lacks; the bias of this log replaces it.
     """
 
     name: str
@@ -46,12 +46,12 @@ class Ranked:
 
     @property
     def is_rejected(self) -> bool:
-        """A mistake is known, or a finding says that it does not hold here."""
+        """A mistake is suspected, or a finding rejects it on this recording."""
         return bool(self.suspicions) or not self.verification.is_passed
 
     @property
     def static_rate_rms(self) -> float:
-        """Rate that is left at rest [rad/s], of the mean over poses; NaN without a gyro."""
+        """Calibrated rate in static poses [rad/s]: rms over the axes of the mean over poses; NaN without a gyro."""
         rest = self.verification.static_rate
         return float(np.sqrt(np.mean(np.mean(rest, axis=0) ** 2))) if len(rest) else float("nan")
 

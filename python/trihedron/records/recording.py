@@ -27,14 +27,14 @@ from trihedron.units import AccelerationUnit, RateUnit
 
 
 def _is_frozen(array: object) -> bool:
-    """Whether nobody can write to an array: neither through it nor through what it is a view of."""
+    """Whether an array is read-only, and every array that it is a view of."""
     while isinstance(array, np.ndarray) and not array.flags.writeable:
         array = array.base
     return array is None or isinstance(array, CORE_MEMORY)
 
 
 def _readonly(array: npt.ArrayLike, name: str, shape: tuple[int | None, ...]) -> FloatArray:
-    # An array that nobody can write to is shared, not copied: a log of 1e8 rows must not exist twice.
+    # A read-only array is shared, not copied: a log of 1e8 rows must not exist twice.
     array = numbers_of(name, array)
     frozen = _is_frozen(array)
     out: FloatArray = np.array(array, dtype=np.float64, order="C", copy=None if frozen else True)
@@ -48,11 +48,11 @@ def _readonly(array: npt.ArrayLike, name: str, shape: tuple[int | None, ...]) ->
 
 
 def spread_timestamps(time_s: FloatArray, step_s: float) -> FloatArray:
-    """Strictly increasing timestamps (n,) from non-decreasing ones: those that are shared, spread evenly to one side.
+    """Strictly increasing timestamps (n,) from non-decreasing ones: repeated timestamps are spread evenly to one side.
 
-    Samples that were timestamped when they arrived together have a long step before their timestamp and were taken in
-    it; timestamps that were cut off to few digits, or repeated, have it behind. The side with more room in the log as a
-    whole is taken; no two samples are put further apart than a sampling step.
+    Samples that were timestamped on arrival in a batch were taken in the long step before their timestamp; for
+    timestamps that were truncated to few digits, or repeated, the long step is after it. The side with the larger sum
+    of steps in the whole log is used; no two samples are put further apart than ``step_s``.
     """
     if np.all(np.diff(time_s) > 0):
         return time_s
@@ -69,7 +69,7 @@ def spread_timestamps(time_s: FloatArray, step_s: float) -> FloatArray:
     place = within - (np.repeat(size, size) - 1 if is_before else 0)
     out = np.repeat(timestamp, size) + place * np.repeat(apart, size)
     out = np.asarray(out - out[0], dtype=np.float64)
-    # Timestamps a rounding apart leave no room for what they share: the smallest number apart will do.
+    # Neighbouring floats cannot be subdivided: such timestamps advance by the smallest float step.
     for k in np.flatnonzero(np.diff(out) <= 0):
         out[k + 1] = np.nextafter(out[k], np.inf)
     return out
@@ -93,20 +93,20 @@ class Recording(Presented):
     temperature_degc, supply_v : (n,) or None
         Auxiliary channels where the log has them.
     source, sha256 : str
-        Where it came from, for people; and the hash of the bytes that were read (of the arrays when made in memory).
+        Name of the source for display; hash of the bytes that were read (of the arrays when made in memory).
     start_epoch_s : float
         Unix time of the first sample where the log has it, else 0.
     findings : tuple of Finding
-        The audit of the log.
+        Findings of the audit of the log.
     sampling : Sampling
-        What the timestamps are worth, as judged when the log was read.
+        Kind and error of the timestamps, as determined when the log was read.
     auxiliary : mapping of name to (n,) array
         Every other numeric column, untouched.
     onboard : Onboard, optional
-        What a flight controller did to the readings before it logged them, where the log says so.
+        Corrections that a flight controller applied before it logged the readings, where the log states them.
     rows_in_file, rows_read : int
-        Rows that the file (or both files) holds, and those that became readings; the others are in findings, so that
-        ``rows_in_file == rows_read + rows_reported``. Zero where no file was read.
+        Rows in the file (or both files), and rows that became readings; the others are in findings, so that
+        ``rows_in_file == rows_read + rows_reported``. 0 where no file was read.
 
     Raises
     ------
@@ -137,7 +137,7 @@ class Recording(Presented):
         n = len(time_s)
         if n == 0:
             raise RefusedError("a recording needs at least one sample")
-        # Between finite ends, what never steps back (NaN would) is finite.
+        # A non-decreasing sequence between finite ends has no NaN and no infinity.
         if not (np.isfinite(time_s[0]) and np.isfinite(time_s[-1]) and np.all(time_s[1:] >= time_s[:-1])):
             raise RefusedError("time_s must be finite and non-decreasing")
         object.__setattr__(self, "time_s", time_s)
@@ -166,17 +166,17 @@ class Recording(Presented):
         freeze(self)
 
     def with_distinct_timestamps(self) -> Recording:
-        """This recording with no two samples at one instant: shared ones are spread (:func:`spread_timestamps`)."""
+        """This recording with strictly increasing timestamps (:func:`spread_timestamps`)."""
         distinct = spread_timestamps(self.time_s, 1.0 / self.rate_hz)
         return self if distinct is self.time_s else self.with_same_readings(time_s=distinct)
 
     def knowing(self, facts: RecordingFacts) -> Recording:
-        """This recording with the facts of its readings as its reader has found them."""
+        """This recording with the channel properties that its reader has measured."""
         self.__dict__["facts"] = facts
         return self
 
     def with_same_readings(self, **changes: Any) -> Recording:
-        """This recording with other fields than its readings, which keep what is known of them."""
+        """This recording with fields other than the readings changed; measured channel properties are kept."""
         changed = replace(self, **changes)
         return changed.knowing(self.facts) if "facts" in self.__dict__ else changed
 
@@ -195,14 +195,14 @@ class Recording(Presented):
     ) -> Recording:
         """An audited recording of arrays: ``time_s`` (n,) [s] or None with ``rate_hz``, readings (n, 3) in their units.
 
-        Masked and NaN readings are missing; rows of them stay in place. The audit is that of a log.
+        Masked and NaN readings are missing; their rows are kept. The audit is the same as for a file.
 
         Raises
         ------
         ValueError
             When shapes disagree, or neither ``time_s`` nor ``rate_hz`` is given.
         """
-        # The audit belongs to the reader; people look for the constructor here.
+        # The audit is in the reader; users look for the constructor here.
         audited: Recording = ask(
             "of_arrays",
             time_s,
@@ -218,27 +218,27 @@ class Recording(Presented):
 
     @cached_property
     def facts(self) -> RecordingFacts:
-        """What the readings say of the ADCs behind them: found on first use, by the reader."""
-        # How facts are found is a room of its own; a record only carries them.
+        """Properties of the ADCs, measured from the readings on first use."""
+        # ``read`` measures them; a record only stores them.
         found: RecordingFacts = ask("facts_of", self.accelerometer, self.gyroscope, self.rate_hz)
         return found
 
     @cached_property
     def possible_limits(self) -> dict[str, tuple[Limit, ...]]:
-        """Limits by sensor that noise covers, on sides where no code is one (``facts``): found when asked, and
-        not more than possible: steady turns share a level too."""
+        """Possible range limits by sensor, blurred by noise, on sides where ``facts`` has no exact code; found on
+        demand. A steady turn at one rate looks the same, so they are not certain."""
         found: dict[str, tuple[Limit, ...]] = ask("find_possible_limits", self._readings(), self.facts)
         return found
 
     @cached_property
     def low_passes(self) -> dict[str, tuple[LowPass, ...]]:
-        """The filter ahead of each channel by sensor, as white noise in the quietest stretches shows it: found on
-        first use; none of a sensor that is never static for 32 readings."""
+        """The low-pass filter of each channel by sensor, from the noise in the quietest intervals; found on first
+        use; empty for a sensor that is never static for 32 readings."""
         found: dict[str, tuple[LowPass, ...]] = ask("find_low_passes", self._readings(), self.rate_hz)
         return found
 
     def _readings(self) -> dict[str, FloatArray]:
-        """Readings (n, 3) of the sensors that there are, by name."""
+        """Readings (n, 3) of the sensors present, by name."""
         named = {"accelerometer": self.accelerometer, "gyroscope": self.gyroscope}
         return {name: one for name, one in named.items() if one is not None}
 
@@ -249,7 +249,7 @@ class Recording(Presented):
 
     @property
     def rows_reported(self) -> int:
-        """Rows of the file that findings say are not among the readings."""
+        """Rows of the file that are reported in findings and not among the readings."""
         return round(sum(finding.numbers.get("rows_left_out", 0.0) for finding in self.findings))
 
     @property
@@ -271,6 +271,6 @@ class Recording(Presented):
 
 
 def distinct_names(sources: Sequence[str]) -> list[str]:
-    """Names of recordings as short as they stay distinct; of two files of one log both."""
+    """Short distinct names of recordings; a log of two files has both names."""
     short = [" + ".join(Path(part).name or part for part in source.split(" + ")) for source in sources]
     return [name if short.count(name) == 1 else source for name, source in zip(short, sources, strict=True)]

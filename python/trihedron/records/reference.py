@@ -1,4 +1,4 @@
-"""Motion known beside a log (rate table, tracking, robot, another unit) and what it says of the log's sensors."""
+"""Reference motion of a log (rate table, tracking, robot, another unit) and the results of a fit to it."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from trihedron.records.finding import Finding
 from trihedron.records.plain import Layout, Plain
 
 NAMED_FROM = 8.0
-"""Score above which an effect is named, and a clock's offset told from another (docs/reference.md)."""
+"""Score above which an effect is accepted, and one clock offset preferred to another (docs/reference.md)."""
 
 
 @dataclass(frozen=True, eq=False)
 class ReferenceMotion:
     """Known motion of a rigid body on a clock of its own.
 
-    ``time_s`` (n,) from the first row on, ``start_epoch_s`` its origin; ``attitude`` (n, 3, 3) reference body → its
-    world; ``rate`` (n, 3) [rad/s] and ``specific_force`` (n, 3) [m/s²] in the reference's body; ``position`` (n, 3) [m]
-    in its world. ``is_stepwise``: the rate of a row holds until the next one (commands of a rate table).
+    ``time_s`` (n,) since the first row, ``start_epoch_s`` its origin; ``attitude`` (n, 3, 3) from reference body to
+    reference world; ``rate`` (n, 3) [rad/s] and ``specific_force`` (n, 3) [m/s²] in the reference's body; ``position``
+    (n, 3) [m] in its world. ``is_stepwise``: the rate is constant from each row to the next (commands of a rate table).
     """
 
     time_s: FloatArray
@@ -55,7 +55,7 @@ class ReferenceMotion:
 
     @property
     def kind(self) -> str:
-        """What it is, for people."""
+        """The kind of reference in words."""
         if self.specific_force is not None:
             return "the log of another unit"
         if self.attitude is None:
@@ -65,10 +65,10 @@ class ReferenceMotion:
 
 @dataclass(frozen=True, eq=False)
 class Estimate(Plain):
-    """Named numbers (n,) with their covariance (n, n) in one SI unit.
+    """Named parameters (n,) with their covariance (n, n) in one SI unit.
 
-    ``score`` of an effect: twice its gain in log evidence over its absence, what was tried paid for; ``shown_from``
-    is the size of all its numbers, in those of data sheets, from which it would be named (infinite: from none).
+    ``score`` of an effect: twice its gain in log evidence, corrected for multiple testing; ``shown_from`` is the
+    detection limit in multiples of its data-sheet size (infinite: no size would be detected).
     """
 
     names: tuple[str, ...]
@@ -91,11 +91,11 @@ class Estimate(Plain):
 
 @dataclass(frozen=True, eq=False)
 class FitToReference(Plain):
-    """One sensor held against a reference: ``truth in the reference's body = S raw + b``.
+    """One sensor fitted to a reference: ``truth in the reference's body = S raw + b``.
 
-    ``covariance`` (12, 12) as a calibration's; ``rms`` [SI] of what is left sample by sample in the band that is
-    compared (up to ``band_hz``), ``rms_held_out`` of rows the fit did not see; ``n_rows`` windows of three components,
-    ``n_left_out`` of them as outliers; ``widened`` by how much blocks of time disagree more than the noise model says.
+    ``covariance`` (12, 12) as a calibration's; ``rms`` [SI] of the residuals of samples, low-pass filtered to the
+    compared band (up to ``band_hz``), ``rms_held_out`` cross-validated; ``n_rows`` windows of three components,
+    ``n_left_out`` excluded as outliers; ``widened`` the excess of the scatter between blocks of time over the noise.
     """
 
     S: FloatArray
@@ -121,7 +121,7 @@ class FitToReference(Plain):
 
 @dataclass(frozen=True)
 class ReplayStage:
-    """Attitude carried by the gyro over ``horizon_s`` against the reference's, on a part no fit saw: rms [rad]."""
+    """Cross-validated error of the attitude integrated from the gyro over ``horizon_s``: rms [rad]."""
 
     stage: str
     horizon_s: float
@@ -134,10 +134,10 @@ SignKind = Literal["quieter-than-gyro", "mounted-without-error", "S-depends-on-d
 
 @dataclass(frozen=True)
 class Sign(Plain):
-    """A sign that a reference was computed from this very gyro: what was seen, and against what.
+    """Evidence that a reference was computed from this very gyro: the measured value and the value to compare with.
 
-    White density of gyro minus reference and that of the gyro at rest [rad/s/√Hz]; angle between their frames and its
-    standard uncertainty [rad]; χ² of S from long blocks against that from short ones and its degrees of freedom.
+    White density of gyro minus reference and that of the static gyro [rad/s/√Hz]; angle between their frames and its
+    standard uncertainty [rad]; χ² of S from long blocks against S from short ones and its degrees of freedom.
     """
 
     kind: SignKind
@@ -147,11 +147,11 @@ class Sign(Plain):
 
 @dataclass(frozen=True)
 class ReferenceError(Plain):
-    """What a reference is worth: its own error, per axis, and the rows that it lacks.
+    """A reference's own error, per axis, and its missing rows.
 
     ``white_rad`` of the mean over a second; ``slow_rad`` the rms of its slow error with a 95 % interval, ``slow_s``
-    its time constant, ``is_of_body`` whether it turns with the body (markers) or stands in the room (tracker). ``rows``
-    that were used and ``rows_left_out`` as outliers; ``gaps_s`` and stretches ``apart_s`` from the rest, beginning and
+    its time constant, ``is_of_body`` whether it turns with the body (markers) or is fixed in the world (tracker).
+    ``rows`` used and ``rows_left_out`` as outliers; ``gaps_s`` and outlying intervals ``apart_s``, beginning and
     end in the log's time; ``signs`` that it is not independent of this gyro.
     """
 
@@ -170,7 +170,7 @@ class ReferenceError(Plain):
 class BiasOverTime(Plain):
     """The gyro's bias b in ``ω = S w' + b`` over the log's time (m,), (m, 3) [rad/s] with σ (m, 3).
 
-    A g-sensitivity within the limits of data sheets is in it, at the recording's mean specific force.
+    It includes a g-sensitivity within data-sheet limits, times the recording's mean specific force.
     """
 
     time_s: FloatArray
@@ -180,10 +180,10 @@ class BiasOverTime(Plain):
 
 @dataclass(frozen=True, eq=False)
 class ErrorOverTime(Plain):
-    """Attitude of the reference against the calibrated gyro's over the log's time (m,): rotation vectors (m, 3) [rad].
+    """Attitude of the reference relative to the calibrated gyro's over the log's time (m,): vectors (m, 3) [rad].
 
-    Along the axes of the reference's world, about their mean; NaN where the reference has no rows. The reference's own
-    error, and beside it what the gyro's white noise adds since the beginning, ``walk`` [rad/√s].
+    Along the axes of the reference's world, about their mean; NaN where the reference has no rows. It is the
+    reference's error plus the gyro's angle random walk since the beginning, ``walk`` [rad/√s].
     """
 
     time_s: FloatArray
@@ -196,13 +196,13 @@ NOWHERE = ErrorOverTime(np.zeros(0), np.zeros((0, 3)), 0.0)
 
 @dataclass(frozen=True, eq=False)
 class AgainstReference(Plain):
-    """Everything that a reference says of a log: clocks, mounting, lever arm, both sensors, effects, replay.
+    """Fit of a log to a reference: clocks, mounting, lever arm, both sensors, effects, replay.
 
     ``clock_offset_s``: by how much the reference's clock is ahead at ``clock_middle_s`` of the log, and its σ.
-    ``earth_rate``: along the axes of the reference's world, where the log tells where it points; else it is in the
-    uncertainties of the gyro's numbers.
-    ``frame_covariance`` (3, 3) [rad²]: of the turn between the body and what the reference shows of it on the whole,
-    which both sensors' uncertainties hold alike.
+    ``earth_rate``: along the axes of the reference's world, where the log determines it; else it is included in the
+    uncertainties of the gyro's parameters.
+    ``frame_covariance`` (3, 3) [rad²]: of the constant rotation error of the reference's body, which is included in
+    the uncertainties of both sensors.
     """
 
     kind: str
@@ -237,7 +237,7 @@ class AgainstReference(Plain):
     )  # fmt: skip
 
     def clock(self) -> dict[str, Any]:
-        """How the two clocks compare."""
+        """Offset [s] and relative rate [ppm] of the reference's clock, with standard uncertainties."""
         rate, rate_std = self.clock_rate_ppm or (None, None)
         offset, offset_std = self.clock_offset_s
         return {

@@ -1,4 +1,4 @@
-"""What the verbs hand back: records together, readable as a laboratory report with ``print``."""
+"""Results of the public functions: records, shown as a laboratory report by ``print``."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class CalibrationResult(Printed):
     Attributes
     ----------
     calibration : Calibration
-        Both sensors, gravity [m/s²], frame and findings: what a calibration file holds.
+        Both sensors, gravity [m/s²], frame and findings: the content of a calibration file.
     segments : Segments
         The poses and moves that were used.
     recording : Recording
         The log, in its own unit.
     reference : AgainstReference, optional
-        What known motion beside the log said, where it was calibrated by that.
+        The fit to the reference motion, where the calibration is from that.
 
     Examples
     --------
@@ -56,7 +56,7 @@ class CalibrationResult(Printed):
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Everything noticed, by every stage."""
+        """Findings of every stage."""
         return self.calibration.findings
 
     @property
@@ -98,7 +98,7 @@ class VerificationResult(Printed):
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Everything noticed."""
+        """Findings of the verification."""
         return self.verification.findings
 
     @property
@@ -119,7 +119,7 @@ class CheckResult(Printed):
     recording : Recording
     segments : Segments
     calibration : Calibration or None
-        The uncertainties to expect; None where none can be made.
+        The calibration with the uncertainties to expect; None where the log does not determine one.
     findings : tuple of Finding
 
     Examples
@@ -162,15 +162,15 @@ class DiagnosisResult(Diagnosis, Presented):
     calibration : Calibration or None
         The linear model at the start: fitted to this recording, or given (``model_is_given``).
     updated : Calibration or None
-        The recording's own calibration where one was given and the recording can carry another.
+        The recording's own calibration where one was given and the recording determines another.
     reference : AgainstReference or None
-        What known motion beside the log says.
+        The fit to the reference motion beside the log.
     simulated
-        What a given scenario reads, moved as the recording was.
+        Simulated readings of a given scenario with the recording's motion.
     own_effects : tuple of AcceptedEffect
-        Every effect that the recording has, those that the given model has too included.
+        All effects of the recording, also those that the given model has too.
     findings, gravity_source : tuple of Finding, str
-        What was noticed, and where |g| is from.
+        Findings, and the source of |g|.
 
     Examples
     --------
@@ -211,7 +211,7 @@ class DiagnosisResult(Diagnosis, Presented):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class KalmanResult(Printed):
-    """What the filter found, with the segments and the recording that it was made from. ``print`` gives the report.
+    """Result of the Kalman filter, with the segments and the recording that it is from. ``print`` gives the report.
 
     Attributes
     ----------
@@ -236,7 +236,7 @@ class KalmanResult(Printed):
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Everything noticed, by every stage."""
+        """Findings of every stage."""
         return self.calibration.findings
 
     @property
@@ -255,9 +255,9 @@ class SessionsResult(Printed):
     Attributes
     ----------
     model : SessionsModel
-        ``repeated`` and ``changes``: how far each parameter repeats, and which changed.
+        ``repeated`` and ``changes``: repeatability of each parameter, and parameters that changed.
     results : tuple of CalibrationResult
-        Each recording by itself.
+        The calibration of each recording.
 
     Examples
     --------
@@ -271,7 +271,7 @@ class SessionsResult(Printed):
 
     @property
     def calibration(self) -> Calibration:
-        """What is common, with the covariance of the next session."""
+        """The common calibration, with the covariance that is valid for the next session."""
         return self.model.calibration
 
     @property

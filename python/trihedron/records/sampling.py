@@ -1,4 +1,4 @@
-"""How a recording was sampled: what its timestamps are worth, as judged when the log was read."""
+"""How a recording was sampled: kind and error of its timestamps, as determined when the log was read."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from enum import Enum
 
 
 class TimestampKind(str, Enum):
-    """What a log's timestamps are.
+    """Kind of a log's timestamps.
 
-    ``NONE``: no timestamps, or too few to tell. ``EXACT``: even. ``ROUNDED``: even, rounded to a grid. ``LATE``: even
-    samples timestamped when they arrived. ``SCATTERED``: even but for a two-sided scatter. ``IRREGULAR``: no even clock
-    lies behind them.
+    ``NONE``: no timestamps, or too few. ``EXACT``: even. ``ROUNDED``: even, rounded to a grid. ``LATE``: even samples,
+    timestamped on arrival. ``SCATTERED``: even with a two-sided scatter. ``IRREGULAR``: not from an even sampling
+    clock.
     """
 
     NONE = "none"
@@ -27,9 +27,9 @@ class Sampling:
     """The clock of a recording.
 
     ``period_s`` with standard error ``sigma_period_s``; ``timestamp_error_s`` rms about the even clock;
-    ``is_even``: ``time_s`` is that even clock and not the timestamps; ``n_lost`` samples and ``n_losses`` places, where
-    ``counts_losses`` (else unknown); ``followed`` share of the timestamps' scatter which readings follow (1: samples
-    were taken when timestamped, 0: evenly) with ``sigma_followed`` (infinite without motion).
+    ``is_even``: ``time_s`` is that even clock and not the timestamps; ``n_lost`` samples at ``n_losses`` places, valid
+    where ``counts_losses``; ``followed`` is the part of the timestamps' scatter that the sampling instants share (1:
+    samples were taken when timestamped, 0: evenly) with ``sigma_followed`` (infinite without motion).
     """
 
     kind: TimestampKind = TimestampKind.NONE
@@ -45,4 +45,4 @@ class Sampling:
 
 
 UNJUDGED = Sampling()
-"""Nothing is known of the timestamps: a recording made in memory, or without timestamps."""
+"""Timestamps of unknown kind: a recording made in memory, or without timestamps."""

@@ -1,4 +1,4 @@
-"""Where a recording stands still and where it moves."""
+"""Static poses of a recording and the moves between them."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from trihedron.records.presented import Presented
 class Pose:
     """One pose.
 
-    ``[start, stop)`` are the samples that may be averaged: edges trimmed, so that no motion leaks in.
-    ``[outer_start, outer_stop)`` is the stretch as detected, before trimming. ``disturbed`` are sub-ranges
-    ``(start, stop)`` inside ``[start, stop)`` that were bumped and are excluded from means. ``is_unsteady`` says that
-    the pose nowhere comes down to the sensor's own noise: held in the hand, or on a support that shakes.
+    ``[start, stop)`` are the samples that may be averaged: edges are trimmed, so that they contain no motion.
+    ``[outer_start, outer_stop)`` is the interval as detected, before trimming. ``disturbed`` are sub-ranges
+    ``(start, stop)`` inside ``[start, stop)`` with a disturbance; means exclude them. ``is_unsteady``: the pose is
+    nowhere as quiet as the sensor's own noise (held in the hand, or on a vibrating support).
     """
 
     index: int
@@ -71,7 +71,7 @@ class Move:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Segments(Presented):
-    """Poses and moves of one recording, and the sensor noise that decided them. Without a sensor its arrays are None.
+    """Poses and moves of one recording, and the sensor noise used to detect them. Arrays of a missing sensor are None.
 
     Attributes
     ----------
@@ -84,17 +84,17 @@ class Segments(Presented):
     accelerometer_sigma_mean, gyroscope_sigma_mean : (n_poses, 3)
         Standard error of each mean, without assuming whiteness: slow noise inside a pose raises it.
     n_averaged : (n_poses,) of int
-        Samples behind each mean.
+        Number of samples of each mean.
     time_mid_s, duration_s : (n_poses,)
-        When and how long, seconds.
+        Middle and duration of each pose [s].
     findings : tuple of Finding
-        What was noticed in poses and moves.
+        Findings about poses and moves.
     whole : Segments or None
-        The poses before they were cut at disturbances, each over all of its samples; None where nothing was cut.
+        The poses before they were divided at disturbances, each with all of its samples; None where none was divided.
     accelerometer_up, accelerometer_sigma_up : (n_poses, 3), (n_poses,)
-        The vertical in raw units (unit vectors, by whose direction |f| grows fastest) and the standard error of the
-        mean along it, NaN where only those of the axes are known: a body that settles turns gravity across itself, its
-        length stays. None where no vertical is known.
+        Unit vectors in raw units along which |f| grows fastest, and the standard error of the mean along them, NaN
+        where only those of the axes are known: a settling body rotates gravity, which leaves |f| unchanged. None where
+        the vertical is unknown.
     """
 
     poses: tuple[Pose, ...]
@@ -143,9 +143,9 @@ class Segments(Presented):
 
     @property
     def norm_sigma(self) -> FloatArray | None:
-        """(n_poses, 3) standard errors of the accelerometer's means for what asks of their length alone.
+        """(n_poses, 3) standard errors of the accelerometer's means for a fit of |f| alone.
 
-        Alike on three axes where the error along the vertical is known: that is all that enters |f|.
+        Equal on three axes where the error along the vertical is known: only that component enters |f|.
         """
         axes, up = self.accelerometer_sigma_mean, self.accelerometer_sigma_up
         if axes is None or up is None:
@@ -153,12 +153,12 @@ class Segments(Presented):
         return np.where(np.isfinite(up)[:, None], up[:, None], axes)
 
     def pose_name(self, start: int, stop: int) -> str:
-        """The pose that holds samples [start, stop), by its number from 1."""
+        """Name of the pose that contains samples [start, stop), numbered from 1."""
         around = [k for k, pose in enumerate(self.poses) if pose.start <= start and stop <= pose.stop]
         return f"pose {around[0] + 1}" if around else "a vibrating pose"
 
     def move_name(self, start: int, stop: int) -> str:
-        """The move of samples [start, stop), by its number from 1; a disturbance inside a pose by that pose."""
+        """Name of the move that contains samples [start, stop), numbered from 1; a disturbance is named by its pose."""
         middle = (start + stop) // 2
         around = [k for k, move in enumerate(self.moves) if move.start <= middle < move.stop]
         return f"move {around[0] + 1}" if around else f"a disturbance in {self.pose_name(middle, middle)}"

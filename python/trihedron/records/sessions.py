@@ -1,4 +1,4 @@
-"""Many recordings of one unit: what is common, how far each parameter repeats, and what changed."""
+"""Many recordings of one unit: common parameters, repeatability of each, and parameters that changed."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen
 
 By = Literal["session", "date", "device", "temperature"]
-"""How sessions are grouped: not at all, by the day they began, by the device, or along their temperature."""
+"""Grouping of sessions: none, by the day they began, by device, or as functions of temperature."""
 
 ChangeKind = Literal["differs", "apart", "step", "trend", "scatter"]
 """``differs``: two sessions differ. ``apart``: one session differs from all others, which agree. ``step``: sessions
-before differ from sessions after. ``trend``: the number moves evenly from session to session. ``scatter``: every
-session has its own."""
+before differ from sessions after. ``trend``: the value changes linearly from session to session. ``scatter``: every
+session has another value."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One of the numbers that do not depend on a frame: ``id`` of the contract (``gyro-bias``), axis or pair ``name``,
-    ``unit`` of its value, ``sensor``."""
+    """A parameter that does not depend on the frame: its group ``id`` (``gyro-bias``), axis or pair ``name``, ``unit``,
+    ``sensor``."""
 
     id: str
     name: str
@@ -47,18 +47,18 @@ PARAMETERS: tuple[Parameter, ...] = (
     *_of("gyro", "rad/s"),
     *(Parameter("triad-alignment", axis, "rad", "both") for axis in AXES),
 )
-"""Order of every vector of numbers: 9 of the accelerometer, 9 of the gyro, 3 of the rotation between them. A scale is
+"""Order of every parameter vector: 9 of the accelerometer, 9 of the gyro, 3 of the rotation between them. A scale is
 the natural logarithm of raw units per SI unit: differences of it are relative."""
 
 
 @dataclass(frozen=True, eq=False)
 class Session(Frozen):
-    """One calibrated recording as the comparison needs it.
+    """One calibrated recording, as input to the comparison.
 
-    ``numbers`` (9,) or (21,) in the order of :data:`PARAMETERS`, ``covariance`` of the same size: the error of the
-    session's own estimate; ``drift`` (same size) variance by which a bias moves within a session like this one.
+    ``numbers`` (9,) or (21,) are the parameters in the order of :data:`PARAMETERS`, ``covariance`` (n, n) that of the
+    session's own estimate; ``drift`` (n,) the variance of the bias change from session to session (eq. 9.3), else 0.
     ``group`` is the day or the device. Temperatures are those of the poses, NaN where the log has none; ``branch`` is
-    +1 while it was heating, -1 while cooling, 0 where neither is told.
+    +1 for heating, -1 for cooling, 0 for neither.
     """
 
     name: str
@@ -87,9 +87,9 @@ class Spread:
 class Repeated:
     """One parameter over all sessions.
 
-    ``value`` what is common, ``std`` its standard error with ``half_width`` that of its 95 % interval; ``within``
-    spread from one session to the next of a group (turn-on to turn-on), ``between`` from group to group (day to day,
-    device to device), ``None`` without groups; ``own_std`` the typical uncertainty of one session.
+    ``value`` is common to all, ``std`` its standard error, ``half_width`` of its 95 % interval; ``within`` the spread
+    between sessions of a group (turn-on to turn-on), ``between`` that between groups (day to day, device to device),
+    ``None`` without groups; ``own_std`` the typical uncertainty of one session.
     """
 
     parameter: Parameter
@@ -103,7 +103,7 @@ class Repeated:
 
 @dataclass(frozen=True)
 class Change:
-    """Whether one group of numbers (an ``id`` of the contract) is the same in all sessions of a unit.
+    """Test whether one group of parameters (by ``id``) is equal in all sessions of a unit.
 
     ``p_adjusted`` after Holm's procedure over the ids; ``where`` names the session (``apart``) or the first session
     after the step; ``size`` and ``std`` (3,) of that change. ``group`` is the device where several were compared.
@@ -124,9 +124,9 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class ThermalTerm:
-    """How one group of numbers follows temperature: polynomial ``coefficients`` (order + 1, 3) in T - reference, lowest
-    first; ``held_out_gain`` of its score against none; ``hysteresis`` (3,) half the difference between heating and
-    cooling, ``None`` where it was not tested or is not there; ``remaining`` (3,) spread of sessions about it."""
+    """Temperature dependence of one group of parameters: polynomial ``coefficients`` (order + 1, 3) in T - reference,
+    lowest first; ``held_out_gain`` in score over a constant; ``hysteresis`` (3,) half of heating minus cooling,
+    ``None`` where it was not tested or not found; ``remaining`` (3,) spread of sessions about it."""
 
     id: str
     order: int
@@ -140,7 +140,7 @@ class ThermalTerm:
 
 @dataclass(frozen=True, eq=False)
 class ThermalModel:
-    """Numbers as polynomials of temperature, valid from ``low_degc`` to ``high_degc``."""
+    """Parameters as polynomials of temperature, valid from ``low_degc`` to ``high_degc``."""
 
     reference_degc: float
     low_degc: float
@@ -150,8 +150,8 @@ class ThermalModel:
 
 @dataclass(frozen=True, eq=False)
 class SessionsModel(Frozen):
-    """Many recordings of one unit as one model: ``calibration`` is what is common, its covariance that of the *next*
-    session (error of the common numbers and what a session differs by)."""
+    """Many recordings of one unit as one model: ``calibration`` is common to them, its covariance that of the *next*
+    session (error of the common parameters plus the spread between sessions)."""
 
     by: By
     sessions: tuple[Session, ...]

@@ -1,4 +1,4 @@
-"""What several recordings of one unit demand together."""
+"""Effects that several recordings of one unit share."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from trihedron.records.presented import Printed
 
 @dataclass(frozen=True)
 class SharedEffect(Frozen, Plain):
-    """An effect whose one size all recordings demand together.
+    """An effect accepted with common parameters for all recordings together.
 
-    ``score`` is twice the log-evidence gained less what the search paid, ``scores`` the same of every recording by
-    itself; ``each`` are its parameters there, ``p_agree`` the chance that equal ones differ as much.
+    ``score`` is twice its gain in log-evidence, corrected for multiple testing, ``scores`` the same for every recording
+    alone; ``each`` are its parameters there, ``p_agree`` the p-value of the hypothesis that they are equal.
     """
 
     id: str
@@ -25,12 +25,12 @@ class SharedEffect(Frozen, Plain):
     each: tuple[tuple[EffectParameter, ...], ...]
     p_agree: float
     is_of_instrument: bool
-    """Whether the recordings' values agree: else something like it differs from recording to recording."""
+    """Whether the recordings' values agree; otherwise the effect differs from recording to recording."""
 
 
 @dataclass(frozen=True)
 class SharedCandidate(Frozen, Plain):
-    """An effect that was tried in all recordings together and is not demanded, with its score."""
+    """An effect that was tried in all recordings together and not accepted, with its score."""
 
     id: str
     score: float
@@ -38,7 +38,7 @@ class SharedCandidate(Frozen, Plain):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SharedDiagnosis(Printed):
-    """Several recordings of one unit: each diagnosed by itself, and what they share. ``print`` gives the report."""
+    """Several recordings of one unit: a diagnosis of each, and shared effects. ``print`` gives the report."""
 
     diagnoses: tuple[Diagnosis, ...]
     effects: tuple[SharedEffect, ...]
@@ -46,7 +46,7 @@ class SharedDiagnosis(Printed):
 
     @property
     def of_single_recordings(self) -> tuple[tuple[str, ...], ...]:
-        """Of every recording the effects (ids) that it names by itself and not all share."""
+        """For every recording the effects (ids) of its own diagnosis that are not shared."""
         shared = {one.id for one in self.effects if one.is_of_instrument}
         return tuple(tuple(one.id for one in d.effects if one.id not in shared) for d in self.diagnoses)
 

@@ -13,15 +13,15 @@ from trihedron.arrays import FloatArray
 from trihedron.records.frozen import Frozen
 
 SegmentKind = Literal["pose", "move", "turn", "disturbance", "vibration", "oscillation", "table-turn"]
-"""What the body did: stood still; went to another pose; turned about a body axis; was pushed; was shaken; swung;
-was carried on a turning table."""
+"""Motion of the body: static; move to another pose; turn about a body axis; disturbance; vibration; oscillation;
+carried on a turning table."""
 
 
 @dataclass(frozen=True)
 class TrueSegment:
-    """One labelled stretch: samples ``[start, stop)`` of the recording, and what the person or the table did.
+    """One labelled interval: samples ``[start, stop)`` of the recording and the kind of motion.
 
-    ``name`` says which pose or turn; ``turn_rad`` is the true angle about ``axis`` (body frame) where it is a turn.
+    ``name`` is the pose or turn; ``turn_rad`` is the true angle about ``axis`` (body frame) where it is a turn.
     """
 
     kind: SegmentKind
@@ -36,22 +36,22 @@ class TrueSegment:
 
 @dataclass(frozen=True, eq=False)
 class Truth(Frozen):
-    """What the instrument was really exposed to and made of.
+    """True motion and true parameters of a simulated instrument.
 
     Parameters
     ----------
     accelerometer_time_s, gyroscope_time_s : (n,)
-        True instants of every row, on the motion's clock: the log's own timestamps may lie.
+        True instants of every row, on the motion's clock: the log's own timestamps may be wrong.
     specific_force_m_s2, angular_rate_rad_s : (n, 3)
-        At the body's reference point, in Mz, each at its own sensor's instants. The rate is inertial.
+        At the body's reference point, in the body frame, each at its own sensor's instants. The rate is inertial.
     attitude : (n, 4)
-        Quaternion (w, x, y, z), Mz to level, at the accelerometer's instants.
+        Quaternion (w, x, y, z), body to level, at the accelerometer's instants.
     segments : tuple of TrueSegment
-        Everything that was done, in order.
+        All segments of the motion, in order.
     accelerometer_S, accelerometer_b, gyroscope_S, gyroscope_b
         Direct form, ``truth = S raw + b`` (raw unit to SI), of the instrument without its further effects.
     gravity_m_s2 : float
-        Magnitude at the place.
+        |g| at the place.
     effects : mapping of catalogue id to parameters
         Every effect that is switched on, with its physical parameters (SI, or the unit named in the key).
     noise : mapping
@@ -59,7 +59,7 @@ class Truth(Frozen):
     temperature_degc, supply_v : (n,) or None
         True values, whether or not they were logged.
     scenario, seed : str, int
-        What was simulated; the same again makes the same log.
+        Scenario and seed; both together reproduce the log.
     kept : (n,) of int
         For every row the index of the sample instant it came from: gaps are lost samples.
     """
@@ -87,16 +87,16 @@ class Truth(Frozen):
 
     @property
     def poses(self) -> tuple[TrueSegment, ...]:
-        """The stretches in which the body stood still."""
+        """The static intervals."""
         return tuple(segment for segment in self.segments if segment.kind == "pose")
 
     @property
     def moves(self) -> tuple[TrueSegment, ...]:
-        """Everything between poses."""
+        """All segments other than poses."""
         return tuple(segment for segment in self.segments if segment.kind != "pose")
 
 
-# An estimate against the truth, where a simulation knows it.
+# An estimate compared with the truth of a simulation.
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ class Comparison:
 
     @property
     def z(self) -> FloatArray:
-        """(k,) errors in standard errors: standard normal when the uncertainties are honest."""
+        """(k,) errors over their standard uncertainty: standard normal where the uncertainties are correct."""
         return (self.estimate - self.truth) / self.sigma
 
     @property

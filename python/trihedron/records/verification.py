@@ -14,11 +14,11 @@ from trihedron.sanitise import one_line
 
 @dataclass(frozen=True)
 class JudgedParameter:
-    """One parameter of a calibration against what the log says of it: ``difference`` is the file's less the log's.
+    """One parameter of a calibration compared with the log's own estimate: ``difference`` is file minus log.
 
     ``id`` and ``name`` as in :data:`trihedron.records.sessions.PARAMETERS`; ``sigma_file`` is the stated standard
     uncertainty (0 where none is stated), ``sigma_log`` that of the log. ``is_judged`` is false where the log does not
-    know the parameter, or far less well than the file claims to.
+    determine the parameter, or with a much larger uncertainty than the file states.
     """
 
     id: str
@@ -38,15 +38,14 @@ class JudgedParameter:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Verification(Presented):
-    """What the calibration of ``calibration_source`` says about another recording, with what it should have said.
+    """Errors of the calibration of ``calibration_source`` on another recording, with their expected size.
 
-    ``norm_error`` (n,) is ``|S a' + b| - |g|`` of every pose [m/s²], ``norm_noise`` (n,) what the noise of the
-    mean allows, ``norm_sigma`` (n,) that and the calibration's own uncertainty. ``angle_deg`` (m,) is the angle between
-    gravity carried through a move by the gyro and gravity measured after it; ``angle_noise_deg`` and
-    ``angle_sigma_deg`` (m,) the same two predictions for it, ``moves`` (m,) which moves these are: one whose readings
-    stood at the gyro's limit for long carries nothing, and is in ``moves_left_out``. ``static_rate`` (n, 3) is the
-    calibrated rate in every pose [rad/s], where the truth is zero: how far the gyro's bias has moved.
-    ``parameters`` says the same of every parameter that the log can judge, and names those that it cannot.
+    ``norm_error`` (n,) is ``|S a' + b| - |g|`` of every pose [m/s²], ``norm_noise`` (n,) its standard deviation by the
+    noise of the mean, ``norm_sigma`` (n,) with the calibration's uncertainty. ``angle_deg`` (m,) is the tilt error
+    after a rotation: the angle between gravity predicted by the gyro and gravity measured after the move;
+    ``angle_noise_deg`` and ``angle_sigma_deg`` (m,) its expected size, by noise and in total; ``moves`` (m,) their
+    indices: a move with long clipping of the gyro is excluded and in ``moves_left_out``. ``static_rate`` (n, 3) is the
+    calibrated rate in every pose [rad/s], truth 0: the change of the gyro's bias. ``parameters`` compares each one.
     """
 
     source: str
@@ -68,12 +67,12 @@ class Verification(Presented):
 
     @property
     def norm_chi2_per_dof(self) -> float:
-        """Mean square of the norm error in its standard uncertainty: 1 where the calibration holds."""
+        """Mean square of the norm error over its standard uncertainty: 1 where the calibration is valid."""
         return float(np.mean((self.norm_error / self.norm_sigma) ** 2))
 
     @property
     def angle_chi2_per_dof(self) -> float:
-        """The same of the tilt errors; NaN without moves."""
+        """Mean square of the tilt error over its expected size; NaN without moves."""
         return float(np.mean((self.angle_deg / self.angle_sigma_deg) ** 2)) if len(self.angle_deg) else float("nan")
 
     @property
@@ -83,17 +82,17 @@ class Verification(Presented):
 
     @property
     def angle_rms_deg(self) -> float:
-        """Root mean square of the gravity prediction [deg]; NaN without moves."""
+        """Root mean square of the tilt error after rotations [deg]; NaN without moves."""
         return float(np.sqrt(np.mean(self.angle_deg**2))) if len(self.angle_deg) else float("nan")
 
     @property
     def angle_expected_deg(self) -> float:
-        """Root mean square of what noise and the calibration's uncertainty allow it to be [deg]; NaN without moves."""
+        """Expected rms of the tilt error, by noise and the calibration's uncertainty [deg]; NaN without moves."""
         return float(np.sqrt(np.mean(self.angle_sigma_deg**2))) if len(self.angle_deg) else float("nan")
 
     @property
     def is_passed(self) -> bool:
-        """No finding says that the calibration does not hold here."""
+        """True without a serious finding."""
         return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
 
     def __repr__(self) -> str:

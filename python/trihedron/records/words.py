@@ -1,4 +1,4 @@
-"""Words of the catalogue: the only English that a value of a finding, or a field beside it, may hold."""
+"""Words of the catalogue: the only English text that a value of a finding, or a field beside it, may contain."""
 
 from __future__ import annotations
 
@@ -8,35 +8,35 @@ from trihedron.answers import ask
 
 
 class Words(str):
-    """Words that the catalogue under ``report/`` has written; a stage hands them on and never writes any."""
+    """Words of the catalogue under ``report/``; a stage passes them on and never writes any."""
 
     __slots__ = ()
 
 
 def words(phrase: str, /, **values: Any) -> Words:
-    """The catalogue's words for a phrase by its id, with values in its places (``report/findings/phrases.py``).
+    """The catalogue's words for a phrase by its id, with values inserted (``report/findings/phrases.py``).
 
     Raises
     ------
     KeyError
-        When the catalogue has no such phrase, or a place of it has no value.
+        When the catalogue has no such phrase, or a placeholder of it has no value.
     """
     return Words(ask("phrase", phrase, values))
 
 
 def effect_words(effect_id: str, case: str, /, **values: Any) -> Words:
-    """What is said of an effect that is accepted, by its id and case, with values (``report/effects``).
+    """The statement about an accepted effect, by its id and case, with values (``report/effects``).
 
     Raises
     ------
     KeyError
-        When the catalogue has no such case, or a place of it has no value.
+        When the catalogue has no such case, or a placeholder of it has no value.
     """
     return Words(ask("effect_words", effect_id, case, values))
 
 
 def experiment_for(effect_id: str, *, at_rest: bool = False) -> Words:
-    """What to record so that an effect cannot be mistaken for another; empty where the catalogue has none."""
+    """The recording that separates an effect from others; empty where the catalogue has none."""
     return Words(ask("experiment", effect_id, at_rest=at_rest))
 
 
@@ -46,16 +46,16 @@ def why_not(name: str, /, **values: Any) -> Words:
     Raises
     ------
     KeyError
-        When there is no such reason, or a place of it has no value.
+        When there is no such reason, or a placeholder of it has no value.
     """
     return Words(ask("why_not", name, values))
 
 
 def relation_experiment(family: str) -> Words:
-    """What would prove a law of a family of variables; empty where the catalogue has none."""
+    """The experiment that tests an empirical relation of a family of variables; empty where the catalogue has none."""
     return Words(ask("family_words", family).experiment)
 
 
 def relation_resembles(family: str) -> tuple[Words, ...]:
-    """Mechanisms that follow such variables."""
+    """Mechanisms that depend on such variables."""
     return tuple(map(Words, ask("family_words", family).resembles))

@@ -1,4 +1,4 @@
-"""REPORT: numbers become words, tables and figures; laid out once, written as text or as a page."""
+"""Reports: words, tables and figures of results; laid out once, written as text or as a page."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _HOME = {"Document": "document", "to_text": "text"}
 
 
 def __getattr__(name: str) -> Any:
-    # Whoever wants one finding's words must not wait for every report (scipy's statistics take a second to load).
+    # Imported on first use: the words of one finding need not every report.
     if name not in __all__:
         raise AttributeError(f"module 'trihedron.report' has no attribute {name!r}")
     return getattr(import_module(f"trihedron.report.{_HOME.get(name, name.removesuffix('_report'))}"), name)

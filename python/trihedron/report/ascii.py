@@ -1,4 +1,4 @@
-"""Text for terminals and files that know no more than ASCII."""
+"""Text for terminals and files with ASCII only."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TABLE = str.maketrans(_WORDS)
 
 
 def ascii_of(text: str) -> str:
-    """The same in ASCII: ``10⁻³`` is ``10^-3``, ``±`` is ``+/-``, ``°/s`` is ``deg/s``; letters lose their accents.
+    """The text in ASCII: ``10⁻³`` is ``10^-3``, ``±`` is ``+/-``, ``°/s`` is ``deg/s``; letters lose their accents.
 
     Examples
     --------

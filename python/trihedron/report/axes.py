@@ -1,6 +1,6 @@
-"""What S and b mean for each sensor axis: sensitivity, bias, and how the axes stand to one another.
+"""Properties of each sensor axis from S and b: sensitivity, bias, and angles between axes.
 
-All three are the same in every frame: they belong to the sensor, not to the choice of Mz.
+All three are the same in every frame: they belong to the sensor, not to the choice of the body frame.
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ from trihedron.records import SensorCalibration
 from trihedron.sensor_model import other_form, other_form_jacobian
 
 LETTERS = 2
-"""Of a name that is made of axes alone."""
+"""Most letters of a name that consists of axes alone, as ``xy``."""
 BIAS = "the reading at zero input (sign opposite to b)"
-"""What a bias is in every report; b is what a corrected reading adds."""
+"""Definition of a bias in every report; b has the opposite sign, as it is added by the calibration."""
 
 
 def axis_in_print(name: str) -> str:
-    """Axes as on the silkscreen: ``xy`` and ``gyro x`` as ``XY`` and ``gyro X``; other names as they are."""
+    """Axes as on the silkscreen: ``xy`` and ``gyro x`` as ``XY`` and ``gyro X``; other names unchanged."""
     sensor, gap, axis = name.rpartition(" ")
     return f"{sensor}{gap}{axis.upper()}" if len(axis) <= LETTERS else name
 
 
 def channel_in_print(channel: str) -> str:
-    """``gx`` and ``vx`` as ``X``; what is no axis (``norm``, ``angle``) as it is."""
+    """``gx`` and ``vx`` as ``X``; names other than axes (``norm``, ``angle``) unchanged."""
     return channel[-1].upper() if len(channel) <= LETTERS else channel
 
 
 @dataclass(frozen=True, eq=False)
 class Axes:
-    """What the numbers of one sensor say about its axes.
+    """Properties of the axes of one sensor.
 
     ``sensitivity`` (3,) in raw unit per SI unit, ``at_zero`` (3,) the reading at zero input, raw, and ``bias`` (3,) the
-    same over the sensitivity, SI; ``skew_rad`` (3,) by which the angles X-Y, X-Z, Y-Z exceed a right angle; each with
-    its standard error.
+    same over the sensitivity, SI; ``skew_rad`` (3,) the excess of the angles X-Y, X-Z, Y-Z over a right angle; each
+    with its standard error.
     """
 
     sensitivity: FloatArray
@@ -51,7 +51,7 @@ class Axes:
 
     @property
     def scale_sigma(self) -> FloatArray:
-        """(3,) relative standard error of the scale of each axis: the one that every report states."""
+        """(3,) relative standard error of the scale of each axis, as in every report."""
         return self.sigma_sensitivity / self.sensitivity
 
 

@@ -1,4 +1,4 @@
-"""The calibration as a laboratory report: result, findings, what the numbers mean, residuals, certainty."""
+"""The calibration as a laboratory report: result, findings, properties of the axes, residuals, uncertainty."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ from trihedron.report.numbers import (
 from trihedron.units import mm_s2_from_m_s2, mrad_from_radians
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
-"""The field's names of the frames."""
+"""Printed names of the frames."""
 NEXT = "Test it on another recording (trihedron verify), then use it (trihedron apply, trihedron export)."
 MOST_PAIRS = 6
-"""Correlated pairs that one line names; a table further down lists all of them."""
+"""Most correlated pairs in one line; a table lists all of them."""
 SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
 
 
 def calibration_report(
     calibration: Calibration, segments: Segments | None = None, recording: Recording | None = None
 ) -> Document:
-    """Lay out a calibration; with the segments and the recording it was made from also its tables and figures."""
+    """Lay out a calibration; with its segments and recording also their tables and figures."""
     sections = [
         Section("Result", _result(calibration, segments, recording)),
         Section("Findings", (findings_block(calibration.findings),)),
@@ -77,7 +77,7 @@ def calibration_report(
 
 
 def _headlines(calibration: Calibration) -> list[Headline]:
-    """How well gravity is predicted: at rest by the accelerometer, through a move by the gyro."""
+    """Gravity error in static poses and tilt error after rotations."""
     out = []
     quality = calibration.accelerometer.quality
     if quality is not None:
@@ -100,7 +100,7 @@ def _headlines(calibration: Calibration) -> list[Headline]:
 
 
 def verdict(calibration: Calibration) -> str:
-    """One sentence: may this be used?"""
+    """The verdict in one sentence: usable or not."""
     return verdict_of(
         calibration.findings,
         "OK: no problems found.",
@@ -144,7 +144,7 @@ def _sensors(calibration: Calibration) -> list[tuple[str, SensorCalibration]]:
 
 
 def parameter_table(name: str, sensor: SensorCalibration) -> Table:
-    """S and b with their standard errors, in powers of ten that leave digits to read."""
+    """S and b with their standard errors, with a common power of ten where it shortens the numbers."""
     true, raw = SYMBOLS[name]
     unit = unit_in_print(sensor.si_unit)
     exponent = engineering_exponent(float(np.abs(sensor.S).max()))
@@ -170,7 +170,7 @@ def parameter_table(name: str, sensor: SensorCalibration) -> Table:
 
 
 def _percent(value: float, sigma: float) -> str:
-    """σ in percent of the value; nothing where either is missing or none of it is known."""
+    """σ in per cent of the value; empty where σ is 0 or not below the value."""
     return f"± {plain_number(100.0 * sigma / abs(value), 2)} %" if 0.0 < sigma < abs(value) else ""
 
 
@@ -202,7 +202,7 @@ def axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
         for i in range(3)
     ]
     if raw != si:
-        # In SI it is the bias above but for the scale: a second figure of one thing.
+        # For readings in SI it equals the bias except for the scale, and is omitted.
         head.append(f"reading at zero input, −S⁻¹ b [{raw}]")
         for i, row in enumerate(rows):
             row.append(with_sigma(axes.at_zero[i], axes.sigma_at_zero[i]))
@@ -231,7 +231,7 @@ def _certainty(calibration: Calibration) -> list[Block]:
         ]
         if seen.weakest:
             rows.append(("least certain", seen.weakest))
-        # One pose is enough where nothing is wrong; findings name all that are missing.
+        # Without a problem one pose is enough; findings name all that are missing.
         if seen.advice:
             rows.append(
                 ("most useful next pose" if name == "accelerometer" else "most useful next move", seen.advice[0])

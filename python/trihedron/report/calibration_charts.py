@@ -1,4 +1,4 @@
-"""What a page draws of a calibration: residuals with their limits, the sphere of poses, moves, correlations."""
+"""Charts of a calibration: residuals with their limits, the sphere of poses, moves, correlations."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from trihedron.report.drawn import said
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 STRONG = 0.5
-"""Correlation above which two parameters are named together."""
+"""Correlation above which a pair of parameters is listed."""
 LIMIT_SIGMAS = 3.0
-"""A pose or move beyond it happens by chance once in 370."""
+"""Limit of a residual in standard errors; chance exceeds it once in 370."""
 MARK = 0.12
-"""Diameter of a pose\'s mark, the horizon having radius 1."""
+"""Diameter of a pose\'s mark; the horizon has radius 1."""
 MOST_NUMBERED = 60
-"""Poses on a disc that carry their number; of more, one would cover the next."""
+"""Most poses on a disc with printed numbers; more would overlap."""
 
 
 def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> Chart:
-    """Residual of every pose in and out of sample, against three standard errors of noise alone."""
+    """Residual of every pose, in sample and cross-validated, with the 3 σ limits of noise alone."""
     pose = np.arange(1, len(quality.residual) + 1, dtype=np.float64)
     residual, sigma = mm_s2(quality.residual), mm_s2(quality.sigma)
     label = [f"pose {k + 1}" for k in range(len(pose))] if names is None else list(names)
@@ -60,9 +60,9 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
 
 
 def _highest(held: FloatArray, held_sigma: FloatArray | None, residual: FloatArray, limit: FloatArray) -> float:
-    """Where the axis ends: every point is shown, of error bars what is usual.
+    """Limit of the axis: every point is shown, error bars up to ``MOST_OF_A_BAR`` times their median.
 
-    A pose without which a parameter is not determined predicts nothing: its bar would hide all others.
+    The cross-validated residual of a pose that alone determines a parameter has a huge σ, which would hide all others.
     """
     reach = np.abs(held)
     if held_sigma is not None:
@@ -76,7 +76,7 @@ def mm_s2(values: FloatArray) -> FloatArray:
 
 
 def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
-    """Tilt error after every rotation, in and out of sample, and what noise alone gives (rms)."""
+    """Tilt error after every rotation, in sample and cross-validated, and its rms by noise alone."""
     assert quality.angle_deg is not None
     n = len(quality.angle_deg)
     move = np.arange(1, n + 1, dtype=np.float64)
@@ -108,14 +108,14 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     marks.append(Points(move, noise, told_noise, None, "noise alone (rms)", "ink"))
     shown = np.concatenate([quality.angle_deg[~is_out], [] if held is None else held[~is_out]])
     shown = shown[np.isfinite(shown)]
-    # A move that was excluded may be a hundred times as wrong: the rest must stay readable.
+    # An excluded move may have a hundred times the error: the others must stay readable.
     top = 1.1 * float(max(shown.max(initial=0.0), np.nanmax(noise, initial=0.0))) or 1.0
     y = Scale("tilt error  [°]", "°", limits=(0.0, top))
     return Chart((Panel(Scale("move", limits=(0.3, n + 0.7), whole=True), y, tuple(marks), height_px=200),))
 
 
 def move_noise_deg(quality: FitQuality) -> FloatArray:
-    """(m,) angle that noise alone gives after each move, rms, degrees."""
+    """(m,) expected rms tilt error after each move by noise alone, degrees."""
     return np.asarray(degrees_from_radians(1.0) * np.linalg.norm(quality.sigma, axis=1) / 9.8)
 
 
@@ -129,11 +129,11 @@ def sphere_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
     for sign, title in ((1.0, "+Z above the horizon"), (-1.0, "+Z below the horizon")):
         points: list[tuple[float, float, str, str, str]] = []
         for k, u in enumerate(up):
-            # A pose with level Z lies on the rim of both.
+            # A pose with level Z is on the rim of both discs.
             if sign * u[2] >= -1e-2:
                 words = " ".join(f"{c:+.2f}" for c in u).replace("-", "−")
                 x, y = equal_area((u[0], u[1], u[2]))
-                # On a mark that covers another's number none can be read: the first of poses alike has one.
+                # Overlapping marks hide each other's numbers: only the first of nearly equal poses has one.
                 is_covered = any(name and math.hypot(x - a, y - b) < MARK for a, b, name, *_ in points)
                 label = "" if is_covered or len(up) > MOST_NUMBERED else str(k + 1)
                 points.append((x, y, label, f"pose {k + 1}: up is {words}", "taken"))
@@ -145,7 +145,7 @@ def sphere_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
 
 
 def direction_in_words(words: str) -> FloatArray | None:
-    """The unit vector (3,) of '+X/-Z edge up'; None where there is none."""
+    """The unit vector (3,) of '+X/-Z edge up'; None for other texts."""
     if re.match(r"[+-][XYZ](/[+-][XYZ])*( edge| corner)? up", words) is None:
         return None
     up = np.zeros(3)

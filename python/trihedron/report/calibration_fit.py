@@ -1,4 +1,4 @@
-"""How well S and b fit: each figure under its definition, the same in every report."""
+"""Figures of fit of S and b, with one definition each in every report."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ METHODS = {
     "joint": "both sensors in one fit of poses and moves",
     "moves": "gravity after rotations between poses",
 }
-"""Methods of the records that are ids; the others are words already."""
+"""Words for methods that records store as ids; other methods are words already."""
 
 
 def fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]:
@@ -38,7 +38,7 @@ def fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]:
 
 
 def _bias(sensor: SensorCalibration) -> list[tuple[str, str]]:
-    """The bias as many recordings and a diagnosis compare it; nothing where S is singular."""
+    """The bias along each axis, as compared between recordings; empty where S is singular."""
     try:
         axes = axes_of(sensor)
     except ValueError:
@@ -64,7 +64,7 @@ def _norm_words(quality: FitQuality) -> str:
 
 
 def angles_of(quality: FitQuality) -> list[tuple[str, float, float]]:
-    """Label, rms and worst angle, in and out of sample, over the same moves."""
+    """Label, rms and worst tilt error, in sample and cross-validated, over the same moves."""
     if quality.angle_deg is None:
         return []
     counted = counted_moves(quality)
@@ -97,13 +97,13 @@ def _angle_words(quality: FitQuality) -> str:
 
 
 def move_floor(quality: FitQuality) -> float:
-    """Angle after a move by noise alone, rms over the moves that count, degrees."""
+    """Tilt error by noise alone, rms over the moves that are not excluded, degrees."""
     noise = move_noise_deg(quality)[counted_moves(quality)]
     return float(np.sqrt(np.mean(noise**2))) if len(noise) else float("nan")
 
 
 def figures_table(calibration: Calibration, session_fit: Mapping[str, str]) -> Table | None:
-    """What the S and b that are saved leave, beside what the fit of the session leaves, whose biases vary."""
+    """Residuals of the saved S and b beside those of the session's fit, in which biases vary."""
     rows = []
     at_rest = calibration.accelerometer.quality
     if at_rest is not None:

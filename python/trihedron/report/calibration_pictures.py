@@ -28,7 +28,7 @@ FEWEST_NAMES = 2
 
 
 def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture | None:
-    """Residual of every pose; beside it, with the segments at hand, gravity's error before and after."""
+    """Residual of every pose; with segments also the gravity error before and after calibration."""
     quality = calibration.accelerometer.quality
     if quality is None:
         return None
@@ -51,7 +51,7 @@ def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture
 
 
 def lead_chart(calibration: Calibration, means: FloatArray) -> Chart:
-    """Residuals of every pose, and the size of gravity's error before and after; ``means`` (n, 3) raw readings."""
+    """Residual of every pose, and |gravity error| before and after calibration; ``means`` (n, 3) raw readings."""
     quality = calibration.accelerometer.quality
     assert quality is not None
     residual = residual_chart(quality)
@@ -59,7 +59,7 @@ def lead_chart(calibration: Calibration, means: FloatArray) -> Chart:
 
 
 def before_after_panel(calibration: Calibration, means: FloatArray) -> Panel:
-    """Size of the gravity error in every pose: of the readings as they are, and calibrated."""
+    """|Gravity error| in every pose: of the readings as logged, and calibrated."""
     quality = calibration.accelerometer.quality
     assert quality is not None
     before = mm_s2(uncalibrated_error(calibration, means))
@@ -67,7 +67,7 @@ def before_after_panel(calibration: Calibration, means: FloatArray) -> Panel:
     pose = np.arange(1, len(before) + 1, dtype=np.float64)
     noise = float(np.sqrt(np.mean(mm_s2(quality.sigma) ** 2)))
     marks: list[Mark] = [Level(y=noise, name="noise alone (rms)", is_dashed=True)] if noise > 0.0 else []
-    # As in the residuals beside it: one colour for fits that saw the pose, one for those that did not.
+    # Colours as in the residuals: one for in-sample, one for cross-validated.
     held = _is_held(quality)
     kinds = ((before, "before", "soft"), (after, "after" + held * ", cross-validated", "accent" if held else "c1"))
     for values, name, colour in kinds:
@@ -84,7 +84,7 @@ def before_after_panel(calibration: Calibration, means: FloatArray) -> Panel:
 
 
 def uncalibrated_error(calibration: Calibration, means: FloatArray) -> FloatArray:
-    """(n,) |s a| − |g| [m/s²] of raw means (n, 3): s the log's own unit, or the one scale that fits counts best."""
+    """(n,) |s a| − |g| [m/s²] of raw means (n, 3): s from the log's unit, or for counts the scale that fits best."""
     norm = np.linalg.norm(means, axis=1)
     scale = _as_read(calibration)
     if scale is None:
@@ -93,28 +93,28 @@ def uncalibrated_error(calibration: Calibration, means: FloatArray) -> FloatArra
 
 
 def before_words(calibration: Calibration) -> str:
-    """What readings without this calibration are."""
+    """Description of the readings without this calibration."""
     return "one scale for all axes, no bias" if _as_read(calibration) is None else "the readings as they are"
 
 
 def _as_read(calibration: Calibration) -> float | None:
-    """m/s² of one raw unit, where the log itself says it."""
+    """m/s² per raw unit; None for counts."""
     return acceleration_to_si(AccelerationUnit(calibration.accelerometer.raw_unit))
 
 
 def _unseen(quality: FitQuality) -> FloatArray:
-    """(n,) residuals of fits that did not see the pose, where there are such."""
+    """(n,) cross-validated residuals, or in-sample ones where there are none."""
     held = quality.held_out
     return held if held is not None and _is_held(quality) else quality.residual
 
 
 def _is_held(quality: FitQuality) -> bool:
-    """Whether any pose was predicted by a fit that did not see it."""
+    """Whether any pose has a cross-validated residual."""
     return quality.held_out is not None and bool(np.any(np.isfinite(quality.held_out)))
 
 
 def figure_blocks(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> list[Block]:
-    """All other pictures that the data at hand allow."""
+    """All other pictures that the given records allow."""
     blocks: list[Block] = []
     quality = calibration.accelerometer.quality
     means = None if segments is None else segments.accelerometer_mean
@@ -170,7 +170,7 @@ def orientation_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
 
 
 def time_chart(calibration: Calibration, segments: Segments, recording: Recording) -> Chart | None:
-    """Residuals over time: gravity's error of the poses, and what every rotation misses of gravity."""
+    """Residuals over time: gravity error of the poses, and tilt error after every rotation."""
     panels = []
     limits = (float(recording.time_s[0]), float(recording.time_s[-1]) or 1.0)
     quality = calibration.accelerometer.quality
@@ -195,7 +195,7 @@ def time_chart(calibration: Calibration, segments: Segments, recording: Recordin
 def _over_time(
     time_s: FloatArray, residual: FloatArray, sigma: FloatArray, kind: str, names: tuple[str, ...]
 ) -> tuple[Mark, ...]:
-    """Dots at ``time_s`` (n,) of ``residual`` (n, k), a stroke of ± 3 ``sigma`` (n,) behind them, SI."""
+    """Dots at ``time_s`` (n,) of ``residual`` (n, k) with bars of ± 3 ``sigma`` (n,), SI."""
     limit, gap = LIMIT_SIGMAS * mm_s2(np.abs(sigma)), np.full(len(time_s), np.nan)
     x, y = (np.column_stack(columns).ravel() for columns in ((time_s, time_s, gap), (-limit, limit, gap)))
     marks: list[Mark] = [Level(y=0.0), Line(x, y, "3 σ of noise alone", "shade")]
@@ -211,7 +211,7 @@ def _over_time(
 
 
 def correlation_picture(calibration: Calibration) -> Picture | None:
-    """How the free parameters of both sensors correlate."""
+    """Correlations of the free parameters of both sensors."""
     names, _ = correlations(calibration)
     if len(names) < FEWEST_NAMES:
         return None
@@ -220,7 +220,7 @@ def correlation_picture(calibration: Calibration) -> Picture | None:
 
 
 def matrix_chart(calibration: Calibration) -> Chart:
-    """A triangle of cells."""
+    """Correlations as a triangle of cells."""
     names, r = correlations(calibration)
     short = tuple(name.replace("accel ", "a ").replace("gyro ", "w ") for name in names)
     return Chart((Matrix("correlations", short, r),), legend=False)

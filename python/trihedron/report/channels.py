@@ -1,4 +1,4 @@
-"""What a log says of the parts behind its channels: resolution, range limits met, bandwidth."""
+"""Resolution, range limits reached, and bandwidth of a log's channels."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ UNKNOWN = "not known"
 
 
 def channels_table(recording: Recording) -> Table:
-    """A row per axis, one for a sensor whose axes are alike."""
+    """A row per axis, or one per sensor where its axes are equal."""
     rows: list[tuple[str, ...]] = []
     for name, unit in _sensors(recording).items():
         facts, filters = recording.facts.of(name), recording.low_passes.get(name)
@@ -35,7 +35,7 @@ def channels_table(recording: Recording) -> Table:
 
 
 def channels_record(recording: Recording) -> dict[str, Any]:
-    """The same for programs: ``resolution`` (3,), ``range_limits`` and ``low_pass`` of every axis, raw units and Hz."""
+    """For JSON: ``resolution`` (3,), ``range_limits`` and ``low_pass`` of every axis, raw units and Hz."""
     out: dict[str, Any] = {}
     for name in _sensors(recording):
         facts, filters = recording.facts.of(name), recording.low_passes.get(name)

@@ -1,4 +1,4 @@
-"""A figure as data: panels with axes and marks, that a page draws sharp at any width, in light, dark and on paper."""
+"""A figure as data: panels with axes and marks, which a page draws at any width, in light, dark and on paper."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ import numpy as np
 from trihedron.arrays import FloatArray
 
 Colour = Literal["c1", "c2", "c3", "accent", "ink", "soft", "shade", "warn", "grey"]
-"""Names, not values: the page gives each a colour for light, dark and paper. c1, c2, c3 are the axes x, y, z."""
+"""Names of colours, which the page defines for light, dark and paper. c1, c2, c3 are the axes X, Y, Z."""
 MOST_OF_A_BAR = 3.0
-"""Times the median of all: up to here an error bar is shown whole."""
+"""Longest error bar shown in full, in multiples of the median bar."""
 AXIS_COLOURS: tuple[Colour, Colour, Colour] = ("c1", "c2", "c3")
 
 
 @dataclass(frozen=True)
 class Scale:
-    """An axis of a panel: ``limits`` in data units (found from the marks where None), ``unit`` for values shown.
+    """An axis of a panel: ``limits`` in data units (from the marks where None), ``unit`` for values shown.
 
-    ``names`` are of the places 1, 2, ...; along x a drawing that has room for them writes them there. Along y they
-    are of the places −1, −2, ..., the first at the top.
+    ``names`` label the positions 1, 2, ... along x, if they fit, and −1, −2, ... along y, the first at the top.
+
     """
 
     label: str
@@ -48,9 +48,9 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Dots with ``sigma`` as uncertainties; ``said`` is what a reader who points at one is told.
+    """Dots with ``sigma`` as uncertainties; ``said`` is the tooltip of each.
 
-    ``is_across``: the uncertainties lie along x, as in a forest plot.
+    ``is_across``: the uncertainties are along x, as in a forest plot.
     """
 
     x: FloatArray
@@ -65,7 +65,7 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """Bars at ``x`` from zero (or ``base``) to ``y``, ``width`` in data units; ``is_across``: at ``y``, to ``x``."""
+    """Bars at ``x`` from 0 (or ``base``) to ``y``, ``width`` in data units; ``is_across``: at ``y`` along x."""
 
     x: FloatArray
     y: FloatArray
@@ -90,7 +90,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Span:
-    """A stretch of x, shaded over the whole height."""
+    """An interval of x, shaded over the whole height."""
 
     first: float
     last: float
@@ -100,7 +100,7 @@ class Span:
 
 @dataclass(frozen=True)
 class Level:
-    """A straight rule at one y, or one x."""
+    """A straight line at one y, or one x."""
 
     y: float | None = None
     x: float | None = None
@@ -111,7 +111,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Note:
-    """A word at a place; ``side`` says on which side of it."""
+    """A text at a point, on the given ``side`` of it."""
 
     x: float
     y: float
@@ -125,7 +125,7 @@ Mark = Line | Points | Bars | Band | Span | Level | Note
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes. Panels of a chart stand side by side where there is room for them."""
+    """One pair of axes. Panels of a chart are side by side where they fit."""
 
     x: Scale
     y: Scale
@@ -138,7 +138,7 @@ class Panel:
 class Disc:
     """Directions on a hemisphere seen along Z (Lambert's equal-area projection), radius one at the rim.
 
-    ``points`` are (x, y, label, what is said, kind), kind one of ``taken``, ``wanted``.
+    ``points`` are (x, y, label, tooltip, kind), kind one of ``taken``, ``wanted``.
     """
 
     title: str
@@ -147,10 +147,10 @@ class Disc:
 
 @dataclass(frozen=True, eq=False)
 class Sphere:
-    """Values by direction, on a sphere about the body that a reader turns; ``limit`` is the value of a full-sized dot.
+    """Values by direction, on a rotatable sphere about the body; ``limit`` is the value of a full-sized dot.
 
     ``directions`` (n, 3) unit vectors in the body frame, ``values`` (n,); negative ones have the colour c1, positive
-    ones the accent.
+    ones the accent colour.
     """
 
     title: str
@@ -162,7 +162,7 @@ class Sphere:
 
 @dataclass(frozen=True, eq=False)
 class Matrix:
-    """Correlations ``values`` (n, n) of what ``names`` say, as cells whose depth is their size."""
+    """Correlations ``values`` (n, n) of the parameters ``names``, as cells shaded by their size."""
 
     title: str
     names: tuple[str, ...]
@@ -180,7 +180,7 @@ class Chart:
 
 
 def limits_of(panel: Panel) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Data limits (x, y) of a panel: those stated, or what its marks need and a margin."""
+    """Data limits (x, y) of a panel: those stated, or the extent of its marks with a margin."""
     x = panel.x.limits or _reach([v for m in panel.marks for v in _xs(m)], panel.x)
     y = panel.y.limits or _reach([v for m in panel.marks for v in _ys(m)], panel.y)
     return x, (-len(panel.y.names) - 0.6, -0.4) if panel.y.names else y
@@ -228,5 +228,5 @@ def _reach(values: list[FloatArray], scale: Scale) -> tuple[float, float]:
     if scale.is_log:
         return low / 1.3, high * 1.3
     room = 0.06 * (high - low) or 0.5 * abs(high) or 0.5
-    # A quantity that is never negative keeps its zero at the edge.
+    # For a quantity that is never negative the axis starts at 0.
     return (0.0 if low == 0.0 else low - room), (0.0 if high == 0.0 and low < 0.0 else high + room)

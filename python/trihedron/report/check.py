@@ -1,4 +1,4 @@
-"""A log before its calibration: is it fit, and how sure would the answer be?"""
+"""Report on a log before its calibration: fitness, and the uncertainties to expect."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def check_report(
 
 
 def _rate(recording: Recording) -> str:
-    """The option without which a log that has no timestamps is read at another rate."""
+    """The option --rate, which a log without timestamps needs to be read at this rate."""
     return "" if recording.sampling.kind is not TimestampKind.NONE else f" --rate {recording.rate_hz:.6g}"
 
 

@@ -1,4 +1,4 @@
-"""The demonstration told as a story: what was done, what came out, and how far it is from the truth."""
+"""Report of the demonstration: steps, results, and errors relative to the truth."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def demonstration_report(
     latitude_deg: float,
     files: tuple[tuple[Path, str], ...],
 ) -> Document:
-    """The whole story."""
+    """Lay out the demonstration."""
     return Document(
         title="A complete session, on a simulated sensor",
         subtitle="Everything below was computed from the CSV log; only section 4 uses the truth.",
@@ -79,7 +79,7 @@ def _verified(verification: Verification, before: float) -> tuple[Block, ...]:
 
 
 def _warnings(findings: tuple[Finding, ...]) -> tuple[Block, ...]:
-    """Findings that matter to the story; the notes are in the reports."""
+    """Findings above a note; notes are in the reports."""
     grave = tuple(finding for finding in findings if finding.severity is not Severity.NOTE)
     return (findings_block(grave),) if grave else ()
 
@@ -88,7 +88,7 @@ def _truth_table(comparison: Comparison) -> Table:
     rows = []
     for k, name in enumerate(comparison.names):
         sensor, parameter = name.split(".")
-        # S of one sensor shares a power of ten, so that its rows compare at a glance.
+        # S of one sensor shares a power of ten, so that its rows can be compared.
         peers = [
             abs(comparison.truth[i])
             for i, other in enumerate(comparison.names)

@@ -63,13 +63,13 @@ MOST_PARAMETERS = 9
 
 
 def first_screen(diagnosis: Diagnosis) -> int:
-    """Sections that fit one screen: where it disagrees, parameters that differ, missing effects, the rest."""
+    """Number of sections on the first screen: disagreement, parameters that differ, missing effects, the rest."""
     return 4 if diagnosis.parameters else 3
 
 
 def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") -> Document:
-    """Lay out a diagnosis; the first sections fit one screen. ``model`` names the file held against the log,
-    ``improved`` the one that the parameters of the log are written to."""
+    """Lay out a diagnosis; the first sections fit one screen. ``model`` names the file compared with the log,
+    ``improved`` the scenario written with the parameters of the log."""
     sections = [Section("Result", _located(diagnosis))]
     if diagnosis.parameters:
         about = (*forest_pictures(diagnosis), *differing_blocks(diagnosis), *_traces(diagnosis))
@@ -96,7 +96,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     found = getattr(diagnosis, "reference", None)
     strengths = strengths_picture(diagnosis)
     if found is not None and strengths is not None:
-        # The reference's own error leads then.
+        # The chart of the reference's own error is the lead then.
         sections[0] = replace(sections[0], blocks=(*sections[0].blocks, strengths))
     document = Document(
         title="Diagnosis against a model" if diagnosis.parameters else "Diagnosis",
@@ -115,7 +115,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
 def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     after = {d.domain: d for d in diagnosis.remaining}
     has_effects = bool(diagnosis.effects)
-    # What one came for stands first: on a narrow terminal the columns behind it move below.
+    # Most important columns first: on a narrow terminal the others move below.
     rows = tuple(
         (
             MEANING[d.domain],
@@ -133,7 +133,7 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     is_fitted = not getattr(diagnosis, "model_is_given", False)
     caption = f"Residuals by domain{', in sample' if is_fitted else ''}; χ²/dof is 1 by noise alone"
     blocks: list[Block] = [Table(head, rows, caption)]
-    # Which parameters differ has a section of its own.
+    # Parameters that differ have a section of their own.
     places = tuple(
         (MEANING[d.domain], place)
         for d in diagnosis.domains
@@ -152,7 +152,7 @@ def _judged_after(before: DomainTest, test: DomainTest | None) -> str:
     if test is None:
         return "–"
     if before.disagrees and not test.disagrees and test.chi2_per_dof == before.chi2_per_dof:
-        # An effect explains it without changing the residual: poses that were not still, a line of interference.
+        # An effect that leaves the residual unchanged explains it: disturbed poses, a spectral line.
         return "explained"
     return "disagrees" if test.disagrees else "agrees"
 
@@ -181,7 +181,7 @@ def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 
 def _without_strongest(statement: str) -> str:
-    """The sentence without its strongest term, which stands below it with the digits that its uncertainty allows."""
+    """The sentence without its strongest term, which is listed below it with its uncertainty."""
     return _capital(re.sub(r"\s*\(strongest term [^:]*: [^;]*?\)(?=\.|$|;)", "", statement))
 
 
@@ -205,7 +205,7 @@ def _parameters(effect: AcceptedEffect) -> str:
 
 
 def _parameter(name: str) -> str:
-    """``K2_x`` is a symbol with its axis; ``accelerometer_delay`` is words."""
+    """A printed name: a symbol with its axis (``K2_x``) unchanged, words (``accelerometer_delay``) with spaces."""
     return name if len(name.rpartition("_")[2]) <= LETTERS else name.replace("_", " ")
 
 
@@ -260,7 +260,7 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 
 def _traces(diagnosis: Diagnosis) -> tuple[Picture, ...]:
-    """Simulated over recorded readings, where a simulation was moved as the recording was."""
+    """Simulated and recorded readings, for a simulation with the recording's motion."""
     recording, simulated, segments = (getattr(diagnosis, name, None) for name in ("recording", "simulated", "segments"))
     if recording is None or simulated is None or segments is None:
         return ()
@@ -270,8 +270,8 @@ def _traces(diagnosis: Diagnosis) -> tuple[Picture, ...]:
 
 
 def _physics(diagnosis: Diagnosis) -> list[Picture]:
-    """One picture per effect, where the recording is at hand and the effect acts on poses or moves one by one."""
-    # A given model's numbers, and its unit, are those of another sensor: forces are read with the recording's own.
+    """One picture per effect, where the recording is given and the effect acts on single poses or moves."""
+    # Forces are computed with the recording's own calibration: a given model's may be of another sensor and unit.
     own = getattr(diagnosis, "updated", None) or getattr(diagnosis, "calibration", None)
     made = [getattr(diagnosis, "recording", None), getattr(diagnosis, "segments", None), own]
     if any(one is None for one in made):
@@ -308,7 +308,7 @@ def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
 
 
 def _counted(residuals: DomainResiduals) -> str:
-    """Poses or moves as the calibration of this log counts them, and the further rows that a disturbance makes."""
+    """Number of poses or moves as counted by calibration, and the additional rows due to disturbances."""
     n, n_rows = residuals.n_whole, len(residuals.before)
     said = how_many(n, residuals.kind)
     if residuals.kind == "move":

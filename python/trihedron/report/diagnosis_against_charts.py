@@ -1,4 +1,4 @@
-"""A given simulation beside the recording in pictures: stage by stage, spectra of the poses, their Allan curves."""
+"""Charts of a given simulation and the recording: errors by stage, spectra of the poses, their Allan curves."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ WORDS = {
 SLOPES: tuple[Colour, ...] = ("c1", "c2", "c3", "accent", "soft")
 FEWEST_OCTAVES = 2
 PER_OCTAVE = 24
-"""Frequencies at which an octave is integrated: sin⁴ has two periods in the highest at the shortest averaging time."""
+"""Frequencies per octave of the integral: at the longest averaging time sin⁴ oscillates within the upper octaves."""
 SENSORS = ("accelerometer", "gyroscope")
 Spectrum = tuple[FloatArray, FloatArray, FloatArray]
 """Edges (m, 2) [Hz], density of the model and of the recording (m,), printed unit/√Hz."""
 
 
 def stages_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """Misfit of the held-out part after every stage."""
+    """Cross-validated misfit after every stage."""
     if len(diagnosis.stages) < len(STAGES) - 1:
         return ()
     caption = (
@@ -51,7 +51,7 @@ def stages_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 
 def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """Spectra of both logs one above the other, and Allan curves of both."""
+    """Spectra and Allan curves of both logs."""
     seen = _spectra(diagnosis.noise_compared)
     if not seen:
         return ()
@@ -64,7 +64,7 @@ def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 
 def stages_chart(diagnosis: Diagnosis) -> Chart:
-    """One slope a domain: rms after every stage over that of its first, since their units differ."""
+    """One line per domain: rms after every stage over that of the first, since units differ."""
     names = tuple(STAGES[stage.stage] for stage in diagnosis.stages)
     marks: list[Mark] = []
     least = 1.0
@@ -85,7 +85,7 @@ def stages_chart(diagnosis: Diagnosis) -> Chart:
 
 
 def spectra_chart(diagnosis: Diagnosis) -> Chart:
-    """A panel per sensor and axis: density of the noise in every octave, steps over its band."""
+    """A panel per sensor and axis: noise density in every octave, constant over its band."""
     panels = []
     for (sensor, axis), (edges, model, own) in _spectra(diagnosis.noise_compared).items():
         unit = _unit(sensor) + "/√Hz"
@@ -98,10 +98,10 @@ def spectra_chart(diagnosis: Diagnosis) -> Chart:
 
 
 def allan_chart(diagnosis: Diagnosis) -> Chart:
-    """A panel per sensor and axis: Allan deviation of a spectrum that is even within its octaves.
+    """A panel per sensor and axis: Allan deviation of a spectrum that is constant within its octaves.
 
-    ``σ²(τ) = 4 ∫ S sin⁴(πτf)/(πτf)² df``, S two-sided, from half a period of the highest frequency to a quarter of
-    the lowest's: what lies below the octaves would be missed beyond.
+    ``σ²(τ) = 4 ∫ S sin⁴(πτf)/(πτf)² df``, S two-sided, for τ from half a period of the highest frequency to a quarter
+    of the lowest's: for longer τ, noise below the lowest octave would be missing.
     """
     panels = []
     for (sensor, axis), (edges, model, own) in _spectra(diagnosis.noise_compared).items():
@@ -148,7 +148,7 @@ def _panel(x: str, unit_x: str, y: str, unit_y: str, marks: Sequence[Mark], titl
 
 
 def _spectra(compared: Sequence[NoiseDifference]) -> dict[tuple[str, str], Spectrum]:
-    """Octaves of both sides by sensor and axis, lowest first."""
+    """Octaves of model and recording by sensor and axis, lowest first."""
     rows: dict[tuple[str, str], list[tuple[float, float, float, float]]] = {}
     for n in compared:
         if n.band_hz is not None and n.model and n.recording and n.sensor in SENSORS:
@@ -162,7 +162,7 @@ def _spectra(compared: Sequence[NoiseDifference]) -> dict[tuple[str, str], Spect
 
 
 def _without_gaps(edges: FloatArray, model: FloatArray, own: FloatArray) -> Spectrum:
-    """The longest run of octaves that adjoin: a band that one side lacks would look like a dip and a ripple."""
+    """The longest run of contiguous octaves: a missing band would appear as a dip and a ripple."""
     runs = np.split(np.arange(len(edges)), 1 + np.flatnonzero(~np.isclose(edges[1:, 0], edges[:-1, 1])))
     longest = max(runs, key=len)
     return edges[longest], model[longest], own[longest]

@@ -1,4 +1,4 @@
-"""What a page draws of a diagnosis: each domain before and after."""
+"""Charts of a diagnosis: residuals of each domain before and after the effects."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PRINTED = {
 
 
 def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Chart:
-    """One domain, before beside after on one scale; without effects only what was fitted."""
+    """Residuals of one domain before and after the effects on one scale; without effects a single panel."""
     factor, unit = PRINTED[residuals.unit]
     sides = [
         (
@@ -66,7 +66,7 @@ def _limits(sides: Sequence[Side], factor: float, *, is_angle: bool) -> tuple[fl
     seen = np.concatenate([np.abs(factor * value).ravel() for _, _, value, *_ in sides])
     bars = np.concatenate([2.0 * factor * sigma for _, _, _, sigma, _ in sides])
     top = float(np.nanmax(seen, initial=0.0))
-    # Bars of a pose that hardly anything is known of may leave the picture; what was measured may not.
+    # Very long error bars may exceed the limits; residuals may not.
     usual = MOST_OF_A_BAR * float(np.nanmedian(bars)) if bars.size else 0.0
     top = 1.08 * max(top, min(float(np.nanmax(bars, initial=0.0)), usual)) or 1.0
     return (0.0 if is_angle else -top), top
@@ -87,7 +87,7 @@ def _domain_marks(
 
 
 def _bars_of_noise(time_s: FloatArray, sigma: FloatArray, *, is_angle: bool) -> Line:
-    """A stroke for each: noise differs from pose to pose, and nothing is known between them."""
+    """A bar for each pose or move, since noise differs between them."""
     low = np.zeros(len(sigma)) if is_angle else -2.0 * sigma
     x = np.column_stack([time_s, time_s, np.full(len(time_s), np.nan)]).ravel()
     y = np.column_stack([low, 2.0 * sigma, np.full(len(time_s), np.nan)]).ravel()

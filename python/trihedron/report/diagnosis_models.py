@@ -28,7 +28,7 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         before, after = getattr(diagnosis.baseline, name), getattr(diagnosis.extended, name)
         if before is None or after is None or before["raw_unit"] == "none":
             continue
-        # Without an effect both models are one.
+        # Without an effect both models are equal.
         models = (before, after) if diagnosis.effects else (before,)
         rows = [
             (f"S_{AXES[i]}{AXES[j]}", *(_cell(model, "S", (i, j)) for model in models))
@@ -83,7 +83,7 @@ def _number_with_sigma(value: float, sigma: float) -> str:
 
 
 def candidates_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """Every effect of the catalogue: what was tried, and why the others could not be."""
+    """Every effect of the catalogue: those tried, and the reason for the others."""
     missing: dict[str, list[str]] = {}
     for candidate in diagnosis.candidates:
         if not candidate.applicable:
@@ -93,7 +93,7 @@ def candidates_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 
 def candidates_table(diagnosis: Diagnosis) -> Table:
-    """Every effect that was tried: its score, its size at most, and what became of it."""
+    """Every effect that was tried: its score, the limit on its size, and the outcome."""
     accepted = {effect.id for effect in diagnosis.effects}
     tried = sorted((c for c in diagnosis.candidates if c.applicable), key=_order)
     rows = [
@@ -114,7 +114,7 @@ def _order(candidate: Candidate) -> float:
 
 
 def _outcome(candidate: Candidate) -> str:
-    """Why an effect that was tried is not in the model: small p alone is no reason beside what was accepted."""
+    """Why an effect that was tried was not accepted: redundant, a stated reason, or not needed."""
     if candidate.superseded_by is not None:
         return f"redundant with {candidate.superseded_by}"
     return candidate.reason or "not needed"
@@ -124,7 +124,7 @@ MOST_COEFFICIENTS = 6
 
 
 def relations_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """One block per empirical relation; none where nothing predicts."""
+    """One block per empirical relation."""
     return tuple(Facts(_rows(one)) for one in diagnosis.relations)
 
 

@@ -1,4 +1,4 @@
-"""A given model against a recording in words: which numbers differ, which noise, and how the fit improves by stages."""
+"""A given model compared with a recording: parameters and noise that differ, and prediction errors by stage."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from trihedron.report.numbers import MINUS, decimals_of, how_many, plain_number,
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 NAMED_SIGMAS = 3.0
-"""Components of a group that differs are named from here on; the largest always is."""
+"""Components of a differing group are listed from this many σ; the largest always is."""
 _WORDS = {
     "accel-bias": "accelerometer {} bias",
     "accel-scale": "accelerometer {} scale",
@@ -34,9 +34,9 @@ GROUPS = {
     "gravity": "gravity",
 }
 MOST_NUMBERS, MOST_NOISE = 3, 2
-"""Clauses of numbers and of noise in a headline, which is one sentence; a table holds them all."""
+"""Most clauses about parameters and about noise in a headline; a table lists all."""
 _SENTENCES_FIRST = ("unit", "frame", "range", "rate")
-"""What is wrong with every reading of a sensor is said before its noise."""
+"""Errors of every reading of a sensor, which come before its noise."""
 _SIZE = re.compile(r"(?<![\w.])\d[\d.]*(?:e[+−-]?\d+)?")
 _HEAD = ("parameter", "model", "recording", "recording − model", "p of its group")
 _STAGES = {
@@ -66,7 +66,7 @@ def differing_numbers(diagnosis: Diagnosis) -> list[str]:
 
 
 def differing_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """The parameters that differ as a table; what they resemble, and noise that differs, as sentences."""
+    """The parameters that differ as a table; likely mistakes, and noise that differs, as sentences."""
     shown = [p for p in diagnosis.parameters if p.significant]
     rows = tuple(map(_row, shown))
     sentences = [*_remarks_in_order(shown), *differing_noise(diagnosis)]
@@ -85,9 +85,9 @@ def _remarks_in_order(parameters: list[ParameterDifference]) -> list[str]:
 
 
 def differing_in_short(diagnosis: Diagnosis) -> list[str]:
-    """What differs for one sentence: every number while they are few, else the groups with their largest.
+    """Differences for one sentence: every parameter if they are few, else groups with their largest member.
 
-    The most certain first; what no longer fits is counted.
+    The most significant first; the rest is counted.
     """
     clauses = {said: _as_clause(together) for said, together in _noise_in_words(diagnosis).items()}
     noise = list(clauses.values())
@@ -96,7 +96,7 @@ def differing_in_short(diagnosis: Diagnosis) -> list[str]:
     numbers = [word for word in differing_numbers(diagnosis) if word not in _remarks(diagnosis)]
     if len(numbers) > MOST_NUMBERS:
         numbers = _groups_in_short(diagnosis)
-    # Beside parameters, noise is named only where every reading of a sensor is wrong.
+    # Together with parameters, only noise terms that affect every reading of a sensor are listed.
     named = (whole if numbers else noise)[:MOST_NOISE]
     left, quieter = len(numbers) - MOST_NUMBERS, len(noise) - len(named)
     more = [f"{left} more"] if left > 0 else []
@@ -105,12 +105,12 @@ def differing_in_short(diagnosis: Diagnosis) -> list[str]:
 
 
 def _as_clause(sentence: str) -> str:
-    """A sentence of noise as a clause of another: without what it adds behind a semicolon."""
+    """A sentence about noise as a clause, cut at its first semicolon."""
     return (sentence[0].lower() + sentence[1:]).split("; ")[0].rstrip(".")
 
 
 def _groups_in_short(diagnosis: Diagnosis) -> list[str]:
-    """Groups that differ, the most certain first, each with the largest of its members beyond their errors."""
+    """Groups that differ, the most significant first, each with its largest significant member."""
     groups: dict[str, list[ParameterDifference]] = {}
     for p in diagnosis.parameters:
         if p.significant:
@@ -143,21 +143,21 @@ def _sentence(n: NoiseDifference) -> str:
 
 
 def differing_noise(diagnosis: Diagnosis) -> list[str]:
-    """One sentence for every figure of noise or sampling that differs, axes with another size of it together."""
+    """One sentence per figure of noise or sampling that differs; axes that differ in size only are merged."""
     return list(dict.fromkeys(_noise_in_words(diagnosis).values()))
 
 
 def _noise_in_words(diagnosis: Diagnosis) -> dict[str, str]:
-    """What is said of every figure, and what of all together that differ from it in nothing but one number."""
+    """For every sentence the merged one of all sentences that differ from it in a single number."""
     alike: dict[str, list[str]] = {}
     for said in dict.fromkeys(map(_sentence, _noise_that_differs(diagnosis))):
-        # More numbers are a band, an interval: nothing that ranges may be made of.
+        # Sentences with several numbers state a band or an interval, and are not merged.
         alike.setdefault(_SIZE.sub("", said) if len(_SIZE.findall(said)) == 1 else said, []).append(said)
     return {said: ranged(same) or said for same in alike.values() for said in same}
 
 
 def numbers_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """The parameters of the model that agree with the recording's; those that differ stand apart."""
+    """The parameters of the model that agree with the recording's; the others have a table of their own."""
     shown = sorted((p for p in diagnosis.parameters if not p.significant), key=lambda p: (p.p_value, p.id))
     if not shown:
         return ()
@@ -196,9 +196,9 @@ def _term(n: NoiseDifference) -> str:
 
 
 def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ...]:
-    """Stage by stage how well the recording is predicted; ``size`` names the domains.
+    """Prediction errors of the recording by stage; ``size`` names the domains.
 
-    A stage that repeats the one before it has no column, a domain that no stage changes no row.
+    A stage equal to the one before it has no column, a domain that no stage changes no row.
     """
     stages = [one for k, one in enumerate(diagnosis.stages) if not k or one.domains != diagnosis.stages[k - 1].domains]
     domains = list(dict.fromkeys(d.domain for stage in stages for d in stage.domains))
@@ -238,7 +238,7 @@ def named(p: ParameterDifference) -> str:
 
 
 def in_print(p: ParameterDifference) -> tuple[float, str]:
-    """Factor and unit in which people compare differences of this kind."""
+    """Factor from SI and unit for differences of this kind."""
     return _unit(p, is_difference=True)
 
 
@@ -255,22 +255,22 @@ def _size(p: ParameterDifference) -> str:
 
 def _value(p: ParameterDifference, value: float) -> str:
     scale, unit = _unit(p, is_difference=False)
-    # The error of a scale is relative to it.
+    # The standard error of a scale is relative.
     sigma = p.std * abs(value) if p.id in ("accel-scale", "gyro-scale") else scale * p.std
     return with_unit(_as_known(scale * value, sigma), unit)
 
 
 def _as_known(value: float, sigma: float) -> str:
-    """As many decimals as the difference is known to; six digits where it is exact."""
+    """Decimals by the uncertainty of the difference; six digits where it is exact."""
     if not 0.0 < sigma < float("inf"):
         return plain_number(value, 6)
     places = decimals_of(sigma)
-    # Adding zero takes the sign off what rounds to zero.
+    # Adding 0.0 turns -0.0 into 0.0.
     return f"{round(value, places) + 0.0:.{places}f}".replace("-", MINUS)
 
 
 def _unit(p: ParameterDifference, *, is_difference: bool) -> tuple[float, str]:
-    """The unit that people use for a number of this kind, and what it takes to get there from SI."""
+    """Factor from SI and customary unit for a parameter of this kind."""
     if p.id not in _WORDS:
         return 1.0, "" if p.unit == "1" else unit_in_print(p.unit)
     if p.unit == "1":

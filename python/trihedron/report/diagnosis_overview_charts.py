@@ -1,4 +1,4 @@
-"""What a page draws of a diagnosis as a whole: disagreement by domain, parameters and noise as forests, traces."""
+"""Overview charts of a diagnosis: disagreement by domain, forest plots of parameters and noise, traces."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from trihedron.sensor_model import correct
 from trihedron.units import ratio_of_units
 
 ROW_PX = 26
-"""A row of names on a page."""
+"""Height of a row in pixels."""
 BESIDE = 0.15
-"""Of a row, by which what is found without the effects stands above its middle, and with them below it."""
+"""Offset of the dots without effects above the middle of a row, and with effects below it, in rows."""
 FEWEST_DOMAINS = 2
-"""That are drawn beside one another; of one the table says it."""
+"""Fewest domains for which the chart is drawn; for one the table is enough."""
 ROOM = 1.6
-"""Factor by which an axis of χ² reaches beyond what it holds."""
+"""Margin of the χ² axis beyond its data, as a factor."""
 TWO_SIGMA = 2.0
 WINDOW_S = 6.0
-"""Of traces drawn: a move and its poses on both sides."""
+"""Length of the traces [s]: a move and parts of the poses on both sides."""
 SENSOR_OF = {"accelerometer": "accelerometer", "gyro": "gyroscope"}
 CORRECTED = "corrected"
 RATIOS = ("N", "B", "K", "Q", "bandwidth", "resolution", "range", "rate", "correlation-time", "poses", "moves")
@@ -39,7 +39,7 @@ RATIOS = ("N", "B", "K", "Q", "bandwidth", "resolution", "range", "rate", "corre
 
 
 def strengths_picture(diagnosis: Diagnosis) -> Picture | None:
-    """How far each domain disagrees, beside what noise explains and what still agrees."""
+    """χ² of each domain, with its expectation by noise alone and the limit of agreement."""
     if sum(d.chi2_per_dof > 0.0 for d in diagnosis.domains) < FEWEST_DOMAINS:
         return None
     caption = "How far the recording and the model disagree, domain by domain. χ² per degree of freedom is about 1 by "
@@ -50,7 +50,7 @@ def strengths_picture(diagnosis: Diagnosis) -> Picture | None:
 
 
 def strengths_chart(diagnosis: Diagnosis) -> Chart:
-    """A row a domain: its limit, and dots as modelled and with the effects."""
+    """A row per domain: its limit, and dots without and with the effects."""
     tests = [d for d in diagnosis.domains if d.chi2_per_dof > 0.0]
     after = {d.domain: d.chi2_per_dof for d in diagnosis.remaining} if diagnosis.effects else {}
     names = tuple(MEANING[d.domain] for d in tests)
@@ -79,7 +79,7 @@ def strengths_chart(diagnosis: Diagnosis) -> Chart:
 
 
 def forest_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """Parameters of the recording about those of the model; noise of the model over the recording's."""
+    """Parameters of the recording relative to those of the model, as a forest plot."""
     out: list[Block] = []
     if diagnosis.parameters:
         caption = "Parameters of the recording (dots, 95 % interval) about those of the model (the line at 0); orange: "
@@ -89,7 +89,7 @@ def forest_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 
 def ratio_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """Noise and sampling of the model over the recording's."""
+    """Ratios of noise and sampling, model over recording."""
     rows = [n for n in diagnosis.noise_compared if n.ratio and n.ratio > 0.0 and n.term in RATIOS]
     if not rows:
         return ()
@@ -99,11 +99,11 @@ def ratio_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 
 def forest_chart(parameters: Sequence[ParameterDifference]) -> Chart:
-    """A panel for every group of one unit."""
+    """A panel for every group of parameters."""
     groups: dict[str, list[ParameterDifference]] = {}
     for p in parameters:
         groups.setdefault(p.id, []).append(p)
-    # Groups differ in size: the larger ones would squeeze the smaller to a point on one axis.
+    # Separate axes, since groups differ in size.
     panels = [_forest(GROUPS.get(name, name), members) for name, members in groups.items()]
     return Chart(tuple(panels), columns=min(3, len(panels)))
 
@@ -127,7 +127,7 @@ def _forest(title: str, members: list[ParameterDifference]) -> Panel:
 
 
 def ratios_chart(rows: Sequence[NoiseDifference]) -> Chart:
-    """A row a term and axis, on one logarithmic axis."""
+    """A row per term and axis, on one logarithmic scale."""
     place = -np.arange(1.0, len(rows) + 1.0)
     ratio = np.array([n.ratio for n in rows], dtype=np.float64)
     ends = np.array([n.interval or (math.nan, math.nan) for n in rows])
@@ -165,7 +165,7 @@ Models = tuple[Calibration | None, Calibration | None]
 def traces_picture(
     recording: Recording, simulated: Recording, segments: Segments, models: Models = (None, None)
 ) -> Picture | None:
-    """Simulated over recorded readings where they lie farthest apart."""
+    """Simulated and recorded readings where they differ most."""
     chart = traces_chart(recording, simulated, segments, models)
     if chart is None:
         return None
@@ -178,7 +178,7 @@ def traces_picture(
 def traces_chart(
     recording: Recording, simulated: Recording, segments: Segments, models: Models = (None, None)
 ) -> Chart | None:
-    """A panel a sensor: the axis that differs most, in the move or pose where both sensors differ most together."""
+    """A panel per sensor: its axis that differs most, in the move or pose where the sensors together differ most."""
     sides = _both_sides(recording, simulated, segments, models)
     if not sides:
         return None
@@ -213,7 +213,7 @@ the recording's noise."""
 
 
 def _both_sides(recording: Recording, simulated: Recording, segments: Segments, models: Models) -> list[Side]:
-    """Sensors that both have, the simulation's in the recording's unit; counts beside another unit both corrected."""
+    """Sensors of both logs, the simulation in the recording's unit; both calibrated where only one is in counts."""
     out: list[Side] = []
     mine_s, theirs_s = (log.time_s - log.time_s[0] for log in (recording, simulated))
     for name, sigma in (("accelerometer", segments.accelerometer_sigma), ("gyroscope", segments.gyroscope_sigma)):
@@ -227,7 +227,7 @@ def _both_sides(recording: Recording, simulated: Recording, segments: Segments, 
             own, given = (None if model is None else getattr(model, name) for model in models)
             if own is None or given is None:
                 continue
-            # Noise of raw readings, which S takes to SI.
+            # Noise of raw readings, converted to SI by S.
             sigma = np.abs(own.S) @ np.asarray(sigma)
             mine, theirs, scale = correct(mine, own.S, own.b), correct(theirs, given.S, given.b), 1.0
             printed = unit_in_print(own.si_unit)

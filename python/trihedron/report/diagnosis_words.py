@@ -1,4 +1,4 @@
-"""A diagnosis in words: the verdict, where it disagrees, and residuals in the units that people use."""
+"""A diagnosis in words: the verdict, where it disagrees, and residuals in customary units."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LEVELS: dict[str, Level] = {
     "not-testable": "usable",
     "unexplained": "bad",
 }
-"""A diagnosis that names what is missing has done its work; one that cannot is no base for anything."""
+"""Colour of each verdict: good only if consistent, bad if the disagreement has no explanation."""
 
 MEANING = {
     "static-accel": "gravity error in static poses",
@@ -39,19 +39,19 @@ MEANING = {
     "noise": "noise and sampling",
 }
 LEAST_SHARE = 0.005
-"""Of the misfit, that is not 0 % in print."""
+"""Smallest share of the misfit that is printed."""
 MOST_NAMED = 4
 
 
 def _followed(diagnosis: Diagnosis) -> str:
-    """What readings follow, the largest relation first, by the variables that a person would plot."""
+    """Variables that the residuals follow, those of the largest relation first."""
     names = list(dict.fromkeys(name for one in diagnosis.relations for name in one.depends_on))
     more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
     return listed(names[:MOST_NAMED]) + more
 
 
 def verdict_in_words(diagnosis: Diagnosis) -> str:
-    """The verdict and what carries it, in one sentence."""
+    """The verdict and its reasons in one sentence."""
     off: list[str] = [MEANING[d.domain] for d in diagnosis.domains if d.disagrees]
     left: list[str] = [MEANING[d.domain] for d in diagnosis.remaining if d.disagrees]
     numbers = differing_in_short(diagnosis)
@@ -99,7 +99,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
 
 
 def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = "") -> str:
-    """What to do with the verdict; ``improved`` is the scenario that has taken over what differs already."""
+    """The next step; ``improved`` is the scenario already written with the parameters that differ."""
     if diagnosis.verdict == "consistent":
         store = "Nothing is missing: store S and b with trihedron calibrate LOG -o FILE, and use them."
         return _dependent(diagnosis) or store
@@ -125,7 +125,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
 
 
 def _taken_by(model: str) -> str:
-    """The option that writes the model anew; a log's simulation is not ours to write."""
+    """The option that rewrites the model, or advice for a simulated log, whose source is unknown."""
     if model.endswith(".toml"):
         return "--improved FILE.toml writes your scenario with them"
     if model.endswith(".json"):
@@ -134,31 +134,31 @@ def _taken_by(model: str) -> str:
 
 
 def level_of(diagnosis: Diagnosis) -> Level:
-    """The colour of the verdict: agreement with a reference that was made from these readings proves nothing."""
+    """The colour of the verdict; not good for agreement with a reference that was computed from these readings."""
     return "usable" if diagnosis.verdict == "consistent" and _dependent(diagnosis) else LEVELS[diagnosis.verdict]
 
 
 def _dependent(diagnosis: Diagnosis) -> str:
-    """What to do about a reference that is not independent; empty where none is."""
+    """The action for a reference that is not independent; empty where it is or there is none."""
     found = getattr(diagnosis, "findings", ())
     return next((str(f.action) for f in found if f.code is FindingCode.REFERENCE_NOT_INDEPENDENT), "")
 
 
 def _not_compared(diagnosis: Diagnosis) -> str:
-    """A gyro that one side lacks is no agreement."""
+    """A remark where the gyro was not compared; else empty."""
     found = getattr(diagnosis, "findings", ())
     is_out = any(f.code is FindingCode.GYROSCOPE_LEFT_OUT for f in found)
     return "; the gyro was not compared" if is_out else ""
 
 
 def _footnotes(diagnosis: Diagnosis) -> str:
-    """What was found and is no physics of the model: a disturbed pose, a weak spectral line."""
+    """A remark on minor effects: a disturbed pose, a weak spectral line."""
     named = list(dict.fromkeys(effect.id for effect in diagnosis.effects))
     return f" (also found: {listed(named)})" if named else ""
 
 
 def quantity(held: HeldOut) -> str:
-    """What a cross-validated figure measures: mechanisms of the accelerations of a rotation are judged by these."""
+    """The quantity of a cross-validated figure; effects on the acceleration during rotations are judged by that."""
     return (
         "acceleration during rotations" if (held.domain, held.unit) == ("dynamics", "m/s^2") else MEANING[held.domain]
     )
@@ -169,7 +169,7 @@ def rms_in_words(test: DomainTest) -> str:
 
 
 def size_in_words(value: float, unit: str) -> str:
-    """A residual in the unit that people use for errors of this kind."""
+    """A residual in the customary unit of its kind."""
     if unit == "m/s^2":
         return f"{plain_number(mm_s2_from_m_s2(value))} mm/s²"
     if unit == "rad/s":
@@ -184,8 +184,8 @@ def printed_unit(unit: str) -> str:
 
 
 def parameter_unit(unit: str, largest: float) -> tuple[float, str]:
-    """What parameters of an effect are multiplied by, the largest being ``largest``, and their unit then: rates in °/s,
-    a power of ten where numbers are small or large."""
+    """Factor and unit for parameters of an effect whose largest is ``largest``: rates in °/s, a power of ten where
+    numbers are small or large."""
     factor, printed = 1.0, printed_unit(unit)
     if unit.startswith(("rad/s", "(rad/s)")):
         factor, printed = degrees_from_radians(1.0), printed.replace("rad", "°", 1)
@@ -196,7 +196,7 @@ def parameter_unit(unit: str, largest: float) -> tuple[float, str]:
 
 
 def parameter_in_words(value: float, unit: str) -> str:
-    """One parameter of an effect as people read it."""
+    """One parameter of an effect in its printed unit."""
     scale, printed = parameter_unit(unit, abs(value))
     return f"{plain_number(scale * value, 2)} {printed}".rstrip()
 
@@ -206,7 +206,7 @@ def p_in_words(p: float) -> str:
 
 
 def where_in_words(test: DomainTest) -> str:
-    """Channels, poses or moves, times and frequencies that carry a disagreement."""
+    """Channels, poses or moves, times and frequencies of a disagreement."""
     where = test.where
     parts = []
     if where.channels:
@@ -231,7 +231,7 @@ def value_in_words(value: float, sigma: float) -> str:
 
 
 def differing_headline(diagnosis: Diagnosis) -> tuple[Headline, ...]:
-    """How many parameters of the model are others than the recording's."""
+    """Number of parameters of the model that differ from the recording's."""
     n_off = sum(p.significant for p in diagnosis.parameters)
     if not n_off:
         return ()
@@ -239,7 +239,7 @@ def differing_headline(diagnosis: Diagnosis) -> tuple[Headline, ...]:
 
 
 def headlines_of(diagnosis: Diagnosis) -> tuple[Headline, ...]:
-    """What every effect explains, and what the strongest gains on unseen poses and moves; else the worst domain."""
+    """Share of the misfit of every effect, and the cross-validated gain of the strongest; else the worst domain."""
     shares = tuple(
         Headline(f"{effect.id} explains", plain_number(100.0 * effect.share, 2), "%", "of the misfit")
         for effect in diagnosis.effects

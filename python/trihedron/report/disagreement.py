@@ -1,4 +1,4 @@
-"""The second act of the demonstration told as a story: simulation and log disagree, why, and what mends it."""
+"""Report of the demonstration's second act: a simulation that a log contradicts, the cause, and the correction."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def disagreement_report(
     folder: Path,
     seed: int,
 ) -> Document:
-    """The story: the disagreement, numbers told from physics, the improved simulation, the seal opened."""
+    """Lay out the disagreement, differing parameters and missing effects, the improved simulation, the answer."""
     numbers = differing_numbers(found)
     more = len(numbers) - _MOST_NUMBERS
     told = tuple(("", word) for word in numbers[:_MOST_NUMBERS]) + ((("", f"and {more} more"),) if more > 0 else ())

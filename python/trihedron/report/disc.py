@@ -11,7 +11,7 @@ _RADIUS = 100.0
 
 
 def drawn_disc(disc: Disc, caption: str) -> str:
-    """Rim, circles of 30° and 60° above it, axes 1 and 2, poses taken and poses wanted."""
+    """Rim, circles of 30° and 60° above it, axes X and Y, poses taken and poses wanted."""
     circles = "".join(
         f'<circle class="rim" r="{_RADIUS * math.sqrt(1.0 - math.sin(math.radians(e))):.1f}"/>' for e in (0, 30, 60)
     )
@@ -21,7 +21,7 @@ def drawn_disc(disc: Disc, caption: str) -> str:
         for word, x, y in (("+X", 118, 3), ("−X", -118, 3), ("+Y", 0, -111), ("−Y", 0, 119))
     )
     marks = []
-    # What is wanted lies on top.
+    # Wanted poses are drawn on top.
     for x, y, label, said, kind in sorted(disc.points, key=lambda p: p[4]):
         px, py, told = f"{_RADIUS * x:.1f}", f"{-_RADIUS * y:.1f}", f'data-t="{escape(said)}"'
         if kind == "taken":
@@ -39,6 +39,6 @@ def drawn_disc(disc: Disc, caption: str) -> str:
 
 
 def equal_area(up: tuple[float, float, float]) -> tuple[float, float]:
-    """Lambert's azimuthal projection of a unit vector about the pole it is nearest to, the equator at radius one."""
+    """Lambert's azimuthal projection of a unit vector about the nearest pole; the equator has radius one."""
     factor = 1.0 / math.sqrt(1.0 + abs(up[2]))
     return up[0] * factor, up[1] * factor

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from trihedron.report.chart import Chart
 
 Level = Literal["good", "usable", "bad"]
-"""The colour of a verdict: nothing speaks against it, something does, not to be trusted."""
+"""The colour of a verdict: no problems, usable with warnings, not to be trusted."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Code:
-    """Lines of a file or a command, to be copied as they are."""
+    """Lines of a file or a command, printed verbatim."""
 
     text: str
 
@@ -54,7 +54,7 @@ class FindingList:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure as data, made when a writer wants it: a page draws it itself, a notebook by matplotlib."""
+    """A figure as data, made on demand: a page draws it as SVG, a notebook by matplotlib."""
 
     name: str
     caption: str
@@ -74,7 +74,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Headline:
-    """A number that the reader came for: ``beside`` says what to hold it against."""
+    """A main figure of the report: ``beside`` is the text for comparison."""
 
     what: str
     value: str
@@ -86,9 +86,9 @@ class Headline:
 class Document:
     """A whole report. The first section is the one that fits one screen.
 
-    ``headlines`` (the first matters most) and the ``lead`` figure stand beside the verdict; ``stated_level`` overrides
-    the colour that follows from ``is_trustworthy`` and the findings; ``provenance`` says how the report was made;
-    ``next_step`` is what to do with the result.
+    ``headlines`` (most important first) and the ``lead`` figure are next to the verdict; ``stated_level`` overrides
+    the colour that follows from ``is_trustworthy`` and the findings; ``provenance`` is how the report was made;
+    ``next_step`` is the advice for the use of the result.
     """
 
     title: str
@@ -114,13 +114,13 @@ class Document:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """All of them, in reading order."""
+        """All findings, in reading order."""
         lists = [b for section in self.sections for b in section.blocks if isinstance(b, FindingList)]
         return tuple(finding for one in lists for finding in one.findings)
 
     @property
     def what_next(self) -> str:
-        """What to do first: what the gravest finding asks for, where it is serious."""
+        """The action of the gravest finding where it is serious, else ``next_step``."""
         first = self.foremost
         if first is None or first.severity is not Severity.SERIOUS or not first.action:
             return self.next_step
@@ -128,7 +128,7 @@ class Document:
 
     @property
     def foremost(self) -> Finding | None:
-        """The first of the gravest findings, where it is more than a note: what a reader should know first."""
+        """The first serious finding, else the first warning; None without either."""
         for severity in (Severity.SERIOUS, Severity.WARNING):
             for finding in self.findings:
                 if finding.severity is severity:
@@ -137,7 +137,7 @@ class Document:
 
 
 def with_its_making(document: Document) -> Document:
-    """The document with how it was made as its last section, for writers that have no foot."""
+    """The document with its provenance as the last section, for writers without a footer."""
     if not document.provenance:
         return document
     return replace(document, sections=(*document.sections, Section("How this was made", (Facts(document.provenance),))))

@@ -1,4 +1,4 @@
-"""Figures that are drawn when they are wanted: text and JSON never load matplotlib, and do without it."""
+"""Figures by matplotlib, imported on demand: text and JSON work without it."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from trihedron.report.document import Picture
 
 
 class NoFiguresError(RefusedError):
-    """Figures were asked for where matplotlib is not installed."""
+    """Figures are requested, but matplotlib is not installed."""
 
 
 def figures() -> ModuleType:
-    """:mod:`trihedron.report.figures`, which alone draws by matplotlib.
+    """:mod:`trihedron.report.figures`, the only module that imports matplotlib.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def figures() -> ModuleType:
 
 
 def png_of(picture: Picture) -> bytes:
-    """A figure drawn, as a PNG file; raises as :func:`figures` does."""
+    """A figure as the bytes of a PNG file; raises as :func:`figures` does."""
     room = figures()
     made: bytes = room.png(room.draw_chart(picture.chart))
     return made

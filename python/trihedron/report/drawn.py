@@ -1,4 +1,4 @@
-"""Charts drawn: marks as SVG that is stretched to its place, axes and words as HTML that is not."""
+"""Charts as HTML: marks as SVG that scales with the panel, axes and text as HTML that does not."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ from trihedron.report.sphere import drawn_sphere
 from trihedron.report.ticks import ticks
 
 COARSE = 10
-"""Units in a step of a long curve: no screen shows less of a line through so many points."""
+"""Resolution of long curves, in units of a panel; finer steps are not visible."""
 FEW_LETTERS = 20
-"""Of all figures below a panel that a phone has room for; of more, every other one is left out there."""
+"""Most characters of the tick labels below a panel on a phone; beyond, every other label is hidden there."""
 LONG = 500
 BETWEEN = "|"
-"""Stands between what is told of the dots, or the bars, of one path."""
+"""Separator between the tooltips of the dots, or the bars, of one path."""
 FEWEST_SAID = 2
 MOST_LETTERS = 32
-"""Of all names below a panel; half a page has room for these side by side. Longer ones are counted."""
+"""Most characters of all names below a panel of half a page; beyond, positions are numbered instead."""
 
 
 def drawn(chart: Chart, caption: str) -> str:
-    """The chart as HTML with inline SVG; ``caption`` is what a screen reader is told of each panel."""
+    """The chart as HTML with inline SVG; ``caption`` is the label of each panel for screen readers."""
     link = " data-linked" if chart.is_linked else ""
     parts = [_legend(chart)] if chart.legend else []
     parts.append(f'<div class="panels n{chart.columns}"{link}>')
@@ -64,7 +64,7 @@ def _one(panel: Panel | Disc | Sphere | Matrix, caption: str, around: tuple[int,
 
 
 def _surroundings(chart: Chart) -> tuple[int, bool]:
-    """What aligns neighbours: letters left of panels below each other, a line of titles of panels beside each other."""
+    """Alignment of panels: width of the y labels [letters] in a column of panels; a title line in a row of panels."""
     panels = [panel for panel in chart.panels if isinstance(panel, Panel)]
     if chart.columns > 1:
         return 0, any(panel.title for panel in panels)
@@ -159,7 +159,7 @@ def _note(note: Note, at: Places) -> str:
 def _mark(mark: Mark, at: Places) -> str:
     if isinstance(mark, Line):
         thin = (" dash" if mark.is_dashed else "") + (" thin" if mark.is_thin else "")
-        # Strokes of noise are no curve to read a value from.
+        # Shaded bars of noise are not a curve, and have no tooltip.
         name = f' data-n="{escape(mark.name)}"' if mark.name and mark.colour != "shade" else ""
         x, y = at.x(mark.x), at.y(mark.y)
         if len(x) < LONG:
@@ -184,7 +184,7 @@ def _mark(mark: Mark, at: Places) -> str:
 
 
 def _spans(panel: Panel, at: Places) -> list[str]:
-    """All stretches of one colour as one path, in the order in which the colours come."""
+    """All spans of one colour as one path, in the order of first use."""
     places: dict[str, str] = {}
     for mark in panel.marks:
         if isinstance(mark, Span):
@@ -195,7 +195,7 @@ def _spans(panel: Panel, at: Places) -> list[str]:
 
 
 def _path(x: FloatArray, y: FloatArray) -> str:
-    """Relative steps in whole units: the shortest text that keeps every point within half a unit."""
+    """SVG path of relative steps in whole units, so that every point is within half a unit."""
     good = np.isfinite(x) & np.isfinite(y)
     xi = np.round(np.where(good, x, 0.0)).astype(int).tolist()
     yi = np.round(np.where(good, y, 0.0)).astype(int).tolist()
@@ -206,7 +206,7 @@ def _path(x: FloatArray, y: FloatArray) -> str:
             before = None
             continue
         if before is None:
-            # A lone point before a gap leaves no step to say.
+            # A lone point before a gap has no step.
             if out and out[-1].endswith("l"):
                 out[-1] = out[-1][:-1]
             out.append(f"M{a} {b}l")
@@ -249,13 +249,13 @@ def _points(mark: Points, at: Places) -> str:
 
 
 def _told(said: Sequence[str], seen: Iterable[int], first: str, last: str) -> str:
-    """What is told of the marks ``seen`` of one path, without what all of them begin and end with."""
+    """Tooltips of the marks ``seen`` of one path, without their common beginning and end."""
     parts = (said[k][len(first) : len(said[k]) - len(last)] for k in seen)
     return escape(BETWEEN.join(part.replace(BETWEEN, "¦") for part in parts))
 
 
 def shared_ends(said: Sequence[str]) -> tuple[str, str]:
-    """What all begin and end with, told once: most of a page of dots would be these words again and again."""
+    """Common beginning and end of all tooltips, written once per path to keep the page small."""
     if len(said) < FEWEST_SAID:
         return "", ""
     least, most = min(said), max(said)
@@ -297,7 +297,7 @@ def _band(mark: Band, at: Places) -> str:
 
 
 def envelope(x: FloatArray, y: FloatArray, most: int = 1000) -> tuple[FloatArray, FloatArray]:
-    """Smallest and largest value of each block: a long log drawn whole, with no peak lost."""
+    """Smallest and largest value of each block, so that a long log keeps its peaks."""
     n = len(y)
     if n <= most:
         return x, y
@@ -314,7 +314,7 @@ def envelope(x: FloatArray, y: FloatArray, most: int = 1000) -> tuple[FloatArray
 
 
 def said(what: str, x: str, value: float, unit: str, sigma: float | None = None) -> str:
-    """What a reader is told of a point: ``pose 7: 1.53 ± 0.98 mm/s²``."""
+    """Tooltip of a point: ``pose 7: 1.53 ± 0.98 mm/s²``."""
     from trihedron.report.numbers import with_sigma
 
     number = plain_number(value) if sigma is None else with_sigma(value, sigma)

@@ -1,4 +1,4 @@
-"""What a page draws of an effect: its curve over the variable that drives it, or the residual that it explains."""
+"""Charts of an effect: its curve over the variable that drives it, or the residual that it explains."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from trihedron.report.numbers import plain_number
 from trihedron.units import degrees_from_radians
 
 HALF_WINDOW_S = 0.3
-"""Readings about the middle of a pose that are averaged into its place on an axis."""
+"""Half the interval [s] about an instant over which readings are averaged."""
 TWO_SIGMA = 2.0
-# What drives an effect whose columns are functions of no one variable.
+# Driving variable for the chart of effects that are not functions of a single variable.
 _FORCE = ("accel-saturation", "accel-hysteresis", "quantisation", "earth-rate")
 _RATE = (
     "accel-gyro-time-offset", "sensor-lag", "lever-arm", "accel-size-effect", "gyro-scale-nonlinearity",
@@ -36,8 +36,8 @@ def effect_chart(
     segments: Segments,
     calibration: Calibration,
 ) -> Chart | None:
-    """An effect as curves over the variable that drives it, with what poses show; of one that acts in moves the
-    residual that it explains against force, rate or time besides."""
+    """Curves of an effect over the variable that drives it, with the data of poses; for one without such data also the
+    residual that it explains over force, rate or time."""
     panels = curve_panels(effect.curves) or rest_panels(effect)
     if not rest_panels(effect) and not any(len(one.data) for one in effect.curves):
         panels += _explained(effect, residuals, recording, segments, calibration)
@@ -45,7 +45,7 @@ def effect_chart(
 
 
 def curve_panels(curves: Sequence[EffectCurve]) -> list[Panel]:
-    """A panel for every variable (and sensor): its curves with two σ about them, and poses as dots."""
+    """A panel for every variable (and sensor): curves with ± 2 σ, and poses as dots."""
     keys = list(dict.fromkeys((one.sensor, one.driver, one.driver_axis, one.is_relative) for one in curves))
     panels = []
     for key in keys:
@@ -107,7 +107,7 @@ def _explained(
     segments: Segments,
     calibration: Calibration,
 ) -> list[Panel]:
-    """The residual that an effect explains against force, rate or time."""
+    """The residual that an effect explains, over force, rate or time."""
     domains = {r.domain: r for r in residuals}
     named = [h.domain for h in effect.held_out if h.domain in domains]
     if not named or not len(domains[named[0]].before):
@@ -140,7 +140,7 @@ def _drivers(
 
 
 def force_at(time_s: FloatArray, recording: Recording, calibration: Calibration) -> FloatArray:
-    """(n, 3) calibrated specific force about each instant, m/s²."""
+    """(n, 3) mean calibrated specific force about each instant, m/s²."""
     assert recording.accelerometer is not None
     sensor = calibration.accelerometer
     first = np.searchsorted(recording.time_s, time_s - HALF_WINDOW_S)
@@ -169,7 +169,7 @@ def fastest_rate(time_s: FloatArray, recording: Recording, segments: Segments, c
 
 
 def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> Panel:
-    """Residuals without the effects as dots; explained by the effects as circles, where poses are the same."""
+    """Residuals without the effects as dots; the part that the effects explain as circles, for equal rows."""
     factor, unit = PRINTED[seen.unit]
     kind = "pose" if seen.kind == "pose" else "move"
     marks: list[Mark] = [Level(y=0.0)]
@@ -183,7 +183,7 @@ def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> P
             for n, (a, v) in enumerate(zip(x, data, strict=True), start=1)
         ]
         marks.append(Points(x, data, told, None, f"{channel}: without the effects", colour))
-        # An angle between vectors is not a difference: the part explained would be no physics.
+        # Tilt errors are angles between vectors: their difference is not the explained part.
         after = factor * seen.after[:, k]
         if is_same and seen.domain == "moves":
             told = [said(f"{kind} {n}, with the effects", "", float(v), unit) for n, v in enumerate(after, 1)]

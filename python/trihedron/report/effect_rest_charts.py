@@ -1,4 +1,4 @@
-"""What a page draws of an effect of a static log: biases over temperature or time with the curve through them."""
+"""Charts of an effect in a static log: bias over temperature or time with the fitted curve."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from trihedron.report.drawn import said
 from trihedron.report.numbers import plain_number
 
 MOST = 200
-"""Dots of one axis; neighbours in time are averaged."""
+"""Most dots per axis; neighbours in time are averaged."""
 TWO_SIGMA = 2.0
 POWERS = ("bias_per_kelvin", "bias_per_kelvin2", "bias_per_kelvin3")
 """Parameters of the polynomial of temperature, about the mean temperature of the log."""
 
 
 def rest_panels(effect: AcceptedEffect) -> list[Panel]:
-    """A panel an axis: the bias of every stretch about its mean, and the polynomial; of a drift its course alone."""
+    """A panel per axis: bias about its mean and the polynomial of temperature; for a drift one panel over time."""
     variant, series = effect.model.get("variant"), effect.model.get("curve", {})
     if variant == "rest-curve" and "temperature_degc" in series:
         return _over_temperature(effect)
@@ -39,7 +39,7 @@ def _over_temperature(effect: AcceptedEffect) -> list[Panel]:
     panels = []
     for k, axis in enumerate(XYZ):
         slopes = [sizes.get(f"{name}_{axis.lower()}", 0.0) for name in POWERS]
-        # Biases are told about the mean of their orientation, where the curve has a mean of its own.
+        # Biases are relative to the mean of their orientation: add the mean of the curve there.
         of_heat = _polynomial(heat - about, slopes)
         mean = np.array([of_heat[pose == p].mean() for p in range(pose.max() + 1)])[pose]
         dots = factor * _averaged(values[k] + mean - of_heat.mean())

@@ -1,4 +1,4 @@
-"""A chart's data as a matplotlib figure: what a page draws as SVG, for notebooks and ``.plot()``."""
+"""Charts as matplotlib figures, for notebooks and ``.plot()``."""
 
 from __future__ import annotations
 
@@ -42,29 +42,29 @@ COLOURS: dict[Colour, str] = {
     "soft": "#8A949C", "grey": "#B4BCC2", "warn": "#D55E00",
 }  # fmt: skip
 MOST_LETTERS = 24
-"""Of a name beside its row, which wraps there, and of one below its place, which is cut at its front."""
+"""Most characters per line of a name beside its row, and of a name below an axis, which is cut at its front."""
 MOST_NAMES = 24
-"""Places along an axis that are named below it; more are counted."""
+"""Most positions along an axis that are named; more are numbered."""
 _UNIT = re.compile(r" +\[")
 WIDTH_IN = 9.5
 DPI = 110
 PX_AN_INCH = 140.0
-"""Of a page's figures, which are lower: it has room for more of them on a screen."""
+"""Pixels of a page's panel height per inch of a figure."""
 HIGH_PX = 420
-"""Of what is as high as wide."""
+"""Height of a square panel [px]."""
 FEW_DECADES = 100.0
-"""Axes that span less are labelled thrice a decade."""
+"""Logarithmic axes with a smaller ratio of limits have three labels per decade."""
 
 
 class ShownFigure(Figure):
-    """A figure that a notebook shows by itself, whatever its back end."""
+    """A figure that a notebook displays with any matplotlib backend."""
 
     def _repr_png_(self) -> bytes:
         return png(self)
 
 
 def png(figure: Figure) -> bytes:
-    """A drawn figure as a PNG file."""
+    """A figure as the bytes of a PNG file."""
     buffer = io.BytesIO()
     # Without a date or version the same data give the same bytes.
     figure.savefig(buffer, format="png", metadata={"Software": None})
@@ -72,12 +72,12 @@ def png(figure: Figure) -> bytes:
 
 
 def draw_onto(chart: Callable[[], Chart], axes: Sequence[Axes]) -> Figure:
-    """The panels of a chart on axes of the caller's own, one for each; on a single one the first.
+    """Draw the panels of a chart on the caller's axes, one for each; on a single one the first panel.
 
     Raises
     ------
     ValueError
-        When there are several axes, but not as many as panels.
+        When there are several axes, and their number is not that of the panels.
     """
     laid_out = chart().panels
     if len(axes) == 1:
@@ -117,7 +117,7 @@ def draw_chart(chart: Callable[[], Chart]) -> Figure:
             )
     for k, (axis, panel) in enumerate(zip(axes, panels, strict=False)):
         if isinstance(panel, Panel) and (len(along) > 1 or k + columns >= len(panels)):
-            # Nothing below it: what a shared axis hides in the rows above is written here.
+            # The lowest panel of its column shows the labels that a shared axis hides.
             axis.tick_params(labelbottom=True)
             _name_below(axis, panel.x)
     for axis in axes[len(panels) :]:
@@ -128,7 +128,7 @@ def draw_chart(chart: Callable[[], Chart]) -> Figure:
 
 
 def _named(axes: Sequence[Axes]) -> dict[str, Artist]:
-    """A name once: a colour that differs from panel to panel is that panel's axis."""
+    """Legend entries by name, each once, although the colour may differ between panels."""
     return {name: mark for axis in axes for mark, name in zip(*axis.get_legend_handles_labels(), strict=True)}
 
 
@@ -149,7 +149,7 @@ def _draw_any(axis: Axes, panel: Panel | Disc | Sphere | Matrix) -> None:
         return
     share = np.abs(panel.values) / (panel.limit or 1.0)
     for up, value, size in zip(panel.directions, panel.values, share, strict=True):
-        # What lies below the horizon is hollow.
+        # Directions below the horizon are hollow.
         fill = "full" if up[2] >= 0.0 else "none"
         colour = COLOURS["accent" if value > 0.0 else "c1"]
         axis.plot(*equal_area(tuple(up)), "o", markersize=3.0 + 9.0 * size, color=colour, fillstyle=fill)
@@ -169,7 +169,7 @@ def _rim(axis: Axes) -> None:
 
 
 def _draw_matrix(axis: Axes, matrix: Matrix) -> None:
-    """Orange positive, blue negative, the lower triangle."""
+    """The lower triangle of correlations: orange positive, blue negative."""
     names, n = matrix.names, len(matrix.names)
     lower = np.where(np.tri(n, k=-1, dtype=bool), matrix.values, np.nan)
     axis.imshow(lower, cmap="PuOr_r", vmin=-1.0, vmax=1.0)
@@ -200,7 +200,7 @@ def _draw_panel(axis: Axes, panel: Panel) -> None:
 
 
 def _decades(axis: Axis, limits: tuple[float, float] | None) -> None:
-    """Figures as one reads them, at 1, 2 and 5 of every decade; of many decades at the first only."""
+    """Plain labels at 1, 2 and 5 of every decade; for many decades at powers of ten only."""
     is_short = limits is not None and limits[1] < FEW_DECADES * limits[0]
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if is_short else (1.0,)))
     axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
@@ -241,7 +241,7 @@ def _draw(axis: Axes, mark: Mark) -> None:
         else:
             axis.bar(mark.x, mark.y - base, mark.width, bottom=base, color=colour, label=mark.name or None)
     elif isinstance(mark, Span):
-        # A shade is pale already; any other colour would hide the curves.
+        # Other colours than the pale shade are made transparent, so that curves stay visible.
         alpha = 1.0 if mark.colour == "shade" else 0.35
         axis.axvspan(mark.first, mark.last, color=colour, alpha=alpha, linewidth=0, zorder=0, label=mark.name or None)
     elif isinstance(mark, Note):

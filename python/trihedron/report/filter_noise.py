@@ -1,4 +1,4 @@
-"""Noise for a filter, as a report."""
+"""Report of filter noise."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ CAUSE_WORDS = {
     "g-sensitivity": ("g-sensitivity", "trihedron calibrate with known motion: none of it goes into N or K"),
     "reference": ("error of the reference", "a better reference: none of it goes into N or K"),
 }
-"""Every cause of the records, and what lowers its share."""
+"""Words for every cause, and measures that lower its share."""
 
 
 def filter_noise_report(found: FilterNoise) -> Document:
-    """Lay out noise for a filter: values, shares, the test on the other half."""
+    """Lay out filter noise: values, shares, the cross-validation on the other half."""
     tables: list[Block] = [values_table(found)]
     tables += [Facts(facts)] if (facts := _facts(found)) else []
     sections = [Section("N and K", tuple(tables))]
@@ -65,7 +65,7 @@ def filter_noise_report(found: FilterNoise) -> Document:
 
 
 def _good(found: FilterNoise) -> str:
-    """What most of each sensor's error is, where no problem was found."""
+    """The largest cause of each sensor's error, where no problem was found."""
     largest = [
         f"{CAUSE_WORDS[share.cause][0]} is {plain_number(100.0 * share.share.value, 2)} % of the {one.sensor}'s error "
         f"over {share.horizon_s:g} s"
@@ -76,13 +76,13 @@ def _good(found: FilterNoise) -> str:
 
 
 def _next_step(found: FilterNoise) -> str:
-    """N and K for the filter, unless most of what they would stand for is what a calibration removes."""
+    """Advice to use N and K, unless most of the error is removed by a calibration."""
     first = (f.action for f in found.findings if f.code is FindingCode.FILTER_NOISE_UNCALIBRATED)
     return next(first, NEXT)
 
 
 def _headlines(one: SensorFilterNoise) -> list[Headline]:
-    """What a filter is given: N and K."""
+    """N and K for the filter."""
     static: tuple[Bounded | None, ...] = (None, None) if one.static is None else (one.static.N, one.static.K)
     return [
         Headline(
@@ -201,7 +201,7 @@ def _percent(one: Bounded) -> str:
 
 
 def _advice(one: SensorFilterNoise) -> Facts:
-    """What would lower the shares, the largest at ten seconds (or the nearest horizon) first."""
+    """Measures that lower the three largest shares at ten seconds (or the nearest horizon)."""
     return Facts(tuple((CAUSE_WORDS[s.cause][0], CAUSE_WORDS[s.cause][1]) for s in _ranked(one)[:3]))
 
 
@@ -236,7 +236,7 @@ def _tested(one: SensorFilterNoise) -> Block:
 
 
 def filter_noise_record(found: FilterNoise) -> dict[str, Any]:
-    """All that the report says, in SI, for machines."""
+    """The content of the report for JSON, in SI."""
     return {
         "source": found.source,
         "reference": found.reference_source,

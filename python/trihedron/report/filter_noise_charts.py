@@ -1,4 +1,4 @@
-"""What a page draws of noise for a filter: error over the horizon, predicted and seen, effective and static."""
+"""Chart of filter noise: actual and predicted error over the horizon, with effective and static noise."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ OF_SENSOR = {
 
 
 def horizon_chart(found: FilterNoise) -> Chart:
-    """One panel a sensor that was tested on the half that the fit did not see."""
+    """One panel per sensor with a cross-validation on the other half."""
     panels = tuple(_panel(one) for one in found.sensors if one.consistency)
     return Chart(panels, columns=len(panels))
 

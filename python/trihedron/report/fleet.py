@@ -1,4 +1,4 @@
-"""A fleet of devices, as a report."""
+"""Report of a fleet of devices."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from trihedron.report.numbers import how_many, plain_number, with_sigma
 
 MOST_NAMED = 4
 MOST_LEADING = 4
-"""Devices in a sentence, and numbers of the first picture."""
+"""Most devices in a sentence, and most parameters in the first picture."""
 VERDICTS = {
     "consistent": "the linear model explains everything",
     "missing-physics": "physics beyond the linear model",
@@ -25,11 +25,11 @@ VERDICTS = {
     "parameters-differ": "other parameters",
 }
 OPEN = ("missing-physics", "unexplained")
-"""Verdicts that leave something out of the calibration."""
+"""Verdicts with effects or residuals that the calibration does not include."""
 
 
 def fleet_report(summary: FleetSummary) -> Document:
-    """Lay out what came of every log, how devices differ, and what they share."""
+    """Lay out the result of every log, differences between devices, and shared effects."""
     n = len(summary.logs)
     bad = [log for log in summary.logs if log.status != "done"]
     n_done = n - len(bad)
@@ -83,7 +83,7 @@ def fleet_report(summary: FleetSummary) -> Document:
 
 
 def _named(devices: list[str]) -> str:
-    """``3 devices (a, b, c)``; of very many the first."""
+    """``3 devices (a, b, c)``; at most ``MOST_NAMED`` names."""
     more = ", ..." if len(devices) > MOST_NAMED else ""
     return f"{how_many(len(devices), 'device')} ({', '.join(devices[:MOST_NAMED])}{more})"
 
@@ -114,7 +114,7 @@ def _first(names: list[str]) -> str:
 
 
 def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
-    """How good the calibrations are, and how far devices are apart."""
+    """Quality of the calibrations, and spread between devices."""
     held = [log.held_out_rms_m_s2 for log in summary.logs if log.held_out_rms_m_s2 is not None and log.is_trustworthy]
     factor, unit = shown("m/s^2")
     out = []

@@ -1,4 +1,4 @@
-"""The first screen of a report as a piece of HTML for a notebook: no scripts, no pictures, light and dark."""
+"""The first screen of a report as an HTML fragment for a notebook, without scripts and pictures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _NOT_SHOWN = (Picture, FindingList, Code)
 
 
 def to_fragment(document: Document) -> str:
-    """Title, verdict and first section; findings folded, unless one is serious."""
+    """Title, verdict and first section; findings are collapsed, unless one is serious."""
     first = document.sections[0].blocks if document.sections else ()
     blocks = [{"kind": KINDS[type(block)], "it": block} for block in first if not isinstance(block, _NOT_SHOWN)]
     lists = [block for section in document.sections for block in section.blocks if isinstance(block, FindingList)]

@@ -28,12 +28,12 @@ Columns = dict[str, Sequence[Any] | npt.NDArray[Any]]
 
 
 def made_by(library: str, columns: Columns) -> Any:
-    """A frame of polars or pandas.
+    """A data frame of polars or pandas.
 
     Raises
     ------
     ValueError
-        When it is another library, or not installed.
+        When the library is another one, or not installed.
     """
     if library not in {"polars", "pandas"}:
         raise RefusedError(f"a data frame is made by 'polars' or 'pandas', not by {library!r}.")
@@ -43,7 +43,7 @@ def made_by(library: str, columns: Columns) -> Any:
         frames = import_module(library)
     except ModuleNotFoundError:
         raise RefusedError(f"{library} is not installed: pip install {library}.") from None
-    # Polars takes no read-only arrays of NumPy without a word; both libraries own what they are given here.
+    # Copies: polars warns about read-only NumPy arrays, and both libraries then own the data.
     owned = {
         name: np.array(values) if isinstance(values, np.ndarray) else list(values) for name, values in columns.items()
     }
@@ -51,7 +51,7 @@ def made_by(library: str, columns: Columns) -> Any:
 
 
 def of_rows(rows: Sequence[Mapping[str, Any]], names: Sequence[str]) -> Columns:
-    """Columns of rows that have these names, whether or not there is a row."""
+    """Columns of these names from rows, of which there may be none."""
     return {name: [row[name] for row in rows] for name in names}
 
 
@@ -105,7 +105,7 @@ def calibration_columns(calibration: Calibration) -> Columns:
 
 
 def verification_columns(verification: Verification) -> Columns:
-    """A row per pose [m/s²] and per move [deg]: error, what noise allows, that and the calibration's own."""
+    """A row per pose [m/s²] and per move [deg]: error, its σ by noise, and σ with the calibration's uncertainty."""
     v = verification
     rows = []
     poses = range(len(v.norm_error))
@@ -129,7 +129,7 @@ def diagnosis_columns(diagnosis: Diagnosis) -> Columns:
 
 
 def noise_columns(noise: Noise) -> Columns:
-    """A row per axis and term: value (zero where absent), standard error, 95 % interval, unit."""
+    """A row per axis and term: value (0 where absent), standard error, 95 % interval, unit."""
     rows = []
     for axis in noise.axes:
         for term in TermName:

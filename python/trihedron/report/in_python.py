@@ -1,4 +1,4 @@
-"""What the command says by its flags, said by the parameters of the Python functions."""
+"""Texts that name command-line flags, rewritten with the parameters of the Python functions."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True)
 class _Patterns:
-    """What is looked for; compiled when first asked for, since a command that works says none of it."""
+    """Patterns for flags and commands; compiled on first use, since most commands need none."""
 
     columns: re.Pattern[str]
     turns: re.Pattern[str]
@@ -75,7 +75,7 @@ class _Patterns:
 
 @cache
 def _patterns() -> _Patterns:
-    # A place holder behind a flag (`--latitude DEG`) says what the parameter's own name says.
+    # A placeholder after a flag (`--latitude DEG`) is dropped: the parameter's name has the same meaning.
     place = r"(?: (?:DEG|M_S2|M|HZ|N|NAME|UNIT|LIST|SIZE|FILE|ALLAN\.json)\b)?"
     flags, commands = (
         "|".join(sorted(map(re.escape, words), key=len, reverse=True)) for words in (_PARAMETERS, _COMMANDS)
@@ -91,7 +91,7 @@ def _patterns() -> _Patterns:
 
 
 def in_python(text: str) -> str:
-    """A sentence with ``--columns ax=1`` as ``columns="ax=1"`` and other flags as the parameters they stand for."""
+    """A sentence with ``--columns ax=1`` as ``columns="ax=1"`` and other flags as their parameters."""
     if "--" not in text and "`trihedron " not in text:
         return text
     said = _patterns()
@@ -118,7 +118,7 @@ def result_in_python(result: Value) -> Value:
 
 
 def _changed(record: Any) -> Any:
-    """The record with other findings, or None where there is nothing to change."""
+    """The record with findings rewritten, or None where none changes."""
     if isinstance(record, tuple) and record and all(isinstance(part, Finding) for part in record):
         said = tuple(finding_in_python(part) for part in record)
         return None if all(new is old for new, old in zip(said, record, strict=True)) else said

@@ -1,4 +1,4 @@
-"""Calibration by Kalman filter as a report: constants by every method, convergence, innovations, residual."""
+"""Report of a calibration by Kalman filter: constants by every method, convergence, innovations, residual."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ from trihedron.report.numbers import how_many, plain_number, unit_in_print, with
 from trihedron.units import mm_s2_from_m_s2
 
 CLOSE = 0.01
-"""A track has arrived when every sensitivity stays within this part of the axis' own of its last value."""
+"""Convergence: every sensitivity stays within this fraction of the axis' sensitivity from its last value."""
 
 
 def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibration: Calibration) -> Document:
-    """Lay out what the filter found."""
+    """Lay out the filter's results."""
     if isinstance(outcome, KalmanCalibration):
         sections = _with_references(outcome, calibration)
     else:
         sections = _without_references(outcome, calibration)
-    # What decides whether the uncertainties hold stands beside the verdict; the rest of the pictures below.
+    # The chart of innovations, which shows whether the uncertainties are valid, is next to the verdict.
     pictures = [b for section in sections for b in section.blocks if isinstance(b, Picture)]
     lead = next(picture for picture in pictures if picture.name == "innovations")
     sections = [Section(s.heading, tuple(b for b in s.blocks if b is not lead)) for s in sections]
@@ -62,7 +62,7 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
 
 
 def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headline]:
-    """Innovations against what the filter predicted, and what is left of the poses."""
+    """Normalised innovations, and the residual of the poses."""
     seen = _consistencies(outcome)
     name, worst, n = max(seen, key=lambda one: abs(np.log(max(one[1].nis_mean, 1e-12))))
     beside = f"{_meaning(worst)}; 99 % limits {_limits(worst)}, {worst.n} of {n} poses"
@@ -76,14 +76,14 @@ def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headl
 
 
 def _consistencies(outcome: KalmanCalibration | NormKalmanCalibration) -> list[tuple[str, Consistency, int]]:
-    """Name, what was seen and the number of poses, of which only those after the start are judged."""
+    """Name, consistency and number of poses, of which only those after the diffuse start are judged."""
     if isinstance(outcome, KalmanCalibration):
         return [(AXES[axis.axis], axis.consistency, outcome.n_poses) for axis in outcome.axes]
     return [("norm", outcome.consistency, len(outcome.residual_m_s2))]
 
 
 def _meaning(seen: Consistency) -> str:
-    """What the ratio says of the noise that the filter was given."""
+    """The mean NIS in words: whether the filter's noise is too large or too small."""
     if seen.nis_mean < seen.nis_low:
         return "the noise given is too large, the uncertainties too wide"
     if seen.nis_mean > seen.nis_high:
@@ -208,7 +208,7 @@ def _consistency_table(seen: list[tuple[str, Consistency, int]]) -> Table:
 
 
 def arrival(constants: FloatArray) -> int:
-    """Pose from which on all three sensitivities (n, 4) stay within 1 % of the axis' own of their last values."""
+    """Pose, numbered from 1, from which on the sensitivities of ``constants`` (n, 4) stay within ``CLOSE``."""
     away = np.abs(constants[:, :3] - constants[-1, :3]).max(axis=1) > CLOSE * np.linalg.norm(constants[-1, :3])
     return int(np.flatnonzero(away)[-1]) + 2 if np.any(away) else 1
 
@@ -242,7 +242,7 @@ def _pose_table(outcome: KalmanCalibration) -> Table:
 
 
 def kalman_record(outcome: KalmanCalibration | NormKalmanCalibration, calibration: Calibration) -> dict[str, Any]:
-    """The same for machines: the calibration file's content, the tracks and the innovations."""
+    """The result for JSON: the calibration file's content, the tracks and the innovations."""
     out: dict[str, Any] = dict(calibration_document(calibration))
     if isinstance(outcome, KalmanCalibration):
         out["constants"] = list(CONSTANT_NAMES)

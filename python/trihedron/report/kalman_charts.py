@@ -1,4 +1,4 @@
-"""What a page draws of a calibration by Kalman filter: convergence, innovations, slow noise, residual."""
+"""Charts of a calibration by Kalman filter: convergence, innovations, slow noise, residual."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from trihedron.report.drawn import said
 from trihedron.report.numbers import one_of, unit_in_print
 
 WINDOW = 15
-"""Poses of a running mean of NIS: its 99 % interval is then 0.31 to 2.19 (χ² with 15 degrees of freedom)."""
+"""Number of poses in a running mean of NIS, with a 99 % interval of 0.31 to 2.19 (χ² with 15 degrees of freedom)."""
 METHODS: dict[str, tuple[str, Colour, bool]] = {
     "recursive least squares": ("recursive least squares", "accent", False),
     "recursive generalised least squares": ("recursive generalised least squares", "c3", True),
@@ -47,7 +47,7 @@ def convergence_chart(axis: AxisKalmanResult, raw_unit: str) -> Chart:
 
 
 def norm_convergence_chart(outcome: NormKalmanCalibration) -> Chart:
-    """S and b after every pose with their 3σ bands; what the frame fixes at zero is excluded."""
+    """S and b after every pose with their 3σ bands, without entries that the frame fixes at 0."""
     n = len(outcome.parameters)
     pose = np.arange(1, n + 1, dtype=np.float64)
     panels = []
@@ -69,17 +69,17 @@ def norm_convergence_chart(outcome: NormKalmanCalibration) -> Chart:
 
 
 def _frame(tracks: Sequence[FloatArray], sigma: FloatArray, last: float) -> tuple[float, float]:
-    """Limits that show the approach and not the first guesses."""
+    """Limits of the axis that show the convergence without the first estimates."""
     n = len(sigma)
     reach = [float(np.max(np.abs(track[n // 8 :] - last))) for track in tracks]
-    # Where a constant is seen late, its band at mid-session still fits.
+    # For a constant that is observed late, the 3σ band after a third of the session fits too.
     half = 1.1 * max(*reach, 3.0 * float(sigma[n // 3]), 6.0 * float(sigma[-1]))
     half = min(half, 60.0 * float(sigma[-1])) or abs(last) or 1.0
     return last - half, last + half
 
 
 def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration]) -> Chart:
-    """Squared innovations of every judged pose, their running mean, and where 99 % of such means lie."""
+    """NIS of every judged pose, its running mean, and the 99 % interval of such means."""
     marks: list[Band | Line | Points | Level] = []
     window, n = WINDOW, 2
     for k, result in enumerate(results):
@@ -105,7 +105,7 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
 
 
 def drift_chart(results: Sequence[AxisKalmanResult], raw_unit: str) -> Chart:
-    """Slow noise that the filter saw while it ran, and smoothed with all readings."""
+    """Slow noise as filtered, and as smoothed with all readings."""
     panels = []
     for result in results:
         pose = np.arange(1, len(result.drift) + 1, dtype=np.float64)
@@ -122,7 +122,7 @@ def drift_chart(results: Sequence[AxisKalmanResult], raw_unit: str) -> Chart:
 
 
 def residual_chart(residual: FloatArray) -> Chart:
-    """Residual (n, 3) of the components or (n, 1) of the length, m/s²."""
+    """Residual (n, 3) of the components or (n, 1) of the norm, m/s²."""
     pose = np.arange(1, len(residual) + 1, dtype=np.float64)
     marks: list[Level | Points] = [Level(y=0.0)]
     for k in range(residual.shape[1]):

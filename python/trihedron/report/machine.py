@@ -1,4 +1,4 @@
-"""Results for machines: everything that the report says, as plain JSON types with units in the names."""
+"""Results for JSON: the content of the report as plain types, with units in the names."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ def recording_record(recording: Recording) -> dict[str, Any]:
 
 
 def json_text(machine: dict[str, Any]) -> str:
-    """Strict JSON: what is not a finite number is ``null``."""
+    """Strict JSON; non-finite numbers are ``null``."""
     return printable_json(json.dumps(plain(machine), indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
 
 
 def curve_record(curve: AllanCurve) -> dict[str, Any]:
-    """An Allan curve: channels in the order of ``names``, arrays as they are."""
+    """An Allan curve: channels in the order of ``names``, arrays unchanged."""
     names = ("kind", "rate_hz", "n_samples", "confidence", "stride", "names", "units", "tau_s", "clusters")
     arrays = ("deviation", "lower", "upper", "edf", "n_terms")
     return {name: getattr(curve, name) for name in (*names, *arrays)}
 
 
 def segments_record(segments: Segments, recording: Recording | None = None) -> dict[str, Any]:
-    """Poses with their means, moves, noise; times of begin and end where the recording is given."""
+    """Poses with their means, moves, noise; start and end times where the recording is given."""
     poses: list[dict[str, Any]] = [
         {
             "start": pose.start,
@@ -71,7 +71,7 @@ def segments_record(segments: Segments, recording: Recording | None = None) -> d
 
 
 def calibration_record(calibration: Calibration, segments: Segments, recording: Recording) -> dict[str, Any]:
-    """The calibration file's content, the figures that every report prints, the segments that it was made from."""
+    """The calibration file's content, the published figures, and the segments that it was made from."""
     document = calibration_document(calibration)
     figures = published_figures(calibration)
     return {**document, "figures": figures, "segments": segments_record(segments, recording)}

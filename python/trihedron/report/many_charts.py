@@ -1,4 +1,4 @@
-"""What a page draws of many recordings of one unit, and of a fleet."""
+"""Charts of many recordings of one unit, and of a fleet."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ SHOWN: dict[str, tuple[float, str]] = {
     "rad": (degrees_from_radians(1.0), "°"),
     "1": (1e2, "%"),
 }
-"""Factor and unit in which people compare numbers of each kind."""
+"""Factor from SI and printed unit for parameters of each unit."""
 REPEATS = "session to session (1 σ)"
 
 
 def shown(unit: str) -> tuple[float, str]:
-    """Factor and unit in print."""
+    """Factor from SI and printed unit."""
     return SHOWN[unit]
 
 
 def short_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Names of files without the file name and the ending that all of them share: an axis has little room."""
+    """Short names of files for an axis, without a file name or an ending that all share."""
     paths = [PurePath(name) for name in names]
     if len(paths) > 1 and len({path.name for path in paths}) == 1 and all(path.parent.name for path in paths):
         return tuple(str(path.parent) for path in paths)
@@ -40,7 +40,7 @@ def short_names(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def compared_variance(sessions: Sequence[Session], k: int) -> FloatArray:
-    """(n,) variance of parameter ``k`` by which recordings are compared: of each, and the unit's drift within one."""
+    """(n,) variance of parameter ``k`` for comparing recordings: that of each plus the mean drift of its group."""
     drift = {
         group: np.mean([s.drift[k] for s in sessions if s.group == group]) for group in {s.group for s in sessions}
     }
@@ -48,7 +48,7 @@ def compared_variance(sessions: Sequence[Session], k: int) -> FloatArray:
 
 
 def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int = 1) -> Chart:
-    """One panel an id: departures from the common value, along temperature where it is modelled; ``only`` these ids."""
+    """One panel per id: deviations from the common value, over temperature where modelled; ``only`` these ids."""
     thermal = model.thermal
     place = np.arange(1.0, len(model.sessions) + 1.0)
     if thermal is not None:
@@ -93,9 +93,9 @@ def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int 
 
 
 def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
-    """One panel a number: devices along the axis, one point a log with its error, about the median of devices.
+    """One panel per parameter: devices along the axis, one point per log with its standard error, about the median.
 
-    ``most``: only so many numbers, those in which devices differ most beside their own errors.
+    ``most``: only that many parameters, those in which devices differ most relative to their standard errors.
     """
     logs = [log for log in summary.logs if log.numbers is not None and log.std is not None]
     n = min((len(log.numbers) for log in logs if log.numbers is not None), default=0)

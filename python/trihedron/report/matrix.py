@@ -8,13 +8,13 @@ from trihedron.report.chart import Matrix
 
 CELL = 10
 NAMES = 62
-"""Room for the names, in units of which a cell has ten."""
+"""Width for the names; a cell has a width of ten."""
 SEEN = 0.05
-"""A correlation below it leaves its cell empty."""
+"""Correlation below which a cell is empty."""
 
 
 def drawn_matrix(matrix: Matrix, caption: str) -> str:
-    """Rows and columns in one order, a cell a pair, names beside the rows and at the end of the columns."""
+    """A cell per pair, with the same order of rows and columns; names beside the rows and at the end of columns."""
     n = len(matrix.names)
     cells, words = [], []
     for i, name in enumerate(matrix.names):

@@ -1,4 +1,4 @@
-"""Noise as a report: terms in SI and customary units with their certainty, how long to average, the Allan plot."""
+"""Report of noise: terms in SI and customary units with uncertainties, best averaging time, the Allan plot."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ the data sheet of this part at its range, or --calibration FILE."""
 def noise_report(
     noise: Noise, lengths: Mapping[str, Mapping[TermName, float | None]] | None = None, accuracy: float = 0.1
 ) -> Document:
-    """Lay out the noise of one log; ``lengths`` are seconds of recording per axis and term for ``accuracy``."""
+    """Lay out the noise of one log; ``lengths`` are recording times [s] per axis and term for ``accuracy``."""
     findings = all_findings(noise)
     length = noise.curve.n_samples / noise.curve.rate_hz
     facts = [
@@ -75,7 +75,7 @@ def _next_step(noise: Noise) -> str:
 
 
 def _headlines(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Headline]:
-    """White noise of each sensor, root mean square of its axes, data sheets' unit beside, and how long to average."""
+    """White noise of each sensor, rms over its axes, also in data-sheet units, and the best averaging time."""
     out = []
     for unit, axes in groups:
         name = {"gyro": "gyroscope", "accel": "accelerometer"}.get(axes[0].name.split()[0], axes[0].name.split()[0])
@@ -101,7 +101,7 @@ def _on_data_sheets(density: float, unit: str) -> str:
 
 
 def _kalibr(noise: Noise) -> tuple[Block, ...]:
-    """Kalibr's imu.yaml, to be copied."""
+    """Kalibr's imu.yaml."""
     rows = kalibr_rows(noise)
     if len(rows) < 2:
         return (Paragraph(_NO_UNIT),)
@@ -123,7 +123,7 @@ def all_findings(noise: Noise) -> tuple[Finding, ...]:
 
 
 def _coloured(noise: Noise) -> list[tuple[str, str]]:
-    """Up to where the spectrum is that of noise terms, said before any term is."""
+    """Upper end of the fit band, where a low-pass filter limits it."""
     limits = [
         f"{axis_in_print(axis.name)} {plain_number(axis.highest_hz, 3)} Hz"
         for axis in noise.axes
@@ -165,7 +165,7 @@ def _terms_table(axes: list[NoiseAxis], unit: str) -> Table:
 
 
 def _intervals(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Section]:
-    """Intervals of all terms; a curve alone has none that hold whatever is named."""
+    """Intervals of all terms; none for a curve without its log, which has no intervals with all terms free."""
     if any(axis.slow_pair is None for _, axes in groups for axis in axes):
         return []
     return [Section("Intervals", tuple(_intervals_table(axes, unit) for unit, axes in groups))]
@@ -280,7 +280,7 @@ def _lowest(axis: NoiseAxis, factor: float) -> str:
 
 
 def kalibr_rows(noise: Noise) -> dict[str, str]:
-    """Kalibr's names with value and unit, one number for the axes of a sensor."""
+    """Kalibr's names with value and unit, one value per sensor."""
     rows: dict[str, str] = {}
     for unit, sensor, square in (("m/s^2", "accelerometer", "m/s²"), ("rad/s", "gyroscope", "rad/s")):
         axes = [axis for axis in noise.axes if axis.unit == unit]
@@ -290,7 +290,7 @@ def kalibr_rows(noise: Noise) -> dict[str, str]:
             ("noise_density", TermName.WHITE, "/√Hz"),
             ("random_walk", TermName.RATE_RANDOM_WALK, "/√s"),
         ):
-            # One number for three axes: the root mean square; an absent term is stated by its limit.
+            # One value for three axes: the rms; an absent term is represented by its limit.
             values = [axis.value(term) for axis in axes]
             if all(axis.terms[term].is_present for axis in axes):
                 words = f"{math.sqrt(float(np.mean(np.square(values)))):.4g}"

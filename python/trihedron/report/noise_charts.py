@@ -1,4 +1,4 @@
-"""What a page draws of noise: Allan curves with their interval, and the parts of the sum that was fitted to them."""
+"""Charts of noise: Allan curves with their interval, and the terms of the fitted sum."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from trihedron.report.noise_units import unit_of
 from trihedron.report.numbers import plain_number, unit_in_print, with_sigma_and_power
 
 READ_AT = {TermName.WHITE: 1.0, TermName.RATE_RANDOM_WALK: 3.0}
-"""Averaging time [s] at which the line of a term shows its value itself."""
+"""Averaging time [s] at which the Allan deviation of a term equals its coefficient."""
 LEAST_SHARE = 1e-3
-"""Of the variance, anywhere: what is less moves the sum by less than the width of its line."""
+"""Smallest share of the variance, at any τ, of a part that is drawn: less is not visible in the sum."""
 NAME_DECADES = (1.2, 0.3)
-"""Decades of time and of deviation that a name takes up where five and four of them fill the picture."""
+"""Size of a name in decades of time and of deviation, for a panel of five by four decades."""
 MARGIN = 1.6
-"""Factor in time by which a name keeps off the ends of the picture."""
+"""Distance of a name from the ends of the panel, as a factor in time."""
 
 Limits = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Allan deviation (k,) of one part of the sum; ``name`` stands beside it at ``x``, ``y``, ``told`` says more."""
+    """Allan deviation (k,) of one part of the sum; ``name`` is its label at ``x``, ``y``, ``told`` its tooltip."""
 
     name: str
     told: str
@@ -39,7 +39,7 @@ class Part:
 
 
 def parts_of(axis: NoiseAxis, tau_s: FloatArray) -> list[Part]:
-    """Every part of the sum that can be seen in it, largest where its name stands, N and K where they are read off."""
+    """Every visible part of the sum, labelled where its share is largest; N and K at the τ of ``READ_AT``."""
     inside = (tau_s >= tau_s[0] * MARGIN) & (tau_s <= tau_s[-1] / MARGIN)
     total = axis.allan_variance(tau_s)
     out: list[Part] = []
@@ -48,7 +48,7 @@ def parts_of(axis: NoiseAxis, tau_s: FloatArray) -> list[Part]:
             continue
         deviation = np.sqrt(variance)
         share = np.where(inside & _is_free(out, tau_s, deviation), variance / total, 0.0)
-        # A sinusoid is largest where N is read off: its name stands at its foot.
+        # A sinusoid is largest near the label of N: its own is placed where it begins to show.
         at = int(np.argmax(share >= 0.1 * share.max() if symbol == "lines" else share))
         read_at = READ_AT.get(TermName(symbol), 0.0) if symbol in TermName._value2member_map_ else 0.0
         near = int(np.argmin(np.abs(np.log(tau_s / read_at)))) if read_at > 0.0 else at
@@ -59,7 +59,7 @@ def parts_of(axis: NoiseAxis, tau_s: FloatArray) -> list[Part]:
 
 
 def _is_free(named: list[Part], tau_s: FloatArray, deviation: FloatArray) -> npt.NDArray[np.bool_]:
-    """Where a name on a line of ``deviation`` (n,) stands on none of those before it."""
+    """(n,) where a label on a line of ``deviation`` (n,) overlaps none of the previous labels."""
     free = np.ones(len(tau_s), dtype=bool)
     for part in named:
         is_beside = np.abs(np.log10(tau_s / part.x)) > NAME_DECADES[0]
@@ -68,7 +68,7 @@ def _is_free(named: list[Part], tau_s: FloatArray, deviation: FloatArray) -> npt
 
 
 def room_for(curve: AllanCurve, axes: list[tuple[NoiseAxis, int]], tau_s: FloatArray) -> Limits | None:
-    """Limits of the deviation that hold the curves (axes with their columns) and the names of all parts."""
+    """Limits of the deviation that include the curves (axes with their columns) and the labels of all parts."""
     seen = [curve.deviation[:, c] for _, c in axes]
     seen += [np.array([part.y]) for axis, _ in axes if axis.sample_sigma > 0 for part in parts_of(axis, tau_s)]
     low, high = float(np.nanmin(np.concatenate(seen))), float(np.nanmax(np.concatenate(seen)))
@@ -86,7 +86,7 @@ def _names(axis: NoiseAxis, symbol: str) -> tuple[str, str]:
         at = ", ".join(plain_number(line.frequency_hz, 3) for line in axis.lines[:4])
         if len(axis.lines) == 1:
             return f"line {at} Hz", f"line {at} Hz"
-        # Frequencies of several would run over the names beside them: who points at the mark reads them.
+        # The frequencies of several lines are too long for a label: they are in the tooltip.
         return f"{len(axis.lines)} lines", f"lines {at}{' …' if len(axis.lines) > 4 else ''} Hz"
     term, unit = axis.terms[TermName(symbol)], unit_of(TermName(symbol), axis.unit)
     if term.is_present:
@@ -102,7 +102,7 @@ BEST = "best averaging time"
 
 
 def allan_chart(curve: AllanCurve, unit: str, axes: Sequence[NoiseAxis]) -> Chart:
-    """Curves of one sensor on the same scales."""
+    """Curves of one sensor, a panel per axis with equal scales."""
     chosen = [curve.names.index(axis.name) for axis in axes]
     y_limits = room_for(curve, list(zip(axes, chosen, strict=True)), _times(curve))
     x_limits = (float(curve.tau_s[0]) / 1.4, float(curve.tau_s[-1]) * 1.4)
@@ -141,7 +141,7 @@ def every_axis_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[Noi
 
 
 def sensors_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseAxis]]]) -> Chart:
-    """Both sensors side by side, three axes each, with where a mean is best."""
+    """Both sensors side by side, three axes each, with the best averaging time."""
     panels = []
     for unit, axes in groups:
         printed = unit_in_print(unit)
@@ -156,12 +156,12 @@ def sensors_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseA
             if best is not None:
                 told = f"{axis_in_print(axis.name)}: best averaging time {plain_number(best[0])} s, "
                 told += f"{plain_number(best[1])} {printed}"
-                # On the curve as measured: the least of the sum of terms may lie beside it.
+                # Placed on the measured curve: the minimum of the fitted sum may be off it.
                 found = np.exp(np.interp(np.log(best[0]), np.log(tau), np.log(curve.deviation[good, c])))
                 marks.append(Points(np.array([best[0]]), np.array([found]), [told], None, BEST, "accent"))
         x = Scale("averaging time τ [s]", "s", is_log=True)
         y = Scale(f"Allan deviation [{printed}]", printed, is_log=True)
-        # The axes stand together in the legend.
+        # Curves before points, so that the axes are together in the legend.
         marks.sort(key=lambda mark: isinstance(mark, Points))
         panels.append(Panel(x, y, tuple(marks), title=axes[0].name.rsplit(" ", 1)[0], height_px=250))
     return Chart(tuple(panels), columns=len(panels))
@@ -191,7 +191,7 @@ def _terms(axis: NoiseAxis, tau: FloatArray) -> list[Mark]:
     for part in parts_of(axis, tau):
         marks.append(Line(tau, part.deviation, "parts of the sum", "soft", is_thin=True))
         marks.append(Points(np.array([part.x]), np.array([part.y]), [part.told], None, "", "ink"))
-        # Towards the middle, where there is room for the name.
+        # The label extends towards the middle of the panel.
         marks.append(Note(part.x, part.y, part.name, side="right" if part.x < middle else "left"))
     total = np.sqrt(axis.allan_variance(tau))
     marks.append(Line(tau, total, "their sum", "ink", is_dashed=True, is_thin=True))

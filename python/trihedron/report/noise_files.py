@@ -1,4 +1,4 @@
-"""Noise for machines: one JSON record with every number and its unit, and the Allan curve as a table."""
+"""Noise for other programs: a JSON record with every value and its unit, and the Allan curve as a table."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ Lengths = Mapping[str, Mapping[TermName, float | None]]
 
 
 def noise_record(noise: Noise, lengths: Lengths | None = None, accuracy: float = 0.1) -> dict[str, Any]:
-    """All that the report says, values in SI (or the log's own unit) with the unit beside them.
+    """The content of the report, values in SI (or the log's own unit) with their unit.
 
-    ``lengths`` are seconds of recording after which each term of each axis is known to ``accuracy``.
+    ``lengths`` are recording times [s] for a relative uncertainty ``accuracy`` of each term of each axis.
     """
     return {
         "source": noise.source,

@@ -23,7 +23,7 @@ PER_UNIT = {
 
 
 def unit_of(term: TermName, unit: str) -> str:
-    """Printed unit of a term of a log in ``unit``."""
+    """Printed unit of a noise term for readings in ``unit``."""
     printed = unit_in_print(unit)
     if unit == "m/s^2" and term in (TermName.RATE_RAMP, TermName.QUANTISATION):
         return "m/s³" if term is TermName.RATE_RAMP else "m/s"
@@ -33,7 +33,7 @@ def unit_of(term: TermName, unit: str) -> str:
 
 
 def customary(term: TermName, unit: str) -> tuple[str, str, float] | None:
-    """IEEE 952 name, customary unit and factor from SI of a term; None where the unit of the log is not known."""
+    """IEEE 952 name, customary unit and factor from SI of a term; None where the unit of the log is unknown."""
     if unit == "rad/s":
         deg = degrees_from_radians(1.0)
         return {

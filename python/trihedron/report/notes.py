@@ -1,4 +1,4 @@
-"""On which side of its place a word of a panel stands: none over another, none over another's mark."""
+"""Placement of labels in a panel, so that they overlap neither each other nor marks."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from trihedron.report.places import UNITS, Places
 Side = Literal["above", "below", "right", "left"]
 SIDES: tuple[Side, ...] = ("above", "below", "right", "left")
 WIDTH_PX = 250.0
-"""Of the narrowest panel: what stands apart there stands apart everywhere."""
+"""Width of the narrowest panel: labels that are apart there are apart in every panel."""
 LETTER_PX, GLYPH_PX, GAP_PX, RISE_PX, MARK_PX = 6.2, 10.0, 6.0, 12.0, 8.0
 
 Box = tuple[float, float, float, float]
@@ -20,7 +20,7 @@ Box = tuple[float, float, float, float]
 
 
 def apart(notes: Sequence[Note], at: Places, height_px: float) -> list[Note]:
-    """Every note on the side that it asks for, or on the first one where it covers least."""
+    """Every note on the side with the least overlap; its preferred side comes first among equals."""
     spots = [(float(at.x(n.x)) * WIDTH_PX / UNITS, float(at.y(n.y)) * height_px / UNITS) for n in notes]
     marks = [_about(x, y, MARK_PX, MARK_PX) for x, y in spots]
     taken: list[Box] = []
@@ -47,7 +47,7 @@ def _about(x: float, y: float, width: float, height: float) -> Box:
 
 
 def _covered(box: Box, others: Iterable[Box]) -> float:
-    """Area [px²] that a word shares with others."""
+    """Area [px²] of a label that overlaps other boxes."""
     return sum(
         max(min(box[2], o[2]) - max(box[0], o[0]), 0.0) * max(min(box[3], o[3]) - max(box[1], o[1]), 0.0)
         for o in others
@@ -55,6 +55,6 @@ def _covered(box: Box, others: Iterable[Box]) -> float:
 
 
 def _outside(box: Box, height_px: float) -> float:
-    """Area [px²] of a word that the panel would cut."""
+    """Area [px²] of a label outside the panel."""
     whole = (box[2] - box[0]) * (box[3] - box[1])
     return whole - _covered(box, [(0.0, 0.0, WIDTH_PX, height_px)])

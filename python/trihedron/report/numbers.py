@@ -1,4 +1,4 @@
-"""Numbers become words here: as many digits as the uncertainty allows, and a unit."""
+"""Numbers as text: as many digits as the uncertainty allows, and a unit."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def decimals_of(sigma: float) -> int:
 
 
 def with_sigma(value: float, sigma: float) -> str:
-    """``value ± σ``: σ with two significant digits, the value with the same decimal places; fixed values bare."""
+    """``value ± σ``: σ with two significant digits, the value with the same decimal places; fixed values without σ."""
     if not math.isfinite(value):
         return "–"
     if sigma == 0.0:
@@ -45,14 +45,14 @@ def with_sigma(value: float, sigma: float) -> str:
         return f"{plain_number(value)} ± ?"
     places = decimals_of(sigma)
     if sigma >= 100.0:
-        # Digits before the point beyond the second of σ mean nothing.
+        # Digits before the point beyond the second of σ are not significant.
         step = 10.0 ** (math.floor(math.log10(sigma)) - 1)
         value, sigma = round(value / step) * step, round(sigma / step) * step
     return f"{value:.{places}f} ± {sigma:.{places}f}".replace("-", MINUS)
 
 
 def with_sigma_and_power(value: float, sigma: float) -> str:
-    """``value ± σ``, in scientific notation from five digits before or behind the point: ``(8.80 ± 0.13)e−5``."""
+    """``value ± σ``, in scientific notation beyond 10⁻⁴ to 10⁵: ``(8.80 ± 0.13)e−5``."""
     exponent = math.floor(math.log10(value)) if value > 0.0 else 0
     if -4 <= exponent <= 4:
         return with_sigma(value, sigma)
@@ -68,14 +68,14 @@ def engineering_exponent(size: float) -> int:
 
 
 def power_of_ten(exponent: int) -> str:
-    """``10⁻³``; nothing for one."""
+    """``10⁻³``; empty for exponent 0."""
     if exponent == 0:
         return ""
     return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def unit_with_power(exponent: int, unit: str) -> str:
-    """A printed unit at a power of ten: ``ms`` where a prefix says it, else ``10⁻⁶ s²/m``."""
+    """A printed unit with a power of ten: ``ms`` where a prefix exists, else ``10⁻⁶ s²/m``."""
     prefix = {-9: "n", -6: "µ", -3: "m"}.get(exponent)
     if prefix is not None and re.match(r"(s|m|rad)(?![\w²³])", unit):
         return prefix + unit
@@ -83,7 +83,7 @@ def unit_with_power(exponent: int, unit: str) -> str:
 
 
 def unit_in_print(unit: str) -> str:
-    """``m/s^2`` and ``sqrt(Hz)`` as people print them."""
+    """``m/s^2`` and ``sqrt(Hz)`` as ``m/s²`` and ``√Hz``."""
     return unit.replace("^2", "²").replace("^3", "³").replace("sqrt(Hz)", "√Hz").replace("sqrt(s)", "√s")
 
 
@@ -117,5 +117,5 @@ def one_of(unit: str) -> str:
 
 
 def in_mm_s2(acceleration_m_s2: float) -> str:
-    """An acceleration in the unit that every report has for errors."""
+    """An acceleration in mm/s², the unit of errors in every report."""
     return f"{plain_number(mm_s2_from_m_s2(acceleration_m_s2))} mm/s²"

@@ -1,4 +1,4 @@
-"""A report as one HTML file that needs no other: figures are inside it, nothing is fetched."""
+"""A report as one self-contained HTML file, with embedded figures."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ KINDS: dict[type, str] = {
     Picture: "picture",
 }
 LONG = 14
-"""Rows of a table that is folded from here on: what fits beside its figure on a screen is not."""
+"""Rows from which a table is collapsed; shorter ones fit on a screen with their figure."""
 WORDY = 28
-"""A column with longer cells holds sentences: they wrap, and begin at the left."""
+"""Characters beyond which a column contains sentences: its cells wrap and are left-aligned."""
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 SHORT = 12
-"""Names of rows that are no longer are never broken."""
+"""Longest row name that is never broken, in characters."""
 _ASIDE = re.compile(r" \([^)]*\)")
 MOST_OTHERS = 2
-"""Findings that the first screen names behind the foremost; the others are counted."""
+"""Findings listed on the first screen after the foremost; the others are counted."""
 _DASHED = re.compile(r"(?<![\w-])-{1,2}[A-Za-z][\w/+-]*")
 
 
 def to_html(document: Document) -> str:
-    """The whole report, figures drawn and embedded; it may fetch nothing and run no script but its own."""
+    """The whole report with embedded figures; its policy allows no network access and no script but its own."""
     sections = [
         {"heading": one_line(section.heading), "blocks": [_shown(block) for block in section.blocks]}
         for section in document.sections
@@ -67,7 +67,7 @@ def to_html(document: Document) -> str:
 
 
 def _noticed(document: Document) -> tuple[Markup, list[tuple[str, str]], str]:
-    """What the first screen says of findings: the foremost, severity and clause of those next in weight, the place."""
+    """Findings on the first screen: the foremost, severity and clause of the next ones, and a link to the rest."""
     first = document.foremost
     if first is None:
         return Markup(""), [], ""
@@ -84,29 +84,29 @@ def _noticed(document: Document) -> tuple[Markup, list[tuple[str, str]], str]:
 
 
 def unbroken(text: str) -> Markup:
-    """Options (``--extended``) and directions (``-X/+Y``) kept on one line, numbers on that of their %; code marked."""
+    """HTML in which options (``--extended``), directions (``-X/+Y``) and ``5 %`` do not break; code is marked."""
     text = re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text)).replace(" %", "\u00a0%"))
     return Markup(_DASHED.sub(r'<span class="whole">\g<0></span>', text))
 
 
 def stacked(text: str) -> Markup:
-    """A cell that may put its uncertainty below its value, where there is no room beside."""
+    """A cell in which a line break is allowed before the uncertainty."""
     return escape(text).replace(" ± ", Markup(" <wbr>± "))
 
 
 def path(text: str) -> Markup:
-    """Names of files, broken at their folders where they must be."""
+    """A file name in which a line break is allowed after each folder."""
     return escape(text).replace("/", Markup("/<wbr>"))
 
 
 def _digest(script: str) -> str:
-    """The one script that a page may run."""
+    """Hash of the page's script, the only one that its policy allows."""
     return f"sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}"
 
 
 @cache
 def template(name: str) -> Template:
-    """A template of this room; whatever goes into it is escaped."""
+    """A template of this package; inserted values are escaped."""
     made = Environment(
         loader=PackageLoader("trihedron.report", "."),
         autoescape=True,
@@ -120,7 +120,7 @@ def template(name: str) -> Template:
 
 @cache
 def _file(name: str) -> str:
-    """A part of every page, without the indents and comments that only its authors need."""
+    """A file that is part of every page, without indents and comments."""
     text = _COMMENT.sub("", (files("trihedron.report") / name).read_text(encoding="utf-8"))
     return "\n".join(line.strip() for line in text.splitlines() if line.strip())
 

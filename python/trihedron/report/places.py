@@ -1,4 +1,4 @@
-"""Where marks of a panel stand: data units to units of the panel."""
+"""Positions of marks in a panel: data units to units of the panel."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from trihedron.arrays import FloatArray
 from trihedron.report.chart import Panel, limits_of
 
 UNITS = 10000
-"""Across a panel, both ways. Marks are in these; a page of 4 k is a third as fine."""
+"""Width and height of a panel in its own units, about three times as fine as a 4k screen."""
 
 
 class Places:
-    """Data units to units of the panel."""
+    """Converts data units to units of the panel."""
 
     def __init__(self, panel: Panel) -> None:
         self.x_limits, self.y_limits = limits_of(panel)
@@ -35,5 +35,5 @@ def _placed(values: npt.ArrayLike, limits: tuple[float, float], *, is_log: bool)
         with np.errstate(divide="ignore", invalid="ignore"):
             v = np.log10(v)
         low, high = math.log10(low), math.log10(high)
-    # Marks far outside must not leave the range of a float32 of the renderer.
+    # Clipped, since renderers use float32.
     return np.clip((v - low) / ((high - low) or 1.0) * UNITS, -9 * UNITS, 10 * UNITS)

@@ -1,4 +1,4 @@
-"""An experiment before it is made: what it would tell, and how certainly."""
+"""Report of a planned experiment: uncertainties to expect."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from trihedron.report.numbers import MINUS, plain_number
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
 
 ALL_NUMBERS = 9
-"""Scale, angles and biases of a triad."""
+"""Number of parameters of a triad: scales, angles and biases."""
 FEWEST_SETS = 2
 
 
@@ -93,7 +93,7 @@ def _picture(poses: tuple[PosePlan, ...]) -> Picture | None:
 
 
 def poses_chart(poses: tuple[PosePlan, ...]) -> Chart:
-    """Uncertainty of scale, angle and bias against how many poses there are."""
+    """Uncertainty of scale, angle and bias over the number of poses."""
     known = [pose for pose in poses if pose.rank == ALL_NUMBERS]
     n = np.array([pose.n_poses for pose in known], dtype=np.float64)
     panels = []
@@ -111,7 +111,7 @@ def poses_chart(poses: tuple[PosePlan, ...]) -> Chart:
 
 
 def plan_record(plan: ExperimentPlan) -> dict[str, Any]:
-    """As plain JSON types; what is not determined is null."""
+    """As plain JSON types; undetermined values are null."""
     record: dict[str, Any] = _plain(asdict(plan))
     return record
 
@@ -167,7 +167,7 @@ def _worth(pose: PosePlan) -> str:
         n = sum(math.isinf(one.loss) for one in pose.worth)
         which = "every pose is" if n == pose.n_poses else f"{n} of the {pose.n_poses} poses are"
         return f"{which} necessary: without it a parameter is not determined"
-    # To a thousandth of a per cent: beyond that only rounding of the arithmetic is left.
+    # Rounded to 0.001 %: smaller differences are rounding errors.
     share, least = (round(100.0 * (loss - 1.0), 3) for loss in (best.loss, pose.worth[-1].loss))
     return (
         f"most useful pose: {best.pose}, +{plain_number(share, 2)} % uncertainty without it; least useful pose: "

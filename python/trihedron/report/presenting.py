@@ -1,4 +1,4 @@
-"""Results shown: which words, tables and figures belong to which record."""
+"""Presentation of results: report, JSON and columns for each kind of record."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _Shown:
-    """How one kind of record is laid out, given to machines, and put into columns."""
+    """Functions that make the report, the JSON and the columns of one kind of record."""
 
     document: Any
     record: Any
@@ -121,7 +121,7 @@ def as_frame(result: object, library: str) -> Any:
 
 
 def _width() -> int:
-    """Columns of the terminal, as many as a file has at most."""
+    """Columns of the terminal, at most those of a file."""
     return min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
 
 
@@ -131,12 +131,12 @@ def as_text(result: object) -> str:
 
 
 def as_screen(result: DiagnosisResult) -> str:
-    """The first screen of a diagnosis as plain text, as ``print`` gives it."""
+    """The first screen of a diagnosis as plain text, for ``print``."""
     return to_text(diagnosis_report(result), sections=first_screen(result), width=_width())
 
 
 def as_html(result: object) -> str:
-    """The first screen of the report, as a notebook shows it."""
+    """The first screen of the report as HTML, for a notebook."""
     return to_fragment(_kind(result).document(result))
 
 
@@ -154,11 +154,11 @@ def plot(result: object, name: str | None = None, *, ax: Axes | Sequence[Axes] |
     Parameters
     ----------
     result : a result of trihedron
-        Of any verb but ``demo``.
+        Of any function but ``demo``.
     name : str, optional
-        Which figure; a wrong name lists those that there are.
+        Which figure; the error for a wrong name lists the figures.
     ax : matplotlib Axes, or one for each panel
-        Where to draw; a figure of its own when not given.
+        Where to draw; a new figure when not given.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def plot(result: object, name: str | None = None, *, ax: Axes | Sequence[Axes] |
     Raises
     ------
     TypeError
-        When it is no result.
+        When ``result`` is not a result.
     ValueError
         When there is no such figure, it has another number of panels, or matplotlib is not installed.
 
@@ -196,7 +196,7 @@ def report(result: object, path: str | os.PathLike[str] | None = None, *, overwr
 
     Parameters
     ----------
-    result : result of a verb
+    result : result of trihedron
         Of calibrate, verify, check, segment, diagnose, allan, plan and the others.
     path : file, optional
         ``.html`` with figures, ``.txt`` or ``.json``.
@@ -211,7 +211,7 @@ def report(result: object, path: str | os.PathLike[str] | None = None, *, overwr
     Raises
     ------
     TypeError
-        When it is no result.
+        When ``result`` is not a result.
     ValueError
         When the ending of the path names no format, or the file exists and may not be replaced.
 

@@ -1,4 +1,4 @@
-"""Several calibrations in order, as a report."""
+"""Report of a ranking of calibrations."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ AGAIN = "Calibrate again: none of these fits this log."
 
 
 def ranking_report(ranking: Ranking) -> Document:
-    """Lay out a ranking: the order, what is wrong with each, and the parameters of the best."""
+    """Lay out a ranking: the order, likely mistakes of each, and the parameters of the best."""
     best = ranking.best
     rejected = [one.name for one in ranking.candidates if one.is_rejected]
     verdict = f"{best.name} fits this log best"
@@ -62,7 +62,7 @@ def ranking_report(ranking: Ranking) -> Document:
 
 
 def said_of(one: Ranked) -> str:
-    """Why a calibration is rejected, in words with its figures; of a sound one what its file leaves open."""
+    """Likely mistakes or serious findings of a calibration, with figures, and sensors whose bias its file lacks."""
     said = [_mistake(found) for found in one.suspicions]
     if not said:
         said = [f.seen for f in one.verification.findings if f.severity.value == "serious"][:2]
@@ -157,7 +157,7 @@ INTERVAL = "95 % interval"
 
 
 def ranking_chart(ranking: Ranking) -> Chart:
-    """A row a calibration, the best first: gravity error in static poses, and tilt error after a rotation."""
+    """A row per calibration, the best first: gravity error in static poses, and tilt error after a rotation."""
     found = ranking.candidates
     gravity = [(one.verification.norm_rms, *one.norm_interval) for one in found]
     tilt = [(one.verification.angle_rms_deg, *one.angle_interval) for one in found]
@@ -172,7 +172,7 @@ def _panel(ranking: Ranking, what: str, unit: str, errors: FloatArray) -> Panel:
     names = tuple(one.name for one in ranking.candidates)
     place = -np.arange(1.0, len(names) + 1.0)
     rejected = np.array([one.is_rejected for one in ranking.candidates])
-    # An interval of a bootstrap is not symmetric: a stroke a row, lifted between rows.
+    # Bootstrap intervals are not symmetric: drawn as one line with gaps between rows.
     ends = np.column_stack([errors[:, 1:], np.full(len(names), np.nan)]).ravel()
     marks: list[Mark] = [Line(ends, np.repeat(place, 3), INTERVAL, "soft")]
     kinds: tuple[tuple[BoolArray, Colour, str], ...] = ((~rejected, "c1", "fits"), (rejected, "accent", "rejected"))

@@ -1,4 +1,4 @@
-"""What a reference says of a log, in words and tables."""
+"""Report sections of the fit to a reference."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 SECONDS_PER_HOUR = 3600.0
 _EFFECTS = {"gyro-g-sensitivity": "g-sensitivity", "gyro-scale-nonlinearity": "nonlinearity of the scale"}
 _SHEET = {"gyro-g-sensitivity": (0.1, "°/s/g"), "gyro-scale-nonlinearity": (0.1, "% of ±250 °/s")}
-"""Sizes in data sheets, in their own units."""
+"""Data-sheet sizes in printed units."""
 _SIGNS = {
     "quieter-than-gyro": "the difference between the two is quieter than the static gyro",
     "mounted-without-error": "it lies along the gyro's own axes",
@@ -29,7 +29,7 @@ _SIGNS = {
 
 
 def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
-    """Clocks, mounting, lever arm, both sensors, effects and the replay, as the first thing to read."""
+    """Clocks, mounting, lever arm, both sensors, effects and the replay."""
     facts = [
         ("reference", f"{found.kind}: {found.source}"),
         ("shared motion", f"{found.overlap_s:.1f} s, correlation of the turning rates {found.correlation:.3f}"),
@@ -73,7 +73,7 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
 
 
 def reference_headlines(found: AgainstReference) -> list[Headline]:
-    """What the reference is worth, and what the gyro does with its numbers."""
+    """The reference's own error, and the attitude error of the calibrated gyro."""
     error = found.error
     size = plain_number(degrees_from_radians(error.slow_rad[0]), 2)
     out = [Headline("slow error of the reference", size, "°", f"1 σ an axis, within {plain_number(error.slow_s, 2)} s")]
@@ -87,7 +87,7 @@ def reference_headlines(found: AgainstReference) -> list[Headline]:
 
 
 def _latitude(found: AgainstReference) -> str:
-    """The latitude that the Earth's rate and the vertical enclose."""
+    """The latitude from the angle between the Earth's rate and the vertical."""
     if found.vertical is None or found.earth_rate is None:
         return ""
     up, rate = found.vertical.value, found.earth_rate.value
@@ -98,7 +98,7 @@ def _latitude(found: AgainstReference) -> str:
 
 
 def references_report(calibration: Calibration, references: tuple[AgainstReference, ...]) -> Document:
-    """One unit beside several references: its calibration, then what is each recording's own."""
+    """Lay out one unit with several references: the shared calibration, then the results of each recording."""
     document = calibration_report(calibration)
     own = Table(
         ("reference", "its slow error", "gyro bias [°/s]", "clock rate [ppm]"),
@@ -129,7 +129,7 @@ def references_report(calibration: Calibration, references: tuple[AgainstReferen
 
 
 def beside_reference(document: Document, found: AgainstReference | None, place: int = 0) -> Document:
-    """The report of one recording with its reference's numbers, tables and figures as the section at ``place``."""
+    """The report of one recording with the section on its reference inserted at ``place``."""
     if found is None:
         return document
     section = Section("Against the reference", reference_blocks(found))
@@ -146,7 +146,7 @@ def _slow(error: ReferenceError) -> str:
 
 
 def _error(found: AgainstReference) -> str:
-    """What the reference itself gets wrong."""
+    """The reference's own error in words."""
     error = found.error
     size, low, high = (plain_number(degrees_from_radians(v), 2) for v in error.slow_rad)
     where = "in the body frame" if error.is_of_body else "in the world frame"
@@ -161,7 +161,7 @@ def _error(found: AgainstReference) -> str:
 
 
 def _bias(found: AgainstReference) -> str:
-    """The bias as it acts in this recording: in the middle, and how far it moves."""
+    """The bias in this recording: at its middle, and its change."""
     bias = found.bias
     k = len(bias.value) // 2
     middle = ", ".join(
@@ -252,7 +252,7 @@ def _effect(ident: str, one: Estimate) -> Table:
 
 
 def _shown_from(ident: str, one: Estimate) -> str:
-    """What a reference this good can show."""
+    """The detection limit of an effect with this reference."""
     if one.shown_from is None:
         return ""
     if not np.isfinite(one.shown_from):
@@ -262,6 +262,6 @@ def _shown_from(ident: str, one: Estimate) -> str:
 
 
 def calibration_result_report(result: CalibrationResult) -> Document:
-    """The report of a calibration, with its reference's where it has one."""
+    """The report of a calibration, with the section on its reference where it has one."""
     document = calibration_report(result.calibration, result.segments, result.recording)
     return beside_reference(document, result.reference, 1)

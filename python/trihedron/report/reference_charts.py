@@ -1,4 +1,4 @@
-"""What a page draws of a log beside known motion: the reference's error over time, and what is left of the rate."""
+"""Charts of a fit to a reference: the reference's error and the residual rate over time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TWO_SIGMA = 2.0
 
 
 def error_picture(found: AgainstReference, name: str = "reference-error") -> Picture | None:
-    """The reference's error over time; ``None`` where no attitude was carried beside it."""
+    """The reference's error over time; ``None`` where no attitude was integrated for comparison."""
     if not np.isfinite(found.apart.angle).any():
         return None
     walk = plain_number(degrees_from_radians(found.apart.walk), 2)
@@ -33,7 +33,7 @@ def error_picture(found: AgainstReference, name: str = "reference-error") -> Pic
 
 
 def error_chart(found: AgainstReference) -> Chart:
-    """Three angles over the log's time, with the reach of the slow error, gaps, and what stands apart."""
+    """Three angles over the log's time, with the size of the slow error, gaps, and outlying intervals."""
     apart, error = found.apart, found.error
     degrees = degrees_from_radians(1.0)
     ends = np.array([apart.time_s[0], apart.time_s[-1]])
@@ -48,12 +48,12 @@ def error_chart(found: AgainstReference) -> Chart:
 
 
 def residual_picture(found: AgainstReference) -> Picture:
-    """What is left of the rate over time."""
+    """Residual rate over time."""
     return Picture("reference", "What is left of the rate, window by window.", partial(residual_chart, found))
 
 
 def residual_chart(found: AgainstReference) -> Chart:
-    """One panel an axis."""
+    """One panel per axis."""
     left = degrees_from_radians(1.0) * found.residual_rate
     reach = 1.3 * float(np.percentile(np.abs(left), 99.5))
     panels = []

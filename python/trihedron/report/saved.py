@@ -1,4 +1,4 @@
-"""A report as plain JSON types and back: what a saved result is laid out again from, page or text."""
+"""A report as plain JSON types and back, so that a saved result can be printed again as page or text."""
 
 from __future__ import annotations
 
@@ -24,33 +24,33 @@ if TYPE_CHECKING:
     from cattrs import Converter
 
 KEY = "report"
-"""Where a saved result holds its report."""
+"""Key of the report in a saved result."""
 VERSION = 1
 DIGITS = 6
-"""Significant digits of a drawn value: a page of 4 k shows four."""
+"""Significant digits of a drawn value: a 4k screen shows four."""
 
 
 class NotAReportError(RefusedError):
-    """A saved result that holds no report, or one that is not of this program."""
+    """A saved result without a report, or with one of another program."""
 
 
 def with_report(machine: Mapping[str, Any], laid_out: Document) -> dict[str, Any]:
-    """The result for machines with the report beside it, from which ``trihedron report`` lays it out again."""
+    """The JSON of a result with the report added, for ``trihedron report``."""
     return {**machine, KEY: {"version": VERSION, "document": _converter().unstructure(laid_out)}}
 
 
 def written(laid_out: Document, machine: Callable[[], Mapping[str, Any]], path: Path) -> str:
-    """A report as the content of a file, in the format that its ending names; ``machine`` makes the result for JSON.
+    """A report as the content of a file, in the format of its ending; ``machine`` makes the JSON.
 
     Raises
     ------
     OutputError
-        (a ``ValueError``) when the ending names none.
+        (a ``ValueError``) when the ending names no format.
     """
     check_report(path)
     ending = path.suffix.lower()
     if ending == ".html":
-        # Its templates are slow to load.
+        # Imported here: its templates are slow to load.
         from trihedron.report.page import to_html
 
         return to_html(laid_out)
@@ -60,12 +60,12 @@ def written(laid_out: Document, machine: Callable[[], Mapping[str, Any]], path: 
 
 
 def report_of(saved: Any) -> Document:
-    """The report that a saved result holds.
+    """The report of a saved result.
 
     Raises
     ------
     NotAReportError
-        (a ``ValueError``) when it holds none, or one that is malformed.
+        (a ``ValueError``) when it has none, or a malformed one.
     """
     held = saved.get(KEY) if isinstance(saved, Mapping) else None
     if not isinstance(held, Mapping) or held.get("version") != VERSION:
@@ -78,11 +78,11 @@ def report_of(saved: Any) -> Document:
 
 @cache
 def _converter() -> Converter:
-    """Reads fields off the dataclasses; what is of another type than its field is refused, since it comes from a file.
+    """Converter for the dataclasses of a report; values of a wrong type raise, since they are read from a file.
 
-    Which of several kinds an entry is stands in it as ``is``.
+    The entry ``is`` names the class of a value of a union.
     """
-    # Imported here: a command that writes no document does without it.
+    # Imported here: a command that writes no document does not need it.
     from cattrs import Converter
     from cattrs.strategies import configure_tagged_union
 
@@ -124,7 +124,7 @@ def _rounded(value: float) -> float | None:
 
 
 def _line(values: FloatArray) -> str:
-    """One line of numbers, rows apart by semicolons: a signal on a line of its own a number would be a megabyte."""
+    """Numbers in one line, rows separated by semicolons; one line per number would make files of megabytes."""
     rows = np.atleast_2d(np.asarray(values, dtype=np.float64))
     return ";".join(" ".join(f"{number:.{DIGITS}g}" for number in row) for row in rows)
 

@@ -1,4 +1,4 @@
-"""What was found in a recording: poses, moves, noise."""
+"""Report of a segmentation: poses, moves, noise."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from trihedron.report.session_charts import means_chart, signals_chart
 
 
 def segments_report(segments: Segments, recording: Recording | None = None) -> Document:
-    """Lay out poses and moves, with facts, times and units of the recording where that is given."""
+    """Lay out poses and moves, with properties, times and units of the recording where that is given."""
     findings = segments.findings if recording is None else (*recording.findings, *segments.findings)
     found, still = _counted(segments), f"{duration(_still_s(segments))} in all"
     facts = (("found", f"{found}, {still} still"),) if recording is None else recording_facts(recording, segments)
@@ -41,7 +41,7 @@ def segments_report(segments: Segments, recording: Recording | None = None) -> D
 
 
 def recording_facts(recording: Recording, segments: Segments | None = None) -> tuple[tuple[str, str], ...]:
-    """Length, rate, sensors with unit; with segments their noise, and what was found."""
+    """Length, rate, sensors with unit; with segments also noise, and the number of poses and moves."""
     facts = [("length", f"{duration(recording.duration_s)}, {recording.n_samples} samples")]
     facts.append(("rate", f"{plain_number(recording.rate_hz, 5)} Hz"))
     for name, readings, raw_unit in (
@@ -69,7 +69,7 @@ def _still_s(segments: Segments) -> float:
 
 
 def pose_table(segments: Segments, recording: Recording | None = None) -> Table:
-    """Every pose with its means; when it began and ended, and units, where the recording is given."""
+    """Every pose with its means; with the recording also start, end and units."""
     if recording is None:
         columns = {
             "middle [s]": [f"{t:.1f}" for t in segments.time_mid_s],

@@ -1,4 +1,4 @@
-"""What a page draws of a recording, and of a calibration tested on it."""
+"""Charts of a recording, and of a calibration tested on it."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from trihedron.report.numbers import unit_in_print
 
 ALLOWED = "3 σ of noise and calibration uncertainty"
 LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
-"""What the length of two Gaussian errors exceeds as rarely as one exceeds 3σ, over its rms."""
+"""Limit of the length of a two-component Gaussian error, over its rms, with the probability of 3σ (0.27 %)."""
 
 
 def signals_chart(recording: Recording, segments: Segments | None = None) -> Chart:
-    """Both sensors over time, holds shaded and bumps marked where segments are given."""
+    """Both sensors over time; with segments, poses are shaded and disturbances marked."""
     poses = () if segments is None else segments.poses
     time_s = recording.time_s
     spans = [Span(float(time_s[h.start]), float(time_s[h.stop - 1]), "pose") for h in poses]
@@ -31,7 +31,7 @@ def signals_chart(recording: Recording, segments: Segments | None = None) -> Cha
 
 
 def truth_chart(recording: Recording, truth: Truth) -> Chart:
-    """Both sensors of a simulation over time, shaded where the body truly stood still."""
+    """Both sensors of a simulation over time, with the true static intervals shaded."""
     time_s, last = recording.time_s, recording.n_samples - 1
     spans = [Span(float(time_s[min(h.start, last)]), float(time_s[min(h.stop - 1, last)]), "pose") for h in truth.poses]
     return _signals(recording, tuple(spans))
@@ -74,7 +74,7 @@ def means_chart(segments: Segments) -> Chart:
 
 
 def verification_chart(verification: Verification) -> Chart:
-    """Norm error of every pose against what was to be expected, and the angle missed after every move."""
+    """Gravity error of every pose and tilt error after every move, with their expected size."""
     v = verification
     pose = np.arange(1, len(v.norm_error) + 1, dtype=np.float64)
     error, sigma = mm_s2(v.norm_error), mm_s2(v.norm_sigma)
@@ -118,6 +118,6 @@ def verification_chart(verification: Verification) -> Chart:
 
 
 def _parted(is_beyond: BoolArray) -> list[tuple[BoolArray, str, Colour]]:
-    """What is within the band and what is beyond it, each where there is any."""
+    """Masks, names and colours of the points within and beyond the 3 σ band, without empty ones."""
     parts: list[tuple[BoolArray, str, Colour]] = [(~is_beyond, "within 3 σ", "c1"), (is_beyond, "beyond 3 σ", "accent")]
     return [part for part in parts if part[0].any()]

@@ -1,4 +1,4 @@
-"""Many recordings of one unit, as a report."""
+"""Report of many recordings of one unit."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from trihedron.report.many_charts import sessions_chart, shown
 from trihedron.report.numbers import how_many, plain_number, with_sigma
 
 DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
-"""What a first picture shows of a unit over its sessions; all the others follow below."""
+"""Groups of parameters in the first picture; the others follow below."""
 HEADLINES = {
     "accel-bias": "accelerometer bias",
     "accel-scale": "accelerometer scale",
@@ -28,7 +28,7 @@ NEXT = "Use the common parameters (-o FILE writes them): their uncertainty is th
 
 
 def sessions_report(model: SessionsModel) -> Document:
-    """Lay out what many recordings share, and how far each parameter repeats."""
+    """Lay out the common parameters of many recordings, and the repeatability of each."""
     n = len(model.sessions)
     changed = [change for change in model.changes if change.significant]
     agree = f"{how_many(n, 'recording')} differ by no more than their uncertainty"
@@ -46,7 +46,7 @@ def sessions_report(model: SessionsModel) -> Document:
         sections.append(Section("Temperature", tuple(_thermal(model.thermal))))
     recordings = _sessions(model)
     if len(recordings.head) > 1:
-        # Names alone stand in the title already.
+        # Names alone are in the title already.
         sections.append(Section("Recordings", (recordings,)))
     sections += [Section("Figures", (picture,)) for picture in _further(model)]
     usable = agree
@@ -65,7 +65,7 @@ def sessions_report(model: SessionsModel) -> Document:
 
 
 def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
-    """How certain the common parameters are, on the worst axis, and how far they repeat."""
+    """Uncertainty of the common parameters on the worst axis, and their repeatability."""
     out = []
     for name, words in HEADLINES.items():
         axes = [one for one in model.repeated if one.parameter.id == name]
@@ -83,7 +83,7 @@ def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
 
 
 def _lead(model: SessionsModel) -> Picture:
-    """Scales and biases alone: what a user carries from one session to the next."""
+    """Scales and biases of every recording."""
     chart = partial(sessions_chart, model, DRIFTING, 2)
     has_band = model.thermal is None and any(one.within is not None for one in model.repeated)
     caption = f"Scale and bias of both sensors in every recording, about the common value; {BARS}"
@@ -244,7 +244,7 @@ def _sessions(model: SessionsModel) -> Table:
 
 
 def _further(model: SessionsModel) -> list[Picture]:
-    """What the first picture does not show."""
+    """Groups of parameters that the first picture does not show."""
     others = tuple(name for name in dict.fromkeys(one.parameter.id for one in model.repeated) if name not in DRIFTING)
     chart = partial(sessions_chart, model, others)
     caption = f"The other parameters in every recording, about the common value; {BARS}."
@@ -252,7 +252,7 @@ def _further(model: SessionsModel) -> list[Picture]:
 
 
 def sessions_columns(model: SessionsModel) -> Columns:
-    """A row per parameter: common value, error, spreads with their ends (SI)."""
+    """A row per parameter: common value, standard error, spreads with their intervals (SI)."""
     columns: dict[str, list[Any]] = {
         "id": [one.parameter.id for one in model.repeated],
         "name": [one.parameter.name for one in model.repeated],
@@ -268,14 +268,14 @@ def sessions_columns(model: SessionsModel) -> Columns:
 
 
 def session_record(session: Session) -> dict[str, object]:
-    """One recording's parameters for machines: ``values`` with their ``covariance``, the variance of the bias drift."""
+    """One recording's parameters for JSON: ``values`` with their ``covariance``, the variance of the bias drift."""
     named = {"numbers": "values", "drift": "bias_drift_variance"}
     record = {named.get(name, name): value for name, value in vars(session).items()}
     return {**record, "temperature_range_degc": list(session.temperature_range_degc)}
 
 
 def sessions_record(model: SessionsModel) -> dict[str, object]:
-    """Everything that the report says, as plain types (SI)."""
+    """The content of the report as plain types (SI)."""
     return {
         "by": model.by,
         "is_trustworthy": model.is_trustworthy,

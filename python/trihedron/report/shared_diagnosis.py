@@ -1,4 +1,4 @@
-"""Several recordings of one unit, diagnosed together, as a report."""
+"""Report of several recordings of one unit, diagnosed together."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from trihedron.report.numbers import listed, plain_number, with_sigma
 
 
 def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
-    """Lay out what recordings share, and what belongs to one of them."""
+    """Lay out shared effects, and effects of single recordings."""
     names = distinct_names([one.recording_source for one in found.diagnoses])
     own = [one.id for one in found.effects if one.is_of_instrument]
     verdict = "The recordings share no missing effect."
@@ -56,7 +56,7 @@ def _headlines(found: SharedDiagnosis) -> tuple[Headline, ...]:
 
 
 def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
-    """The strongest of what recordings share: whether its sizes agree is seen at a glance; else how far all are."""
+    """The strongest shared effect with its size in every recording; without one, the scores of all effects."""
     if found.effects:
         chart = partial(shared_chart, found.effects[0], names)
         caption = f"{found.effects[0].id}: its parameters in all recordings together and in each, with 95 % intervals."
@@ -129,7 +129,7 @@ def _candidates(found: SharedDiagnosis) -> tuple[tuple[str, ...], ...]:
 
 
 def shared_diagnosis_record(found: SharedDiagnosis) -> dict[str, Any]:
-    """Everything that the report says, as plain types (SI)."""
+    """The content of the report as plain types (SI)."""
     return {
         "n_recordings": len(found.diagnoses),
         "effects": [one.to_dict() for one in found.effects],
@@ -142,13 +142,13 @@ TWO_SIGMA = 2.0
 ROW_PX = 26
 COLUMNS = 3
 BAR = 0.7
-"""Of a row."""
+"""Height of a bar as a fraction of its row."""
 LONGEST = 16
-"""Letters of a name that stands beside its row; recordings of longer ones are counted, as the title names them."""
+"""Most letters of a name beside its row; recordings with longer names are numbered, as in the title."""
 
 
 def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
-    """A panel a parameter: its value in all recordings together, then in each, with 95 % intervals."""
+    """A panel per parameter: its value in all recordings together, then in each, with 95 % intervals."""
     panels = []
     rows = ("together", *names)
     is_counted = max(map(len, names)) > LONGEST
@@ -170,12 +170,12 @@ def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
 
 
 def candidates_chart(candidates: Sequence[SharedCandidate]) -> Chart:
-    """A bar an effect: its score in all recordings together."""
+    """A bar per effect: its score in all recordings together."""
     place = -np.arange(1.0, len(candidates) + 1.0)
     score = np.array([one.score for one in candidates])
     told = [f"{one.id}: score {plain_number(one.score)}" for one in candidates]
     bars = Bars(score, place, BAR, told, "tried in all recordings together", "soft", is_across=True)
-    # Room on the side that no score may reach, so that what would gain is seen to have a place.
+    # The axis extends beyond 0, so that positive scores have space even if there are none.
     x = Scale("score", includes=(0.0, -0.1 * float(score.min())))
     names = tuple(one.id for one in candidates)
     marks = (bars, Level(x=0.0, name="gains from here on"))

@@ -1,4 +1,4 @@
-"""A simulated recording as a report: what was done to which instrument, and what it was made of."""
+"""Report of a simulated recording: motion, instrument, and its true parameters."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from trihedron.report.session_charts import truth_chart
 
 
 def simulation_report(recording: Recording, truth: Truth) -> Document:
-    """Lay out a simulation: its motion, the effects that are on, the true numbers."""
+    """Lay out a simulation: its motion, the effects switched on, the true parameters."""
     n = len(truth.effects)
     effects = f"{how_many(n, 'effect')} beyond the linear model" if n else "no effect beyond the linear model"
     facts = (
@@ -62,7 +62,7 @@ def _effects(effects: Mapping[str, Mapping[str, object]]) -> Block:
 
 
 def in_rows(value: Any) -> str:
-    """Numbers of an effect in words: a matrix row by row."""
+    """Values of an effect as text, a matrix row by row."""
     try:
         numbers = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
@@ -72,7 +72,7 @@ def in_rows(value: Any) -> str:
 
 
 def _linear(recording: Recording, truth: Truth) -> tuple[Table, ...]:
-    """The true S and b of both sensors, laid out as a calibration lays out what it found."""
+    """The true S and b of both sensors, in the layout of a calibration report."""
     out = []
     for name, S, b, raw, unit in (
         ("accelerometer", truth.accelerometer_S, truth.accelerometer_b, recording.accelerometer_unit.value, "m/s²"),

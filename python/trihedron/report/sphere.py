@@ -1,4 +1,4 @@
-"""Values by direction on a sphere about the body, which a reader turns."""
+"""Values by direction on a rotatable sphere about the body."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from trihedron.report.chart import Sphere
 
 
 def drawn_sphere(sphere: Sphere, caption: str) -> str:
-    """A canvas that the page's script draws and turns: by dragging, or by the arrow keys."""
+    """A canvas that the page's script draws and rotates, by dragging or by the arrow keys."""
     share = np.clip(sphere.values / (sphere.limit or 1.0), -1.0, 1.0)
     points = [
         [*(round(float(c), 3) for c in direction), round(float(s), 3), told]

@@ -1,4 +1,4 @@
-"""Records that no command reports by themselves, laid out all the same: a recording, an Allan curve."""
+"""Reports of records that have no command of their own: a recording, an Allan curve."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from trihedron.report.segments import recording_facts
 from trihedron.report.session_charts import signals_chart
 
 MOST_ROWS = 12
-"""Of a curve's table: one averaging time in so many, so that it is read at a glance."""
+"""Rows of a curve's table, about; averaging times between them are omitted."""
 
 
 def recording_summary(recording: Recording) -> Document:
@@ -38,7 +38,7 @@ def recording_summary(recording: Recording) -> Document:
 
 
 def curve_summary(curve: AllanCurve) -> Document:
-    """Allan deviations with their intervals, a dozen averaging times of them."""
+    """Allan deviations with their intervals, at about a dozen averaging times."""
     k = len(curve.clusters)
     chosen = np.unique(np.linspace(0, k - 1, min(k, MOST_ROWS)).round().astype(int))
     deviation, lower, upper = (values.reshape(k, -1) for values in (curve.deviation, curve.lower, curve.upper))

@@ -14,39 +14,39 @@ from trihedron.report.document import Block, Code, Document, Facts, FindingList,
 from trihedron.sanitise import one_line, printable
 
 WIDTH = 100
-"""Columns of a report that goes into a file, a pipe or a notebook."""
+"""Columns of a report in a file, a pipe or a notebook."""
 NARROWEST, WIDEST = 60, 200
 _GAP, _NARROW_GAP = 3, 2
 _HELD = "\u00a0"
 _TOGETHER = re.compile(r"(?<=\S) ± (?=[\d.])|(?<=\d) %")
 _FEWEST, _FEWEST_OF_HEADS = 16, 9
-"""Columns that names of rows keep, and heads."""
-# The sixteen colours: the terminal's own theme decides what is readable on its background.
+"""Fewest columns for names of rows, and for heads."""
+# The sixteen ANSI colours, which follow the terminal's theme.
 _COLOURS = {"good": "1;32", "usable": "1;33", "bad": "1;31", "serious": "1;31", "warning": "1;33", "note": "1;36"}
 _BOLD, _DIM = "1", "2"
 
 
 @dataclass(frozen=True)
 class Style:
-    """What the place of a report can show."""
+    """Width, colours and characters of the output."""
 
     width: int = WIDTH
     has_colour: bool = False
     is_ascii: bool = False
 
     def paint(self, text: str, code: str) -> str:
-        """Coloured where there is colour."""
+        """The text in a colour, where colours are supported."""
         return f"\x1b[{code}m{text}\x1b[0m" if self.has_colour and text else text
 
     def plain(self, text: str) -> str:
-        """In the characters there are, and none that steers a terminal: a log's names are somebody else's."""
+        """The text with control characters escaped, since names in logs are untrusted, and in ASCII if needed."""
         return printable(ascii_of(text) if self.is_ascii else text)
 
 
 def to_text(document: Document, *, sections: int | None = None, width: int = WIDTH, style: Style | None = None) -> str:
-    """Title, verdict and sections; ``sections`` limits how many (the first fits one screen), ``width`` the columns.
+    """Title, verdict and sections; ``sections`` limits their number (the first fits one screen), ``width`` the columns.
 
-    A table that is wider is cut between columns; every part begins with the first column again and says what it is.
+    A wider table is divided between columns; every part repeats the first column and the caption.
     """
     style = Style(width) if style is None else style
     style = replace(style, width=min(max(style.width, NARROWEST), WIDEST))
@@ -82,7 +82,7 @@ def _block(block: Block, style: Style) -> list[str]:
 
 
 def finding_lines(finding: Finding, style: Style) -> list[str]:
-    """Seen, cause and next action, hanging below the severity."""
+    """Observation, cause and next action, indented below the severity."""
     name, width = finding.severity.value, style.width
     first, *rest = _wrap(style.plain(finding.seen), width, f"{name:<8}", " " * 8)
     lines = [style.paint(name, _COLOURS[name]) + first[len(name) :], *rest]
@@ -95,7 +95,7 @@ def finding_lines(finding: Finding, style: Style) -> list[str]:
 
 
 def _wrap(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
-    # A name such as accel-scale is one word, and so is a number with its uncertainty or its per cent.
+    # No break inside a name such as accel-scale, or inside a number with its uncertainty or per cent.
     text = _TOGETHER.sub(lambda found: found[0].replace(" ", _HELD), text)
     lines = textwrap.wrap(
         text, width, initial_indent=first, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False
@@ -128,7 +128,7 @@ def _facts(facts: Facts, style: Style) -> list[str]:
 
 
 def _table(table: Table, style: Style) -> list[str]:
-    """The first of the layouts that keeps the columns together, else the one that parts them least."""
+    """The first layout in which all columns fit, else the one with the fewest parts."""
     rows = [tuple(map(style.plain, row)) for row in (table.head, *table.rows)]
     found = [_as_it_is(rows), _with_heads_in_lines(rows), _stacked(rows), _with_names_in_lines(rows, style.width)]
     grid, gap = min(found, key=lambda one: len(_parts(_widths(one[0]), style.width, one[1])))
@@ -153,7 +153,7 @@ def _as_it_is(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
 
 
 def _with_heads_in_lines(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
-    """Heads no wider than what stands below them."""
+    """Heads wrapped to the width of their columns."""
     grid, gap = _as_it_is(rows)
     room = _widths(grid[1:]) if len(grid) > 1 else [0] * len(rows[0])
     grid[0] = [_in_lines(cell, max(most, _FEWEST_OF_HEADS)) for cell, most in zip(rows[0], room, strict=True)]
@@ -161,7 +161,7 @@ def _with_heads_in_lines(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
 
 
 def _stacked(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
-    """Uncertainties below their values as well, and columns closer to each other."""
+    """Heads wrapped, uncertainties below their values, and narrower gaps."""
     low = [[_below(cell) for cell in row] for row in rows[1:]]
     room = _widths(low) if low else [0] * len(rows[0])
     return [
@@ -171,7 +171,7 @@ def _stacked(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
 
 
 def _with_names_in_lines(rows: Sequence[Sequence[str]], columns: int) -> tuple[Grid, int]:
-    """The names of the rows as well, in the room that the others leave."""
+    """As :func:`_stacked`, with row names wrapped to the remaining width."""
     grid, gap = _stacked(rows)
     room = columns - sum(width + gap for width in _widths(grid)[1:])
     for row, cells in zip(grid, rows, strict=True):
@@ -180,7 +180,7 @@ def _with_names_in_lines(rows: Sequence[Sequence[str]], columns: int) -> tuple[G
 
 
 def _in_lines(text: str, most: int) -> list[str]:
-    """Text in lines of at most so many columns, or of the longest word; a power of ten is one with its sign."""
+    """Text in lines of at most ``most`` columns, or of the longest word; ``× 10ⁿ`` is not broken."""
     text = text.replace(" × ", f" ×{_HELD}")
     longest = max((_width(word) for word in re.split(r"[ ]|(?<=-)", text)), default=1)
     lines = textwrap.wrap(text, max(most, longest, 1), break_long_words=False) or [""]
@@ -197,7 +197,7 @@ def _widths(grid: Grid) -> list[int]:
 
 
 def _line(row: list[list[str]], chosen: Sequence[int], widths: Sequence[int], room: tuple[int, int]) -> list[str]:
-    """One row of a part within (columns, gap); a last cell that is too long for the terminal is wrapped."""
+    """One row of a part; ``room`` is (columns, gap); a last cell that is too long is wrapped."""
     columns, gap = room
     high = max(len(row[k]) for k in chosen)
     lines = []
@@ -210,7 +210,7 @@ def _line(row: list[list[str]], chosen: Sequence[int], widths: Sequence[int], ro
 
 
 def _parts(widths: list[int], columns: int, gap: int) -> list[list[int]]:
-    """Columns of every part of a table, the first column in each, as many as fit (one at least)."""
+    """Indices of the columns in every part of a table: the first column, and as many others as fit (at least one)."""
     parts: list[list[int]] = []
     part, used = [0], widths[0] if widths else 0
     for k in range(1, len(widths)):

@@ -1,4 +1,4 @@
-"""Where an axis is marked, and with what."""
+"""Positions and labels of axis ticks."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import math
 from trihedron.report.numbers import MINUS, power_of_ten
 
 Tick = tuple[float, str]
-"""Place in data units, and its words (empty: a line without a word)."""
+"""Position in data units and label (empty: a grid line without a label)."""
 
 
 def ticks(low: float, high: float, *, is_log: bool, whole: bool = False, most: int = 6) -> list[Tick]:
-    """Round values between the limits, at most about ``most``."""
+    """Ticks at round values between the limits, at most about ``most``."""
     return _log_ticks(low, high, most) if is_log else _linear_ticks(low, high, whole, most)
 
 
@@ -35,7 +35,7 @@ def _log_ticks(low: float, high: float, most: int) -> list[Tick]:
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
     every = max(1, math.ceil((last - first) / most))
     decades = math.log10(high / low)
-    # Of less than a decade 1, 2 and 5 may leave a single figure, from which no scale is read.
+    # Within a decade, 1, 2 and 5 may leave a single tick, which does not define a scale.
     marked = (1, 2, 3, 4, 6, 8) if decades < 1.0 else (1, 2, 5) if decades < 2.0 else (1,)
     out = []
     for n in range(first, last + 1):
@@ -55,7 +55,7 @@ def _log_word(mantissa: int, n: int, *, is_plain: bool) -> str:
 
 def _word(value: float, places: int) -> str:
     if value != 0.0 and (abs(value) >= 1e6 or places > 5):
-        # As many digits as tell one tick from the next.
+        # As many digits as distinguish neighbouring ticks.
         digits = max(1, places + math.floor(math.log10(abs(value)))) if value else 1
         return f"{value:.{digits}e}".replace("e-0", "e-").replace("e+0", "e").replace("-", MINUS)
     return f"{value if round(value, places) else 0.0:.{places}f}".replace("-", MINUS)

@@ -1,4 +1,4 @@
-"""A calibration judged on another recording, as a report."""
+"""Report of a calibration tested on another recording."""
 
 from __future__ import annotations
 
@@ -56,18 +56,18 @@ def _subtitle(v: Verification) -> str:
 
 
 def _expected(size: str, chi2_per_dof: float) -> str:
-    """What noise and the calibration's uncertainty allow; the weighted error decides, so it stands beside."""
+    """The expected size by noise and the calibration's uncertainty, and χ²/dof, which decides."""
     return f"expected {size}, χ²/dof {plain_number(chi2_per_dof, 2)}"
 
 
 def _usable(v: Verification) -> str:
-    """A warning about the errors themselves takes ``Verified`` away."""
+    """``Verified``, or the errors that exceed noise and uncertainty."""
     above = {finding.code: _ABOVE_NOISE[finding.code] for finding in _above_noise(v)}
     return f"{listed(list(above.values())).capitalize()} above noise and uncertainty" if above else "Verified"
 
 
 def _next_step(v: Verification) -> str:
-    """To use it only where nothing speaks against its errors."""
+    """The action of the finding about the errors; else advice to use the calibration; empty where it is rejected."""
     above = _above_noise(v)
     if above or not v.is_passed:
         return above[0].action if above else ""
@@ -79,7 +79,7 @@ def _above_noise(v: Verification) -> list[Finding]:
 
 
 def headlines_of(v: Verification) -> tuple[Headline, ...]:
-    """Errors beside what was to be expected."""
+    """Gravity and tilt error with their expected size."""
     expected = _expected(in_mm_s2(float(np.sqrt(np.mean(v.norm_sigma**2)))), v.norm_chi2_per_dof)
     norm = plain_number(mm_s2_from_m_s2(v.norm_rms))
     beside = f"rms over {how_many(len(v.norm_error), 'pose')}; {expected}"
@@ -92,7 +92,7 @@ def headlines_of(v: Verification) -> tuple[Headline, ...]:
 
 
 def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
-    """Errors in poses and after rotations beside what was to be expected, and how far the gyro's bias changed."""
+    """Gravity and tilt errors with their expected size, and the change of the gyro's bias."""
     worst = int(np.argmax(np.abs(v.norm_error)))
     expected = float(np.sqrt(np.mean(v.norm_sigma**2)))
     allowed = "rms from noise and calibration uncertainty, χ²/dof"
@@ -133,7 +133,7 @@ def _without(v: Verification) -> str:
 
 
 def parameters_table(v: Verification) -> Table:
-    """Every parameter: the file's less this log's, both uncertainties, and whether this log can judge it."""
+    """Every parameter: file minus log, both uncertainties, and whether the log determines it."""
     rows = []
     for one in v.parameters:
         scale, unit = _SHOWN.get(one.unit, (1.0, one.unit))

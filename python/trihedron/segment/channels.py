@@ -1,4 +1,4 @@
-"""The log as short blocks of all channels: everything after this file works on blocks."""
+"""The log as short blocks of all channels, on which the whole segmentation works."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from trihedron.channel_facts.at_rest import adc_steps, probe_stride
 from trihedron.records import Recording
 
 BLOCK_S = 0.1
-"""Shorter than any motion of a hand (a few hertz), long enough for a variance at 50 Hz and more."""
+"""Shorter than any hand motion (a few hertz), long enough for a variance at 50 Hz and more."""
 BLOCK_SAMPLES = 5
 """Fewer readings have no useful variance: slow logs get longer blocks."""
 WINDOW_BLOCKS = 5
-"""Stillness is judged over five blocks (half a second): long enough to see a turn of 1 deg/s in gravity, and shorter
-than the shortest pose by half."""
+"""Stillness is judged over five blocks (half a second): long enough to see a rotation of 1 °/s in gravity, and half of
+the shortest pose."""
 USUALLY_STILL = 0.1
-"""Quantile of a log's windows that stands for stillness before it is found."""
+"""Quantile of a log's windows that represents stillness before poses are found."""
 
 FINEST = 1e-7
-"""Part of a channel's span that stands for its step where it is finer: no ADC has 23 bits of what it measures,
-and a simulated channel without noise or ADC would be seen to move by any change of its last digit."""
+"""Least LSB, as a part of a channel's span: no ADC has 23 bits, and in a simulated channel without noise or ADC any
+change of the last digit would count as motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,17 +50,17 @@ class Channels:
 
     @property
     def quantisation_variance(self) -> FloatArray:
-        """(c,) variance of rounding to a step, q²/12: no reading is known better than this."""
+        """(c,) rounding variance q²/12, the least variance of a reading."""
         return self.quantum**2 / 12.0
 
     def blocks(self, duration_s: float) -> int:
-        """Blocks in a duration, at least one."""
+        """Number of blocks in a duration, at least one."""
         return max(1, round(duration_s / self.step_s))
 
 
 class BlockSums:
-    """Blocks of an evenly sampled log that comes in pieces of whole blocks: what :func:`split_into_blocks` makes of
-    the whole of it."""
+    """Blocks of an evenly sampled log that comes in pieces of whole blocks: equal to :func:`split_into_blocks` of the
+    whole log."""
 
     def __init__(self, recording: Recording) -> None:
         self.length = block_length(recording.rate_hz)
@@ -74,7 +74,7 @@ class BlockSums:
         self.probes: list[list[FloatArray]] = [[] for _ in self.is_gyroscope]
 
     def add(self, triads: list[FloatArray]) -> None:
-        """The next rows, (k, 3) a sensor; k is a multiple of ``length`` but in the last piece."""
+        """Add the next rows, (k, 3) per sensor; k is a multiple of ``length`` except in the last piece."""
         self.parts.append(_blocks(triads, self.length))
         first = -self.n % self.stride
         for probe, triad in zip(self.probes, triads, strict=True):
@@ -82,13 +82,13 @@ class BlockSums:
         self.n += len(triads[0])
 
     def state(self) -> dict[str, FloatArray]:
-        """All that :meth:`restore` needs to go on after the rows so far."""
+        """The state from which :meth:`restore` continues after the rows so far."""
         mean, variance, is_valid = (np.concatenate([part[k] for part in self.parts]) for k in range(3))
         probes = {f"probe{k}": np.concatenate(probe) for k, probe in enumerate(self.probes)}
         return {"mean": mean, "variance": variance, "is_valid": is_valid.astype(np.float64), **probes}
 
     def restore(self, n: int, state: Mapping[str, FloatArray]) -> None:
-        """Go on after ``n`` rows of the same log, a multiple of ``length``."""
+        """Continue after ``n`` rows of the same log, a multiple of ``length``."""
         self.n = n
         self.parts = [(state["mean"], state["variance"], state["is_valid"] > 0.0)]
         self.probes = [[state[f"probe{k}"]] for k in range(len(self.probes))]
@@ -111,7 +111,7 @@ def _blocks(triads: list[FloatArray], length: int) -> tuple[FloatArray, FloatArr
     parts = [_core.block_statistics(a, length) for a in triads]
     mean = np.hstack([p[0] for p in parts])
     variance = np.hstack([p[1] for p in parts])
-    # Half of the readings must be there for a block to speak for its whole length.
+    # A block is valid if more than half of its readings are present.
     is_valid = np.logical_and.reduce([2 * p[2] > length for p in parts]) & np.isfinite(variance).all(axis=1)
     return mean, variance, is_valid
 
@@ -136,7 +136,7 @@ def _not_below_arithmetic(step: FloatArray, mean: FloatArray) -> FloatArray:
 
 
 def mean_present(rows: FloatArray) -> FloatArray:
-    """(c,) mean of rows (k, c), those that are no numbers passed over; they are looked for where there are any."""
+    """(c,) mean of rows (k, c) without missing values, which are searched only if the mean is not a number."""
     mean: FloatArray = rows.mean(axis=0)
     return np.nanmean(rows, axis=0) if np.isnan(mean).any() else mean
 

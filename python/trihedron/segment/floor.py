@@ -1,4 +1,4 @@
-"""The sensor's own noise, from the log itself, and the two activities measured against it."""
+"""The sensor's own noise, estimated from the log, and the two activities relative to it."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.range_ends import RangeEnd, inside_the_range
 
 SEED_S = 1.0
-"""The quietest 2 % of a log, and no less than one second of it, is taken for still to begin with."""
+"""The quietest 2 % of a log, and at least one second of it, count as still at first."""
 ROUNDING = 1e-7
-"""Of a channel's rms: running sums round at a tenth of this; no sensor's noise is so small beside its motion."""
+"""Least noise over a channel's rms: running sums round at a tenth of this; no sensor's noise is so small."""
 FALSE_ALARM = 1e-4
-"""Chance that a still window is called moving: once in minutes of windows, and so short a gap is closed again."""
+"""Probability that a still window counts as moving: once in minutes of windows, and so short a gap is closed again."""
 TAILS = (probability.ndtr(-1.0), -probability.ndtri(FALSE_ALARM))
-"""Part of still windows a deviation below their median, and deviations above it up to which a window is still."""
+"""Share of still windows below one deviation under their median, and deviations above it up to which they are still."""
 
 
 @dataclass(frozen=True, eq=False)
 class Activity:
-    """How much every block moves, as logarithms of power over the sensor's own noise.
+    """Activity of every block, as logarithms of power over the sensor's own noise.
 
-    ``fast`` (m,) is the scatter inside blocks, ``slow`` (m,) the scatter of block means, both over the window round the
-    block and averaged over channels (log of a ratio: 0 is still). ``is_quiet`` (m,) is at the noise floor in both.
+    ``fast`` (m,) is the scatter inside blocks, ``slow`` (m,) the scatter of block means, both over the window around
+    the block and averaged over channels (log of a ratio: 0 is still). ``is_quiet`` (m,) is at the noise floor in both.
     ``fast_limit``, ``slow_limit`` are the limits of a still sensor; ``white_variance`` and ``slow_variance`` (c,) the
     floors themselves: variance of a reading inside a block, and of a block mean inside a window [raw unit squared].
     """
@@ -42,11 +42,11 @@ class Activity:
     slow_variance: FloatArray
 
     def is_drifting(self, channels: Channels) -> bool:
-        """The floor itself moves: block means scatter as those of a random walk do, or more.
+        """Whether the quiet windows move: block means scatter like those of a random walk, or more.
 
         For white noise the variance of block means is that of a reading over the block's length n; for a random walk
-        it is 5n times that (for a ramp 30n). A sensor at rest is near the first, a body in motion near the last; half
-        of the walk's is the limit, for the median channel.
+        it is 5n times that (for a ramp 30n). A static sensor is near the first, a moving one near the last; half of the
+        walk's value is the limit, for the median channel.
         """
         live = (self.white_variance > 0.0) & (self.slow_variance > 0.0)
         if not live.any():
@@ -56,12 +56,12 @@ class Activity:
 
 
 def measure_activity(channels: Channels, ends: Sequence[RangeEnd] = ()) -> Activity:
-    """Noise floor by growing the quietest windows until they hold every window that the same noise explains.
+    """Noise floor, by growing the quietest windows until they include every window that the same noise explains.
 
-    The floor of a channel is the median over the quiet windows, so neither axes of different noise nor a few
-    disturbed windows matter; the limit lies at the false-alarm quantile of a log-normal whose width is that of the
-    chi-square law, or the width of the quiet windows' lower half where that is larger (coloured noise, rounding).
-    A channel at one of the ``ends`` of its range has no vote there.
+    The floor of a channel is the median over the quiet windows, which is robust against axes of different noise and a
+    few disturbed windows; the limit is the false-alarm quantile of a log-normal with the width of the chi-square
+    distribution, or of the quiet windows' lower half where that is larger (coloured noise, rounding).
+    Windows of a channel at one of the range limits ``ends`` are excluded.
     """
     width = min(WINDOW_BLOCKS, channels.n_blocks)
     freedom = max(width - 1, 1)
@@ -79,7 +79,7 @@ def measure_activity(channels: Channels, ends: Sequence[RangeEnd] = ()) -> Activ
 
 
 def quiet_channels(channels: Channels, activity: Activity, which: BoolArray) -> BoolArray:
-    """(m,) windows in which the channels ``which`` (c,) alone are at the noise floor, whatever the others read."""
+    """(m,) windows in which the channels ``which`` (c,) are at the noise floor, whatever the others read."""
     width = min(WINDOW_BLOCKS, channels.n_blocks)
     alive = which & (activity.white_variance > 0.0) & (activity.slow_variance > 0.0)
     if not alive.any() or not activity.is_quiet.any():
@@ -98,9 +98,9 @@ def quiet_channels(channels: Channels, activity: Activity, which: BoolArray) -> 
 
 
 def _scatter(channels: Channels, mean: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Variance inside the blocks and of block means about their own, over windows (m, c).
+    """Variance inside the blocks and of block means, over windows (m, c).
 
-    ``mean`` (m, c) are counted from near their own, for running sums round, and nothing where blocks are invalid.
+    ``mean`` (m, c) are relative to a constant near them, because running sums round, and 0 where blocks are invalid.
     """
     width = min(WINDOW_BLOCKS, channels.n_blocks)
     inside = rolling_mean(np.where(channels.is_valid[:, None], variance, 0.0), width)

@@ -1,4 +1,4 @@
-"""What is weak about the poses that were found, said as findings."""
+"""Findings on the poses and on the log as a whole."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from trihedron.segment.range_ends import RangeEnd, is_cut
 from trihedron.segment.runs import MIN_POSE_S, Run, means_of
 
 CREEP_CHANCE = 1e-3
-"""Chance that some steady pose of a log is called settling though none is."""
+"""Probability that any steady pose of a log is called settling though none is."""
 POSES_FOR_NINE = 9
-"""A norm fit of nine parameters needs nine poses in different directions, and more to check itself."""
+"""A norm fit of nine parameters needs nine poses in different directions, and more to test itself."""
 
 
 def judge_runs(
@@ -28,7 +28,7 @@ def judge_runs(
     poses: tuple[Pose, ...],
     noise: MeanNoise,
 ) -> list[Finding]:
-    """Settling, bumps and unsteadiness of single poses, each named by its number and time."""
+    """Settling, disturbances and unsteadiness of single poses, each with its number and time."""
     found: list[Finding] = []
     sizes = _settling_sizes(channels, runs, noise, CREEP_CHANCE / max(len(runs), 1))
     creeping = [(size, k) for k, size in enumerate(sizes.tolist()) if size > 0.0]
@@ -73,7 +73,7 @@ def judge_runs(
 
 
 def _settling_sizes(channels: Channels, runs: list[Run], noise: MeanNoise, chance: float) -> FloatArray:
-    """(h,) distance of the halves of steady runs in standard errors where it is more than chance allows, else 0."""
+    """(h,) difference between the halves of steady runs in standard errors, where it exceeds chance, otherwise 0."""
     sizes = np.zeros(len(runs))
     judged = [k for k, run in enumerate(runs) if not run.is_unsteady and len(_halves(run)[0]) > 0]
     if not judged:
@@ -92,7 +92,7 @@ def _settling_sizes(channels: Channels, runs: list[Run], noise: MeanNoise, chanc
 
 
 def _halves(run: Run) -> tuple[list[Range], list[Range]]:
-    """Ranges of the first and of the last half of a run's quiet blocks; none of halves of a single block."""
+    """Ranges of the first and of the last half of a run's quiet blocks; none if a half has fewer than two."""
     ranges = run.quiet_ranges()
     half = sum(b - a for a, b in ranges) // 2
     if half < 2:
@@ -115,7 +115,7 @@ def _halves(run: Run) -> tuple[list[Range], list[Range]]:
 def without_cut(
     recording: Recording, channels: Channels, runs: list[Run], ends: Sequence[RangeEnd]
 ) -> tuple[list[Run], list[Finding]]:
-    """Stretches of stillness whose accelerometer was inside its range, and what is said of the others."""
+    """Runs whose accelerometer was inside its range, and a finding on the others."""
     cut = [is_cut(recording, channels, (run.first, run.last), ends) for run in runs]
     kept = [run for run, end in zip(runs, cut, strict=True) if end is None]
     first = next(((run, end) for run, end in zip(runs, cut, strict=True) if end is not None), None)
@@ -135,13 +135,13 @@ def judge_log(
     poses: tuple[Pose, ...],
     turning: BoolArray,
 ) -> list[Finding]:
-    """Whether the log as a whole rests where it should."""
+    """Findings on the log as a whole: number of poses, slow rotation, no initial pose."""
     found: list[Finding] = []
     duration = recording.duration_s
     if not runs:
         found.append(Finding.of(FindingCode.NOT_STATIC, duration_s=duration, poses=0))
         return found
-    # Shorter stretches are the ends of moves, not turns of their own.
+    # Shorter ranges are the ends of moves.
     turns = [(a, b) for a, b in ranges_of(turning) if b - a >= channels.blocks(MIN_POSE_S)]
     if turns:
         total = sum(b - a for a, b in turns) * channels.step_s
@@ -160,5 +160,5 @@ def _start_s(recording: Recording, pose: Pose) -> float:
 
 
 def _named(indices: list[int]) -> list[int]:
-    """Poses as reports count them."""
+    """Numbers of poses as in reports, from 1."""
     return [k + 1 for k in sorted(indices)]

@@ -1,4 +1,4 @@
-"""The mean reading of every pose, and its standard error without the assumption of whiteness."""
+"""The mean reading of every pose, and its standard error without assuming white noise."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from trihedron.units import acceleration_to_si
 PIECE = 1 << 18
 """Rows of a pose that are read at a time."""
 OCTAVES = 4
-"""A pose's own excess noise is judged on stretches from a half down to a sixteenth of it: the four octaves that weigh
-in the error of its mean."""
+"""Octaves that determine a pose's own excess noise, from a half down to a sixteenth of its length: those that matter
+for the error of its mean."""
 
 
 @dataclass(frozen=True, eq=False)
 class PoseMeans:
     """``mean``, ``sigma`` (h, c) raw units; ``n_averaged`` (h,) finite samples.
 
-    ``up`` (h, 3), ``sigma_up`` (h,) the accelerometer's vertical and its mean's standard error along it, or ``None``.
+    ``up`` (h, 3) the accelerometer's vertical, ``sigma_up`` (h,) standard error of the mean along it, or ``None``.
     """
 
     mean: FloatArray
@@ -39,11 +39,11 @@ class PoseMeans:
 def average_poses(
     recording: Recording, channels: Channels, runs: list[Run], poses: tuple[Pose, ...], noise: MeanNoise
 ) -> PoseMeans:
-    """Means over the samples of each pose; their variances are the pooled law times the pose's own excess.
+    """Means over the samples of each pose; their variances are the pooled ones times the pose's own excess.
 
-    The excess of a pose is the ratio of its own two-sample variances to the pooled law over the four coarsest octaves;
-    being uncertain, it is drawn towards 1 by as many degrees of freedom as the ratios' scatter over poses leaves room
-    for (empirical Bayes). An unsteady pose is taken at its own word, axis by axis.
+    The excess of a pose is the ratio of its own two-sample variances to the pooled ones over the four coarsest octaves.
+    It is shrunk towards 1 with as many prior degrees of freedom as the scatter of the ratios over poses implies
+    (empirical Bayes). The ratio of an unsteady pose is used as it is, axis by axis.
     """
     n_channels = channels.mean.shape[1]
     mean, n_averaged = _sample_means(
@@ -54,8 +54,8 @@ def average_poses(
     shrunk = ratio.copy()
     for triad in range(n_channels // 3):
         axes = slice(3 * triad, 3 * triad + 3)
-        # At rest the axes of a triad differ from the common law alike: their excess is one number. A tremor does
-        # not: it turns gravity across itself, and leaves the reading along it, which tells |g|, as quiet as ever.
+        # In poses the axes of a triad have the same excess, which is one number. A tremor differs: it rotates gravity
+        # across itself, and leaves the reading along it, which determines |g|, as quiet as ever.
         shrunk[:, axes] = _shrunk(ratio[:, axes], freedom, steady)
     duration = np.array([sum(b - a for a, b in run.quiet_ranges()) * channels.step_s for run in runs])
     rounding = rounding_bias_variance(channels, runs)
@@ -76,7 +76,7 @@ def average_poses(
 
 
 def _shrunk(ratio: FloatArray, freedom: FloatArray, steady: npt.NDArray[np.bool_]) -> FloatArray:
-    """(h, k) excess of every pose on axes that are alike: drawn towards 1 where steady, at its own word elsewhere."""
+    """(h, k) excess of every pose on similar axes: shrunk towards 1 if steady, otherwise its own, at least 1."""
     r, nu = ratio.mean(axis=1), freedom * ratio.shape[1]
     prior = _prior_freedom(r[steady], nu[steady])
     pulled = ((prior + nu * r) / (prior + nu))[:, None]
@@ -84,12 +84,12 @@ def _shrunk(ratio: FloatArray, freedom: FloatArray, steady: npt.NDArray[np.bool_
 
 
 def _sample_means(triads: list[FloatArray], poses: tuple[Pose, ...]) -> tuple[FloatArray, IntArray]:
-    """(h, c) means over the samples of each pose, and (h,) how many of them are finite in every sensor."""
+    """(h, c) means over the samples of each pose, and (h,) number of samples that are finite in every sensor."""
     parts = [(k, a, b) for k, pose in enumerate(poses) for a, b in pose.undisturbed()]
     owner, begins, ends = np.array(parts, dtype=np.int64).reshape(-1, 3).T.copy()
     spans = np.column_stack([begins, ends])
     n_rows = np.bincount(owner, spans[:, 1] - spans[:, 0], len(poses)).astype(np.int64)
-    # A log on disk stands for its arrays, and is read in parts.
+    # A log on disk acts like its arrays, and is read in parts.
     if all(isinstance(a, np.ndarray) and a.flags.c_contiguous and a.dtype == np.float64 for a in triads):
         found = [_core.means_by_owner(a, spans, owner, len(poses)) for a in triads]
         if all(np.array_equal(count, n_rows) for _, count in found):
@@ -99,7 +99,7 @@ def _sample_means(triads: list[FloatArray], poses: tuple[Pose, ...]) -> tuple[Fl
     for k, pose in enumerate(poses):
         sums = [_Sum() for _ in triads]
         for first, last in pose.undisturbed():
-            # In pieces: a pose of hours is not copied as a whole.
+            # In pieces, so that a pose of hours is not copied as a whole.
             for start in range(first, last, PIECE):
                 readings = [triad[start : min(start + PIECE, last)] for triad in triads]
                 finite = [np.asarray(np.isfinite(r).all(axis=1)) for r in readings]
@@ -111,7 +111,7 @@ def _sample_means(triads: list[FloatArray], poses: tuple[Pose, ...]) -> tuple[Fl
 
 
 class _Sum:
-    """A mean about the first row: a large offset costs no digits."""
+    """A mean relative to the first row, so that a large offset costs no digits."""
 
     def __init__(self) -> None:
         self.about: FloatArray | None = None
@@ -147,56 +147,56 @@ def _excess(channels: Channels, runs: list[Run], noise: MeanNoise) -> tuple[Floa
 
 
 def _prior_freedom(ratio: FloatArray, freedom: FloatArray) -> float:
-    """Degrees of freedom of the poses' common law: few when holds truly differ, many when sampling explains it all."""
+    """Prior degrees of freedom of the excess: few where poses differ, many where sampling explains their scatter."""
     seen = freedom > 0.0
     if seen.sum() < 2:
         return 1e3
-    # E[(r-1)^2] = 2/ν of sampling + 2/ν0 of real differences; the median keeps one odd pose from deciding.
+    # E[(r-1)^2] = 2/ν of sampling + 2/ν0 of real differences; clipping keeps one odd pose from dominating.
     spread = float(np.mean(np.minimum((ratio[seen] - 1.0) ** 2, 4.0)))
     real = spread - float(np.mean(2.0 / freedom[seen]))
     return float(np.clip(2.0 / max(real, 1e-9), 1.0, 1e3))
 
 
 NORMAL_AT, NORMAL_WEIGHT = np.array([-np.sqrt(3.0), 0.0, np.sqrt(3.0)]), np.array([1.0, 4.0, 1.0]) / 6.0
-"""Three points that stand for a normal number (Gauss and Hermite)."""
+"""Three nodes and weights for the mean over a normal distribution (Gauss-Hermite)."""
 FEWEST_PHASES = 6
-"""Codes, an LSB and more apart in the rms, from which on places inside a step are any."""
+"""Number of codes in the poses, spread by an LSB rms or more, from which the places inside an LSB are uniform."""
 HARMONICS = np.arange(1, 61)
-"""Of a period of one step: with noise of 3 % of a step the sixtieth is down to a thousandth."""
+"""Harmonics of the LSB: with noise of 3 % of an LSB the sixtieth is down to a thousandth."""
 NOISE_TRIED = np.concatenate([[0.0], np.linspace(0.03, 1.0, 98)])
-"""Noise of one reading in LSB."""
+"""Noise of one reading, in LSB."""
 BIAS_VARIANCE = np.where(
     NOISE_TRIED > 0.0,
     np.sum(np.exp(-4.0 * (np.pi * np.outer(NOISE_TRIED, HARMONICS)) ** 2) / (2.0 * (np.pi * HARMONICS) ** 2), axis=1),
     1.0 / 12.0,
 )
-"""Variance of what rounding leaves in a mean, in steps squared, over all places inside a step."""
+"""Variance of the rounding error of a mean, in LSB squared, over all places inside an LSB."""
 SEEN_VARIANCE = np.maximum.accumulate(NOISE_TRIED**2 + 1.0 / 12.0 - BIAS_VARIANCE)
-"""And that of the rounded readings about their mean: the noise, q²/12, less what stays in the mean."""
+"""Variance of the rounded readings about their mean: the noise, plus q²/12, less the rounding error of the mean."""
 
 
 def _mean_bias(seen: FloatArray) -> float:
-    """Mean of what rounding leaves over what the noise may be: as uncertain as variances (n,) of places scatter."""
+    """Rounding variance averaged over the uncertainty of the noise, from the scatter of the variances ``seen`` (n,)."""
     tried = seen.mean() + NORMAL_AT * seen.std() / np.sqrt(len(seen))
     noise = np.interp(np.maximum(tried, 0.0), SEEN_VARIANCE, NOISE_TRIED)
     return float(NORMAL_WEIGHT @ np.interp(noise, NOISE_TRIED, BIAS_VARIANCE))
 
 
 def left_by_rounding(noise: FloatArray, q2: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-    """Variance (c,) of what rounding to steps of ``q2`` squared leaves in a mean, in steps squared, and where the
-    variance ``noise`` (c,) of the readings does not show how large their noise is.
+    """Variance (c,) of the rounding error of a mean, in LSB squared (``q2`` is LSB²), and where the variance ``noise``
+    (c,) of the readings does not determine their noise.
     """
-    # Readings that only toggle between two neighbours have a variance up to q²/4.
+    # Readings that only toggle between two codes have a variance of up to q²/4.
     is_hidden = noise < q2 / 4.0
     return np.interp(np.sqrt(np.where(is_hidden, 0.0, noise) / q2), NOISE_TRIED, BIAS_VARIANCE), is_hidden
 
 
 def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
-    """(c,) variance of what rounding leaves in a mean however long, where the noise is too small to dither.
+    """(c,) rounding variance of a mean that averaging does not reduce, where the noise is too small to dither.
 
     The mean of a rounded Gaussian of deviation σ is off by the sum over k of (q/πk) exp(-2π²k²σ²/q²) sin(2πkx/q): q/√12
-    rms without noise, a fifth of it at σ = 0.28 q (Widrow and Kollár 2008, ch. 4). σ follows from what the readings
-    scatter by, which depends on the place in a step as well: many poses apart have all places, a bias has one.
+    rms without noise, a fifth of it at σ = 0.28 q (Widrow and Kollár 2008, ch. 4). σ follows from the scatter of the
+    readings, which depends on the place in an LSB too: poses far apart have all places, a bias has one.
     """
     if not runs:
         return np.zeros(channels.mean.shape[1])
@@ -208,7 +208,7 @@ def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
     if len(runs) >= FEWEST_PHASES:
         by_pose = means_of(channels.variance, parts) / q2
         for axis in np.flatnonzero(is_hidden & (mean.var(axis=0) > q2)):
-            # Holds that read one code (a face, turned on its table) show one place inside a step, once.
+            # Poses with one code (a face, turned on its table) count as one place inside the LSB.
             place = np.unique(np.round(mean[:, axis] / np.sqrt(q2[axis])), return_inverse=True)[1]
             n = int(place.max()) + 1
             if n >= FEWEST_PHASES:
@@ -217,21 +217,21 @@ def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
     return np.where(channels.quantum > 0.0, left, 0.0)
 
 
-# The error of a pose's mean along the vertical, the only part of it that the length of gravity sees.
+# The error of a pose's mean along the vertical, the only part that changes the norm of gravity.
 
 FEWEST_ON_ELLIPSOID = 9
-"""Poses from which the ellipsoid of their readings (six numbers) is fitted."""
+"""Poses from which the ellipsoid of their readings (six parameters) is fitted."""
 MOST_UNEVEN = 3.0
-"""Ratio of the axes' sensitivities above which such an ellipsoid is no accelerometer's: its poses lie in a plane."""
+"""Ratio of the axes' sensitivities above which the ellipsoid is not an accelerometer's: its poses lie in a plane."""
 WORST_CONDITION = 50.0
-"""Condition number above which poses do not tell its numbers apart."""
+"""Condition number above which poses do not determine its parameters."""
 
 
 def upright(mean: FloatArray, *, has_unit: bool) -> FloatArray | None:
-    """(h, 3) unit gradients of the length of gravity by the raw means (h, 3) of the accelerometer.
+    """(h, 3) unit gradients of the norm of gravity by the raw means (h, 3) of the accelerometer.
 
-    Normals of the ellipsoid with the sensor's axes through the means; where they do not fix one, their own directions
-    if the readings have a unit (biases are then small beside gravity), else ``None``.
+    Normals of the axis-parallel ellipsoid through the means; where they do not determine one, the directions of the
+    means if the readings have a unit (biases are then small beside gravity), else ``None``.
     """
     if len(mean) >= FEWEST_ON_ELLIPSOID and np.isfinite(mean).all():
         centre, scale = 0.5 * (mean.max(axis=0) + mean.min(axis=0)), float(np.ptp(mean, axis=0).max())
@@ -255,8 +255,8 @@ def _unit(rows: FloatArray) -> FloatArray:
 def along(channels: Channels, runs: list[Run], up: FloatArray) -> Channels:
     """The accelerometer's blocks along each pose's own direction ``up`` (h, 3), as the first axis of a triad.
 
-    A support that gives, a tremor and a body that goes on settling turn gravity across itself: readings across the
-    vertical differ by the angle, that along it by half its square.
+    A soft support, a tremor and settling rotate gravity across itself: readings across the vertical change by the
+    angle, that along it by half its square.
     """
     force = np.flatnonzero(~channels.is_gyroscope)
     mean, variance = np.zeros((channels.n_blocks, 3)), np.zeros((channels.n_blocks, 3))
@@ -270,6 +270,6 @@ def along(channels: Channels, runs: list[Run], up: FloatArray) -> Channels:
 
 
 def noise_along(channels: Channels, runs: list[Run]) -> MeanNoise:
-    """The law of that one axis, from steady holds where there are any."""
+    """Noise of the mean along that axis, from steady poses where there are any."""
     pooled = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
     return pool_mean_noise(channels, pooled or [r for run in runs for r in run.quiet_ranges()])

@@ -1,4 +1,4 @@
-"""How far the mean of a stretch is from the next stretch's: noise over time, pooled over all poses."""
+"""Noise of means over time: differences between the means of neighbouring intervals, pooled over all poses."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class MeanNoise:
     walk: FloatArray
 
     def variance(self, duration_s: float | FloatArray) -> FloatArray:
-        """Variance of a mean over ``duration_s`` about the mean of a like stretch next to it, halved.
+        """Half the variance of the difference between the means of two neighbouring intervals of ``duration_s``.
 
         (c,) for one duration, (k, c) for a column (k, 1) of them.
         """
@@ -35,11 +35,11 @@ class MeanNoise:
 
 @dataclass(frozen=True, eq=False)
 class HalvesDifferences:
-    """Stretches halved again and again: ``square`` (k, c) halved squared difference of the means of two halves.
+    """Repeated halving of intervals: ``square`` (k, c) half the squared difference of the means of two halves.
 
-    ``size`` (k,) blocks in a half (harmonic mean where the halves differ by one), ``depth`` (k,) 0 for the stretch as a
-    whole, ``stretch`` (k,) which one it came from. For white noise the differences are independent of each other and
-    leave nothing out (an unbalanced Haar transform): n blocks give n - 1.
+    ``size`` (k,) blocks in a half (harmonic mean where the halves differ by one), ``depth`` (k,) 0 for the interval as
+    a whole, ``stretch`` (k,) its index. For white noise the differences are independent of each other and complete (an
+    unbalanced Haar transform): n blocks give n - 1.
     """
 
     square: FloatArray
@@ -49,15 +49,15 @@ class HalvesDifferences:
 
 
 def split_by_halves(mean: FloatArray, ranges: list[Range]) -> HalvesDifferences:
-    """Differences of the halves of every stretch of blocks ``mean`` (m, c), of their halves, and so on to one block."""
+    """Differences of the halves of every range of blocks ``mean`` (m, c), of their halves, and so on to one block."""
     return HalvesDifferences(*_core.halves_of(mean, np.array(ranges, dtype=np.int64).reshape(-1, 2)))
 
 
 def pool_mean_noise(channels: Channels, ranges: list[Range], is_robust: bool = False) -> MeanNoise:
-    """Fit the noise law to the halves' differences of all stretches of blocks together, octave by octave.
+    """Fit white noise, flicker and walk to the differences of halves of all ranges of blocks together, by octave.
 
-    Weights are those of a variance with as many degrees of freedom as there are differences; robust means the median
-    of the squares (over that of chi-square with one degree of freedom), for use before the edges are trimmed.
+    Weights are those of a variance with as many degrees of freedom as there are differences; robust uses the median of
+    the squares (over that of chi-square with one degree of freedom), for use before the edges are trimmed.
     """
     n_channels = channels.mean.shape[1]
     halves = split_by_halves(channels.mean, ranges)
@@ -90,10 +90,10 @@ def pool_mean_noise(channels: Channels, ranges: list[Range], is_robust: bool = F
 
 
 TERMS = ([0], [0, 1], [0, 2], [0, 1, 2])
-"""White alone; with flicker; with walk; with both. The law is their average by Schwarz's weights; a term costs the
-logarithm of the number of stretches, for a slow term shows once in each: it must earn its place, or it would inflate
-every error, and none is struck out for good by too short a log. Which terms a sensor has is decided on its three axes
-together, which are made alike: a few coarse differences of one axis say little, and carry far beyond their time."""
+"""White noise; with flicker; with walk; with both. The result is their average with weights by Schwarz's criterion. A
+term costs the logarithm of the number of ranges, because a slow term shows once in each: a term without support would
+inflate every error, and none is dropped for good in too short a log. Terms are chosen for the three axes of a sensor
+together, which are alike: a few coarse differences of one axis determine little, and would be extrapolated far."""
 
 
 def _fit(design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int]) -> tuple[float, FloatArray]:
@@ -102,14 +102,14 @@ def _fit(design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int])
     A variance with n degrees of freedom has the deviance n (s/v - 1 - ln(s/v)).
     """
     if len(seen) < len(chosen):
-        # Too few lengths leave the terms open; which are then zero is a matter of the method.
+        # Too few durations leave the terms undetermined; which of them are zero then depends on the method.
         return _fit_open(design, seen, n, chosen)
     deviance, terms = _core.mean_noise_terms(design, seen, n, chosen)
     return deviance, np.array(terms)
 
 
 def _fit_open(design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int]) -> tuple[float, FloatArray]:
-    """As :func:`_fit`, by the active sets of Lawson and Hanson."""
+    """As :func:`_fit`, by the active-set method of Lawson and Hanson."""
     from scipy import optimize
 
     terms = np.zeros(3)

@@ -1,4 +1,4 @@
-"""One recording into poses and moves: the composition of the room."""
+"""Segmentation of one recording into poses and moves."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks, turn
 from trihedron.units import AccelerationUnit, rate_to_si
 
 LONG_S = 4.0
-"""A quiet stretch this long has a middle that still shows noise over seconds."""
+"""Duration of a quiet range whose central half still shows noise over seconds."""
 
 
 def segment_recording(recording: Recording, *, progress: Progress | None = None) -> Segments:
-    """Find poses and the moves between them; no threshold is asked for, the sensor's own noise sets it.
+    """Find poses and the moves between them; no threshold is needed, the sensor's own noise sets it.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def segment_recording(recording: Recording, *, progress: Progress | None = None)
     Returns
     -------
     Segments
-        Weak answers (too few poses, a log that never rests, creep, bumps) are findings in it.
+            Weak answers (too few poses, a log that is never static, settling, disturbances) are findings in it.
 
     Notes
     -----
@@ -70,7 +70,7 @@ def segment_recording(recording: Recording, *, progress: Progress | None = None)
 
 
 def _limits(recording: Recording) -> list[tuple[int, Limit]]:
-    """Limits of all channels, counted as blocks count them."""
+    """Limits of all channels, with channels numbered as in blocks."""
     sensors = [one for one in (recording.facts.accelerometer, recording.facts.gyroscope) if one is not None]
     return [(3 * k + limit.axis, limit) for k, facts in enumerate(sensors) for limit in facts.limits]
 
@@ -82,8 +82,8 @@ def segment_blocks(
     limits: Sequence[tuple[int, Limit]] = (),
     progress: Progress | None = None,
 ) -> Segments:
-    """The same from blocks that were made already, with the (channel, limit) that readings were seen to end at; of the
-    recording itself only rows of poses are read."""
+    """As :func:`segment_recording`, from blocks and the (channel, limit) of range limits; of the recording itself only
+    rows of poses are read."""
     report = progress or (lambda _done, _text: None)
     if channels.is_valid.sum() < WINDOW_BLOCKS:
         return _nothing_found(recording, channels)
@@ -122,7 +122,7 @@ def _find_runs(recording: Recording, channels: Channels, quiet: BoolArray, loose
     seen = [r for r in ranges_of(quiet) if r[1] - r[0] >= WINDOW_BLOCKS] or ranges_of(quiet)
     if not seen:
         return []
-    # The ends of soft moves reach into the stretches: what is to be found there may not be taken for noise.
+    # The ends of soft moves reach into the quiet ranges: what is to be trimmed there must not count as noise.
     long = channels.blocks(LONG_S)
     core = [(a + (b - a) // 4, b - (b - a) // 4) if b - a >= long else (a, b) for a, b in seen]
     noise = pool_mean_noise(channels, core, is_robust=True)
@@ -137,7 +137,7 @@ def _find_runs(recording: Recording, channels: Channels, quiet: BoolArray, loose
 
 
 def _gravity_reading(recording: Recording, channels: Channels) -> float | None:
-    """Roughly what |g| reads in raw units: known by the unit, or half the widest range of the calmer readings."""
+    """Approximate reading of |g| in raw units: from the unit, or half the widest range of the 1 to 99 % quantiles."""
     if recording.accelerometer is None:
         return None
     if recording.accelerometer_unit is AccelerationUnit.M_S2:
@@ -183,7 +183,7 @@ def _describe(
 
 def _pose(index: int, run: Run, runs: list[Run], channels: Channels, n_samples: int) -> Pose:
     m = channels.length
-    # Quiet blocks are centres of quiet windows: the window reaches two blocks further on either side.
+    # Quiet blocks are centres of quiet windows: a window extends two blocks further on either side.
     reach = WINDOW_BLOCKS // 2
     lower = runs[index - 1].last if index else 0
     upper = runs[index + 1].first if index + 1 < len(runs) else channels.n_blocks
@@ -228,7 +228,7 @@ def _assemble(
     findings: tuple[Finding, ...],
     vertical: tuple[FloatArray | None, FloatArray | None] = (None, None),
 ) -> Segments:
-    """Channels back to sensors."""
+    """Segments, with the channels assigned to their sensors."""
     accelerometer = slice(0, 3) if recording.accelerometer is not None else None
     gyroscope = None
     if recording.gyroscope is not None:
@@ -255,21 +255,21 @@ def _assemble(
     )
 
 
-# Roughly how many radians a gyro reading is worth: enough to know a support that settles from a body that turns.
+# Approximate scale of a gyro reading, sufficient to separate a support that settles from a body that rotates.
 
 LEAST_TURN_RAD = 0.3
-"""Gravity must turn by this much between two stretches to weigh the gyro's path against it."""
+"""Least rotation of gravity between two quiet ranges that is compared with the gyro's path."""
 USUAL = 0.8
-"""Quantile over the moves of gravity's turn over the gyro's path: near one where a move is direct and about a level
-axis, less for all others."""
+"""Quantile over the moves of the rotation of gravity over the gyro's path: near one where a move is direct and about a
+level axis, smaller for all others."""
 
 
 def radians_per_reading(
     recording: Recording, channels: Channels, ranges: list[Range], centre: FloatArray
 ) -> float | None:
-    """Scale [rad/s per raw unit] by the unit, or by how far gravity turns between quiet stretches; to a factor of two.
+    """Scale [rad/s per raw unit] by the unit, or by the rotation of gravity between quiet ranges; to a factor of two.
 
-    ``None`` in counts where no move turns gravity.
+    ``None`` in counts where no move rotates gravity.
     """
     unit = rate_to_si(recording.gyroscope_unit)
     if unit is not None:
@@ -284,7 +284,7 @@ def radians_per_reading(
     size = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
     cosine = np.sum(before * after, axis=1) / np.where(size > 0.0, size, 1.0)
     angle = np.where(size > 0.0, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
-    # Of every block between two stretches: which two, and how fast the gyro turned.
+    # For every block between two quiet ranges: the index of the move, and the rate of the gyro.
     length = edges[1:, 0] - edges[:-1, 1]
     move = np.repeat(np.arange(len(length)), length)
     block = np.arange(len(move)) + (edges[1:, 0] - np.cumsum(length))[move]

@@ -1,4 +1,4 @@
-"""Poses once more, as a joint model needs them: cut where they were bumped, found where they were only shaken."""
+"""Poses for a joint model: cut at disturbances, and extended by poses that only vibrate or drift."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from trihedron.records import Move, Pose, Recording, Segments
 from trihedron.segment.shaken import is_shaken_by_a_support
 
 SHORTEST_PIECE_S = 0.3
-"""Of a pose beside a bump: what is shorter is left out."""
+"""Least duration of a piece of a pose beside a disturbance; shorter ones are excluded."""
 RESTING = 1e-3
-"""A mean rate of a thousandth of the moves' rms, five times over, is rest: below 1 °/s after moves of 3 rad/s."""
+"""Mean rate, over the rms of the moves, that counts as zero, times five: below 1 °/s after moves of 3 rad/s."""
 
 
 def resegment(recording: Recording, segments: Segments) -> Segments:
-    """Poses as a model of the whole session needs them: cut where they were bumped, found where only shaken.
+    """Poses for a model of the whole session: cut at disturbances, and extended by those that only vibrate or drift.
 
-    A bump inside a pose turns the body; averaged over, it contradicts the moves on both sides. Cut there, the gyro
-    carries the attitude across it like across any move. A pose that vibrates is no rest, but its slow part stands
-    still: it becomes a pose of its own, so that a bias that follows the vibration can be seen.
+    A disturbance inside a pose rotates the body; the mean over it contradicts the moves on both sides. Between the
+    pieces of a cut pose the gyro carries the attitude like in any move. A pose that vibrates is not quiet, but its mean
+    is static: it becomes a pose of its own, so that a bias that depends on vibration can be estimated.
 
-    The answer's ``whole`` are the poses as they were found, each averaged over whatever happened in it.
+    ``whole`` of the result are the poses as they were found, each averaged over all of its samples.
     """
     shortest = max(int(SHORTEST_PIECE_S * recording.rate_hz), 8)
     spans: list[tuple[int, int, int]] = []
@@ -51,12 +51,12 @@ def resegment(recording: Recording, segments: Segments) -> Segments:
 
 
 LONG_S = 1800.0
-"""A pose that lasts longer is cut into pieces: its bias has time to drift, and one mean would hide it."""
+"""A longer pose is cut into pieces: its bias has time to drift, which one mean would hide."""
 MOST_PIECES = 40
 
 
 def _in_pieces(recording: Recording, spans: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
-    """Long poses cut into pieces, two samples apart so that a model knows nothing turned between them."""
+    """Long poses cut into pieces, two samples apart, so that the moves between them are known to have no rotation."""
     rate = recording.rate_hz
     total_s = sum((b - a) / rate for a, b, _ in spans if (b - a) / rate > LONG_S)
     piece_s = max(LONG_S / 2.0, total_s / MOST_PIECES)
@@ -69,7 +69,7 @@ def _in_pieces(recording: Recording, spans: list[tuple[int, int, int]]) -> list[
 
 
 def _drifting(recording: Recording, segments: Segments, block_s: float = 60.0) -> list[tuple[int, int]]:
-    """Hours between poses in which nothing moves but the readings drift: block after block as quiet as a pose."""
+    """Hours between poses in which only the readings drift: consecutive blocks that are as quiet as a pose."""
     if recording.accelerometer is None:
         return []
     assert segments.accelerometer_sigma is not None
@@ -97,7 +97,7 @@ def _drifting(recording: Recording, segments: Segments, block_s: float = 60.0) -
 
 
 def _averaged_whole(recording: Recording, segments: Segments) -> Segments:
-    """The poses as they were found, averaged over all of their samples, with the bumps that were seen in them."""
+    """The poses as they were found, averaged over all of their samples, with the disturbances seen in them."""
     spans = [(pose.start, pose.stop, i) for i, pose in enumerate(segments.poses)]
     out = _segments_of(recording, segments, spans)
     poses = tuple(replace(new, disturbed=old.disturbed) for new, old in zip(out.poses, segments.poses, strict=True))
@@ -116,7 +116,7 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
             return None, None
         mean = np.array([np.nanmean(values[a:b], axis=0) for a, b, _ in spans])
         error = np.zeros_like(mean)
-        # How far the old means' errors exceed white noise, for pieces of other lengths.
+        # Ratio of the old means' errors to white noise, for pieces of other durations.
         colour = np.median(old / (sigma / np.sqrt(np.maximum(segments.n_averaged, 1))[:, None]), axis=0)
         for k, (a, b, source) in enumerate(spans):
             n = b - a
@@ -128,7 +128,7 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
                 blocks = np.array_split(part, 8) if len(part) >= 8 else [np.zeros((1, 3))] * 8
                 scatter = np.std([block.mean(axis=0) for block in blocks], axis=0, ddof=1) / np.sqrt(8.0)
                 floor = np.maximum(colour, 1.0) * sigma / np.sqrt(n)
-                # Eight blocks tell a pose that goes on settling (several times the noise), not 20 % of its noise.
+                # Eight blocks detect a pose that goes on settling (several times the noise), not 20 % of its noise.
                 error[k] = np.maximum(floor, scatter if source < 0 else np.where(scatter > 2.0 * floor, scatter, 0.0))
         return mean, error
 
@@ -162,13 +162,13 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
 
 
 MAX_TURNING = 0.05
-"""Scatter of the rate in a shaken pose, as a share of the fastest rate of the recording."""
+"""Scatter of the rate in a vibrating pose, as a share of the fastest rate of the recording."""
 
 
 def _shaken(
     recording: Recording, segments: Segments, block_s: float = 0.1, shortest_s: float = 0.8
 ) -> list[tuple[int, int]]:
-    """Stretches of moves whose block means stand still while the samples shake."""
+    """Ranges of moves whose block means are static while the samples vibrate."""
     if recording.gyroscope is None or recording.accelerometer is None or segments.gyroscope_mean is None:
         return []
     assert segments.accelerometer_sigma is not None
@@ -176,7 +176,7 @@ def _shaken(
     bias = np.median(segments.gyroscope_mean, axis=0)
     assert segments.gyroscope_sigma is not None
     spread = np.maximum(np.std(segments.gyroscope_mean, axis=0), segments.gyroscope_sigma / np.sqrt(block))
-    # A bias that follows the shaking is no motion: rates far below those of real moves count as none.
+    # A bias that depends on vibration is no motion: rates far below those of real moves count as zero.
     moving = np.concatenate([recording.gyroscope[m.start : m.stop] for m in segments.moves] or [np.zeros((1, 3))])
     spread = np.maximum(spread, RESTING * float(np.sqrt(np.nanmean((moving - bias) ** 2))))
     fastest = float(np.nanmax(np.abs(recording.gyroscope - bias)))
@@ -193,12 +193,12 @@ def _shaken(
         own = np.nanstd(gyro, axis=1) / np.sqrt(block)
         force_mean = np.nanmean(accel, axis=1)
         force_own = np.nanstd(accel, axis=1)
-        # Zero rate within its own scatter, and force that steps from block to block by less than it shakes in one.
+        # Zero rate within its own scatter, and force that changes between blocks by less than it vibrates in one.
         still = (np.abs(rate_mean - bias) < 5.0 * np.hypot(own, spread)).all(axis=1)
         step = np.abs(np.diff(force_mean, axis=0, prepend=force_mean[:1]))
         calm = (step < 4.0 * np.sqrt(2.0 / block) * np.maximum(force_own, segments.accelerometer_sigma)).all(axis=1)
         shaking = (force_own > 3.0 * segments.accelerometer_sigma).any(axis=1)
-        # A hand that swings back and forth is no pose: what only shakes turns slowly beside the session's moves.
+        # A hand that swings back and forth is no pose: a vibrating one rotates slowly beside the session's moves.
         turning = (np.nanstd(gyro, axis=1) > MAX_TURNING * fastest).any(axis=1)
         good = still & calm & shaking & ~turning
         for first, last in ranges_of(good):

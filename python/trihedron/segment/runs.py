@@ -1,4 +1,4 @@
-"""From quiet blocks to poses, still counted in blocks."""
+"""From quiet blocks to poses, in units of blocks."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ from trihedron.segment.floor import Activity
 from trihedron.segment.noise import MeanNoise
 
 MIN_POSE_S = 1.0
-"""A hand that hesitates stops for a few tenths of a second; a person who holds, holds a second."""
+"""A hand that hesitates stops for a few tenths of a second; an intended pose lasts a second or more."""
 SEEN_S = 0.8
-"""What is left to see of the shortest pose at the noise floor: its ends share their blocks with the moves."""
+"""Part of the shortest pose that is seen at the noise floor: its ends share their blocks with the moves."""
 SET_DOWN_S = 0.5
-"""A sensor set down for a second comes to rest, and leaves, in less than this; a hand that calms down takes longer."""
+"""Longest approach to, and departure from, a short pose: a sensor that is set down takes less, a calming hand more."""
 FAR_SHORTER = 0.1
-"""Of the usual pose: who holds for half a minute does not set down for a second, but hesitates."""
+"""Least length of a short pose over the usual one: among poses of half a minute, a second is a hesitation."""
 BUMP_S = 2.0
-"""A push and the ringing after it last less than this; what lasts longer is a move even if the pose comes back."""
+"""Longest push with its ringing; a longer disturbance is a move even if the pose comes back."""
 RETURN = 0.3
-"""A push and its return cancel: what is left of the turn is less than this part of the way turned to and fro."""
+"""Net rotation over the path of a push and its return, below which they cancel."""
 CLEAN_EDGE = 2e-3
-"""Chance that a clean stretch at an end is trimmed, where it costs some tenths of a second."""
+"""Probability that an undisturbed edge is trimmed, which costs some tenths of a second."""
 EDGE_BLOCKS = [2**k for k in range(16)]
-"""Stretches at an end of a pose that are compared with its middle."""
+"""Lengths of the edges of a pose that are compared with its middle, in blocks."""
 CREEP_PART = 0.02
-"""A settling support turns slower than this part of the speed of the log's own moves."""
+"""Rate of a settling support over that of the log's own moves, at most."""
 SAME_POSE = 1e-3
-"""Chance that two stretches of one pose are called two poses."""
+"""Probability that two parts of one pose are taken for two poses."""
 SWAY_RAD = 0.02
-"""About one degree, the tremor and sway of a hand that tries to hold still: an unsteady pose keeps within it."""
+"""About one degree, the tremor and sway of a hand that tries to hold still: the limit for an unsteady pose."""
 ONE_WAY = 0.5
-"""Share of a hand's mean square rate above which its straight line makes it a turn: over half of it in a slow move and
-in its pauses, next to nothing in a tremor of several swings."""
+"""Share of a hand's mean square rate that a straight line in time explains, above which it is a rotation: over half in
+a slow move and in its pauses, almost nothing in a tremor of several swings."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """Blocks ``[first, last)`` of one pose; ``bumps`` are block ranges inside it that are excluded."""
+    """Blocks ``[first, last)`` of one pose; ``bumps`` are block ranges of disturbances in it, which are excluded."""
 
     first: int
     last: int
@@ -62,14 +62,14 @@ class Run:
         return self.last + self.trimmed[1]
 
     def quiet_ranges(self) -> list[Range]:
-        """The stretches between bumps."""
+        """The ranges between disturbances."""
         if not self.bumps:
             return [(self.first, self.last)] if self.last > self.first else []
         edges = [self.first, *(k for bump in self.bumps for k in bump), self.last]
         return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a]
 
     def quiet_rows(self, values: FloatArray) -> FloatArray:
-        """(k, c) of one row a block ``values`` (m, c): those between bumps; a view where there are none."""
+        """(k, c) of one row per block ``values`` (m, c): those between disturbances; a view where there are none."""
         parts = [values[a:b] for a, b in self.quiet_ranges()]
         return parts[0] if len(parts) == 1 else np.vstack(parts)
 
@@ -89,7 +89,7 @@ def loose_blocks(activity: Activity, is_valid: BoolArray) -> BoolArray:
 
 
 def close_gaps(quiet: BoolArray, is_valid: BoolArray) -> BoolArray:
-    """Quiet blocks with gaps shorter than a window closed: a true disturbance lifts every window it lies in."""
+    """Quiet blocks with gaps shorter than a window closed: a true disturbance raises every window that contains it."""
     out = quiet.copy()
     for first, last in ranges_of(~quiet):
         if first > 0 and last < len(quiet) and last - first < WINDOW_BLOCKS and is_valid[first:last].all():
@@ -98,7 +98,7 @@ def close_gaps(quiet: BoolArray, is_valid: BoolArray) -> BoolArray:
 
 
 def widen(quiet: BoolArray, is_valid: BoolArray) -> BoolArray:
-    """The whole of the quiet windows: a quiet block is the centre of one, which reaches further on either side."""
+    """The whole of the quiet windows: a quiet block is the centre of one, which extends further on either side."""
     kernel = np.ones(2 * (WINDOW_BLOCKS // 2) + 1)
     return (np.convolve(quiet.astype(np.float64), kernel, mode="same") > 0.5) & is_valid
 
@@ -114,7 +114,7 @@ def speed_of_moves(channels: Channels, quiet: BoolArray) -> float:
 
 
 def join_quiet(channels: Channels, quiet: BoolArray, loose: BoolArray, noise: MeanNoise) -> list[Run]:
-    """Stretches of one pose from quiet ones, however short: neighbours with only a bump between are one."""
+    """Poses from quiet ranges of any length: neighbours with only a disturbance between them are one."""
     runs: list[Run] = []
     creeping = CREEP_PART * speed_of_moves(channels, quiet)
     for first, last in ranges_of(quiet):
@@ -132,15 +132,15 @@ def join_quiet(channels: Channels, quiet: BoolArray, loose: BoolArray, noise: Me
 
 
 def long_enough(channels: Channels, runs: list[Run], shortest_s: float) -> list[Run]:
-    """Those whose quiet parts last as long."""
+    """Runs whose quiet parts together last at least ``shortest_s``."""
     shortest = channels.blocks(shortest_s)
     return [run for run in runs if sum(b - a for a, b in run.quiet_ranges()) >= shortest]
 
 
 def set_down(channels: Channels, runs: list[Run], loose: BoolArray, taken: list[Run]) -> list[Run]:
-    """Short stretches between moves on either side: poses of a second, not calm moments of a longer one or of a hand.
+    """Short poses between moves on either side, not calm moments of a longer pose or of a hand.
 
-    ``loose`` (m,) as of :func:`loose_blocks`, ``taken`` what is a pose already.
+    ``loose`` (m,) as of :func:`loose_blocks`, ``taken`` the poses found so far.
     """
     most, found = channels.blocks(SET_DOWN_S), []
     usual = float(np.median([run.last - run.first for run in taken])) if taken else 0.0
@@ -170,7 +170,7 @@ def _is_same_pose(channels: Channels, before: Run, after: Run, noise: MeanNoise,
 
 
 def _comes_back(channels: Channels, before: Run, after: Run, noise: MeanNoise, creeping: float) -> bool:
-    """The gyro's integral between two stretches is nothing: a push and its return, not a turn about the vertical."""
+    """Whether the gyro's integral between two ranges is zero: a push and its return, no rotation about the vertical."""
     gyro = np.flatnonzero(channels.is_gyroscope)
     between = slice(before.last, after.first)
     is_valid = channels.is_valid[between]
@@ -188,29 +188,29 @@ def _comes_back(channels: Channels, before: Run, after: Run, noise: MeanNoise, c
 
 
 def run_mean(channels: Channels, run: Run) -> tuple[FloatArray, int]:
-    """(c,) mean reading of the quiet blocks of a run, and how many they are."""
+    """(c,) mean reading of the quiet blocks of a run, and their number."""
     blocks = run.quiet_rows(channels.mean)
     return blocks.mean(axis=0), len(blocks)
 
 
 def means_of(values: FloatArray, parts: list[list[Range]]) -> FloatArray:
-    """(h, c) means of one row a block ``values`` (m, c) over the ranges of each part (h,), missing ones passed over."""
+    """(h, c) means of one row per block ``values`` (m, c) over the ranges of each part (h,), without missing ones."""
     ranges = np.array([r for part in parts for r in part], dtype=np.int64).reshape(-1, 2)
     owner = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
     return _core.column_means(values, ranges, owner, len(parts))
 
 
 def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravity: float | None) -> list[Run]:
-    """Poses that never come down to the noise floor: long calm stretches whose attitude stays within a hand's sway.
+    """Poses that never reach the noise floor: long calm ranges whose attitude stays within a hand's sway.
 
-    ``gravity`` is the accelerometer's reading of |g| in raw units; without it an angle has no scale, and none is found.
+    ``gravity`` is the accelerometer's reading of |g| in raw units; without it angles have no scale, and none is found.
     """
     accelerometer = np.flatnonzero(~channels.is_gyroscope)
     if gravity is None or not len(accelerometer):
         return []
     free = loose.copy()
     for run in steady:
-        # A calm fringe of a steady pose is its settling, not another pose.
+        # Calm blocks beside a steady pose are its settling, not another pose.
         free[slice(*grown(free, (run.first, run.last)))] = False
     attitude = channels.mean[:, accelerometer] / gravity
     bias = (
@@ -228,7 +228,7 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
             max(first - near.last, near.first - last) < bump and _sway(attitude, [near, run]) < SWAY_RAD
             for near in steady
         ):
-            # The same pose before it settled, or after it was touched.
+            # The same pose before it settled, or after it was disturbed.
             continue
         if found and first - found[-1].last < bump and _sway(attitude, [found[-1], run]) < SWAY_RAD:
             before = found.pop()
@@ -238,8 +238,8 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
 
 
 def without_approaches(channels: Channels, steady: list[Run]) -> list[Run]:
-    """Poses without the last of a slow move before it is set down, or the first of one that is lifted: what still turns
-    beside a longer pose is its fringe."""
+    """The runs without the end of a slow move before a pose, or the start of one after it: these rotate steadily beside
+    a longer run."""
     beside = channels.blocks(BUMP_S)
     kept = []
     for run in steady:
@@ -255,9 +255,9 @@ def without_approaches(channels: Channels, steady: list[Run]) -> list[Run]:
 
 
 def turns_on(channels: Channels, first: int, last: int, bias: FloatArray) -> bool:
-    """The gyro's reading follows a straight line: a slow move, or its pause, turning back or on about another axis.
+    """Whether the gyro's reading follows a straight line: a slow move, or its pause before the next move.
 
-    A hand that tries to hold still goes to and fro.
+    A hand that tries to hold still moves to and fro.
     """
     gyro = channels.is_gyroscope
     is_valid = channels.is_valid[first:last]
@@ -270,15 +270,15 @@ def turns_on(channels: Channels, first: int, last: int, bias: FloatArray) -> boo
 
 
 def _sway(attitude: FloatArray, runs: list[Run]) -> float:
-    """Scatter of the attitude over runs together [rad]."""
+    """Scatter of the attitude over all runs together [rad]."""
     blocks = np.vstack([attitude[a:b] for run in runs for a, b in run.quiet_ranges()])
     return float(np.linalg.norm(blocks.std(axis=0)))
 
 
 @dataclass(frozen=True, eq=False)
 class EdgeNoise:
-    """What an end of a pose is compared by: the ``terms`` (3, c) of a mean's noise, its ``variance`` (k, c) over
-    ``EDGE_BLOCKS``, and the ``limit`` of χ² of the channels that are ``live`` (c,)."""
+    """Limits for the edges of a pose: the ``terms`` (3, c) of a mean's noise, its ``variance`` (k, c) over
+    ``EDGE_BLOCKS``, and the ``limit`` of χ² for the ``live`` channels (c,)."""
 
     terms: FloatArray
     variance: FloatArray
@@ -287,7 +287,7 @@ class EdgeNoise:
 
     @classmethod
     def of(cls, channels: Channels, noise: MeanNoise) -> EdgeNoise:
-        """The same for all poses of a log."""
+        """The limits for all poses of a log."""
         live = np.asarray(noise.variance(1.0) > 0.0)
         duration_s = np.array(EDGE_BLOCKS, dtype=np.float64)[:, None] * channels.step_s
         limit = float(probability.chdtri(int(live.sum()), CLEAN_EDGE))
@@ -295,9 +295,9 @@ class EdgeNoise:
 
 
 def trim_edges(channels: Channels, run: Run, edges: EdgeNoise) -> Run:
-    """Take blocks off both ends until no stretch at an end departs from the middle of the pose.
+    """Remove blocks at both ends until no edge differs from the middle of the pose.
 
-    Stretches of 1, 2, 4 ... blocks at each end are compared with the central half; at most a third is taken off.
+    Edges of 1, 2, 4 ... blocks at each end are compared with the central half; at most a third is removed.
     """
     n = run.last - run.first
     start, tail = _core.ends_to_trim(

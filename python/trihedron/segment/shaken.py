@@ -1,4 +1,4 @@
-"""Poses on something that shakes: the accelerometer is as loud as in a move, and the body does not turn."""
+"""Poses on a vibrating support: the accelerometer is as loud as in a move, but the body does not rotate."""
 
 from __future__ import annotations
 
@@ -27,28 +27,28 @@ from trihedron.segment.runs import (
 )
 
 SMOOTH_S = 1.0
-"""Raised cosine over which a shaking of some hertz and more averages out of the attitude, and a carried body's way
-of speeding up and slowing down does not."""
+"""Length of the raised cosine that averages vibration of some hertz and more out of the attitude, but not the
+acceleration and deceleration of a body that is carried."""
 CALM_RAD_S = SWAY_RAD / 1.0
-"""A hand's sway in one second, the shortest pose: faster is a turn."""
+"""A hand's sway in one second, the shortest pose: a faster rate is a rotation."""
 SUPPORT_RAD = SWAY_RAD / 2.0
-"""A support that shakes does not sway as a hand does: twice what is left of strong shaking by the smoothing."""
+"""Largest sway of a vibrating support, less than a hand's: twice what smoothing leaves of strong vibration."""
 LINE_SHARE = 0.8
-"""Of the power above the noise, in a line and its first harmonics: a motor's is nearly all there, a hand's tremor of
-several hertz of width has about half in any band so narrow."""
+"""Share of the power above the noise in a line and its first harmonics: a motor's is nearly all there, a hand's tremor,
+several hertz wide, has about half in any band so narrow."""
 LINE_BINS = 3
-"""On either side of a line: the main lobe of the raised cosine is two wide, and a motor is not quite steady."""
+"""Bins on either side of a line: the main lobe of the raised cosine is two wide, and a motor is not quite steady."""
 HARMONICS = (1, 2, 3)
 LINE_S = 2.0
-"""The shortest stretch whose spectrum tells so: in half of it a hand's tremor fills no more bins than a line."""
+"""Shortest interval for this test: in half of it a hand's tremor fills no more bins than a line."""
 HAND_HZ = 15.0
-"""A hand's tremor is slower, a rattling support is not."""
+"""Above a hand's tremor, below the vibration of a rattling support."""
 LOBE_BINS = 2
-"""The main lobe itself: so little time leaves a motor none to be unsteady in."""
+"""Bins of the main lobe alone, for intervals too short for a motor to change its frequency."""
 LOBE_SHARE = 0.96
-"""In shorter stretches, of the power above the noise, in one oscillation of the main lobe."""
+"""Share of the power above the noise in one oscillation of the main lobe, in shorter intervals."""
 ABOVE_NOISE = 2.0
-"""Times the noise's power from which on a sensor shows what shakes it."""
+"""Power over that of the noise from which a sensor shows vibration."""
 
 
 def find_shaken(
@@ -59,14 +59,14 @@ def find_shaken(
     free: BoolArray,
     scales: tuple[float | None, float | None],
 ) -> list[Run]:
-    """The ``taken`` runs, and stretches beside them in which the body keeps its place while the accelerometer shakes.
+    """The ``taken`` runs, and ranges beside them in which the body stays in place while the accelerometer vibrates.
 
-    Either the gyro is at its noise floor and the accelerometer above its own; or, averaged over half a second, the gyro
-    stands still, and what either sensor reads above its noise is a line, which a machine makes and a hand does not. In
-    both cases the way turned by the gyro and the smoothed attitude of the accelerometer stay where they are.
+    Either the gyro is at its noise floor and the accelerometer above its own; or the gyro, averaged over half a second,
+    is static, and the power of both sensors above noise is a line, which a machine makes and a hand does not. In both
+    cases the angle integrated by the gyro and the smoothed attitude of the accelerometer stay constant.
 
     ``scales`` are the reading of |g| and radians per second per reading of the gyro, to a factor of two; without
-    either, or without a steady pose that tells the gyro's bias, none is added. ``free`` (m,) are blocks to look in.
+    either, or without a steady pose for the gyro's bias, none is added. ``free`` (m,) are the blocks that are searched.
     """
     gyro = channels.is_gyroscope
     steady = [part for run in taken if not run.is_unsteady for part in run.quiet_ranges()]
@@ -95,16 +95,16 @@ def find_shaken(
 
 
 def _is_part(run: Run, whole: Run) -> bool:
-    """Whether an unsteady ``run`` lies, but for a window at its ends, inside another that is longer by a window."""
+    """Whether an unsteady ``run`` lies, up to a window at its ends, inside another that is longer by a window."""
     inside = min(run.last, whole.last) - max(run.first, whole.first)
     length = run.last - run.first
     return run.is_unsteady and inside >= length - WINDOW_BLOCKS and length + WINDOW_BLOCKS <= whole.last - whole.first
 
 
 def is_shaken_by_a_support(recording: Recording, stretch: Range, white_variance: tuple[FloatArray, FloatArray]) -> bool:
-    """Whether one sensor at least reads more than its white noise (3,), (3,) in these rows, and none what a hand makes.
+    """Whether at least one sensor exceeds its white noise (3,), (3,) in these rows, and neither moves as a hand does.
 
-    Where nothing shakes the stillness of the log has spoken: such a stretch slowly turns.
+    A range without vibration was not called quiet before because it rotates slowly.
     """
     rows = slice(*stretch)
     is_short = stretch[1] - stretch[0] < LINE_S * recording.rate_hz
@@ -116,7 +116,7 @@ def is_shaken_by_a_support(recording: Recording, stretch: Range, white_variance:
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """Smoothed attitude (m, 3) and way turned in a block (m, 3), both rad; stretches that are still."""
+    """Smoothed attitude (m, 3) and rotation per block (m, 3), both rad; ranges of steady poses."""
 
     attitude: FloatArray
     turn: FloatArray
@@ -124,10 +124,10 @@ class _Seen:
 
 
 def _poses(channels: Channels, seen: _Seen, calm: BoolArray, taken: list[Run], shortest_s: float) -> list[Run]:
-    """Calm stretches (m,) that keep their place, last ``shortest_s``, and are no part of a ``taken`` one."""
+    """Calm ranges (m,) that stay in place, last ``shortest_s``, and are no part of a ``taken`` run."""
     calm = calm.copy()
     for run in taken:
-        # A calm fringe of a pose is its settling, not another pose.
+        # Calm blocks beside a pose are its settling, not another pose.
         calm[slice(*grown(calm, (run.outer_first, run.outer_last)))] = False
     found: list[Run] = []
     shortest = max(channels.blocks(shortest_s), WINDOW_BLOCKS)
@@ -152,16 +152,16 @@ def _smoothed(values: FloatArray, channels: Channels) -> FloatArray:
 
 
 def _shakes(channels: Channels, activity: Activity, run: Run) -> bool:
-    """Whether the accelerometer is loud inside blocks: what only its block means show is a body that slowly turns."""
+    """Whether the accelerometer is loud inside blocks: if only its block means vary, the body rotates slowly."""
     force = ~channels.is_gyroscope
     inside = channels.variance[run.first : run.last, force].mean(axis=0)
     return bool(np.any(inside > ABOVE_NOISE * activity.white_variance[force]))
 
 
 def _turns(channels: Channels, run: Run, settled: list[Run]) -> bool:
-    """Whether the gyro reads on one way beyond what ``settled`` poses read: the middle of a slow turn is as quiet.
+    """Whether the gyro rotates steadily beyond the biases of ``settled`` poses: a slow rotation is quiet in its middle.
 
-    Their biases scatter with the attitude (g-sensitivity), with temperature and with time.
+    These biases scatter with the attitude (g-sensitivity), with temperature and with time.
     """
     biases = np.array([run_mean(channels, one)[0] for one in settled])
     nearest = np.clip(run_mean(channels, run)[0], biases.min(axis=0), biases.max(axis=0))
@@ -169,7 +169,7 @@ def _turns(channels: Channels, run: Run, settled: list[Run]) -> bool:
 
 
 def _stays(seen: _Seen, stretch: Range) -> bool:
-    """Attitude and the way turned both keep to a place as a support does."""
+    """Whether attitude and integrated angle both stay as constant as on a support."""
     here = slice(*stretch)
     sway = float(np.linalg.norm(seen.attitude[here].std(axis=0)))
     angle = np.cumsum(seen.turn[here], axis=0)
@@ -177,15 +177,15 @@ def _stays(seen: _Seen, stretch: Range) -> bool:
 
 
 def _is_no_hand(readings: FloatArray, white_variance: FloatArray, hand: float, is_short: bool) -> bool | None:
-    """Whether what (n, 3) readings show above white noise is one line and its harmonics, or faster than a ``hand``
-    (bins); ``None`` for nothing.
+    """Whether the power of readings (n, 3) above white noise is one line with its harmonics, or faster than a ``hand``
+    (bins); ``None`` without such power.
 
-    In a short stretch a tremor is nearly as narrow as a line, but the axes tremble each on its own: there one
-    oscillation that all axes share has to hold nearly all.
+    In a short interval a tremor is nearly as narrow as a line, but differs between the axes: there one oscillation
+    common to all axes must contain nearly all power.
     """
     part = np.asarray(readings)[np.isfinite(readings).all(axis=1)]
     weight = np.hanning(len(part))
-    # A straight line in time is drift of the bias.
+    # A straight line in time is bias drift.
     time = np.linspace(-1.0, 1.0, len(part))
     part = part - part.mean(axis=0)
     part = part - np.outer(time, time @ part / (time @ time))
@@ -198,7 +198,7 @@ def _is_no_hand(readings: FloatArray, white_variance: FloatArray, hand: float, i
     if float((power[int(hand) + 1 :] - noise).sum()) > LINE_SHARE * above:
         return True
     if peak <= (LOBE_BINS if is_short else LINE_BINS):
-        # So near to frequency zero it is no line but the pause of a slow move, which a straight line does not hold.
+        # A peak so near to frequency zero is no line but the pause of a slow move, which no straight line describes.
         return False
     if is_short:
         lobe = amplitude[max(peak - LOBE_BINS, 0) : peak + LOBE_BINS + 1]
@@ -210,7 +210,7 @@ def _is_no_hand(readings: FloatArray, white_variance: FloatArray, hand: float, i
 
 
 def _is_one_pose(channels: Channels, attitude: FloatArray, run: Run, near: Run) -> bool:
-    """The pose before it began to shake, or after: close in time, and no further off than a hand's sway."""
+    """Whether a run is the pose ``near`` before or after its vibration: close in time, and within a hand's sway."""
     apart_s = max(run.first - near.last, near.first - run.last) * channels.step_s
     both = np.vstack([attitude[run.first : run.last], attitude[near.first : near.last]])
     return apart_s < BUMP_S and float(np.linalg.norm(both.std(axis=0))) < SWAY_RAD

@@ -1,4 +1,4 @@
-"""Motion too slow for half a second: told by gravity turning on over seconds, with the gyro as the second witness."""
+"""Motion too slow for half-second windows: detected by a change of gravity over seconds, and by the gyro."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from trihedron.segment.means import left_by_rounding
 from trihedron.segment.runs import CREEP_PART, MIN_POSE_S, SAME_POSE, SWAY_RAD, speed_of_moves
 
 TURN_SIGMAS = 6.0
-"""A quiet gyro that reads further than this from the common bias, in robust standard deviations, is turning."""
+"""Deviation of a quiet gyro from the common bias, in robust standard deviations, from which it rotates."""
 
 
 def turning_blocks(
     channels: Channels, quiet: BoolArray, gravity: float | None, radians_per_reading: float | None
 ) -> BoolArray:
-    """Quiet blocks in which the gyro reads far from its common bias: a slow steady turn, gravity says nothing of.
+    """Quiet blocks in which the gyro reads far from its common bias: a slow constant rotation, even about the vertical.
 
-    The bias is where the windows of one second are densest, for turns may take most of the time; its scatter is theirs,
-    or that of the poses' nearest windows where that is larger: a bias that depends on the pose is no turn. Where the
-    accelerometer sees the tilt too, and the whole turn stays within ``SWAY_RAD`` by both sensors, the pose settles and
-    remains a pose: a table that leans a little shows as small a tilt, but the gyro tells how far it turns.
+    The bias is where the windows of one second are densest, because rotations may take most of the time. Its scatter is
+    that of these windows, or of the poses' nearest windows where larger: a bias that depends on the pose is no
+    rotation. Where the accelerometer sees the tilt too, and both sensors keep the whole rotation within ``SWAY_RAD``,
+    the pose settles and remains a pose: a leaning table shows as small a tilt, but the gyro shows how far it rotates.
     """
     out = np.zeros(len(quiet), dtype=bool)
     gyro = np.flatnonzero(channels.is_gyroscope)
@@ -37,15 +37,15 @@ def turning_blocks(
     second = np.zeros_like(reading)
     ranges = ranges_of(quiet)
     for a, b in ranges:
-        # Inside the quiet stretch only: the move next to it has its own say.
+        # Inside the quiet range only: the move next to it is excluded.
         second[a:b] = rolling_mean(reading[a:b], channels.blocks(1.0))
     bias, scatter = _densest(second[quiet])
     long = _edges([(a, b) for a, b in ranges if b - a >= channels.blocks(MIN_POSE_S)])
     if len(long) > 2:
         nearest = np.minimum.reduceat(np.abs(second[: long[-1]] - bias), long[:-1], axis=0)[::2]
         scatter = np.maximum(scatter, 1.4826 * medians(nearest))
-    # A few short poses hold a few independent seconds: the shortest interval among them flatters. No window is known
-    # better than the white noise of its blocks.
+    # A few short poses have few independent seconds, among which the shortest interval is too short. No window has a
+    # smaller error than the white noise of its blocks.
     inner = _edges([(a, b - 1) for a, b in ranges if b - a >= 2])
     if len(inner):
         squares = np.add.reduceat(np.diff(reading[: inner[-1] + 1], axis=0) ** 2, inner[:-1], axis=0)[::2]
@@ -64,25 +64,25 @@ def turning_blocks(
             continue
         is_slow = bool((np.abs(second[flagged] - bias).max(axis=0) < CREEP_PART * top).all())
         if radians_per_reading is not None:
-            # Within a factor of two, which is what is known of the scale.
+            # To a factor of two, the uncertainty of the scale.
             turned = (reading[flagged] - bias).sum(axis=0) * channels.step_s * radians_per_reading
             is_slow = is_slow and float(np.linalg.norm(turned)) < 2.0 * SWAY_RAD
         if gravity is not None and is_slow and _tilts_a_little(channels, flagged[0], flagged[-1] + 1, gravity):
             out[a:b] = False
         for first, last in ranges_of(out[a:b]):
-            # A turn of any length fills a whole second of windows; at the ends of the stretch it may run on outside.
+            # Any rotation fills a whole second of windows; at the ends of the range it may continue outside.
             if last - first < WINDOW_BLOCKS and first > 0 and last < b - a:
                 out[a + first : a + last] = False
     return out
 
 
 def _edges(ranges: list[Range]) -> IntArray:
-    """Edges of ranges one after the other, as ``reduceat`` wants them: every other stretch lies between two ranges."""
+    """Edges of ranges in sequence, as ``reduceat`` needs them: every other interval lies between two ranges."""
     return np.array(ranges, dtype=np.int64).ravel()
 
 
 def _tilts_a_little(channels: Channels, first: int, last: int, gravity: float) -> bool:
-    """The accelerometer too sees a drift over the stretch, of no more than a hand's sway."""
+    """Whether the accelerometer too drifts over the range, by no more than a hand's sway."""
     attitude = channels.mean[first:last, ~channels.is_gyroscope]
     half = len(attitude) // 2
     if half < 1 or not attitude.shape[1]:
@@ -92,13 +92,13 @@ def _tilts_a_little(channels: Channels, first: int, last: int, gravity: float) -
     variance = (steps**2).mean(axis=0) / half
     live = variance > 0.0
     statistic = float((drift[live] ** 2 / variance[live]).sum())
-    # The halves' means are half of the whole drift apart.
+    # The halves' means differ by half of the whole drift.
     is_small = 2.0 * float(np.linalg.norm(drift)) / gravity < SWAY_RAD
     return is_small and statistic > float(probability.chdtri(max(int(live.sum()), 1), SAME_POSE))
 
 
 def _densest(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Middle of the shortest interval that holds a quarter of the values of each axis, and the deviation it implies."""
+    """Middle of the shortest interval with a quarter of the values of each axis, and the deviation it implies."""
     ordered = np.sort(values, axis=0)
     n = len(ordered)
     quarter = max(n // 4, 1)
@@ -111,20 +111,20 @@ def _densest(values: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 HALVES_S = (0.5, 1.0, 2.0)
-"""Half lengths of the windows compared: a turn's trace grows with time as its noise falls, and a pose may be this
-short on either side of where it is cut."""
+"""Half lengths of the windows: the change by a rotation grows with time while noise falls, and a pose may be this short
+on either side of a cut."""
 FALSE_ALARM = 1e-5
-"""Chance that the halves of a still window are called different; of a hundred overlapping ones, once in some hours."""
+"""Probability that the halves of a still window differ; of a hundred overlapping ones, once in some hours."""
 MOST_FITTED = 30_000
-"""Windows that the gyro's share is fitted to, evenly spread: they tell twelve numbers to a hundredth of the noise."""
+"""Windows, evenly spread, that the gyro's twelve coefficients are fitted to: errors of a hundredth of the noise."""
 FEWEST_WINDOWS = 24
-"""Fewer windows than twice the twelve unknowns of the gyro's share do not tell noise from motion."""
+"""Windows, twice the gyro's twelve coefficients, below which noise and motion cannot be separated."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Windows:
-    """Windows ``[first, first + 2 half)`` of blocks: ``first`` (n,), ``change`` (n, 3) from half to half of the
-    accelerometer's reading, its ``mean`` (n, 3), and the gyro's ``rate`` (n, 3), if any, as the change weighs it."""
+    """Windows ``[first, first + 2 half)`` of blocks: ``first`` (n,), ``change`` (n, 3) between the halves and ``mean``
+    (n, 3) of the accelerometer's reading, and the gyro's ``rate`` (n, 3) weighted as in the change, if any."""
 
     first: np.ndarray[tuple[int], np.dtype[np.int64]]
     change: FloatArray
@@ -132,13 +132,13 @@ class _Windows:
     rate: FloatArray | None
 
     def some(self, most: int) -> _Windows:
-        """At most so many of them, evenly spread."""
+        """At most ``most`` of them, evenly spread."""
         step = -(-len(self.first) // most)
         rate = None if self.rate is None else self.rate[::step]
         return _Windows(self.first[::step], self.change[::step], self.mean[::step], rate)
 
     def left(self, solution: FloatArray) -> FloatArray:
-        """(n, 3) of the change that the twelve numbers do not predict."""
+        """(n, 3) change that the twelve coefficients do not predict."""
         assert self.rate is not None
         turn = self.rate @ solution[:9].reshape(3, 3).T + solution[9:]
         return np.asarray(self.change - np.cross(self.mean, turn), dtype=np.float64)
@@ -147,12 +147,12 @@ class _Windows:
 def drifting_blocks(
     channels: Channels, quiet: BoolArray, ranges: list[Range], centre: FloatArray, white_variance: FloatArray
 ) -> list[BoolArray]:
-    """Blocks (m,) at which the accelerometer's reading moves on, for every window length of ``HALVES_S``.
+    """Blocks (m,) at which the accelerometer's reading changes, for every window length of ``HALVES_S``.
 
-    Over a window the reading changes by noise, and by ``∫ f × ω dt`` if the body turns. The gyro's part is fitted over
-    all windows at once (nine parameters of scale, three of bias: whatever its unit, signs and axes) and the rest is the
-    noise of a still sensor, also where nothing in the log is still for as long. A change beyond that noise is motion.
-    Marked is the first block of the second half of each window that moves.
+    Over a window the reading changes by noise, and by ``∫ f × ω dt`` if the body rotates. The gyro's part is fitted
+    over all windows at once (nine coefficients of scale, three of bias: for any unit, signs and axes). The residual is
+    the noise of a still sensor, even where no part of the log is still for as long. A change beyond that noise is
+    motion. Marked is the first block of the second half of each window that moves.
     """
     out = []
     for half_s in HALVES_S:
@@ -183,25 +183,25 @@ def _windows(channels: Channels, ranges: list[Range], half: int, centre: FloatAr
     after = (sums[middle + half] - sums[middle]) / half
     seen = None
     if rate.shape[1]:
-        # The change of means weighs the rate by a triangle about the middle: a sum over half a window of such sums.
+        # A change of means weights the rate by a triangle about the middle: a sum over half a window of such sums.
         between = 0.5 * (rate[1:] + rate[:-1])
         seen = _sums(_sums(between, half), half)[first] / half**2
     return _Windows(first, after - before, 0.5 * (before + after), seen)
 
 
 def _sums(values: FloatArray, count: int) -> FloatArray:
-    """(n - count + 1, 3) sums over so many rows from each on."""
+    """(n - count + 1, 3) sums over ``count`` rows from each on."""
     total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
     return total[count:] - total[:-count]
 
 
 def _noise_of_change(channels: Channels, windows: _Windows, half: int, white_variance: FloatArray) -> FloatArray:
-    """(3,) variance of the change without motion: the median of what the gyro leaves of it, at least white noise."""
+    """(3,) variance of the change without motion: median square of the gyro's residual, at least white noise."""
     accelerometer = np.flatnonzero(~channels.is_gyroscope)
     white = 2.0 * white_variance[accelerometer] / (half * channels.length)
     rest = windows.change
     if windows.rate is not None and len(windows.first) >= 2 * FEWEST_WINDOWS:
-        # A channel that never changes has no noise to be weighed by.
+        # A channel that never changes has no noise for a weight.
         scale = np.sqrt(np.where(white > 0.0, white, max(float(white.max()), 1.0)))
         rest = windows.left(_share_of_gyroscope(windows.some(MOST_FITTED), scale))
     seen = medians(rest**2) / float(probability.chdtri(1, 0.5))
@@ -210,7 +210,7 @@ def _noise_of_change(channels: Channels, windows: _Windows, half: int, white_var
 
 
 def _share_of_gyroscope(windows: _Windows, scale: FloatArray) -> FloatArray:
-    """(12,) by which the gyro predicts the changes best, with least absolute deviations in units of ``scale`` (3,)."""
+    """(12,) coefficients of the gyro for the changes, by least absolute deviations in units of ``scale`` (3,)."""
     assert windows.rate is not None
     return np.array(_core.share_of_gyroscope(windows.change, windows.mean, windows.rate, scale.tolist()))
 
@@ -225,9 +225,9 @@ def cut_slow_motion(
 ) -> BoolArray:
     """Quiet blocks without the slow motion in them.
 
-    The stretch of a range that drifts is motion if it runs on to the range limit, where a move begins, or changes
-    the reading by more than ``limit_raw`` (a hand's sway). What is left inside a range is a pose where it lasts
-    ``shortest`` blocks; a range of which nothing is left, and that keeps within ``limit_raw``, is a pose that settles.
+    A drifting part of a range is motion if it extends to an end of the range, where a move begins, or changes the
+    reading by more than ``limit_raw`` (a hand's sway). The rest of a range is a pose where it lasts ``shortest``
+    blocks; a range without such a rest that stays within ``limit_raw`` is a pose that settles.
     """
     out = quiet.copy()
     for first, last in ranges:
@@ -237,7 +237,7 @@ def cut_slow_motion(
             half = max(channels.blocks(half_s), 2)
             inside = np.flatnonzero(marks[first:last])
             for start, stop in _stretches(inside):
-                # The change lies between the middles of the halves; an end that drifts is given away whole.
+                # The change lies between the middles of the halves; a drifting end is removed completely.
                 lower = 0 if start <= half else start - half // 2
                 upper = size if stop + half >= size else stop + half // 2
                 moving[lower:upper] = True
@@ -254,7 +254,7 @@ def cut_slow_motion(
 
 
 def _without_ends(moving: BoolArray) -> BoolArray:
-    """All but the moving stretches at either end: inside, what stays within a hand's sway is a disturbance."""
+    """All but the moving parts at either end: inside, motion within a hand's sway is a disturbance."""
     still = np.flatnonzero(~moving)
     out = np.zeros(len(moving), dtype=bool)
     if len(still):

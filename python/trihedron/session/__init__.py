@@ -1,1 +1,1 @@
-"""What every estimator of a session of poses and moves shares: its noise, measured once, and its strengths."""
+"""Noise of a session of poses and moves, measured once for every estimator, and its noise strengths."""

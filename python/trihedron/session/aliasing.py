@@ -1,14 +1,14 @@
-"""Motion that is faster than the samples: its share of every move's integral cannot be known (eq. 8.2a).
+"""Motion faster than the samples: the error of every move's integral by aliasing (eq. 8.2a).
 
-A jolt on the table lasts a millisecond. What lies near the multiples of the sampling frequency f folds onto zero
-frequency and is read as velocity or angle. It cannot be seen, but it can be extrapolated by a power law. With power
-c ν^-p on either side of zero, what the samples show at f/4, at f/2 and falsely at zero are sums over all foldings,
+A jolt on the table lasts a millisecond. Its power near the multiples of the sampling frequency f folds onto zero
+frequency and is integrated as velocity or angle. It is extrapolated by a power law. With power c ν^-p on either side of
+zero, the powers at f/4, at f/2 and folded onto zero are sums over all foldings,
 
     D₁ = c (f/4)^-p Z,   D₂ = 2 c (f/2)^-p Z,   A = 2 c f^-p Z / (1 - 2^-p),   Z = 1 + 3^-p + 5^-p + ...
 
-so that D₁/D₂ = 2^p/2 and A = D₂/(2 D₁/D₂ - 1): all of it for what is white among the samples (D₁ = D₂), no more, and a
-third of it for a rate that steps (p = 2). D₁ holds slower motion too, which makes the fall look steep: up to the third,
-a part of it is believed to be of its band.
+so that D₁/D₂ = 2^p/2 and A = D₂/(2 D₁/D₂ - 1): all of D₂ where the samples are white (D₁ = D₂), no more, and a third of
+it for a rate that steps (p = 2). D₁ contains slower motion too, which makes the slope look steep: up to the third, only
+a part of D₁ is counted.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from trihedron.arrays import FloatArray, IntArray
 from trihedron.quantiles import medians
 
 _AT_HALF = [1.0 / 16.0, -4.0 / 16.0, 6.0 / 16.0, -4.0 / 16.0, 1.0 / 16.0]
-"""Unit gain at half the sampling frequency, fourth-order zero at rest: smooth motion does not pass."""
+"""Unit gain at half the sampling frequency, fourth-order zero at zero frequency, which removes smooth motion."""
 _AT_QUARTER = [-0.25, 0.0, 0.5, 0.0, -0.25]
 OF_A_STEP = 1.0 / 3.0
-"""Part of the power at half the sampling frequency that a rate with steps has falsely at zero: 1/(2^p - 1) of p = 2."""
+"""Power folded onto zero over that at half the sampling frequency for a rate with steps: 1/(2^p - 1) with p = 2."""
 OF_ITS_BAND = 0.4
-"""Part of the power around a quarter of the sampling frequency that is not slower motion, where a body knocks and rocks
-at a tenth of it."""
+"""Part of the power around a quarter of the sampling frequency that is not slower motion, for a body that knocks and
+rocks at a tenth of the sampling frequency."""
 LENGTH = 5
-"""Of both filters, samples."""
+"""Taps of both filters."""
 GAP = 1.5
-"""A step longer than this many usual ones has lost samples, as the session model counts them (its ``gaps``)."""
+"""A step longer than this many usual ones has lost samples, as in the session model (its ``gaps``)."""
 MARGIN = 3.0
-"""Standard deviations of the noise's own power that are not yet motion."""
+"""Standard deviations of the noise's own power below which no motion is counted."""
 
 
 def unresolved_variance(
@@ -50,13 +50,13 @@ def unresolved_variance(
     readings : (n, 3)
         Raw readings of one sensor.
     move_ranges, pose_ranges : half-open sample ranges
-        The holds give the power of the noise in both bands (their median), which is taken off.
+            The poses give the power of the noise in both bands (their median), which is subtracted.
     step_s : float
         Sample step, s.
     quantum : (3,)
-        Resolution (LSB) of the ADC: a pose does not show its rounding where the bias stays inside one step, moves do.
+            Resolution (LSB) of the ADC: a pose whose bias stays inside one LSB does not show its rounding, moves do.
     time_s : (n,)
-        Timestamps: filters run from gap to gap, across which smooth motion would look fast.
+            Timestamps: filters run from gap to gap, across which smooth motion would look fast.
 
     Returns
     -------
@@ -73,15 +73,15 @@ def unresolved_variance(
         power = _core.band_power(readings, taps, np.concatenate([poses, pieces]))
         level = medians(power[: len(poses)] / n_poses) if len(poses) else np.zeros(3)
         level = np.maximum(level, quantum**2 / 12.0)
-        # Neighbouring outputs of five taps share samples: about a third as many independent squares.
+        # Neighbouring outputs of five taps share samples: about a third as many squares are independent.
         usual = level * (1.0 + MARGIN * np.sqrt(6.0 / np.maximum(n_moves, 1)))
         of_moves = np.stack([np.bincount(of_move, p, len(moves)) for p in power[len(poses) :].T], axis=1)
-        # What lies across gaps is as lively as the rest.
+        # Samples across gaps are assumed to have the mean power of the move.
         out: FloatArray = np.maximum(of_moves - usual * n_moves, 0.0) * (n_whole / np.maximum(n_moves, 1))
         return out
 
     at_half, at_quarter = excess(_AT_HALF), excess(_AT_QUARTER)
-    # The fall from band to band is the sensor's filter and the hand's manner: that of the usual move, not the wildest.
+    # The slope between the bands depends on filter and motion: that of the usual move is taken, not the largest.
     total, falls = at_quarter.sum(axis=1), at_half.sum(axis=1)
     both = (total > 0) & (falls > 0)
     fall = min(float(np.median(falls[both] / total[both])), 1.0) if np.any(both) else 1.0
@@ -91,9 +91,9 @@ def unresolved_variance(
 
 
 def _between_gaps(ranges: IntArray, time_s: FloatArray | None, step_s: float) -> tuple[IntArray, IntArray]:
-    """Half-open sample ranges (p, 2) that hold a filter and no gap, and which of ``ranges`` (m, 2) each is a piece of.
+    """Half-open sample ranges (p, 2) without gaps, at least a filter long, and the index in ``ranges`` (m, 2) of each.
 
-    A range whose steps are mostly long has timestamps that say little of the samples, and stays whole.
+    A range in which long steps dominate stays whole, because its timestamps do not show gaps.
     """
     after = np.zeros(0, dtype=np.int64) if time_s is None else np.flatnonzero(np.diff(time_s) > GAP * step_s) + 1
     if not len(after):

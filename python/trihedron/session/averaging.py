@@ -1,8 +1,8 @@
-"""Sensors that average over the sample interval, as many do whose filter decimates (docs/model-session.md, 11.6d).
+"""Sensors that average over the sample interval, as decimating filters do (docs/model-session.md, 11.6d).
 
-A mean m over the interval T is the value in its middle but for T²/24 of its second derivative: ω = m - a/24 (m₋ - 2 m +
-m₊), a = 1 of a sensor that averages, 0 of one that samples points. The turn over a move, a sum of means, knows no
-difference; rotations that do not commute do. Which sensor it is, moves show as far as it matters.
+A mean m over the interval T differs from the value in its middle by T²/24 of the second derivative:
+ω = m - a/24 (m₋ - 2 m + m₊), a = 1 for a sensor that averages, 0 for one that samples points. For the angle of a move
+about one axis, a sum of means, a does not matter; for rotations that do not commute it does, and moves determine it.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from trihedron.arrays import FloatArray
 EITHER = 0.5
 """Prior mean and standard deviation of ``a``: a sensor of either kind is one standard deviation off."""
 BLOCK = 1 << 16
-"""Rows sharpened together: what is needed in between never takes the memory of a long log again."""
+"""Rows processed together, to bound the memory of intermediate arrays in a long log."""
 GAP = 1.5
-"""A step longer than this many usual ones has lost samples: there is no second difference across."""
+"""A step longer than this many usual ones has lost samples: no second difference is taken across it."""
 
 
 def sharpened(readings: FloatArray, time_s: FloatArray, share: float) -> FloatArray:
-    """(n, 3) readings with ``share`` of what means over their interval lose of the value in its middle given back."""
+    """(n, 3) readings at the middle of their interval, with averaging ``share`` (a) between 0 and 1."""
     if share == 0.0:
         return readings
     steps = np.diff(time_s)

@@ -1,4 +1,4 @@
-"""Means of poses with a spectral line in them by a joint fit of constant and line (docs/diagnosis-method.md, 8.0)."""
+"""Means of poses with a spectral line, by a joint fit of constant and line (docs/diagnosis-method.md, 8.0)."""
 
 from __future__ import annotations
 
@@ -18,33 +18,33 @@ from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 
 SURE = 1e-8
-"""Chance of such a line in noise, all frequencies of a pose counted. A fainter one of six cycles or more moves the
-plain mean by less than a quarter of its standard error, and need not be fitted."""
+"""False-alarm probability of a line in noise over all frequencies of a pose. A fainter line of six cycles or more moves
+the plain mean by less than a quarter of its standard error, and is not fitted."""
 FEWEST_CYCLES = 6
-"""Slower than that a line is hardly told from drift, which has its own place in the model."""
+"""A slower line is confounded with drift, which the session model has terms for."""
 ABOVE_SLOWER = 10.0
-"""Power of a line over that of the bins three to five below: a walk of a bias has up to nine times less, not more."""
+"""Power of a line over that of the bins three to five below: in a bias random walk the ratio is 1/9 to 1."""
 FEWEST_SAMPLES = 64
-"""A spectrum of fewer has too few frequencies to tell a line from the noise around it."""
+"""A spectrum of fewer samples has too few frequencies to separate a line from the noise around it."""
 LONGEST_REMEMBERED = 4096
-"""Samples of a pose whose lines are remembered: with 512 poses of two sensors 50 MB at most."""
+"""Samples of a pose whose lines are cached: with 512 poses of two sensors 50 MB at most."""
 FEWEST_BINS, MOST_BINS = 27, 101
-"""Frequencies whose median is the level of the noise at one: few follow its colour, many know it well."""
+"""Frequencies whose median is the noise level at one: few follow its colour, many determine it well."""
 MOST_LINES = 3
-"""A shaker and its first harmonics; what remains widens the error bar."""
+"""A shaker and its first harmonics; the remaining vibration widens the uncertainty."""
 STILL_SHAKES = 2.0
-"""Scatter beside the lines over that of quiet poses from which something still shakes there."""
+"""Scatter beside the lines over that of quiet poses, from which vibration remains."""
 N_BESIDE = 4
-"""Bins beside frequency zero that tell the noise there: below the slowest line looked for, known to a third."""
+"""Bins beside frequency zero that give the noise there: below the slowest line searched, with an error of a third."""
 BLOCKS = 8
-"""Stretches of a pose whose means tell whether something slow is left."""
+"""Parts of a pose whose means show whether slow motion remains."""
 
 
 def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segments, FloatArray]:
     """Segments whose poses with a line have mean and standard error of a fit of constant + lines; swing of the lines.
 
     A sinusoid of amplitude A that is no whole number of cycles moves the mean of a pose of length T by up to A/(πfT),
-    and block means scatter by it. Poses without a significant line keep their numbers. Samples are taken as even.
+    and block means scatter by it. Poses without a significant line stay as they are. Samples are taken as even.
 
     The swing (h, 2, 3), force and rate, is the variance of a line's integral at the edge of its pose, (raw unit · s)²:
     A²/2(2πf)². A move that begins or ends in it does not begin or end at rest.
@@ -58,7 +58,7 @@ def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segmen
         if readings is None or mean is None or error is None or sigma is None or not len(mean):
             continue
         white = sigma / np.sqrt(np.maximum(segments.n_averaged, 1))[:, None]
-        # How far errors of means exceed white noise: a line does not change what slow noise there is.
+        # Ratio of the errors of means to white noise: a line does not change the slow noise.
         colour = np.maximum(np.median(error / np.maximum(white, 1e-300), axis=0), 1.0)
         new_mean, new_error = mean.copy(), error.copy()
         for k, pose in enumerate(segments.poses):
@@ -81,7 +81,7 @@ def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segmen
 
 
 def _known_lines(part: FloatArray) -> tuple[tuple[float, ...], npt.NDArray[np.bool_]]:
-    """As :func:`find_pose_lines`; poses of usual length are remembered: every change of a session asks for all anew."""
+    """As :func:`find_pose_lines`, cached for poses of usual length: every change of a session needs all lines again."""
     if len(part) > LONGEST_REMEMBERED:
         lines, has_line = find_pose_lines(part)
         return tuple(lines), has_line
@@ -127,7 +127,7 @@ def _strongest(rest: FloatArray) -> tuple[int, npt.NDArray[np.bool_]] | None:
     ratio = np.where(live, power / np.where(live, level, 1.0), 0.0)
     together = ratio[FEWEST_CYCLES:].sum(axis=1)
     k = FEWEST_CYCLES + int(np.argmax(together))
-    # Noise of a bias that walks rises towards slow: a line stands above what is slower, too.
+    # A bias random walk rises towards low frequencies: a line must exceed these too.
     if ratio[k].sum() < ABOVE_SLOWER * ratio[k - 5 : k - 2].sum(axis=1).mean():
         return None
     if gammaincc(int(live.sum()), ratio[k].sum()) * (n / 2) > SURE:
@@ -148,7 +148,7 @@ def _model(part: FloatArray, lines: Sequence[float]) -> tuple[FloatArray, FloatA
 
 
 def _swing(part: FloatArray, lines: Sequence[float]) -> FloatArray:
-    """(3,) variance of the lines' integral over a phase that may be any, (reading · samples)²."""
+    """(3,) variance of the lines' integral at a random phase, (reading · samples)²."""
     _, coefficient = _model(part, lines)
     m = len(lines)
     squares = coefficient[1 : 1 + m] ** 2 + coefficient[1 + m :] ** 2
@@ -157,7 +157,7 @@ def _swing(part: FloatArray, lines: Sequence[float]) -> FloatArray:
 
 
 def _refined(part: FloatArray, lines: Sequence[float], near: float) -> float:
-    """Frequency of least squares within a bin and a half of ``near``, the lines known already fitted along."""
+    """Least-squares frequency within 1.5 bins of ``near``, the known lines fitted jointly."""
     scale = np.maximum(np.std(part, axis=0), 1e-300)
     reduced = part / scale
 
@@ -191,10 +191,10 @@ def _constant_beside(part: FloatArray, lines: Sequence[float], sigma: FloatArray
     edges = np.linspace(0, n, BLOCKS + 1).astype(int)
     blocks = np.array([rest[a:b].mean(axis=0) for a, b in pairwise(edges)])
     scatter = blocks.std(axis=0, ddof=1) / np.sqrt(BLOCKS)
-    # Eight blocks tell a pose that goes on settling, not a fifth of its noise.
+    # Eight blocks detect a pose that goes on settling, not a fifth of its noise.
     error = np.where(scatter > 2.0 * error, scatter, error)
     tapered, its_error = _tapered(rest, sigma)
-    # A shaker whose frequency wanders stays in the rest, far from frequency zero where the mean is.
+    # A shaker of varying frequency remains in the residuals, away from frequency zero, where the mean is.
     is_better = (level > STILL_SHAKES * sigma) & (its_error < error)
     return coefficient[0] + np.where(is_better, tapered, 0.0), np.where(is_better, its_error, error)
 
@@ -202,8 +202,8 @@ def _constant_beside(part: FloatArray, lines: Sequence[float], sigma: FloatArray
 def _tapered(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Mean (3,) by Hann's window and its standard error (3,) from the spectrum beside frequency zero.
 
-    Of motion k cycles from zero the window passes 1/k³, a plain mean 1/k. The noise of the mean is that of the bins
-    3 to 6 (the window spreads what is at zero over two), and at least the sensor's white noise.
+    Of motion k cycles from zero the window passes 1/k³, a plain mean 1/k. The noise of the mean is that of bins 3 to 6
+    (the window spreads frequency zero over two), and at least the sensor's white noise.
     """
     n = len(rest)
     window = np.hanning(n)

@@ -1,4 +1,4 @@
-"""Noise of a session, measured once: `calibrate` and `diagnose` weigh every reading alike (docs/model-session.md)."""
+"""Noise of a session, measured once: `calibrate` and `diagnose` use the same weights (docs/model-session.md)."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from trihedron.session.aliasing import unresolved_variance
 from trihedron.session.rounding import rounding_of_moves
 
 LEAST_SHARE = 1e-9
-"""Where nothing scatters (a simulation without noise) a billionth of a unit stands for the rounding of the log."""
+"""Least error of a pose mean over the largest reading, for logs without scatter (a simulation without noise)."""
 Along = tuple[FloatArray, FloatArray]
 """Directions (h, 3) and the standard errors (h,) of pose means along them."""
 Pair = tuple[float, float]
 Strengths = tuple[Pair, tuple[float, float, float, float], Pair, Pair]
-"""Corner times of walks [s], scatter from pose to pose in its units (accelerometer, gyro by axis), straying between
-poses in units of the scatter, excess of moves over their noise; accelerometer and gyro (gravity and velocity) each."""
+"""Corner times of walks [s], scatter from pose to pose in its units (accelerometer, gyro by axis), departure in moves
+in units of the scatter, factors on the noise of moves. Pairs: accelerometer and gyro; of moves gravity and velocity."""
 NO_SCATTER = 1e-3
-"""Scatter that counts as none."""
+"""Scatter that counts as zero."""
 START_STRENGTHS: Strengths = ((160.0, 160.0), (NO_SCATTER,) * 4, (1.0, 1.0), (1.0, 1.0))
-"""Where the search of strengths begins."""
+"""Start of the search for strengths."""
 Bounds = tuple[Pair, Pair, Pair]
-"""Shortest corner times [s], largest scatter, largest excess of moves: accelerometer and gyro, gravity and velocity."""
+"""Shortest corner times [s], largest scatter, largest factors on the noise of moves: each for the pairs above."""
 ANYTHING: Bounds = ((0.0, 0.0), (np.inf, np.inf), (np.inf, np.inf))
 NOISE_CORNER_S = 20.0
-"""Shortest corner time, where white noise and bias walk meet: Allan deviations of consumer parts turn up there or
-later. A walk of any strength is allowed in every hypothesis; a stronger one than this is called drift."""
+"""Shortest corner time that the part's noise explains, where white noise and bias walk have equal Allan deviation: in
+consumer parts it is this or later. Every hypothesis allows a walk of any strength; a stronger one is called drift."""
 PART_NOISE: Bounds = ((NOISE_CORNER_S, NOISE_CORNER_S), (NO_SCATTER, NO_SCATTER), (1.0, 1.0))
-"""Strengths of a part that is as its samples show it."""
+"""Bounds of a part whose noise is that of its samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +45,8 @@ class SessionNoise:
     Standard errors of pose means (h, 3), white noise ``density`` (3,) raw · √s, and ``unresolved`` (m, 2, 3): variance
     of every move's integrals, force and rate, (raw unit · s)², by motion faster than the samples and by noise slower
     than a move. ``force_up`` are the verticals (h, 3) and the standard errors (h,) of the means along them, NaN where
-    those of the axes hold; ``None`` where no vertical is known. ``force_scatter`` and ``rate_scatter`` [raw]: by how
-    much 1/f noise lets the bias differ from pose to pose, 0 where poses show none.
+    those of the axes apply; ``None`` where no vertical is known. ``force_scatter`` and ``rate_scatter`` [raw]: scatter
+    of the bias from pose to pose that 1/f noise explains, 0 where poses show none.
     """
 
     force_sigma: FloatArray
@@ -65,7 +65,7 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
     Raises
     ------
     ValueError
-        When the segments do not say how certain their means are.
+            When the segments state no uncertainty of their means.
     """
     if (
         recording.accelerometer is None
@@ -96,7 +96,7 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
         quantum = recording.facts.of(("accelerometer", "gyroscope")[k]).step
         variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s, quantum, recording.time_s)
         if k == 0:
-            # A gyro's rounding is measured with its turns, beside the place of its bias.
+            # For a gyro rounding is estimated with the angles of moves and the place of its bias.
             variances[:, k] += rounding_of_moves(readings, ranges, quantum, segments.accelerometer_sigma) * step_s**2
         if sigma is not None and density is not None:
             halves = _second_halves_minus_first(readings, np.array(spans, dtype=np.int64).reshape(-1, 2))
@@ -115,9 +115,9 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
 
 
 def along_gradient(sigma: FloatArray, along: Along | None, gradient: FloatArray) -> FloatArray:
-    """(h,) standard errors of what grows with the means by ``gradient`` (h, 3), errors as the session model has them.
+    """(h,) standard errors of a quantity with gradient ``gradient`` (h, 3) by the means, as in the session model.
 
-    Across the vertical those of the axes (h, 3), along it the vertical's own where it is known.
+    Across the vertical from the errors of the axes (h, 3), along it from the vertical's own where it is known.
     """
     plain = (gradient**2 * sigma**2).sum(axis=1)
     if along is None:
@@ -131,7 +131,7 @@ def along_gradient(sigma: FloatArray, along: Along | None, gradient: FloatArray)
 
 
 def _second_halves_minus_first(readings: FloatArray, spans: IntArray) -> FloatArray:
-    """(n, 3) differences of the means of both halves of every span (n, 2)."""
+    """(n, 3) differences of the means of the two halves of every span (n, 2)."""
     middle = spans[:, 0] + (spans[:, 1] - spans[:, 0] + 1) // 2
     halves = np.column_stack([spans[:, 0], middle, middle, spans[:, 1]]).reshape(-1, 2)
     means, _ = _core.means_by_owner(readings, halves, np.arange(len(halves)), len(halves))
@@ -139,10 +139,10 @@ def _second_halves_minus_first(readings: FloatArray, spans: IntArray) -> FloatAr
 
 
 def scatter_unit(force_sigma: FloatArray, rate_sigma: FloatArray | None, along: Along | None = None) -> FloatArray:
-    """(2, 3) the scatter that strength one means: the usual standard error of a pose, accelerometer and gyro, raw.
+    """(2, 3) scatter of strength one, raw: the usual standard error of a pose, accelerometer and gyro.
 
-    One size for three axes: an axis that is noisier than the others need not scatter more. The accelerometer's is that
-    along the vertical where it is known: no other scatter shows at rest.
+    One size for three axes: an axis with more noise need not scatter more. The accelerometer's is that along the
+    vertical where it is known, because static poses show no other scatter.
     """
     out = np.ones((2, 3))
     out[0] = np.sqrt(np.mean(medians(force_sigma) ** 2))
@@ -153,13 +153,13 @@ def scatter_unit(force_sigma: FloatArray, rate_sigma: FloatArray | None, along: 
     return np.maximum(out, 1e-300)
 
 
-# Slow noise of the sensors inside moves, as the poses show it (eq. 8.2b).
+# Slow noise of the sensors inside moves, estimated from the poses (eq. 8.2b).
 
 QUIET, QUIET_OF_NORMAL = 0.3, 0.3853
-"""Quantile over the poses of the change from first half to second, and that of |x| for a normal x: slow noise is in all
-poses alike, a bias that jumps only in those where it did."""
+"""Quantile over the poses of the change between halves, and that quantile of |x| for a normal x: slow noise is in all
+poses alike, a bias that jumps only in some."""
 MAY_EXCEED = 2.5
-"""How far the colour of all poses may exceed that of the quiet ones: their quantile is good to a factor of two."""
+"""Largest ratio of the colour of all poses to that of the quiet ones, whose quantile is good to a factor of two."""
 
 
 def coloured_variance(
@@ -171,16 +171,16 @@ def coloured_variance(
 ) -> FloatArray:
     """Variance that slow noise adds to every move's integral, beyond that of white noise.
 
-    The integral of white noise over T has the variance N²T. Flicker and walk add what the poses' means show of them: a
-    mean over τ with c² times the white variance stands for c²N² as long as T is of the order of τ. Without it most
-    healthy sessions of a consumer part (0.3 mg, 20 °/h) disagree (benches/blind_nuisances.py --flicker).
+    The integral of white noise over T has the variance N²T. Pose means show flicker and walk: where a mean over τ has
+    c² times the white variance, c²N² replaces N² as long as T is of the order of τ. Without it most healthy sessions of
+    a consumer part (0.3 mg, 20 °/h) disagree (benches/blind_nuisances.py --flicker).
 
     Parameters
     ----------
     pose_sigma : (poses, 3)
-        Standard errors of pose means that do not assume whiteness, raw units.
+            Standard errors of pose means, estimated without assuming white noise, raw units.
     halves : (poses, 3)
-        Mean of every pose's second half minus that of its first, raw units.
+            Mean of every pose's second half minus that of its first, raw units.
     density : (3,)
         White noise, raw units per √Hz.
     pose_duration_s, move_duration_s : (poses,), (moves,)
@@ -196,26 +196,26 @@ def coloured_variance(
     return np.outer(move_duration_s, (colour - 1.0) * density**2)
 
 
-# How far 1/f noise carries biases from pose to pose, from what it does inside poses (docs/model-session.md, 11.12d).
+# Bias scatter from pose to pose by 1/f noise, estimated from inside the poses (docs/model-session.md, 11.12d).
 
 PARTS = 8
-"""Of a pose: their means differ from neighbour to neighbour by white noise, its halves by white noise and flicker."""
+"""Parts of a pose: neighbouring ones differ by white noise, its halves by white noise and flicker."""
 FEWEST_POSES = 6
 FEWEST_READINGS = 4 * PARTS
 MEDIAN_OF_SQUARE = 0.4549
-"""Of a standard normal's square."""
+"""Median of a standard normal's square."""
 FAR = 9.0
-"""Squares beyond so many variances are a hand's, not the noise's."""
+"""Squares beyond so many variances are disturbances by hand, not noise."""
 SEEN = 1.0
-"""Standard errors of the mean square of the halves by which it must exceed white noise's, where it widens bars only."""
+"""Standard errors by which the mean square of halves must exceed white noise: low, as it only widens uncertainties."""
 
 
 def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray) -> float:
     """Standard deviation [raw] of a pose's bias about that of the session by flicker alone, along the vertical.
 
-    Means of neighbouring parts of length t differ by a variance 2N²/t + 4 ln 2 h of white noise N² and a flicker of
-    one-sided density h/f; beneath the frequencies that a pose of length T sees, down to those of a session of length L,
-    lies a variance h ln(L/2T). Nothing, 0, where halves of poses differ as white noise makes them.
+    Means of neighbouring parts of length t differ by a variance 2N²/t + 4 ln 2 h for white noise N² and a flicker of
+    one-sided density h/f. Below the frequencies that a pose of length T sees, down to those of a session of length L,
+    lies a variance h ln(L/2T). It is 0 where white noise explains the differences of halves.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray) -> f
 
 
 def expected_scatter_of_axes(readings: FloatArray, spans: IntArray) -> float:
-    """The same of a gyro, rms over its axes: its bias shows along all of them."""
+    """The same for a gyro, rms over its axes: its bias shows along all of them."""
     spans = spans[spans[:, 1] - spans[:, 0] >= FEWEST_READINGS]
     if len(spans) < FEWEST_POSES:
         return 0.0
@@ -247,13 +247,13 @@ def expected_scatter_of_axes(readings: FloatArray, spans: IntArray) -> float:
 
 
 def _between_poses(halves: FloatArray, parts: FloatArray, spans: IntArray) -> FloatArray:
-    """(k,) scatter along each direction from steps of halves (h, 1, k) and of parts (h, PARTS - 1, k) of poses."""
+    """(k,) scatter along each direction from differences of halves (h, 1, k) and parts (h, PARTS - 1, k) of poses."""
     k = halves.shape[2]
     of_halves = np.array([_mean_square(halves[:, :, i].ravel()) for i in range(k)])
-    # What halves would differ by if what makes the parts differ were white.
+    # Variance of the differences of halves if the noise of the parts is white.
     white = np.array([_mean_square(parts[:, :, i].ravel()) for i in range(k)]) * (2.0 / PARTS)
     if not (white > 0.0).all():
-        return np.zeros(k)  # readings are missing, or never change
+        return np.zeros(k)  # readings are missing, or constant
     excess = float(np.mean(of_halves / white)) - 1.0
     if not excess > SEEN * math.sqrt(2.0 / halves.size):
         return np.zeros(k)

@@ -1,4 +1,4 @@
-"""What a coarse ADC hides: the rate inside one step, at rest and in moves."""
+"""Rate hidden inside one LSB of a coarse ADC, in poses and in moves."""
 
 from __future__ import annotations
 
@@ -12,40 +12,40 @@ from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.ranges import ranges_of
 
 UNDITHERED = 0.5
-"""Noise below this part of a step does not dither it: the mean of a rounded reading is off by up to half a step,
+"""Noise, in LSB, below which it does not dither the ADC: the mean of rounded readings is wrong by up to half an LSB,
 however long it is taken."""
 SETTLING = (0.50, 0.68), (2.5, 1.25)
-"""Of a body that settles as exp(-t/τ), then of one that starts as t² does: time for the second step beside its bias's
-in that for the first, and the samples over which what it still turns, rms over where in its step the bias may lie, is
-a step's uniform error, for each sample that the first step took."""
+"""For a body that settles as exp(-t/τ), then for one that starts as t²: duration of the second step beside the bias's
+over that of the first, and samples per sample of the first step. Over these the rotation hidden in the bias's step is,
+rms over the place of the bias, as large as a uniform error of one step."""
 TURNING = 2.0 / (math.sqrt(2.0) - 1.0)
-"""How many times as long as in the steps beside it a rate stays, at most, in the one in which it turns back as t² does;
-one that stays longer is steady."""
+"""Longest time a rate that turns back as t² stays in a step, in mean durations of the steps beside it; a rate that
+stays longer is constant."""
 TURNED = 1.0 / 3.0
-"""Mean square of what such a turn's readings are off together, beside that of a steady rate: ``(2h/3 - 1/2)²`` of a
-step for a turn at ``h`` of it, in the mean over ``h`` of readings, which are as ``√h``."""
+"""Mean square of the common error of such a turn's readings over that of a constant rate: ``(2h/3 - 1/2)²`` of a step
+for a turn at height ``h`` in it, averaged over ``h`` with the number of readings, which grows as ``√h``."""
 CHATTER = 9
-"""Readings whose median is free of toggling between neighbouring codes."""
+"""Length of the running median, in readings, that removes toggling between neighbouring codes."""
 LEAST_WHITE = 1e-2
-"""Part of the rounding's variance that an undithered axis is given as white noise: it shows none of its own."""
+"""Least white noise of an undithered axis, as a share of the rounding variance: its readings show none."""
 
 
 def undithered_axes(quantum: FloatArray, sigma: FloatArray) -> BoolArray:
-    """Axes (3,) whose noise ``sigma`` (3,) [raw] is too small to be seen through the ADC's ``quantum`` (3,)."""
+    """Axes (3,) whose noise ``sigma`` (3,) [raw] is too small against the LSB ``quantum`` (3,) to dither."""
     return (quantum > 0.0) & (sigma < UNDITHERED * quantum)
 
 
 def rounding_variance(
     readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray
 ) -> FloatArray | None:
-    """Variance (n, 3) by rounding of readings summed as if independent; ``None`` where no axis needs it.
+    """Rounding variance (n, 3) of readings for sums that treat them as independent; ``None`` where no axis needs it.
 
-    While the rate passes through a step from one side to the other, the errors of the ``n`` readings inside run through
-    all values of the step and cancel but for one of them: ``q²/12`` for the run, ``q²/12n`` a reading. Where the rate
-    stands inside the step and turns back, the readings share one error: their sum has the variance ``n² q²/12``, that
-    is ``n q²/12`` a reading, and a third of it where the rate turns at once (:data:`TURNED`). At the ``rest`` reading
-    (3,) the error is that of the bias, which is not charged here but for the start and the end of a move that still lie
-    inside the step; NaN where there is none.
+    While the rate passes through a step from one side to the other, the errors of the ``n`` readings inside take all
+    values of the step and cancel except for one: ``q²/12`` for the run, ``q²/12n`` per reading. Where the rate turns
+    back inside the step, the readings share one error: their sum has the variance ``n² q²/12``, that is ``n q²/12`` per
+    reading, and a third of it where the rate turns at once (:data:`TURNED`). In the step of the ``rest`` reading (3,)
+    the error is that of the bias, which is not included here, except at the start and the end of a move that are still
+    inside that step; NaN where there is no bias.
     """
     if not np.any(axes):
         return None
@@ -54,7 +54,7 @@ def rounding_variance(
         codes, steady = _steady(readings[:, axis])
         out[:, axis] = _of_runs(codes, steady, float(quantum[axis]), float(rest[axis]))
     for still, begin, end in _standing(readings, quantum, rest, axes):
-        # What of the others' turn reaches an axis that stands still stays inside its step, all along.
+        # The part of the others' rotation along a resting axis stays inside its step all the time.
         out[begin:end, still] = np.maximum(out[begin:end, still], (end - begin) * quantum[still] ** 2 / 12.0)
     return out
 
@@ -62,9 +62,9 @@ def rounding_variance(
 def rounding_of_moves(
     readings: FloatArray, ranges: list[tuple[int, int]], quantum: FloatArray, sigma: FloatArray
 ) -> FloatArray:
-    """Variance (moves, 3) of the sums of readings (n, 3) over ``ranges``, of noise ``sigma`` (3,) that may not dither.
+    """Variance (moves, 3) of the sums of readings (n, 3) over ``ranges``; noise ``sigma`` (3,) may not dither the ADC.
 
-    A move begins and ends in the steps of its poses: what it reads there is off by as much as their means.
+    A move begins and ends in the LSB of its poses: its readings there have the same error as their means.
     """
     axes = undithered_axes(quantum, sigma)
     nowhere = np.full(3, np.nan)
@@ -75,7 +75,7 @@ def rounding_of_moves(
 def _steady(readings: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Codes (n,), missing ones infinite, and their running median.
 
-    A little noise makes readings toggle where they pass from code to code: runs there say nothing of the time.
+    Small noise makes readings toggle between codes where they pass: such runs say nothing about the duration of a step.
     """
     codes = np.where(np.isfinite(readings), readings, np.inf)
     return codes, _core.running_median(codes, CHATTER)
@@ -102,7 +102,7 @@ def _of_runs(codes: FloatArray, steady: FloatArray, quantum: float, rest: float)
 
 
 def _turns_at_once(count: IntArray) -> BoolArray:
-    """Whether runs of ``count`` readings, too long for toggling, are as short beside their neighbours as a turn's."""
+    """Whether runs of ``count`` readings, too long for toggling, are as short beside their neighbours as in a turn."""
     out = np.zeros(len(count), dtype=np.bool_)
     clean = np.minimum(np.minimum(count[:-2], count[2:]), count[1:-1]) > CHATTER // 2
     out[1:-1] = clean & (count[1:-1] < 0.5 * TURNING * (count[:-2] + count[2:]))
@@ -110,7 +110,7 @@ def _turns_at_once(count: IntArray) -> BoolArray:
 
 
 def resting_axes(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> BoolArray:
-    """Readings (n, 3) of ``axes`` (3,) at which the axis stands still while another one turns."""
+    """(n, 3) whether a reading of ``axes`` (3,) is inside the LSB of its bias while another axis rotates."""
     out = np.zeros(readings.shape, dtype=np.bool_)
     for axis, begin, end in _standing(readings, quantum, rest, axes):
         out[begin:end, axis] = True
@@ -120,8 +120,8 @@ def resting_axes(readings: FloatArray, quantum: FloatArray, rest: FloatArray, ax
 def _standing(
     readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray
 ) -> Iterator[tuple[int, int, int]]:
-    """(axis, begin, end) where an axis stays in the step of its bias, others turning, longer than it takes to leave it:
-    where all axes turn, each passes that step or leaves it with the others."""
+    """(axis, begin, end) where an axis stays in the LSB of its bias while others rotate, for longer than it takes to
+    leave it: where all axes rotate, each passes that step or leaves it with the others."""
     turns = np.abs(readings - rest) > 1.75 * quantum
     for axis in np.flatnonzero(axes).tolist():
         others = np.any(turns[:, np.arange(3) != axis], axis=1)
@@ -134,10 +134,10 @@ def _standing(
 
 
 def _rests(steady: FloatArray, quantum: float, rest: float) -> Iterator[tuple[int, int, int, int]]:
-    """Stretches (begin, end) in which an axis stands in the step of its bias, and the samples at either end in which it
-    may turn unseen."""
+    """Ranges (begin, end) in which an axis stays in the LSB of its bias, and the samples at either end in which it may
+    rotate undetected."""
     away = np.abs(steady - rest)
-    # Between the two nearest codes a bias may toggle.
+    # A bias may toggle between its two nearest codes.
     is_rest, is_next = away < 0.75 * quantum, away < 1.75 * quantum
     at_rest, beyond = ranges_of(is_rest), ranges_of(away < 2.75 * quantum)
     for first, last in ranges_of(is_next):
@@ -145,24 +145,24 @@ def _rests(steady: FloatArray, quantum: float, rest: float) -> Iterator[tuple[in
         if not inside:
             continue
         n, begin, end = max(inside)
-        # Whether the move before and the one after go the same way says nothing.
+        # The signs of the moves before and after do not matter.
         outer = next(one for one in beyond if one[0] <= first and last <= one[1])
         left = _hidden(begin - first, first - outer[0]) if first > 0 else 0
         right = _hidden(last - end, outer[1] - last) if last < len(steady) else 0
-        if n > min(left, right):  # else passed on the way, or turned back in
+        if n > min(left, right):  # otherwise passed through, or turned back inside
             yield begin, end, min(left, n), min(right, n)
 
 
 def _hidden(first_step: int, second_step: int) -> int:
-    """Samples charged next to the step of the bias, by how long the two steps beside it took."""
+    """Samples with rounding variance next to the LSB of the bias, from the durations of the two steps beside it."""
     ratio = second_step / max(first_step, 1)
     return math.ceil(first_step * float(np.interp(ratio, *SETTLING)))
 
 
 def shared_errors(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> Iterator[FloatArray]:
-    """Errors (n, 3) of one standard deviation each that all moves share: what an axis turns inside the step of its bias
-    while another one leads. Their misalignment makes it, the other way in turns the other way: it does not scatter from
-    move to move.
+    """Errors (n, 3) of one standard deviation each that all moves share: the rotation of an axis inside the LSB of its
+    bias while another one leads. It is due to their misalignment and changes sign with the rotation: it does not
+    scatter from move to move.
     """
     away = (readings - rest) / np.where(quantum > 0.0, quantum, np.inf)
     size = np.abs(away)
@@ -186,9 +186,9 @@ def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: f
 
 
 def common_bias(bias: FloatArray, var_bias: FloatArray, axes: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Biases (n, 3) and variances of undithered axes: one bias for all poses, as uncertain between them as it scatters.
+    """Biases (n, 3) and variances of undithered axes: one bias for all poses, its scatter added to the variance.
 
-    A mean that rounding has moved says nothing of its own pose; what is common to all poses is left to the moves.
+    A mean biased by rounding does not determine its own pose's bias; the common bias is left to the moves.
     """
     bias, var_bias = bias.copy(), var_bias.copy()
     for axis in np.flatnonzero(axes):

@@ -27,7 +27,7 @@ fn is_forward_lanes<const FUSED: bool>(time: &[Row; ROWS + 1]) -> bool {
 }
 
 for_each_instruction_set! {
-    /// Half rotation vectors of rates that are constant or linear over each step; whether no step goes back in time.
+    /// Half rotation vectors of rates that are constant or linear over each step; whether time never decreases.
     pub(super) fn half_vectors(
         time: &[Row; ROWS + 1],
         rate: &[[Row; 3]; ROWS + 1],
@@ -74,7 +74,7 @@ fn half_vectors_lanes<const FUSED: bool>(
 }
 
 for_each_instruction_set! {
-    /// Quaternions from half rotation vectors; whether all were short enough (and numbers) for the series.
+    /// Quaternions from half rotation vectors; whether all are finite and short enough for the series.
     pub(super) fn step_quaternions(turn: &mut [[Row; 4]; ROWS]) -> bool = step_quaternions_lanes
 }
 
@@ -97,7 +97,7 @@ fn step_quaternions_lanes<const FUSED: bool>(turn: &mut [[Row; 4]; ROWS]) -> boo
 }
 
 for_each_instruction_set! {
-    /// The products of every lane.
+    /// Product of all steps of every lane.
     pub(super) fn last_products(turn: &[[Row; 4]; ROWS], ends: &mut [Row; 4]) = last_products_lanes
 }
 
@@ -118,7 +118,7 @@ fn last_products_lanes<const FUSED: bool>(turn: &[[Row; 4]; ROWS], ends: &mut [R
 }
 
 for_each_instruction_set! {
-    /// The running products of every lane, in place.
+    /// Running products of the steps of every lane, in place.
     pub(super) fn products(turn: &mut [[Row; 4]; ROWS]) = products_lanes
 }
 

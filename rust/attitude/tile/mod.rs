@@ -1,4 +1,4 @@
-//! A tile of steps: every lane of a vector takes a stretch of it.
+//! A tile of steps, divided among the lanes of a vector.
 
 #![expect(
     clippy::inline_always,
@@ -18,7 +18,7 @@ const LANES: usize = 16;
 const ROWS: usize = 32;
 type Row = [f64; LANES];
 
-/// Where a tile begins: the rotation since the piece began, and the attitude at that beginning.
+/// Start of a tile: the rotation since the piece began, and the attitude where the piece began.
 #[derive(Clone, Copy)]
 pub(super) struct Start {
     pub turned: Quaternion,
@@ -50,10 +50,10 @@ impl Tile {
         })
     }
 
-    /// The rotation since the piece began after the steps `first..stop`, a tile's worth of them at most.
+    /// The rotation since the piece began, after the steps `first..stop` (at most one tile of them).
     ///
     /// # Errors
-    /// The number of a step that cannot be made.
+    /// The number of a step whose rotation is not finite or whose time runs backward.
     pub(super) fn turn(
         &mut self,
         samples: &Samples<'_>,
@@ -68,7 +68,7 @@ impl Tile {
         Ok(unit(whole))
     }
 
-    /// The same, and the attitude after each step.
+    /// Writes the attitude after each step; returns what [`turn`](Self::turn) returns.
     pub(super) fn write(
         &mut self,
         samples: &Samples<'_>,
@@ -183,7 +183,7 @@ impl Tile {
         }
     }
 
-    /// Steps of any length, one by one.
+    /// Quaternions of steps of any length, one by one.
     fn fill_slowly(
         &mut self,
         samples: &Samples<'_>,

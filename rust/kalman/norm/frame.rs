@@ -1,11 +1,11 @@
-//! Nine numbers as `S` and `b`: the length of a vector leaves a rotation free, the frame fixes it.
+//! Nine parameters as `S` and `b`: the norm of a vector does not determine a rotation, the frame fixes it.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Which rotation of the body frame is chosen, since the length of a vector cannot tell.
+/// The body frame, which the norm of a vector determines only up to a rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Frame {
-    /// `S` lower triangular: parameters `s11 s21 s22 s31 s32 s33`.
+    /// `S` lower triangular: parameters `S_xx S_yx S_yy S_zx S_zy S_zz`.
     Lower,
     /// `S` symmetric: the same entries, mirrored.
     Symmetric,

@@ -1,8 +1,8 @@
-//! The filter that needs no reference attitudes: at rest the corrected reading has the length of gravity.
+//! The filter that needs no reference attitudes: in a static pose the corrected reading has the norm of gravity.
 //!
-//! `z = |g| = |S (a' − n) + b| + v`: nine constants (`S` lower triangular or symmetric, `b`) and the slow noise `n` of all
-//! three axes. The measurement is not linear, so each update is iterated, and after a session the whole run is repeated
-//! with every pose linearised at the latest constants until nothing moves: that limit is the weighted batch fit.
+//! `z = |g| = |S (a' − n) + b| + v`: nine constants (`S` lower triangular or symmetric, `b`) and the slow noise `n` of
+//! all three axes. The measurement is not linear: each update is iterated, and after a session the whole run is
+//! repeated with every pose linearised at the latest constants until convergence, which is the weighted batch fit.
 
 mod frame;
 mod pose;
@@ -25,7 +25,7 @@ const MAX_ITERATIONS: usize = 20;
 /// An iteration that moves every parameter by less than this part of its standard error is the last.
 const SETTLED: f64 = 1e-3;
 /// The point of linearisation moves by at most this part of gravity or of a sensitivity at a time: a few poses in one
-/// plane leave directions to which the length of gravity is stationary, and a full step there leads nowhere.
+/// plane leave directions in which the norm is stationary, and a full step along them is arbitrary.
 const LONGEST_STEP: f64 = 0.2;
 
 /// Recursive estimate of a triad from the length of gravity alone.
@@ -42,7 +42,7 @@ pub struct NormFilter {
     steps: Steps,
     poses: Vec<NormPose>,
     innovations: Vec<Innovation>,
-    /// Where the last call of [`Self::relinearise`] ended.
+    /// Parameters at the end of the last call of [`Self::relinearise`].
     settled: Vec<f64>,
 }
 
@@ -70,7 +70,7 @@ fn transition<'a>(
 }
 
 impl NormFilter {
-    /// A filter that has seen nothing yet.
+    /// A filter before its first pose.
     ///
     /// # Errors
     /// When the noise, the prior or gravity is malformed.
@@ -222,7 +222,7 @@ impl NormFilter {
         self.timeline.gap(pose.start, pose.pose_s).map(|_| ())
     }
 
-    /// Take one more pose, iterating its update until the point of linearisation is the estimate itself.
+    /// Processes one more pose; its update is iterated until the point of linearisation is the estimate itself.
     ///
     /// # Errors
     /// When the pose is not finite or out of order.
@@ -285,8 +285,8 @@ impl NormFilter {
         }
     }
 
-    /// Take many poses without estimating anything: [`Self::relinearise`] then starts from the prior's mean, with all of
-    /// them together.
+    /// Stores poses without estimating: [`Self::relinearise`] then starts from the prior's mean, with all poses
+    /// together.
     ///
     /// # Errors
     /// As [`Self::add`].
@@ -317,7 +317,7 @@ impl NormFilter {
         &self.innovations
     }
 
-    /// Poses seen.
+    /// Number of poses processed.
     #[must_use]
     pub fn n_poses(&self) -> usize {
         self.poses.len()

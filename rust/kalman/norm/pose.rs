@@ -1,4 +1,4 @@
-//! What goes into the filter: poses, and what is believed before the first.
+//! Input of the filter: poses, and the prior before the first.
 
 use super::N_PARAMETERS;
 
@@ -15,7 +15,7 @@ pub struct NormPose {
     pub extra_variance: [f64; 3],
 }
 
-/// What is believed of the nine parameters before the first pose.
+/// Prior of the nine parameters before the first pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NormPrior {
     /// Mean, in the order of [`super::Frame::unpack`].

@@ -1,4 +1,4 @@
-//! All poses again, linearised at the latest constants, until nothing moves.
+//! Repeated runs over all poses, linearised at the latest constants, until convergence.
 
 use super::{N_PARAMETERS, NormFilter, NormPrior, transition};
 use crate::error::Result;
@@ -9,7 +9,7 @@ use crate::kalman::ud::{Innovation, UdFilter};
 const CONVERGED: f64 = 1e-6;
 
 /// A step longer than this many standard errors must lower the cost; shorter ones end at the fixed point of the runs,
-/// which is not exactly where the cost, whose weights move as well, is least.
+/// which is not exactly the minimum of the cost, whose weights depend on the constants too.
 const LOOKED_AT: f64 = 0.1;
 /// A step that does not lower the cost is halved at most this often.
 const MOST_HALVINGS: usize = 12;
@@ -36,10 +36,10 @@ impl NormFilter {
         Ok((filter, innovations))
     }
 
-    /// Squared innovations with the constants held at `theta`, and its squared distance from the prior.
+    /// Squared normalised innovations with the constants fixed at `theta`, and its squared distance from the prior.
     ///
-    /// The weights belong to `theta`: towards `S = 0` the noise in m/s² vanishes together with the signal, so that the
-    /// worthless solution `S = 0`, `|b| = |g|` costs as much as no fit at all.
+    /// The weights are those at `theta`: towards `S = 0` the noise in m/s² vanishes together with the signal, so that
+    /// the trivial solution `S = 0`, `|b| = |g|` costs as much as no fit at all.
     fn cost(&mut self, theta: &[f64]) -> Result<f64> {
         let mut fixed = self.prior.clone();
         fixed.mean.copy_from_slice(theta);
@@ -60,14 +60,14 @@ impl NormFilter {
         })
     }
 
-    /// Run over all poses again, linearised at the latest constants, until they stay. Returns the number of runs, or
-    /// `None` when `most` were not enough.
+    /// Repeats the run over all poses, linearised at the latest constants, until they converge. Returns the number of
+    /// runs, or `None` when `most` were not enough.
     ///
     /// Starts from the best of the latest constants, those of the last call and the prior's mean; a long step is
     /// shortened until it lowers the cost.
     ///
     /// # Errors
-    /// Never for poses that were taken once.
+    /// Never for poses that were accepted once.
     pub fn relinearise(&mut self, most: usize) -> Result<Option<usize>> {
         let mut theta = self.prior.mean.to_vec();
         let mut cost = self.cost(&theta)?;
@@ -104,7 +104,7 @@ impl NormFilter {
             }
         }
         if runs.is_none() {
-            // The last run's estimate is a full step from `theta` that nobody has looked at.
+            // The last run's estimate is a full step from `theta`, of unknown cost.
             let estimate = self.filter.x[self.n_noise..].to_vec();
             if self.cost(&estimate)? > cost {
                 self.filter.x[self.n_noise..].copy_from_slice(&theta);

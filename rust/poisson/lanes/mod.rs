@@ -20,7 +20,7 @@ const LANES: usize = 8;
 type Row = [f64; LANES];
 const ZERO: Row = [0.0; LANES];
 
-/// One step of a move, reduced to what does not depend on the calibration.
+/// One step of a move, in terms that do not depend on the calibration.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Step {
     /// `∫ w' dτ`.
@@ -30,7 +30,7 @@ pub(super) struct Step {
     /// Change of the raw reading over the step.
     pub change: Vector3<f64>,
     pub h: f64,
-    /// Where the middle of the step lies between the anchors: 0 before, 1 after.
+    /// Position of the middle of the step between the anchors: 0 before, 1 after.
     pub fraction: f64,
 }
 
@@ -54,25 +54,25 @@ const EMPTY: StepRow = StepRow {
 };
 
 /// The steps of a move: step `i` is row `i % rows` of lane `i / rows`; the last lane is filled up with steps of no
-/// duration, which change nothing.
+/// duration, which add nothing.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Steps {
     rows: Vec<StepRow>,
     n: usize,
 }
 
-/// What the rate is made of, and its noise.
+/// Scale, bias and noise of the rate.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rate {
     pub scale: Matrix3<f64>,
-    /// At the anchor before, rad/s.
+    /// Bias at the anchor before, rad/s.
     pub bias: Vector3<f64>,
-    /// From the anchor before to the one after.
+    /// Change of the bias from the anchor before to the one after, rad/s.
     pub change: Vector3<f64>,
     pub span_s: f64,
-    /// Of the raw reading, raw unit² s.
+    /// Noise density squared of the raw reading, raw unit² s.
     pub variance: Vector3<f64>,
-    /// Of a time stamp, s².
+    /// Variance of a timestamp, s².
     pub var_time: f64,
     /// A step longer than this has lost samples.
     pub gap_s: f64,
@@ -87,7 +87,7 @@ struct Sums {
     wrt_scale: [Row; 27],
     /// `Σ P h`, `Σ P h · fraction` and `Σ Q h²/12`.
     wrt_bias: [[Row; 9]; 3],
-    /// `xx xy xz yy yz zz`.
+    /// Covariance of the noise, `xx xy xz yy yz zz`.
     cov: [Row; 6],
 }
 
@@ -99,7 +99,7 @@ impl Steps {
         }
     }
 
-    /// The steps of a move without missing readings; `odd` makes those that no cubic suits.
+    /// The steps of a move without missing readings; `odd` computes those for which no cubic is suitable.
     pub(super) fn of(of: &Whole<'_>, model: RateModel, odd: impl Fn(usize) -> Step) -> Self {
         let mut out = Self::new(of.n_steps());
         let n_rows = out.rows.len();
@@ -139,7 +139,7 @@ impl Steps {
     }
 }
 
-/// Rows that are made, integrated and forgotten: they stay where the processor is quickest.
+/// Rows computed and integrated at a time: few enough for the fastest cache.
 const BLOCK: usize = 16;
 
 /// The turn over a move without missing readings, integrated once.
@@ -206,7 +206,7 @@ impl Sums {
     }
 
     fn add(&mut self, instructions: Instructions, rows: &[StepRow], rate: &Rate) {
-        // Timestamps with errors let the rate's change over every step count, lost samples that over some.
+        // With timestamp errors the change of the rate over every step counts, with lost samples that over some.
         let is_jumpy =
             rate.var_time > 0.0 || rows.iter().any(|row| row.h.iter().any(|&h| h > rate.gap_s));
         add_steps(instructions, rows, rate, is_jumpy, self);

@@ -1,7 +1,7 @@
 //! Moments of the raw readings over the steps of a move, a row of them at a time.
 //!
-//! Row after row is written, eight stretches of the move being read side by side: written stretch after stretch, every
-//! line of memory would be fetched eight times.
+//! Written row by row, eight stretches of the move read side by side: stretch by stretch, every cache line would be
+//! fetched eight times.
 
 #![expect(
     clippy::inline_always,
@@ -15,7 +15,7 @@ use crate::poisson::RateModel;
 use crate::poisson::steps::UNEVEN_STEPS;
 use crate::simd::{Instructions, fma, for_each_instruction_set};
 
-/// A move all of whose samples are numbers of rising time.
+/// A move all of whose samples are finite, with increasing timestamps.
 #[derive(Clone, Copy)]
 pub(in crate::poisson) struct Whole<'a> {
     pub time_s: &'a [f64],
@@ -30,8 +30,8 @@ impl Whole<'_> {
     }
 }
 
-/// Writes rows from `first` on of a move of `n_rows`; `odd` gets the steps for which no cubic can be laid through four
-/// samples of about even time: they are still to be set.
+/// Writes rows from `first` on of a move of `n_rows`; `odd` collects the steps without a cubic through four evenly
+/// spaced samples, which the caller sets.
 pub(super) fn fill(
     rows: &mut [StepRow],
     first: usize,
@@ -62,13 +62,13 @@ for_each_instruction_set! {
     ) = fill_cubics_body
 }
 
-/// Timestamps and readings of some sample of every stretch.
+/// Timestamps and readings of one sample of every stretch.
 struct Samples {
     time_s: Row,
     raw: [Row; 3],
 }
 
-/// Samples `l n_rows + row + ahead` of the move, or its last one.
+/// Samples `l n_rows + at` of the move in lane `l`, or its last one.
 #[inline(always)]
 fn samples(of: &Whole<'_>, n_rows: usize, at: usize) -> Samples {
     let last = of.time_s.len() - 1;
@@ -87,7 +87,7 @@ fn samples(of: &Whole<'_>, n_rows: usize, at: usize) -> Samples {
     out
 }
 
-/// Everything of a row but the moments; beyond the end of the move steps have no duration.
+/// All of a row except the moments; beyond the end of the move steps have no duration.
 #[inline(always)]
 fn ends(out: &mut StepRow, of: &Whole<'_>, from: &Samples, to: &Samples) {
     for l in 0..LANES {
@@ -155,7 +155,7 @@ fn fill_cubics_body<const FUSED: bool>(
     let n = of.time_s.len();
     for (k, out) in rows.iter_mut().enumerate() {
         let row = first + k;
-        // The first step of all has no sample before it, and is odd below: nothing lies between two equal ones.
+        // The first step of all has no sample before it, and is odd below: its first two samples are equal.
         let seen = [row.saturating_sub(1), row, row + 1, row + 2].map(|at| samples(of, n_rows, at));
         ends(out, of, &seen[1], &seen[2]);
         let mut tau = [ZERO; 4];

@@ -1,4 +1,4 @@
-//! One step of every stretch at a time: its rotation, and what it adds to the sensitivities and to the noise.
+//! One step of every stretch at a time: its rotation, and its contribution to the sensitivities and to the noise.
 
 #![expect(
     clippy::inline_always,
@@ -30,7 +30,7 @@ fn add_steps_lanes<const FUSED: bool>(
     let mut to_start = [ZERO; 9];
     for row in rows {
         rotation_vectors::<FUSED>(row, rate, &mut phi);
-        // Nearly always all lanes turn by less than half a radian.
+        // Nearly always the rotation in all lanes is below half a radian.
         if phi.square.iter().all(|&q| q <= SERIES_LIMIT) {
             for l in 0..LANES {
                 let (a, b, c) = short_series::<FUSED>(phi.square[l]);
@@ -150,7 +150,7 @@ fn rodrigues<const FUSED: bool>(v: [f64; 3], a: f64, b: f64, q: f64) -> [f64; 9]
     ]
 }
 
-/// δθ = Bᵀ J(φ) δφ, δφ = (I − [φ₁]×) δφ₀ + [φ₀]× δφ₁: what the step adds to every sum.
+/// δθ = Bᵀ J(φ) δφ, δφ = (I − [φ₁]×) δφ₀ + [φ₀]× δφ₁: adds the step to every sum.
 #[inline(always)]
 fn sensitivities<const FUSED: bool>(
     row: &StepRow,
@@ -211,8 +211,8 @@ fn sensitivities<const FUSED: bool>(
     }
 }
 
-/// The covariance from timestamps with errors, and from lost samples: they leave the rate anywhere between its neighbours,
-/// uniform, so h²/12.
+/// The covariance from timestamp errors and from lost samples: a step with lost samples changes its rate at an unknown
+/// time, uniform over h, hence h²/12.
 #[inline(always)]
 fn jumps<const FUSED: bool>(row: &StepRow, rate: &Rate, to_start: &[Row; 9], cov: &mut [Row; 6]) {
     let s = &rate.scale;

@@ -1,4 +1,4 @@
-//! What the filter is compared with: least squares, recursive and batch, ordinary and generalised.
+//! Baselines of the filter: least squares, recursive and batch, ordinary and generalised.
 
 use numpy::{
     PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
@@ -47,7 +47,7 @@ pub(super) fn kalman_noise_covariance<'py>(
 
 type Recursion = (Py<PyArray2<f64>>, Py<PyArray2<f64>>);
 
-/// Recursive ordinary least squares: constants, stated sigma.
+/// Recursive ordinary least squares: constants, sigma for white noise.
 #[pyfunction]
 pub(super) fn kalman_least_squares(
     py: Python<'_>,

@@ -1,4 +1,4 @@
-//! The Kalman filter across the seam.
+//! Bindings of the Kalman filter.
 
 mod least_squares;
 mod poses;
@@ -55,7 +55,7 @@ fn rows4(py: Python<'_>, rows: Vec<[f64; N_CONSTANTS]>) -> PyResult<Py<PyArray2<
         .unbind())
 }
 
-/// Noise of one axis and how it is shaped.
+/// Noise of one axis, and its representation by states.
 #[pyclass(module = "trihedron._core", frozen)]
 pub(super) struct AxisKalmanModel {
     pub(super) inner: ShapingModel,
@@ -115,7 +115,7 @@ impl AxisKalmanModel {
     }
 }
 
-/// Where a filter starts: constants of one axis, their standard errors, how they walk.
+/// Prior of a filter: constants of one axis, their standard deviations, intensities of their random walks.
 #[pyclass(module = "trihedron._core", frozen)]
 pub(super) struct KalmanStart {
     pub(super) prior: Prior,

@@ -1,4 +1,4 @@
-//! The evidence of hypotheses across the seam.
+//! Bindings of the evidence of hypotheses.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::session_model::looks::Looks;
 use crate::session_model::{Distortion, Session, Strengths};
 
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
-/// Columns of force and rate of further effects, and their sizes beforehand.
+/// Columns of force and rate of further effects, and their prior sizes.
 pub(super) type Asked<'py> = (Option<Array3<'py>>, Option<Array3<'py>>, Vec<f64>);
 /// Log-evidence, strengths, parameters and their covariance.
 pub(super) type Answer<'py> = (
@@ -34,7 +34,7 @@ pub(super) type Glance<'py> = (
     Bound<'py, PyArray2<f64>>,
 );
 
-/// Every hypothesis at the strengths that make it likeliest.
+/// Every hypothesis at its most likely noise strengths.
 pub(super) fn tuned<'py>(
     of: (&Arc<Session>, &Arc<Fit>),
     py: Python<'py>,
@@ -56,7 +56,7 @@ pub(super) fn tuned<'py>(
     lent.collect()
 }
 
-/// What every candidate, or every one of its `parts`, gains at each of some strengths (11.19).
+/// Gain of every candidate, or of each of its `parts`, at each of the given strengths (11.19).
 pub(super) fn seen<'py>(
     of: (&Arc<Session>, &Arc<Fit>),
     py: Python<'py>,
@@ -110,7 +110,7 @@ fn asked_of(session: &Session, hypotheses: &[Asked<'_>]) -> PyResult<Vec<(Distor
     each.collect()
 }
 
-/// What is asked of every hypothesis, side by side.
+/// Evaluates `ask` for every hypothesis, in parallel.
 fn each<T: Send + 'static>(
     of: (&Arc<Session>, &Arc<Fit>),
     py: Python<'_>,

@@ -1,4 +1,4 @@
-//! A fitted session across the seam.
+//! Bindings of a fitted session.
 
 use std::sync::{Arc, OnceLock};
 
@@ -34,7 +34,7 @@ type Rest<'py> = (
 pub(super) struct SessionFit {
     pub session: Arc<Session>,
     pub fit: Arc<Fit>,
-    /// Share of every row that the fit used up, once asked for.
+    /// Leverage of every row, computed at the first request.
     leverage: OnceLock<Vec<f64>>,
 }
 
@@ -60,7 +60,7 @@ impl SessionFit {
         self.fit.state.force_bias.as_slice().to_pyarray(py)
     }
 
-    /// With one bias for the session.
+    /// `b_a` with one bias for the session.
     #[getter]
     fn session_force_bias<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.fit
@@ -95,8 +95,8 @@ impl SessionFit {
         self.fit.state.effect.as_slice().to_pyarray(py)
     }
 
-    /// Corner times, s; scatter in its units (accelerometer, gyro by axis); straying between poses in units of the scatter;
-    /// excess of moves.
+    /// Corner times, s; scatter of either bias in its unit (accelerometer, gyro by axis); departure of a bias from the
+    /// line between poses, in units of its scatter; excess of moves.
     #[getter]
     fn strengths(&self) -> AllStrengths {
         all_strengths(&self.fit.strengths)
@@ -189,14 +189,14 @@ impl SessionFit {
         let effects = distortion(force.as_ref(), rate.as_ref(), self.session.n_points())?;
         let fit = Arc::clone(&self.fit);
         let session = Arc::clone(&self.session);
-        // Tenths of a millisecond: a thread of its own would take longer to begin.
+        // Takes tenths of a millisecond: a thread of its own would take longer to start.
         let parts = run(py, || {
             session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, &effects)
         })?;
         stacked(py, &parts, effects.k)
     }
 
-    /// Columns `(rows, k)` minus what the unknowns of the fit can imitate.
+    /// Columns `(rows, k)` minus their projection onto the unknowns of the fit.
     fn project<'py>(
         &self,
         py: Python<'py>,
@@ -215,9 +215,9 @@ impl SessionFit {
         matrix(py, &out)
     }
 
-    /// Log-evidence of every hypothesis (force, rate, sizes beforehand of further effects), all but the strengths of the
-    /// noise integrated out; strengths are sought from the best of those given, `within` shortest corner times, largest
-    /// scatter and largest excess. With each its strengths, its parameters one linear step from here, their covariance.
+    /// Log-evidence of every hypothesis (force, rate, prior sizes of further effects), all but noise strengths
+    /// integrated out; these are searched from the best of those given, `within` shortest corner times, largest scatter
+    /// and largest excess. With it the strengths, the parameters one linear step from this fit, and their covariance.
     fn evidence<'py>(
         &self,
         py: Python<'py>,
@@ -234,9 +234,9 @@ impl SessionFit {
         )
     }
 
-    /// What every candidate gains in log-evidence at each of some strengths, its sizes beforehand times each of some
-    /// scales: `(scales, strengths)`; its parameters and their covariance at the first strengths and their best scale.
-    /// With `parts` (numbers of columns) each of these instead, candidate after candidate.
+    /// Gain of every candidate in log-evidence at each of the `strengths`, its prior sizes times each of the `scales`:
+    /// `(scales, strengths)`; its parameters and their covariance at the first strengths and their best scale. With
+    /// `parts` (indices of columns), the gain of each part instead, candidate after candidate.
     #[pyo3(signature = (candidates, scales, strengths, parts=None))]
     fn looks<'py>(
         &self,
@@ -256,14 +256,14 @@ impl SessionFit {
         )
     }
 
-    /// `(rows,)` share of every row that the fit used up.
+    /// `(rows,)` leverage of every row.
     fn leverage<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (fit, known) = (&self.fit, &self.leverage);
         Ok(run(py, || Ok(known.get_or_init(|| fit.leverage())))?.to_pyarray(py))
     }
 
-    /// Held-out prediction of folds of rows, `(folds, rows)` flags: χ² `(folds, 4)`, log-determinants `(folds,)`,
-    /// directions `(4,)`, innovations `(rows,)` whitened, and over each row's own noise.
+    /// Cross-validation of folds of rows, `(folds, rows)` flags: χ² `(folds, 4)`, log-determinants `(folds,)`,
+    /// directions `(4,)`, innovations `(rows,)` whitened, and in units of each row's own noise.
     #[allow(clippy::type_complexity)]
     fn held_out<'py>(
         &self,
@@ -289,13 +289,13 @@ impl SessionFit {
         ))
     }
 
-    /// Covariance of what all poses share: both linear models (18), then effects.
+    /// Covariance of the parameters that all poses share: both linear models (18), then effects.
     fn border_covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         matrix(py, &self.fit.border_covariance())
     }
 
-    /// `(24, 24)` covariance of `(S_a, b_a, S_w, b_w)` on raw readings centred at two origins, and `b_w` `(3,)`; one
-    /// bias of either sensor for the session.
+    /// `(24, 24)` covariance of `(S_a, b_a, S_w, b_w)` on raw readings centred at two origins, and `b_w` `(3,)`, with
+    /// one bias of either sensor for the session.
     #[allow(clippy::type_complexity)]
     fn linear_covariance<'py>(
         &self,
@@ -312,8 +312,8 @@ impl SessionFit {
         Ok((matrix(py, &covariance)?, bias.as_slice().to_pyarray(py)))
     }
 
-    /// What the other rows say without those flagged, of every fold `(folds, rows)`: `S_a`, `b_a`, `S_w` on centred readings,
-    /// and the `(12, 12)` covariance of `(S_a, b_a)` on raw ones.
+    /// The fit without the rows flagged, for every fold `(folds, rows)`: `S_a`, `b_a`, `S_w` on centred readings, and
+    /// the `(12, 12)` covariance of `(S_a, b_a)` on raw ones.
     fn without<'py>(
         &self,
         py: Python<'py>,

@@ -1,4 +1,4 @@
-//! The joint model of a session across the seam.
+//! Bindings of the joint model of a session.
 
 mod evidence;
 mod fit;
@@ -27,10 +27,10 @@ use poses::{SessionMoves, SessionPoses, SessionState};
 
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
-/// A figure of the accelerometer and of the gyro.
+/// A value for the accelerometer and one for the gyro.
 type Pair = (f64, f64);
-/// Corner times s, scatter, straying between poses, excess of moves: accelerometer and gyro (gravity and velocity) each,
-/// scatter of the gyro by axis.
+/// Corner times s, scatter, departure from the line between poses, excess of moves: accelerometer and gyro (gravity and
+/// velocity) each, scatter of the gyro by axis.
 type AllStrengths = (Pair, (f64, f64, f64, f64), Pair, Pair);
 /// Shortest corner times s, largest scatter, largest excess of moves.
 type Bounds = (Pair, Pair, Pair);
@@ -44,7 +44,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     Ok(())
 }
 
-/// What was read in a session, arranged once for many fits.
+/// Readings of a session, arranged once for many fits.
 #[pyclass(frozen, module = "trihedron._core")]
 struct SessionModel {
     session: Arc<Session>,
@@ -130,9 +130,9 @@ fn sizes_fit(sizes: &[f64], k: usize) -> PyResult<()> {
 
 #[pymethods]
 impl SessionModel {
-    /// `noise`: jitter of the sample instants s, usual step s. `prior`: mean `(18,)`, covariance `(18, 18)`, whether it is
-    /// weak. `scatter`: `(2, 3)` raw, what strength one means, and the strength of the accelerometer's that its noise inside
-    /// poses lets expect, 0 where it shows none.
+    /// `noise`: jitter of the sample instants s, usual step s. `prior`: mean `(18,)`, covariance `(18, 18)`, whether it
+    /// is weak. `scatter`: `(2, 3)` raw, the scatter of strength one, and the strength of the accelerometer's scatter
+    /// that is expected from its noise inside poses, 0 where there is none.
     #[new]
     #[pyo3(signature = (*, gravity_m_s2, poses, moves, noise, prior, scatter))]
     fn new(
@@ -181,7 +181,7 @@ impl SessionModel {
         })
     }
 
-    /// Fits from a state, at the `strengths` given, or at the likeliest found from there `within` some bounds.
+    /// Fits from a state, at the `strengths` given, or at the most likely ones from there `within` some bounds.
     #[expect(
         clippy::too_many_arguments,
         reason = "named, and a thin seam: each is one array of the caller"
@@ -223,7 +223,7 @@ impl SessionModel {
         Ok(SessionFit::new(Arc::clone(&self.session), found))
     }
 
-    /// `(moves, 5)` whitened residuals of the moves at a state, nothing fitted.
+    /// `(moves, 5)` whitened residuals of the moves at a state, without a fit.
     fn move_residuals<'py>(
         &self,
         py: Python<'py>,

@@ -1,4 +1,4 @@
-//! Poses, moves and a point in the unknowns, each arranged once and handed over as one object.
+//! Poses, moves and a state of the unknowns, each arranged once and passed as one object.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ type Array1<'py> = PyReadonlyArray1<'py, f64>;
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
 
-/// Means of the still poses.
+/// Means of the static poses.
 #[pyclass(frozen, module = "trihedron._core")]
 pub(super) struct SessionPoses {
     pub time_s: Vec<f64>,
@@ -27,8 +27,8 @@ pub(super) struct SessionPoses {
 
 #[pymethods]
 impl SessionPoses {
-    /// `time_s` `(h,)`, means and standard errors `(h, 3)`, densities `(3,)`: raw and centred; `force_along`: directions
-    /// `(h, 3)` and the standard errors `(h,)` of the means along them, NaN where those of the axes hold.
+    /// `time_s` `(h,)`, means and standard errors `(h, 3)`, densities `(3,)`: raw and centred; `force_along`:
+    /// directions `(h, 3)` and the standard errors `(h,)` of the means along them, NaN where those of the axes apply.
     #[new]
     #[pyo3(signature = (*, time_s, force, force_sigma, force_density, rate, rate_sigma, rate_density, force_along=None))]
     #[allow(clippy::too_many_arguments)]
@@ -68,13 +68,13 @@ impl SessionPoses {
         })
     }
 
-    /// `(h, 3, 3)` from an error of the accelerometer's means, raw, to whitened rows.
+    /// `(h, 3, 3)` matrices that whiten an error of the accelerometer's means, raw.
     fn force_white<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         stack3(py, self.force.white.iter().copied())
     }
 }
 
-/// Samples of the moves between them.
+/// Samples of the moves between poses.
 #[pyclass(frozen, module = "trihedron._core")]
 pub(super) struct SessionMoves {
     pub moves: Arc<Vec<Move>>,
@@ -82,8 +82,8 @@ pub(super) struct SessionMoves {
 
 #[pymethods]
 impl SessionMoves {
-    /// `pose_time_s` `(h,)`; whole recording `time_s` `(n,)`, `force`, `rate` `(n, 3)` raw and centred; `ranges` `(m, 2)` of
-    /// samples, the pose `before` `(m,)` each, `unresolved` `(m, 2, 3)` variances of their integrals.
+    /// `pose_time_s` `(h,)`; whole recording `time_s` `(n,)`, `force`, `rate` `(n, 3)` raw and centred; `ranges`
+    /// `(m, 2)` of samples, the pose `before` `(m,)` each, `unresolved` `(m, 2, 3)` variances of their integrals.
     #[new]
     #[pyo3(signature = (*, pose_time_s, time_s, force, rate, ranges, before, unresolved))]
     fn new(
@@ -110,7 +110,7 @@ impl SessionMoves {
     }
 }
 
-/// A point in the unknowns.
+/// Values of all unknowns.
 #[pyclass(frozen, module = "trihedron._core")]
 pub(super) struct SessionState {
     pub state: State,
@@ -118,7 +118,7 @@ pub(super) struct SessionState {
 
 #[pymethods]
 impl SessionState {
-    /// `S_a`, `b_a`, `S_w` on centred readings; of every pose the vertical and both biases, raw, `(h, 3)`; effects `(k,)`.
+    /// `S_a`, `b_a`, `S_w` on centred readings; vertical and both biases of every pose, raw, `(h, 3)`; effects `(k,)`.
     #[new]
     #[pyo3(signature = (*, force_scale, force_bias, rate_scale, up, pose_rate_bias, pose_force_bias, effect))]
     fn new(

@@ -63,7 +63,7 @@ pub(super) fn path<'py>(
     ))
 }
 
-/// `(moves, 5)` residuals of moves in SI and `(moves, 5, 5)` their noise.
+/// `(moves, 5)` residuals of moves in SI and `(moves, 5, 5)` their noise covariance.
 pub(super) fn moves<'py>(py: Python<'py>, fit: &Fit) -> PyResult<(Rows<'py>, Blocks<'py>)> {
     let m = fit.passed.len();
     let residual: Vec<f64> = fit

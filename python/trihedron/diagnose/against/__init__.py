@@ -1,1 +1,1 @@
-"""A given model held against what the recording says of itself: numbers first, physics on top of them."""
+"""A given model compared with a recording: parameters first, then effects."""

@@ -1,4 +1,4 @@
-"""A fitted model of both sensors as the comparison needs it: numbers, their covariance, and how far zeros wander."""
+"""A fitted model of both sensors for the comparison: S and b, covariance, and variance of the bias between sessions."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from trihedron.units import AccelerationUnit, RateUnit, acceleration_to_si, rate
 def as_read(given: Calibration, recording: FittedModel) -> Calibration:
     """``given`` with S per unit of the recording's readings.
 
-    Between SI units the factor is known. Between counts and SI it is not: there the mean scale of the three axes is
-    the recording's own, as in the comparison of the numbers, and what is left are the differences between axes.
+    Between SI units the factor is known. Between counts and SI it is not: the mean scale of the three axes is then
+    taken from the recording, as in the comparison of parameters, and only differences between axes remain.
     """
     a, g = given.accelerometer, given.gyroscope
     units = acceleration_to_si(AccelerationUnit(a.raw_unit)), acceleration_to_si(AccelerationUnit(recording.accel_unit))
@@ -48,19 +48,19 @@ def _scaled(
 
 
 PUBLISHED_DIGITS = 1e-6
-"""A calibration without error bars is taken at its last printed digits: this share of each number."""
+"""Relative standard uncertainty of a calibration without a covariance: its last printed digits."""
 LONGEST_CORNER = 0.25
-"""Corner times beyond a quarter of the recording are not told from none: a zero may wander as much as that allows.
-Over 14 simulated pairs of one unit the accelerometer's differences are then 0.9 to 1.1 of their error bars."""
+"""Share of the recording above which a corner time is not distinguished from none: the bias may walk by as much. In 14
+simulated pairs of one unit accelerometer differences are 0.9 to 1.1 of their uncertainty."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedModel:
     """S and b of both sensors, direct form, raw → SI.
 
-    ``covariance`` (24, 24), or (12, 12) without a gyro, in the order of a calibration file; ``accel_wander``,
-    ``gyro_wander`` (3,) variances [SI²] by which a zero of the instrument frame differs from one session to the next
-    for reasons that the fit knows nothing of.
+    ``covariance`` (24, 24), or (12, 12) without a gyro, in the order of a calibration file; ``accel_bias_drift``,
+    ``gyro_bias_drift`` (3,) variances [SI²] of the bias change from one session to the next in the body frame, which
+    the covariance does not contain.
     """
 
     accel_S: FloatArray
@@ -75,7 +75,7 @@ class FittedModel:
 
 
 def model_of_calibration(calibration: Calibration) -> FittedModel:
-    """A calibration as given. How far its zeros wander is not in the file: the recording's own wander stands for it."""
+    """A calibration as given. It contains no bias change between sessions: the comparison uses the recording's."""
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     covariance = np.array(calibration.covariance, dtype=np.float64)
     if not np.any(covariance):
@@ -95,9 +95,9 @@ def model_of_calibration(calibration: Calibration) -> FittedModel:
 
 
 def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> FittedModel:
-    """The fit of a recording to itself, with the effects accepted in it or without, widened by what is unexplained.
+    """The fit of a recording, with its accepted effects or without, its covariance widened by the remaining misfit.
 
-    Wander of a zero between two sessions: twice the floor of its Allan variance, or what the zeros of the poses show
+    Bias change between two sessions: twice the floor of the Allan variance, or what the biases of the poses show
     where that is more (eq. 9.2, 9.3).
     """
     fit = diagnosis.extended if with_effects else diagnosis.baseline
@@ -124,10 +124,10 @@ def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> Fi
 
 
 def _excess(tests: tuple[DomainTest, ...], domain: Domain) -> float:
-    """χ² per degree of freedom of what the fit leaves, at least 1 (Birge), whether or not the domain disagrees.
+    """χ² per degree of freedom of the remaining misfit, at least 1 (Birge), whether or not the domain disagrees.
 
-    Sixteen degrees of freedom call nothing below 2 a disagreement: zeros that scatter a little would leave error bars
-    a third too short.
+    With sixteen degrees of freedom only values above 2 count as disagreement: small bias scatter would make the
+    uncertainties a third too small.
     """
     for test in tests:
         if test.domain == domain:
@@ -146,17 +146,17 @@ def _floor(diagnosis: Diagnosis, sensor: str) -> FloatArray:
 
 
 def _scatter_of_mean(diagnosis: Diagnosis) -> FloatArray:
-    """(3,) wander of a session's zero as its own poses show it: what neighbours share stays, what they do not averages.
+    """(3,) variance of the bias change between sessions from the biases of the poses, SI².
 
-    ``2 C₁ + (V - C₁)/n``, V the variance of the zeros of n poses beyond their noise, C₁ the covariance of neighbours,
-    both pooled over the axes: between two sessions 1/f noise differs by twice what it does within one (eq. 9.3).
+    ``2 C₁ + (V - C₁)/n``, V the variance of the biases of n poses beyond their noise, C₁ the covariance of neighbours,
+    both pooled over the axes: between two sessions 1/f noise differs by twice its variance within one (eq. 9.3).
     """
     for shown in diagnosis.residuals:
         if shown.domain == "static-gyro" and len(shown.after) > 2:
             n = len(shown.after)
             away = shown.after - shown.after.mean(axis=0)
             total = max(float((away**2).sum()) / (3 * (n - 1)) - float(np.mean(shown.sigma_after**2)), 0.0)
-            # Taking the mean off makes neighbours anticorrelated by variance/n: given back.
+            # Subtracting the mean makes neighbours anticorrelated by variance/n, which is added back.
             shared = float(np.mean(away[1:] * away[:-1])) + float(np.mean(away**2)) / n
             shared = min(max(shared, 0.0), total)
             return np.full(3, 2.0 * shared + (total - shared) / n)

@@ -1,4 +1,4 @@
-"""Effects of the recording against those of the given model: missing, surplus, or the same with other values."""
+"""Effects of the recording against those of the given model: missing, surplus, or common with other parameters."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ from trihedron.records.words import effect_words
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 FRAME_TOLERANCE = 0.03
-"""Parameters of one effect are stated along the axes of each side's own fit: 3 % (the angle between the two frames and
-the first order of the mechanisms) is no difference."""
+"""Relative difference of parameters that is ignored: each side states them along the axes of its own fit, and
+the angle between the two frames and the first order of the mechanisms make up to 3 %."""
 
 FREE_CURVES = frozenset({"curve", "smooth"})
-"""Variants of a drift that have no mechanism: waves over a session, and a curve drawn through its zeros. Of sessions of
-unlike length, or begun at another warmth, they are no numbers to compare."""
+"""Variants of a drift without a mechanism: cosines over a session, and a curve through its biases. Sessions of
+different length, or started at another temperature, have no comparable parameters."""
 
 CODE = "raw_"
-"""Begins the name of a parameter that is another one's reading, exact as a converter writes it."""
+"""Prefix of a parameter that states another one as an exact ADC code."""
 
 FAINT = 1.0 - 1.0 / 1.05**2
-"""Of the variance inside poses: a line of this share raises their scatter by 5 %, as 30 K raise white noise."""
+"""Share of the variance inside poses: such a line raises their scatter by 5 %, as 30 K raise white noise."""
 
 LARGEST_READ: Mapping[str, float] = MappingProxyType({"accel-bias": STANDARD_GRAVITY_M_S2, "gyro-bias": 1.0})
-"""What a scale that follows temperature is a share of where it is taken for a zero: gravity; a turn by hand [rad/s]."""
+"""Largest reading that a thermal scale multiplies, where it acts like a bias: gravity; a rotation by hand [rad/s]."""
 
 
 def left_open_by(effects: Iterable[AcceptedEffect], span_k: float | None = None) -> dict[str, float]:
-    """Ids of numbers that these effects leave open, and by how much (SI): where they are counted from is a convention.
+    """Ids of parameters whose reference point these effects leave undefined, and by how much (SI).
 
-    ``effects`` of either side, those that both have included: two sessions at other temperatures, or begun at another
-    state of warmth, count the level of one and the same effect from other places. The size is that of the effect's
-    parameters, those per kelvin times ``span_k`` (all temperatures of both logs), each up to two standard errors more,
-    those of one axis added up (waves of one curve stand at their crests together where it begins); infinite where that
-    is not known. An effect that both sides have counts once, with its larger size.
+    ``effects`` are those of both sides: two sessions at other temperatures, or started at another state of warm-up,
+    refer one and the same effect to different points. The size is that of the effect's parameters, those per kelvin
+    times ``span_k`` (all temperatures of both logs), each with two standard uncertainties added, summed over one axis
+    (the cosines of a curve can add up at its start); infinite where it is not known. An effect that both sides have
+    counts once, with its larger size.
     """
     named = {effect.id: effect.leaves_open for effect in catalogue()}
     by_effect: dict[tuple[str, str], float] = {}
@@ -66,7 +66,7 @@ def left_open_by(effects: Iterable[AcceptedEffect], span_k: float | None = None)
 
 
 def _moved(parameter: EffectParameter, number: str, unit: str, span_k: float | None) -> float | None:
-    """How far one parameter moves the level of a number in ``unit``; ``None`` where it says nothing of it."""
+    """Change of a parameter in ``unit`` caused by one parameter of an effect; ``None`` where it has none."""
     size = abs(parameter.value) + 2.0 * abs(parameter.std)
     if parameter.unit == unit:
         return size
@@ -91,12 +91,12 @@ class ComparedEffects:
 
     @property
     def differ(self) -> bool:
-        """Whether instruments do: footnotes are no physics that a model lacks."""
+        """Whether the instruments differ; minor effects do not count."""
         return bool(self.surplus) or not all(is_footnote(effect) for effect in self.missing)
 
     @property
     def in_order(self) -> tuple[AcceptedEffect, ...]:
-        """Missing before surplus; behind both what is no mechanism of an instrument, as a scatter or a pushed pose."""
+        """Missing before surplus; last those that are no mechanism of an instrument (a scatter, a disturbed pose)."""
         return tuple(sorted((*self.missing, *self.surplus), key=_is_beside))
 
 
@@ -111,21 +111,20 @@ def compare_effects(
     tried_on_model: Sequence[Candidate] = (),
     freedom: Mapping[Domain, float] = MappingProxyType({}),
 ) -> ComparedEffects:
-    """Pair the effects of both sides by name, or by what neither recording could tell apart.
+    """Pair the effects of both sides by id, or by what was confounded with them.
 
-    Effects of one session (a pushed pose, a table that was not level, the arm that it was turned on) belong to that
-    session: they are never surplus.
-    Nor is an effect that would show in a domain of which the recording leaves more ``unexplained`` than its noise:
-    it may be there, and hidden. ``misses``: rms of the recording's residuals in each domain before any effect; an
-    effect of a channel that the recording did not log, or a scatter, is surplus only if it makes more than that; a
-    scatter by more than two of one size differ by chance, each known with the domain's degrees of ``freedom``.
-    ``tried_on_model``: candidates of the simulation's own diagnosis. Nor is an effect of the recording missing that the
-    simulation's own test calls likely, where nothing else was found there that could be mistaken for it.
+    Effects of one session (a disturbed pose, a table that was not level, the arm to the centre of rotation) are never
+    surplus. Nor is an effect that shows in a domain in which the recording has ``unexplained`` misfit: it may be
+    hidden there. ``misses``: rms of the recording's residuals in each domain before any effect. An effect of a channel
+    that the recording did not log, or a scatter, is surplus only if it makes more than that; a scatter only beyond the
+    chance difference of two draws with the domain's degrees of ``freedom``.
+    ``tried_on_model``: candidates of the simulation's own diagnosis. An effect of the recording is not missing if the
+    simulation's own test calls it likely and no other effect there could be mistaken for it.
     """
     by_id = {effect.id: effect for effect in catalogue()}
     of_session = {effect.id for effect in by_id.values() if effect.is_of_session or effect.is_of_motion}
-    # What the recording's own test calls likely, the search paid for, is not lacking, even where it did not earn its
-    # place there.
+    # An effect that the recording's own test calls likely, corrected for multiple testing, is not called surplus,
+    # even where it was not accepted.
     tried = [c for c in candidates if c.applicable]
     excluded = {c.id for c in tried if c.p_value is None or len(tried) * c.p_value > alpha}
     drifting = {effect.id for effect in recording}
@@ -165,12 +164,12 @@ def compare_effects(
 def _is_likely(
     effect: AcceptedEffect, tried: Sequence[Candidate], others: Sequence[AcceptedEffect], alpha: float
 ) -> bool:
-    """Whether a log's own test, the search paid for, calls an effect likely that did not earn its place there."""
+    """Whether a log's own test, corrected for multiple testing, calls an effect likely that was not accepted there."""
     applicable = [c for c in tried if c.applicable]
     own = [c.p_value for c in applicable if c.id == effect.id and c.p_value is not None]
     domains = {seen.domain for seen in effect.held_out[:1]}
     spreads = {one.id for one in catalogue() if one.is_spread}
-    # A scatter is what any effect of the poses looks like until it is named.
+    # Any effect of the poses looks like a scatter until it is identified.
     is_shown_otherwise = any(
         domains & {seen.domain for seen in one.held_out[:1]} for one in others if one.id not in spreads
     )
@@ -178,10 +177,10 @@ def _is_likely(
 
 
 def is_footnote(effect: AcceptedEffect) -> bool:
-    """Whether an effect of the recording is none that its simulation lacks.
+    """Whether an effect of the recording is not counted as missing from its simulation.
 
-    So are a pose that was pushed, which happened to the session and to no instrument; an arm of the motion that no
-    domain of misfit asks for; and a line so faint that it adds less to the scatter inside poses than noise strays by.
+    These are a disturbed pose, which belongs to the session and not to the instrument; an arm of the motion that
+    explains no misfit; and a line that adds less to the scatter inside poses than noise varies between parts.
     """
     of = {one.id: one for one in catalogue()}[effect.id]
     share = effect.share or 0.0
@@ -189,14 +188,14 @@ def is_footnote(effect: AcceptedEffect) -> bool:
 
 
 def _is_beside(effect: AcceptedEffect) -> bool:
-    """Whether it follows behind mechanisms: a scatter, or what states that it carries little (a faint line)."""
+    """Whether it is listed after mechanisms: a scatter, or an effect with a small share of its own (a faint line)."""
     is_spread = {one.id: one.is_spread for one in catalogue()}[effect.id]
     is_stated = effect.side == "recording" and not effect.model.get("variant")
     return is_spread or (is_stated and (effect.share or 0.0) < HEADLINE)
 
 
 def _would_show(effect: AcceptedEffect, misses: Mapping[Domain, float]) -> bool:
-    """Whether an effect of this size made some domain's residuals larger than all that the recording's are."""
+    """Whether an effect of this size makes some domain's residuals larger than all of the recording's."""
     return any(
         seen.rms_before**2 - seen.rms_after**2 > misses.get(seen.domain, 0.0) ** 2 for seen in effect.held_out[:1]
     )
@@ -205,7 +204,7 @@ def _would_show(effect: AcceptedEffect, misses: Mapping[Domain, float]) -> bool:
 def _beyond_chance(
     misses: Mapping[Domain, float], freedom: Mapping[Domain, float], alpha: float
 ) -> dict[Domain, float]:
-    """What a scatter as large as the recording's comes to, in one draw of many, beside another draw of it."""
+    """Largest rms of a second draw of the recording's scatter, at false-alarm rate ``alpha``, per domain."""
     return {
         domain: rms * (math.sqrt(f_upper(dof, dof, alpha)) if dof >= 1.0 else 1.0)
         for domain, rms in misses.items()
@@ -236,8 +235,8 @@ def _parameters(model: AcceptedEffect, recording: AcceptedEffect, alpha: float) 
         sensor = "gyroscope"
     given = {p.name: p for p in model.parameters}
     shared = [(given[p.name], p) for p in recording.parameters if p.name in given and p.unit == given[p.name].unit]
-    # What neither side gives an error is a count of its session, or a code of its converter: no number of the effect.
-    # Where the codes beneath a number are one, how far apart it lies in SI is the scales' difference, told with them.
+    # A parameter without uncertainty on either side counts events of its session, or is an ADC code. Where the codes
+    # beneath a parameter are equal, its difference in SI is that of the scales, which are compared by themselves.
     codes = {r.name for m, r in shared if r.name.startswith(CODE) and m.value == r.value}
     shared = [(m, r) for m, r in shared if (m.std > 0.0 or r.std > 0.0) and CODE + r.name not in codes]
     if not shared:

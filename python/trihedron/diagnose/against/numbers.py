@@ -1,4 +1,4 @@
-"""The numbers of a given model against those of the recording, group by group (docs/diagnosis-method.md, section 9)."""
+"""Parameters of a given model against those of the recording, by group (docs/diagnosis-method.md, section 9)."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ Sensor = Literal["accelerometer", "gyroscope", "both"]
 
 SPREAD_DOF = 100.0
 """Degrees of freedom of the covariances: those of a session of some tens of poses. F(3, 100) instead of χ² keeps the
-false alarms of 72 simulated pairs at their level; with 60 or 200 the 1 % point moves by 2 %."""
+false-alarm rate of 72 simulated pairs; with 60 or 200 the 1 % point moves by 2 %."""
 DRIFT_DOF = 10.0
-"""The same for zeros: their wander is read off one or two sessions, and scatters by 70 % from one to the next (28
-simulated sessions of 20 to 32 poses), which is that of a variance with 4 degrees of freedom a session."""
+"""The same for biases: their variance between sessions is estimated from one or two sessions and scatters by 70 %
+(28 simulated sessions of 20 to 32 poses), as a variance with 4 degrees of freedom per session does."""
 RANGE_TOLERANCE = 0.05
-"""A ratio of sensitivities within 5 % of a power of two on all axes is another range of the part: no part strays by a
-factor of 1.9 and ranges come in powers of two."""
+"""A ratio of sensitivities within 5 % of a power of two on all axes is another range setting: parts do not vary by a
+factor of 1.9, and ranges are powers of two."""
 MISTAKEN_UNITS: Mapping[str, tuple[tuple[float, str, str], ...]] = MappingProxyType(
     {
         "accelerometer": (
@@ -50,20 +50,20 @@ MISTAKEN_UNITS: Mapping[str, tuple[tuple[float, str, str], ...]] = MappingProxyT
         "gyroscope": ((math.degrees(1.0), "degrees", "radians"), (math.radians(1.0), "radians", "degrees")),
     }
 )
-"""Reading over truth where it is written in the first unit and taken for the second."""
+"""Reading over truth where a reading written in the first unit is read as the second."""
 NO_BIAS = 0.05
-"""Three zeros that are none look like this, or less, by chance in one model of twenty."""
+"""p-value of three biases against 0 above which they count as zero: true zeros fail in one model of twenty."""
 WOULD_SHOW = 0.1
-"""A model knows its zeros ten times better than the recording's are large."""
+"""Uncertainty of a model's biases, relative to the rms of the recording's, below which missing biases are noticed."""
 ADRIFT = 1e-9
-"""Variance, relative to its group's largest, below which a covariance is not told from zero."""
+"""Variance, relative to its group's largest, below which a covariance counts as zero."""
 
 NOTHING_OPEN: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """One id of the contract: (n,) model values, recording values, difference and its covariance (n, n)."""
+    """One group of parameters by id: (n,) model, recording, difference, and its covariance (n, n)."""
 
     id: str
     sensor: Sensor
@@ -88,10 +88,10 @@ class _Group:
 
 @dataclass(frozen=True)
 class CommonFactor:
-    """A sensor whose readings are ``factor`` times as large in the recording, on all axes: a range, or a unit misread.
+    """A sensor whose readings are ``factor`` times as large in the recording, on all axes: another range or unit.
 
-    ``written`` and ``taken`` name the units where one side (``side``, empty where nobody knows) writes one of them and
-    is read as the other; both are empty for another range.
+    ``written`` and ``taken`` name the units where one side (``side``, empty if unknown) writes the first and is read as
+    the second; both are empty for another range.
     """
 
     sensor: Sensor
@@ -103,7 +103,7 @@ class CommonFactor:
 
 @dataclass(frozen=True)
 class ComparedNumbers:
-    """Every number, significant or not, and what was told apart from it."""
+    """Differences of all parameters, significant or not, and common factors of the scales."""
 
     parameters: tuple[ParameterDifference, ...]
     factors: tuple[CommonFactor, ...]
@@ -122,19 +122,19 @@ def compare_numbers(
     linear: FittedModel | None = None,
     left_open: Mapping[str, float] = NOTHING_OPEN,
 ) -> ComparedNumbers:
-    """Hold the numbers of ``model`` against those of ``recording``.
+    """Compare the parameters of ``model`` with those of ``recording``.
 
     Parameters
     ----------
     model, recording : FittedModel
-        What is given, and the fit of the recording with the effects found in it.
+            The given model, and the fit of the recording with the effects found in it.
     alpha : float
-        Chance that any group of one unit on one day is called different; half of it is spent here (Holm).
+            Chance that any group of one unit on one day is called different; half of it is used here (Holm).
     linear : FittedModel, optional
-        The recording's fit without effects. A linear calibration absorbs part of an effect that it does not know: a
-        group counts only where it differs from this fit too.
+            The recording's fit without effects. A linear calibration absorbs part of an effect that it does not
+            contain: a group counts only where it differs from this fit too.
     left_open : mapping from id to size, optional
-        Groups whose level an accepted effect leaves open by so much: beneath it they are shown, never significant.
+            Groups whose reference an accepted effect leaves undefined by so much: no smaller difference is significant.
     """
     groups, factors = _groups(model, recording)
     p = np.array([group.p_value for group in groups])
@@ -215,12 +215,12 @@ def _sensor(
     drift_model: FloatArray,
     drift_recording: FloatArray,
 ) -> tuple[list[_Group], CommonFactor | None]:
-    """Zero, scale and misalignment of one sensor, and the common factor of its scales where it has a name."""
+    """Bias, scale and misalignment of one sensor, and the common factor of its scales where it is recognised."""
     (S_m, b_m), (S_r, b_r) = pair
     a, r = invariants(S_m, b_m), invariants(S_r, b_r)
     J_m, J_r = jacobian(S_m, b_m), jacobian(S_r, b_r)
     covariance = J_m @ covariances[0] @ J_m.T + J_r @ covariances[1] @ J_r.T
-    # A file without a record of wander: the same unit wanders as the recording shows.
+    # A calibration file has no bias change between sessions: that of the recording is used.
     before = drift_model if np.any(drift_model) else drift_recording
     covariance[:3, :3] += np.diag(before + drift_recording)
     sensor: Sensor = "accelerometer" if prefix == "accel" else "gyroscope"
@@ -232,12 +232,12 @@ def _sensor(
     change = log_r - log_m
     scale_covariance = covariance[3:6, 3:6]
     if is_relative:
-        # Counts against SI: only what differs from axis to axis can be compared.
+        # Counts against SI: only differences between axes can be compared.
         centre = np.eye(3) - np.ones((3, 3)) / 3.0
         scale_covariance = centre @ scale_covariance @ centre.T + np.ones((3, 3)) * np.trace(scale_covariance) / 3.0
     names = tuple(f"{a}{b}" for a, b in (("x", "y"), ("x", "z"), ("y", "z")))
     assert len(names) == len(PAIRS)
-    # S is SI per raw unit: what reads a larger count for the same truth has the smaller S, so a scale is -ln k.
+    # S is SI per raw unit: a larger count for the same truth has the smaller S, so a scale is -ln k.
     groups = [
         _Group(f"{prefix}-bias", sensor, AXES, a.bias, r.bias, r.bias - a.bias, covariance[:3, :3], unit, DRIFT_DOF,
                _never_added(prefix, a.bias, r.bias, J_m @ covariances[0] @ J_m.T, drift_model)),
@@ -255,7 +255,7 @@ def _sensor(
 def _never_added(
     prefix: str, model: FloatArray, recording: FloatArray, covariance: FloatArray, drift: FloatArray
 ) -> str:
-    """What a model whose zeros are none resembles, where it would show zeros like the recording's."""
+    """Remark for a model whose biases are all zero within their uncertainty, where the recording's would be seen."""
     sigma = np.sqrt(np.maximum(np.diag(covariance)[:3] + drift, 1e-300))
     is_none = float(np.sum((model / sigma) ** 2)) < float(chi2.isf(NO_BIAS, 3))
     would_show = bool(np.all(sigma < WOULD_SHOW * np.sqrt(np.mean(recording**2))))
@@ -266,7 +266,7 @@ def _never_added(
 
 
 def _relative_to(prefix: str, a: Invariants, r: Invariants, units: tuple[float | None, float | None]) -> str:
-    """That scales of counts and of SI have no common part to compare, and how large a count is."""
+    """Remark that scales of counts and of SI have no common factor to compare, and the size of a count."""
     counts, side = (r, "recording") if units[1] is None else (a, "model")
     per_si = math.exp(float(counts.log_scale.mean()))
     if prefix == "gyro":
@@ -275,14 +275,14 @@ def _relative_to(prefix: str, a: Invariants, r: Invariants, units: tuple[float |
 
 
 def _sizes_in_si(a: Invariants, r: Invariants, units: tuple[float | None, float | None]) -> tuple[float, float] | None:
-    """ln of reading over truth of both sides, where both say their unit: zero for a healthy sensor."""
+    """ln of reading over truth of both sides, where both state their unit: zero for a healthy sensor."""
     if units[0] is None or units[1] is None:
         return None
     return float(np.median(a.log_scale)) + math.log(units[0]), float(np.median(r.log_scale)) + math.log(units[1])
 
 
 def _common_factor(sensor: Sensor, change: FloatArray, sizes: tuple[float, float] | None) -> CommonFactor | None:
-    """The unit misread or the power of two by which all scales differ; ``change`` (3,) is Δ ln k."""
+    """The misread unit or the power of two by which all scales differ; ``change`` (3,) is Δ ln k."""
 
     def is_near(factor: float) -> bool:
         return bool(np.all(np.abs(change - math.log(factor)) < RANGE_TOLERANCE))
@@ -299,7 +299,7 @@ def _common_factor(sensor: Sensor, change: FloatArray, sizes: tuple[float, float
 def _log_scales(
     a: Invariants, r: Invariants, units: tuple[float | None, float | None], is_same_unit: bool
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """ln of sensitivities of both sides in one unit; True where that is known only up to a common factor."""
+    """ln of sensitivities of both sides in one unit; True where these are known only up to a common factor."""
     if is_same_unit:
         return a.log_scale, r.log_scale, False
     if units[0] is not None and units[1] is not None:
@@ -325,7 +325,7 @@ def _triads(model: FittedModel, recording: FittedModel) -> _Group:
 
 
 def _as_gravity(scale: _Group, alpha: float) -> _Group:
-    """All three accelerometer scales changed alike: gravity, which no norm of it can tell from a common scale."""
+    """The group, or one of gravity where all accelerometer scales changed alike: the two are confounded."""
     ones = np.ones(3)
     weight = np.linalg.inv(scale.covariance + ADRIFT * np.trace(scale.covariance) * np.eye(3))
     variance = 1.0 / float(ones @ weight @ ones)

@@ -1,4 +1,4 @@
-"""The catalogue: every file of this folder that defines an :class:`Effect` is found by itself."""
+"""The catalogue: every file of this folder that defines an :class:`Effect` is found automatically."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Effect", "catalogue"]
 @cache
 def catalogue() -> tuple[Effect, ...]:
     """One instance of every effect in this folder, sorted by id."""
-    # An effect that is loaded is found by its class.
+    # Importing the modules registers their effects as subclasses.
     modules_of(__name__, __path__)
     return tuple(sorted((kind() for kind in _concrete(Effect)), key=lambda effect: effect.id))
 

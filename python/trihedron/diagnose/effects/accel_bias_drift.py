@@ -1,4 +1,4 @@
-"""Accelerometer bias that drifts in time though no logged channel explains it."""
+"""Accelerometer bias that drifts in time and that no logged channel explains."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from trihedron.diagnose.effects.contract import force_only
 from trihedron.diagnose.session.state import Distortion
 
 FEWEST_OF_WAVES = ((25, 4), (18, 2))
-"""Poses from which a curve of so many cosines an axis is tried: one length a pose, nine spent on S and b, three a
-cosine, and some that are left to judge it by."""
+"""(poses, cosines per axis) from which a slow curve is tried. Each pose determines one number, the norm of gravity:
+nine go to S and b, three to each cosine, and the others test the curve."""
 
 
 class AccelBiasDrift(BiasDrift):
-    """Of the accelerometer: what the length of gravity shows from pose to pose."""
+    """Accelerometer bias drift: seen in the norm of gravity from pose to pose."""
 
     id = "accel-bias-drift"
     leaves_open = ("accel-bias",)

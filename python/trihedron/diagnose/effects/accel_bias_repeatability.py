@@ -1,4 +1,4 @@
-"""Accelerometer bias that is another in every pose."""
+"""Accelerometer bias that differs from pose to pose."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from trihedron.records.words import Words
 
 
 class AccelBiasRepeatability(BiasProcess):
-    """Biases drawn anew in every pose, one size for three axes: the length of gravity does not tell axes apart."""
+    """Bias drawn anew in every pose, one sigma for all axes: the norm of gravity does not separate the axes."""
 
     is_spread = True
     id = "accel-bias-repeatability"

@@ -1,4 +1,4 @@
-"""One sensor stamped late against the other."""
+"""Timestamps of one sensor late against those of the other."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from trihedron.diagnose.effects.late_readings import TIMES_S, by_delay, is_confi
 
 
 class AccelGyroTimeOffset(Effect):
-    """Accelerometer readings belong to an earlier instant: f(t) reads f(t − δ); where δ < 0 the gyro is late."""
+    """Accelerometer readings belong to an earlier instant: the reading at t is f(t − δ); at δ < 0 the gyro is late."""
 
     id = "accel-gyro-time-offset"
     needs_moves = True
     size = 0.015
-    """s: a sample or two of a slow log, the delay of a filter."""
+    """s: one or two samples of a slow log, or the delay of a filter."""
 
     def variants(self, context: Context) -> list[Variant]:
         return [_offset(context, sign * t, f"{1e3 * sign * t:+.0f} ms") for t in TIMES_S for sign in (1.0, -1.0)]

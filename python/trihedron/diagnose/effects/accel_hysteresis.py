@@ -1,4 +1,4 @@
-"""Accelerometer offset that remembers the previous orientation."""
+"""Accelerometer offset that depends on the previous orientation."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per
 
 PLAY_WIDTHS_M_S2 = (0.5, 2.0, 5.0)
 PLAY_M_S2, CREEP = 0.02, 0.005
-"""2 mg, and half a percent of a change that follows later."""
+"""Prior sigma: 2 mg of play; half a percent of a change of force that settles slowly."""
 CREEP_TIMES_S = (5.0, 20.0, 60.0)
 
 
 class AccelHysteresis(Effect):
-    """Offset per axis that depends on the direction of arrival (play operator) or creeps after a turn."""
+    """Offset per axis that depends on the direction of arrival (play operator) or settles after a rotation."""
 
     id = "accel-hysteresis"
 
@@ -34,14 +34,14 @@ class AccelHysteresis(Effect):
         return self._play(context, value) if variant.label == "play" else self._creep(context, value)
 
     def _coarse(self, context: Context) -> tuple[FloatArray, npt.NDArray[np.intp], int]:
-        """The path in steps of a tenth of a second, and which of them each sample belongs to."""
+        """History of the force every 0.1 s, the index of the interval of each sample, and samples per interval."""
         step = max(1, round(0.1 * context.obs.recording.rate_hz))
         coarse = context.history[::step]
         return coarse, np.minimum(np.arange(len(context.history)) // step, len(coarse) - 1), step
 
     def _play(self, context: Context, width: float) -> Variant:
         coarse, index, _ = self._coarse(context)
-        # The path's lead over its follower: reading minus this is what hysteresis adds.
+        # Hysteresis adds minus the lead of the force over its follower.
         memory = -_core.play(coarse, width)[index]
         columns = context.on_accelerometers(context.at_points(memory))
         shape = {"half_width": (width, "m/s^2")}

@@ -1,4 +1,4 @@
-"""Different scale for positive and negative force."""
+"""Accelerometer scale that differs between positive and negative force."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Three accelerometers that do not sit at one point."""
+"""Three accelerometers at different points of the package (size effect)."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from trihedron.diagnose.effects.contract import Effect, Variant, force_only
 
 
 class AccelSizeEffect(Effect):
-    """Accelerometers 2 and 3 displaced from accelerometer 1: each reads its own α×r + ω×(ω×r)."""
+    """Accelerometers Y and Z displaced from accelerometer X: each reads its own α×r + ω×(ω×r)."""
 
     id = "accel-size-effect"
     needs_moves = True
     applies_elsewhere = True
     size = 5e-3
-    """m: dies of one package."""
+    """m: distance between dies in one package."""
 
     def variants(self, context: Context) -> list[Variant]:
         w, a = context.rate, context.angular_acceleration
@@ -25,7 +25,7 @@ class AccelSizeEffect(Effect):
         sides = []
         for j in (1, 2):
             n = to_axes[j]
-            # n · (a × r + w × (w × r)), as a row on r.
+            # n · (α × r + ω × (ω × r)) as a row vector that multiplies r.
             along = np.cross(n, a) + (w @ n)[:, None] * w - square * n
             sides.append(axes[:, j, None] * along[:, None, :])
         columns = np.concatenate(sides, axis=2)

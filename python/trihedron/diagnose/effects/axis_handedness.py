@@ -11,11 +11,11 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 
 SIGN_SIGMA = 5.0
-"""A scale this many standard errors from zero has its sign: a wrong one once in 3.5 million axes."""
+"""Standard errors between a scale and zero from which its sign counts: wrong by chance in one of 3.5 million axes."""
 
 
 class AxisHandedness(DirectEffect):
-    """The gyro's axes, as documented, turn against the accelerometers' as documented."""
+    """The gyro's axes, as documented, have the other handedness than the accelerometer's as documented."""
 
     id = "axis-handedness"
 
@@ -29,7 +29,7 @@ class AxisHandedness(DirectEffect):
             return None
         cov = context.fitted.covariance()[9:18, 9:18]
         sigma = np.sqrt(np.maximum(np.diag(cov), 0.0)).reshape(3, 3)
-        # A sign is only claimed where the scale itself is known.
+        # The sign of an axis is used only where its scale is determined.
         if any(abs(S[main[j], j]) < SIGN_SIGMA * sigma[main[j], j] for j in range(3)):
             return None
         signs = np.array([np.sign(unit[main[j], j]) for j in range(3)])

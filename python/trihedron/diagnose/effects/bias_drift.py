@@ -1,4 +1,4 @@
-"""A bias that drifts in time though no logged channel explains it: what both sensors share."""
+"""A bias that drifts in time and that no logged channel explains: the part common to both sensors."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ class BiasDrift(BiasProcess):
 
     walks = True
     typical: ClassVar[float]
-    """How far parts drift while they warm up, one sigma, SI."""
+    """Bias change of typical parts while they warm up, one sigma, SI."""
 
     @abstractmethod
     def on_axes(self, context: Context) -> Callable[[FloatArray], FloatArray]:
-        """Columns per axis from values (n, 3) of the instrument's axes."""
+        """Columns per sensor axis from values (n, 3) along the sensor axes."""
 
     @abstractmethod
     def only(self, columns: FloatArray) -> Distortion:
-        """The distortion of this sensor alone."""
+        """The distortion with these columns for this sensor alone."""
 
     def variants(self, context: Context) -> list[Variant]:
         return drift_variants(context, self.on_axes(context), self.only, self.unit, self.n_waves(context.obs.n_poses))
@@ -39,7 +39,7 @@ class BiasDrift(BiasProcess):
         return np.full(variant.distortion.n_parameters, self.typical)
 
     def n_waves(self, n_poses: int) -> int:  # noqa: ARG002
-        """Cosines per axis that so many poses tell."""
+        """Number of cosines per axis that this many poses can determine."""
         return 4
 
     def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:
@@ -54,15 +54,15 @@ class BiasDrift(BiasProcess):
         return per_axis_parameters("range", size, std, self.unit), self.told("walk", range=size)
 
 
-# Smooth curves in time that a hidden drift may follow.
+# Smooth curves in time that a bias drift may follow.
 
 MOST_M_S2, MOST_RAD_S = 0.6, 0.09
-"""Zeros of parts drift by less while they warm up (0.06 g, 5 °/s; chambers of 90 K show as much); more is a wrong
-pose."""
+"""Largest bias change of a part while it warms up (0.06 g, 5 °/s; chambers of 90 K show as much); a larger one
+indicates a disturbed pose."""
 STILL_THERE, FEWEST_POSES_OF_A_DRIFT = 0.1, 3
-"""A drift that has fallen to a tenth by the third pose is a matter of one or two poses, not of the session."""
+"""Share of a drift that must remain at the third pose: a faster decay concerns one or two poses, not the session."""
 WARM_UP_FRACTIONS = (0.04, 0.1, 0.25, 0.6)
-"""Time constants tried, as fractions of the recording: faster is over before the first moves, slower is a line."""
+"""Time constants tried, as fractions of the recording: faster ones end before the first moves, slower are a line."""
 
 
 def drift_variants(
@@ -72,7 +72,7 @@ def drift_variants(
     unit: str,
     n_waves: int = 4,
 ) -> list[Variant]:
-    """Line, warm-up exponentials, and a slow curve of so many cosines per axis."""
+    """Line, warm-up exponentials, and a slow curve of ``n_waves`` cosines per axis."""
     x = context.elapsed
     three = np.ones(3)
     out = [Variant(only(on_axes((x - 0.5)[:, None] * three)), per_axis("drift"), (unit,) * 3, label="line")]
@@ -84,7 +84,7 @@ def drift_variants(
         return out
     orders = tuple(range(1, n_waves + 1))
     axes = on_axes(np.ones((1, 3)))[0]
-    # Every wave along every axis, as one product of matrices.
+    # Every cosine along every axis, as one matrix product.
     spread = np.zeros((len(orders), 3, 3 * len(orders)))
     for k in range(len(orders)):
         spread[k, :, 3 * k : 3 * k + 3] = axes
@@ -102,7 +102,7 @@ def warm_up_variant(
     unit: str,
     tau_s: float,
 ) -> Variant:
-    """An exponential of one time constant; its parameter is the bias at the first sample."""
+    """An exponential with one time constant; its parameters are the bias per axis at the first sample."""
     tau_s = max(tau_s, shortest_time_constant(context))
     elapsed_s = context.time_s - context.obs.time_s[0]
     columns = on_axes(np.exp(-elapsed_s / tau_s)[:, None] * np.ones(3))
@@ -110,7 +110,7 @@ def warm_up_variant(
 
 
 def shortest_time_constant(context: Context) -> float:
-    """s; a faster exponential is over before the third pose."""
+    """Shortest time constant, s: a faster exponential is over before the third pose."""
     middles = context.obs.pose_time_s
     if len(middles) < FEWEST_POSES_OF_A_DRIFT:
         return 0.0
@@ -118,11 +118,11 @@ def shortest_time_constant(context: Context) -> float:
 
 
 def is_possible_drift(variant: Variant, value: FloatArray) -> bool:
-    """Whether the curve stays inside what zeros of parts drift by."""
+    """Whether the peak-to-peak range of the curve is at most that of a part's bias (``MOST_M_S2``, ``MOST_RAD_S``)."""
     for side, most in ((variant.distortion.force, MOST_M_S2), (variant.distortion.rate, MOST_RAD_S)):
         if side is None:
             continue
-        # Axis by axis: along rows of three the extremes take ten times as long.
+        # Contiguous per axis: ptp over rows of three takes ten times as long.
         drift = np.ascontiguousarray((side.reshape(-1, len(value)) @ value).reshape(len(side), 3).T)
         if float(np.ptp(drift, axis=1).max(initial=0.0)) > most:
             return False

@@ -1,4 +1,4 @@
-"""What a bias does by itself from pose to pose: a strength of the session's noise, not columns of the readings."""
+"""Random changes of a bias from pose to pose: a strength of the session's noise, not columns of the readings."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from trihedron.records.domains import Domain
 from trihedron.records.words import Words, why_not
 
 FEWEST_POSES = 6
-"""Two processes on three axes are not told apart by fewer poses."""
+"""Fewer poses do not separate two processes on three axes."""
 
 
 class BiasProcess(Effect):
-    """A bias that walks, or is drawn anew, beyond what the part's noise explains (:mod:`diagnose.bias_strengths`)."""
+    """A bias random walk or scatter beyond what the part's noise explains (:mod:`diagnose.bias_strengths`)."""
 
     sensor: ClassVar[int]
     """0 accelerometer, 1 gyro."""
     walks: ClassVar[bool]
-    """Whether it walks from pose to pose; else it is drawn anew in each."""
+    """Whether the bias walks from pose to pose; otherwise it is drawn anew in each."""
     unit: ClassVar[str]
     domain: ClassVar[Domain]
 
@@ -38,10 +38,10 @@ class BiasProcess(Effect):
 
     @abstractmethod
     def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
-        """Parameters and sentence for its size along every axis, SI (3,), with standard errors."""
+        """Parameters and sentence for the size along every axis, SI (3,), with standard uncertainties."""
 
 
 def per_axis_parameters(symbol: str, size: FloatArray, std: FloatArray, unit: str) -> tuple[EffectParameter, ...]:
-    """One parameter an axis."""
+    """One parameter per axis."""
     named = zip(AXES, np.asarray(size), np.asarray(std), strict=True)
     return tuple(EffectParameter(f"{symbol}_{axis}", float(v), float(s), unit) for axis, v, s in named)

@@ -1,4 +1,4 @@
-"""What an effect is: a mechanism that predicts, per parameter, what it adds to the readings.
+"""The interface of an effect: a mechanism that predicts, per parameter, what it adds to the readings.
 
 To add one: write a file in this folder with a subclass of :class:`Effect` and nothing else (docs/adding-an-effect.md).
 """
@@ -19,21 +19,21 @@ from trihedron.records.domains import Domain
 from trihedron.records.words import Words, effect_words, experiment_for, why_not
 
 TYPICAL_M_S2, TYPICAL_RAD_S = 0.03, 2e-3
-"""3 mg and 0.1 °/s: what consumer parts stray by."""
+"""3 mg and 0.1 °/s: typical errors of consumer parts."""
 LEAST_RMS = 1e-12
-"""Columns that never add anything have any size."""
+"""Smallest rms of a column, so that a column of zeros does not divide by zero."""
 SHAPE_NAMES = ("time_constant", "half_width", "pose")
-"""Nonlinear parameters, chosen from a grid and refined on the profile likelihood."""
+"""Names of the shape parameters, which are nonlinear: chosen from a grid, refined at the maximum of the evidence."""
 
 
 @dataclass(frozen=True, eq=False)
 class Variant:
-    """One shape of an effect: the distortion per unit of each parameter, and the shape numbers it was made with.
+    """One shape of an effect: the distortion per unit of each parameter, and the shape parameters it was computed with.
 
-    ``shape`` are nonlinear parameters (time constants, widths) chosen from a grid; each costs as a parameter does.
-    ``scale`` is what one of a linear parameter stands for in the unit that is reported, ``given`` what is known of the
-    place (its gravity) and bounds what the parameters can be. ``stands_for_many`` is set on one of a family of shapes
-    that is tried for all of it (a filter's order and damping): a plain mechanism that explains as much goes before it.
+    ``shape`` are nonlinear parameters (time constants, widths) chosen from a grid; the score corrects for their number.
+    ``scale`` converts a linear parameter to the reported unit. ``given`` holds known values of the session (gravity)
+    that limit the possible parameters. ``stands_for_many`` marks a shape that represents a family (a filter of any
+    order and damping): a plain mechanism that explains as much is preferred.
     """
 
     distortion: Distortion
@@ -52,43 +52,43 @@ class Effect(ABC):
 
     id: ClassVar[str]
     mechanism: ClassVar[str] = ""
-    """What it is called, of an effect that a user's own file adds: the words of ours stand in ``report/effects``."""
+    """Name of an effect from a user's own file; the texts of the built-in effects are in ``report/effects``."""
     experiment: ClassVar[str] = ""
-    """What to record so that a user's own effect cannot be mistaken for another."""
+    """What to record to separate a user's own effect from others."""
     applies_elsewhere: ClassVar[bool] = False
-    """Whether the fitted effect can be taken off another recording of the same sensor, from logged signals alone."""
+    """Whether the effect can be compensated in another recording of the same sensor, from logged signals alone."""
     needs_moves: ClassVar[bool] = False
-    """Whether it shows in nothing but moves between poses, which need a gyro."""
+    """Whether it shows only in moves between poses, which need a gyro."""
     repeatable: ClassVar[bool] = False
-    """Whether it may be accepted more than once (another pose, another line)."""
+    """Whether it may be accepted more than once (a second pose, a second line)."""
 
     accounts_for: ClassVar[tuple[Domain, ...]] = ()
-    """Domains of samples whose disagreement is this effect itself, seen from another side."""
+    """Domains of samples whose disagreement this effect explains."""
 
     is_spread: ClassVar[bool] = False
-    """Whether it only says how far something scatters, not why: mechanisms are named before it."""
+    """Whether it is only the size of a scatter, without a cause: mechanisms are named before it."""
     is_of_session: ClassVar[bool] = False
-    """Whether it belongs to one experiment (a pushed pose, a tilted table) and to no instrument."""
+    """Whether it belongs to one experiment (a disturbed pose, a tilted table) and not to the instrument."""
     is_of_motion: ClassVar[bool] = False
-    """Whether it belongs to how the sensor was moved (the arm it was turned on): another session has another."""
+    """Whether it belongs to the motion of one session (the arm to the centre of rotation)."""
     is_of_samples: ClassVar[bool] = False
-    """Whether the share that it states is one of the variance inside poses (a line)."""
+    """Whether its stated share is one of the variance inside poses (a line)."""
     leaves_open: ClassVar[tuple[str, ...]] = ()
-    """Numbers (ids) whose level depends on where the effect is counted from: a zero at the session's mean temperature
-    is no other zero than one at 25 °C."""
+    """Ids of parameters whose value depends on the reference point of the effect: the bias at the session's mean
+    temperature is not the bias at 25 °C."""
     drifts_as: ClassVar[str] = ""
-    """The effect (id) that it is in a log without its channel: what follows a temperature that nobody logged drifts."""
+    """Id of the effect that replaces it where its channel is not logged: without a temperature it is a bias drift."""
     is_local: ClassVar[bool] = False
-    """Whether it concerns one pose or move only: its gain may then come from one block of held-out data."""
+    """Whether it concerns one pose or move only: its gain may then come from one fold of the cross-validation."""
 
     size: ClassVar[float] = 0.0
-    """How large one parameter is in parts as data sheets have them, one sigma, in the unit that is reported; 0 where
-    :meth:`sizes` says so."""
+    """Typical size of one parameter in data sheets, one sigma, in the reported unit; 0 where :meth:`sizes` is
+    overridden."""
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
-        """(k,) how large every parameter of a variant is expected to be, one sigma.
+        """(k,) expected size of every parameter of a variant, one sigma.
 
-        Of an effect that does not say so: what adds a few mg, or a tenth of a degree per second, to the readings.
+        Default without ``size``: the size that adds 3 mg or 0.1 °/s rms to the readings.
         """
         if self.size > 0.0:
             return np.full(variant.distortion.n_parameters, self.size / abs(variant.scale))
@@ -100,31 +100,31 @@ class Effect(ABC):
         return out
 
     def unavailable(self, context: Context) -> str | None:
-        """Why this recording cannot show the effect; ``None`` when it can."""
+        """Why this recording cannot show the effect, or ``None``."""
         return why_not("no-moves") if self.needs_moves and not context.moves else None
 
     @abstractmethod
     def variants(self, context: Context) -> list[Variant]:
-        """Forward models to compete, simplest first; SI, at the context's points."""
+        """Forward models that compete, simplest first; SI, at the context's points."""
 
     def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:  # noqa: ARG002
-        """The same variant at another value of its one shape number; ``None`` where the shape is not continuous."""
+        """The same variant at another value of its one shape parameter; ``None`` where the shape is not continuous."""
         return None
 
     def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:  # noqa: ARG002
-        """A scaled variant made again for the size it was found to have; ``None`` where columns do not depend on it."""
+        """A scaled variant computed again for its fitted size; ``None`` where its columns do not depend on the size."""
         return None
 
     def is_plausible(self, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
-        """Whether the fitted parameters are ones that the mechanism can have."""
+        """Whether the mechanism can have the fitted parameters."""
         return True
 
     def is_plausible_variant(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
-        """The same where it depends on the shape."""
+        """Whether the mechanism can have the fitted parameters in this variant."""
         return self.is_plausible(value, covariance)
 
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
-        """Physical parameters from the linear ones; shape numbers follow without a standard error of their own."""
+        """Physical parameters from the linear ones, then the shape parameters with ``shape_sigma`` as uncertainty."""
         sigma = abs(variant.scale) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
         linear = tuple(
             EffectParameter(name, variant.scale * float(v), float(s), unit)
@@ -134,7 +134,7 @@ class Effect(ABC):
         return linear + shape
 
     def n_shape(self, parameters: tuple[EffectParameter, ...]) -> int:
-        """How many of the parameters, at the end, are shape numbers."""
+        """Number of shape parameters at the end of ``parameters``."""
         return sum(1 for p in parameters if p.name in SHAPE_NAMES)
 
     def told(self, case: str, /, **values: Any) -> Words:
@@ -142,7 +142,7 @@ class Effect(ABC):
         return effect_words(self.id, case, **values)
 
     def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
-        """What is said of it where it competed with others: the mechanism with its strongest term."""
+        """Sentence for an effect selected by the search: the mechanism with its most significant parameter."""
         strongest = max(
             parameters[: len(parameters) - self.n_shape(parameters)], key=lambda p: abs(p.value) / max(p.std, 1e-300)
         )
@@ -152,7 +152,7 @@ class Effect(ABC):
         )  # fmt: skip
 
     def separating_experiment(self) -> str:
-        """What to record so that it cannot be mistaken for another."""
+        """What to record to separate it from other effects."""
         return experiment_for(self.id) or self.experiment
 
 

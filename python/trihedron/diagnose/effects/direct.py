@@ -1,4 +1,4 @@
-"""Effects that show themselves in the samples, not as a curve over poses: they bring their own evidence."""
+"""Effects detected by a test on the samples, with evidence of their own, not by columns over poses."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from trihedron.records.domains import Domain, HeldOut, Where
 
 NOWHERE = Where()
 MIN_FALL = 15.0
-"""Chi-square that moves must gain by samples put back: as one of two numbers (place and count) paid for by a search."""
+"""Chi-square that inserted samples must gain in their moves: it allows for the search over place and count."""
 MUST_HALVE = 0.5
-"""Share of the misfit of such moves that may stay: a loss explains its move, a jolt does not."""
+"""Largest share of the misfit of such moves that may remain: a loss explains its move, a jolt does not."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What a direct test found.
+    """Result of a direct test.
 
-    ``p_value`` before payment for the search over effects; ``held_out`` the effect's own before/after on data its
-    parameters were not fitted to; ``reweigh`` changes what the observations claim (noise, excluded moves),
-    or None; ``strength`` is the gain in 2 log-likelihood, for ranking.
-    ``touched`` are the moves whose readings ``reweigh`` changes, ``None`` for all: there the change must help.
-    ``share`` is the part of its domain's misfit that it explains, where that is not a matter of poses and moves.
-    ``statement`` is the catalogue's (:meth:`Effect.told`), or what a user's own effect says.
-    ``series`` is a curve that belongs to the answer, as plain JSON types.
-    ``restate`` gives the parameters once more from the twin that was fitted with the evidence taken into account.
+    ``p_value`` is not corrected for the number of effects tested; ``held_out`` compares before and after on data that
+    the parameters were not fitted to; ``reweigh`` changes the observations (noise, excluded moves), or is None;
+    ``strength`` is the gain in twice a log-likelihood, for ranking.
+    ``touched`` are the moves whose readings ``reweigh`` changes, ``None`` for all: these moves must improve.
+    ``share`` is the share of its domain's misfit that it explains, for effects that do not show in poses and moves.
+    ``statement`` is the catalogue's (:meth:`Effect.told`), or that of a user's own effect.
+    ``series`` is a curve shown with the result, as plain JSON types.
+    ``restate`` gives the parameters again from the session fitted with ``reweigh`` applied.
     """
 
     p_value: float
@@ -53,25 +53,25 @@ class Evidence:
 
 
 class DirectEffect(Effect):
-    """An effect with a test of its own."""
+    """An effect with its own test on the samples."""
 
     is_sought_again: ClassVar[bool] = False
-    """Whether it is looked for once more then: what another effect had hidden, or what was mistaken for it."""
+    """Whether the test is repeated after the search: another effect may have hidden it or been mistaken for it."""
     is_proof: ClassVar[bool] = False
-    """Whether the samples alone prove it (a range that ends): else mending it must predict held-out moves better."""
+    """Whether the samples alone prove it (a range limit); otherwise its correction must improve held-out moves."""
 
     @abstractmethod
     def find(self, context: Context) -> Evidence | None:
-        """The evidence for the effect in this recording, or ``None`` when there is none."""
+        """The evidence for the effect in this recording, or ``None``."""
 
     def variants(self, context: Context) -> list[Variant]:  # noqa: ARG002
-        """Direct effects do not compete in the score test."""
+        """No columns: a direct effect takes no part in the search unless it overrides this."""
         return []
 
 
 def without_moves(
     ranges: tuple[tuple[int, int], ...], poses: npt.NDArray[np.intp], bad: set[int]
 ) -> tuple[tuple[tuple[int, int], ...], npt.NDArray[np.intp]]:
-    """Move ranges and their poses without some of them."""
+    """Move ranges and their poses, without the moves in ``bad``."""
     keep = [m for m in range(len(ranges)) if m not in bad]
     return tuple(ranges[m] for m in keep), poses[keep]

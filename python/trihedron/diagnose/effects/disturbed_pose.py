@@ -1,4 +1,4 @@
-"""A pose that was pushed or not still: the experiment, not the sensor."""
+"""A pose that was disturbed or not static: a property of the experiment, not of the sensor."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import Words
 
 MOST = 0.25
-"""If more than a quarter of the poses are restless it is not a pose that was disturbed but the place that shakes."""
+"""Share of vibrating poses above which the place vibrates and no single pose is called disturbed."""
 
 
 MIN_GAIN = 15.0
-"""Chi-square that cutting poses at their bumps must win in held-out data of one domain; the share that may stay."""
+"""Held-out chi-square that cutting the disturbances must gain in one domain; the largest share that may remain."""
 MUST_FALL = 0.9
 OWN_SIGMA = 4.0
-"""How far a pose's own readings must be off before a push of it is considered."""
+"""Deviation of a pose's own readings, in sigma, from which a disturbance of it is considered."""
 BUMP_SIGMA = 7.0
-"""A tenth of a second must leave the line through its surroundings by this much: drift inside a pose does not."""
+"""Deviation of a 0.1 s mean from the line through its surroundings, in sigma: drift inside a pose stays below it."""
 FEWEST_BLOCKS = 4
-"""Blocks of a tenth of a second a pose must have: two on either side carry the line."""
+"""Blocks of 0.1 s that a pose must have: two on either side determine the line."""
 SHAKES_P = 1e-6
-"""p-value of a pose's variance, times the number of poses and channels, from which it shakes: 48 healthy sessions do
-not come below 0.02, and real noise is not as white."""
+"""p-value of a pose's variance, corrected for the number of poses and channels, below which the pose vibrates: 48
+healthy sessions stay above 0.02, and real noise is not as white."""
 IN_EITHER_HALF = 0.5
-"""Share of ``LOUD`` that shaking reaches in both halves of its pose; a push is in one of them."""
+"""Share of ``LOUD`` that vibration reaches in both halves of its pose; a disturbance is in one of them."""
 MOST_NAMED = 4
 """Poses of each kind that the sentence names."""
 LEAST_DOF = 0.1
-"""Degrees of freedom at least: a pose whose rows the fit has used up cannot be off by a rounding error."""
+"""Smallest degrees of freedom of a pose: where the fit uses up its rows, rounding errors are no deviation."""
 
 
 def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
-    """How far the readings of a stretch leave the straight line that the pose before and after it predicts.
+    """Deviation of the readings in ``span`` [s] from the straight line through the readings before and after it.
 
-    ``None`` when by less than 7 sigma. Chi-square per tenth of a second and channel, then that of the surroundings.
+    Chi-square per 0.1 s block and channel inside and outside the span; ``None`` below 7 sigma or with too few blocks.
     """
     rate = obs.recording.rate_hz
     a, b = (int(k) for k in np.searchsorted(obs.time_s, span))
@@ -77,7 +77,7 @@ def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
 
 
 def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
-    """Held-out prediction with every pose averaged over its bumps, against the poses cut there; empty if no better."""
+    """Held-out prediction with whole poses against poses cut at their disturbances; empty if cutting does not help."""
     obs, state = context.obs, context.fitted.state
     if len(state.effect):
         return ()
@@ -105,7 +105,7 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
 
 
 def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
-    """Poses that shake throughout: the level of one half, not that of the other poses, predicts the other half."""
+    """Poses that vibrate throughout, and how the level of one half predicts the other half, against the usual level."""
     scatter = pose_scatter(obs)
     own = np.array([not pose.is_unsteady for pose in obs.segments.poses])
     loud = own[:, None] & (scatter.ratio > LOUD) & (scatter.p_value * scatter.p_value.size < SHAKES_P)
@@ -126,9 +126,9 @@ def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
 
 
 def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
-    """(poses,) whether a pose's own readings tell of a disturbance: its norm, or its first half against its second.
+    """(poses,) whether a pose's own readings show a disturbance: in their norm, or between the halves of the pose.
 
-    Moves that disagree on both sides of a pose are no sign of it: whatever else is missing in moves does the same.
+    Misfit of the moves on both sides of a pose is no evidence: any effect missing in moves causes it.
     """
     obs, fitted = context.obs, context.fitted
     rows = np.flatnonzero((fitted.system.domain == STATIC_ACCEL) & (fitted.system.walk == 0))
@@ -145,11 +145,11 @@ def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
 
 
 class DisturbedPose(DirectEffect):
-    """A bump seen inside the pose, or one pose with an acceleration of its own."""
+    """A disturbance detected inside a pose, or one pose with an acceleration of its own."""
 
     id = "disturbed-pose"
     size = 0.05
-    """m/s²: a push that a hand does not feel."""
+    """m/s²: a push too weak to be noticed by hand."""
     is_of_session = True
     repeatable = True
     is_local = True
@@ -176,7 +176,7 @@ class DisturbedPose(DirectEffect):
         t = obs.time_s
         poses = obs.segments.poses
         spans = tuple(bumped) + tuple((float(t[poses[i].start]), float(t[poses[i].stop - 1])) for i in restless)
-        # A nuisance that the twin has already cut out: it ranks behind whatever the fit gains by.
+        # The session state already excludes the disturbance: rank it behind effects that improve the fit.
         strength = 10.0 * (len(bumped) + len(restless))
         names = list(dict.fromkeys(obs.pose_names(restless)))
         told = self.told(
@@ -195,7 +195,7 @@ class DisturbedPose(DirectEffect):
             columns = np.zeros((context.n_points, 3, 3))
             columns[i] = np.eye(3)
             (name,) = context.obs.pose_names([int(i)])
-            # By its number in the recording, from 1: a pose before it may have been cut at a disturbance.
+            # Numbered as in the recording, from 1: an earlier pose may have been cut at a disturbance.
             shape = {"pose": (float(name.removeprefix("pose ")) if name.startswith("pose ") else i + 1.0, "number")}
             out.append(Variant(force_only(columns), per_axis("push"), ("m/s^2",) * 3, shape, name))
         return out

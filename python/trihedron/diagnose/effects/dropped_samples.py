@@ -1,4 +1,4 @@
-"""Samples lost without a trace in the time timestamps."""
+"""Samples lost without a gap in the timestamps."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 
 CLEAR_COUNT = 3.0
-"""Standard errors by which a count must differ from none."""
+"""Standard errors by which a count must differ from zero."""
 UNSETTLED = 0.15
-"""Relative error of a count that only the joint of the two sides tells."""
+"""Relative error of a count determined only by joining the two sides of the gap."""
 MEDIAN_OF_FIVE = 4.35
-"""Median of a chi-square of the five rows that a move has."""
+"""Median of a chi-square with five degrees of freedom: a move has five rows."""
 CONTRADICTS, FEWEST_MOVES = 10.0, 3
-"""Times the median of all moves' misfits: of five rows that agree one in thirty million is so far off."""
+"""Misfit, in medians of all moves, above which a move contradicts the session: by chance one in thirty million."""
 MOST_OF_INTERVALS = 0.02
-"""Losses in more than one of fifty intervals are no losses here and there: the clock or the motion is another."""
+"""Share of intervals with losses above which they are not single losses: the clock or the motion is different."""
 NAMED = 4
-"""Places that the sentence names."""
+"""Places that the sentence lists."""
 _KNOWN: WeakKeyDictionary[Observations, tuple[list[Loss], dict[int, float]]] = WeakKeyDictionary()
 
 
 def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
     """Losses with their counts, and the standard error of each count by its sample.
 
-    The joint of the two sides tells where and roughly how many; gravity and rest after the move tell how many exactly,
-    or none: a turn whose middle is missing ends elsewhere. The session is fitted without the moves concerned, so that a
-    loss cannot bend what it is judged by. Searched once per set of observations.
+    Joining the two sides of a gap gives the place and an approximate count. Gravity and zero velocity after the move
+    determine the exact count, or show that nothing is missing, because a loss changes the integrated rotation. The
+    session is fitted without the moves concerned, so that a loss cannot bias it. Computed once per set of observations.
     """
     if context.obs not in _KNOWN:
         losses = find_losses(context)
@@ -76,7 +76,7 @@ def _by_gravity(context: Context, losses: list[Loss]) -> tuple[list[Loss], dict[
 
 @dataclass(frozen=True, eq=False)
 class _Move:
-    """One move held against a session that agrees; ``usual`` is what moves miss gravity by, over their noise."""
+    """One move compared with the session of the others; ``usual`` is their chi-square over its mean, at least 1."""
 
     obs: Observations
     state: SessionState
@@ -84,12 +84,12 @@ class _Move:
     usual: float
 
     def misfit(self, losses: Sequence[Loss]) -> float:
-        """Chi-square of gravity and velocity after the move with what was lost put back."""
+        """Chi-square of gravity and velocity after the move with the lost samples inserted."""
         residual = residual_after(self.obs, self.state, self.m, {one.sample: one.count for one in losses})
         return float(residual @ residual)
 
     def counted(self, losses: Sequence[Loss]) -> list[Loss]:
-        """Losses with the counts that gravity tells, without those that it denies."""
+        """Losses with the counts that gravity determines; losses that do not reduce the misfit are removed."""
         own = sorted(losses, key=lambda one: -one.gain)
         for _ in range(2 if len(own) > 1 else 1):  # several in one move are counted in turn
             for k in range(len(own)):
@@ -113,7 +113,7 @@ class _Move:
         return best
 
     def sigma(self, own: list[Loss], one: Loss) -> float:
-        """Standard error of a count: misfit grows by one at one sigma; what a move shows beyond noise widens it."""
+        """Standard error of a count from the curvature of the misfit, widened by the remaining misfit of the move."""
         others, best = [other for other in own if other is not one], self.misfit(own)
         beside = [
             self.misfit([*others, replace(one, count=n)]) - best for n in (one.count - 1, one.count + 1) if n >= 1
@@ -122,7 +122,7 @@ class _Move:
 
 
 def _of_moves_that_agree(obs: Observations, state: SessionState, prior: Prior | None) -> SessionState:
-    """The session without moves that contradict it: a loss that was not found must not bend what others are held to."""
+    """The session without moves that contradict it: an undetected loss must not bias the reference of the others."""
     for _ in range(obs.n_moves):
         state = fit(obs, state, NO_DISTORTION, prior).state
         misfit = (move_residuals(obs, state) ** 2).sum(axis=1)
@@ -135,7 +135,7 @@ def _of_moves_that_agree(obs: Observations, state: SessionState, prior: Prior | 
 
 
 class DroppedSamples(DirectEffect):
-    """Both sensors jump at once by the same whole number of samples; put back, the motion is smooth again."""
+    """Both sensors skip the same whole number of samples at once; with these inserted the motion is smooth."""
 
     id = "dropped-samples"
     needs_moves = True
@@ -144,14 +144,14 @@ class DroppedSamples(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         losses, sigmas = counted_losses(context)
-        # A jolt looks like a loss; gravity then finds nothing missing, or cannot say how much.
+        # A jolt looks like a loss; gravity then gives a count of zero, or one that is not significant.
         losses = [loss for loss in losses if loss.count > CLEAR_COUNT * sigmas[loss.sample]]
         if not losses:
             return None
         obs = context.obs
         n_intervals = sum(b - a for a, b in obs.move_ranges)
         if len(losses) > MOST_OF_INTERVALS * n_intervals:
-            return None  # everywhere is not a loss here and there
+            return None  # losses everywhere are another effect
         counts = {loss.sample: loss.count for loss in losses}
         t = obs.time_s
         total = float(np.sqrt(sum(sigmas[loss.sample] ** 2 for loss in losses)))
@@ -179,7 +179,7 @@ class DroppedSamples(DirectEffect):
             tuple((float(t[loss.sample]), float(t[loss.sample + 1])) for loss in losses),
         )
         gain = sum(loss.gain for loss in losses)
-        # A chi-square of one degree of freedom, paid for by all intervals and counts looked at.
+        # A chi-square with one degree of freedom, corrected for all intervals and 60 counts.
         weakest = min(max(loss.per_sensor) for loss in losses)
         p = float(np.clip(np.exp(-0.5 * weakest) * n_intervals * 60, 1e-300, 1.0))
         return Evidence(
@@ -188,14 +188,14 @@ class DroppedSamples(DirectEffect):
         )  # fmt: skip
 
 
-# Lost samples put back: a cubic bridge across every gap, timestamps and poses behind it moved.
+# Lost samples are inserted on a cubic across every gap; timestamps and poses behind it move.
 
 
 def insert_samples(recording: Recording, segments: Segments, losses: dict[int, int]) -> tuple[Recording, Segments]:
-    """Put ``n`` samples behind sample ``k`` for every ``k: n``, on a cubic by the values and slopes on either side.
+    """Insert ``n`` samples behind sample ``k`` for every ``k: n``, on a cubic by the values and slopes on either side.
 
-    A cubic Hermite bridge keeps value and slope at both edges of the gap, so that the rotation integrated across it is
-    right to the fifth power of its length. Time timestamps behind a gap move by what was lost.
+    A cubic Hermite bridge keeps value and slope at both edges of the gap, so that the error of the rotation integrated
+    across it is of fifth order in its length. Timestamps behind a gap move by the duration lost.
     """
     n_old = recording.n_samples
     step = 1.0 / recording.rate_hz

@@ -1,4 +1,4 @@
-"""The Earth's rotation, which turns with the attitude."""
+"""Earth rate, which turns with the attitude."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from trihedron.records.words import Words
 from trihedron.units import degrees_from_radians, radians_from_degrees
 
 STEPS = 91, 180
-"""Latitudes and azimuths over which the likelihood is taken: two degrees each."""
+"""Grid of latitudes and azimuths for the likelihood: two degrees each."""
 N_STEPS, FINE = 10, np.pi / 90.0
-"""Gauss-Newton steps from the best of them, at most two degrees each; angles better known than four are normal."""
+"""Gauss-Newton steps from the best grid point, at most two degrees each; below σ = 4° angles are normal."""
 MISSES = 6.63
-"""χ² of one number, the length, that one Earth in a hundred exceeds: beyond it the vector is another's."""
+"""χ² of the vector's length, one degree of freedom, p = 0.01: above it the vector is not Earth rate."""
 NOMINAL = (9.8, 9.80665, 9.807, 9.81)
-"""Gravity that is written down without being known: it tells no latitude."""
+"""Nominal values of gravity, which give no information on the latitude."""
 HEIGHTS_M, GRAVITY_SLACK = (-430.0, 5000.0), 0.005
-"""Where sensors are calibrated, and what gravity strays from normal or is rounded to, m/s²."""
+"""Heights where sensors are calibrated, m, and deviation of gravity from normal gravity, rounding included, m/s²."""
 OUTSIDE = 3.0
-"""Sigmas by which a latitude may lie outside what gravity allows."""
+"""Standard uncertainties by which a latitude may lie outside the range that gravity allows."""
 
 
 @dataclass(frozen=True)
 class Turning:
-    """The Earth's turning nearest to a measured vector: angles, their standard errors [rad], χ² of the difference."""
+    """Earth rate nearest to a measured vector: angles and their standard uncertainties [rad], χ² of the difference."""
 
     latitude: float
     azimuth: float
@@ -40,10 +40,10 @@ class Turning:
 
 
 def nearest_turning(value: FloatArray, covariance: FloatArray) -> Turning:
-    """The vector of the Earth's length nearest to ``value`` (3,) rad/s in the metric of its covariance.
+    """The vector of Earth rate's length nearest to ``value`` (3,) rad/s in the metric of its covariance.
 
-    The vertical part of a free vector is not told from an isotropic g-sensitivity; that the Earth turns at one rate
-    tells it from the horizontal part, but for its sign.
+    The vertical part of a free vector is confounded with an isotropic g-sensitivity. The known length of Earth rate
+    determines it from the horizontal part, except for its sign.
     """
     precision = np.linalg.pinv(covariance, hermitian=True)
     latitude, azimuth = np.meshgrid(
@@ -69,7 +69,7 @@ def nearest_turning(value: FloatArray, covariance: FloatArray) -> Turning:
     best = float(min(last @ precision @ last, chi2.min()))
     if std.max() < 2.0 * FINE:
         return Turning(float(at[0]), float(at[1]), float(std[0]), float(std[1]), best)
-    # Far from a normal distribution: mean and spread of the likelihood within the hemisphere that fits better.
+    # Not normal: mean and spread of the likelihood within the hemisphere of the higher likelihood.
     weight = np.exp(-0.5 * (chi2 - chi2.min())) * np.cos(latitude)
     weight *= (latitude > 0.0) == (weight[latitude > 0.0].sum() >= weight[latitude < 0.0].sum())
     weight /= weight.sum()
@@ -83,14 +83,14 @@ def nearest_turning(value: FloatArray, covariance: FloatArray) -> Turning:
 
 
 def _turning(latitude: FloatArray, azimuth: FloatArray) -> FloatArray:
-    """(..., 3) the Earth's rate in a level frame whose x lies ``azimuth`` from north."""
+    """(..., 3) Earth rate [rad/s] in a level frame whose x lies ``azimuth`` from north."""
     level = np.cos(latitude)
     unit = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(latitude)], axis=-1)
     return np.asarray(unit * EARTH_RATE_RAD_S)
 
 
 def latitudes_of(gravity: float) -> tuple[float, float]:
-    """Least and greatest absolute latitude, rad, where gravity has this size at a height where people live."""
+    """Least and greatest absolute latitude, rad, at which gravity has this value at any height of ``HEIGHTS_M``."""
     low, high = HEIGHTS_M
     if not np.isclose(gravity, NOMINAL, rtol=0.0, atol=1e-9).any():
         possible = [
@@ -108,7 +108,7 @@ class EarthRate(Effect):
     id = "earth-rate"
     needs_moves = True
     size = EARTH_RATE_RAD_S
-    """It has one size."""
+    """rad/s: the size is known."""
 
     def variants(self, context: Context) -> list[Variant]:
         attitude = context.pose_attitude
@@ -121,7 +121,7 @@ class EarthRate(Effect):
         ]  # fmt: skip
 
     def is_plausible_variant(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
-        # The Earth turns at one rate, and gravity tells the latitude: what turns otherwise is something else.
+        # The length of Earth rate is known and gravity limits the latitude: any other vector is another effect.
         near = nearest_turning(value, covariance)
         least, most = latitudes_of(variant.given["gravity"])
         outside = max(least - abs(near.latitude), abs(near.latitude) - most)

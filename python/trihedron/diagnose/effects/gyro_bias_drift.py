@@ -1,4 +1,4 @@
-"""Gyro bias that drifts in time though no logged channel explains it."""
+"""Gyro bias that drifts in time and that no logged channel explains."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from trihedron.diagnose.session.state import Distortion
 
 
 class GyroBiasDrift(BiasDrift):
-    """Of the gyro: what its readings at rest show from pose to pose."""
+    """Gyro bias drift: seen in the static rates from pose to pose."""
 
     id = "gyro-bias-drift"
     leaves_open = ("gyro-bias",)

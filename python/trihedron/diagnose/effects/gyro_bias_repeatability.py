@@ -1,4 +1,4 @@
-"""Gyro bias that is another in every pose."""
+"""Gyro bias that differs from pose to pose."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ UNIT = "(rad/s)/(m/s^2)"
 
 
 class GyroGSensitivity(Effect):
-    """Rate bias linear in specific force: ω reads G f more."""
+    """Rate bias linear in specific force: the gyro reads ω + G f."""
 
     id = "gyro-g-sensitivity"
     size = 2e-4
@@ -28,7 +28,7 @@ class GyroGSensitivity(Effect):
         columns = np.einsum("kij,nj->nik", eye, context.force)
         names = tuple(f"G_{i}{j}" for i in AXES for j in AXES)
         whole = Variant(rate_only(columns), names, (UNIT,) * 9)
-        # One gyro of three may have it, or show it.
+        # One gyro axis of three may have it, or show it.
         rows = [
             Variant(rate_only(columns[:, :, 3 * k : 3 * k + 3]), names[3 * k : 3 * k + 3], (UNIT,) * 3, label=axis)
             for k, axis in enumerate(AXES)

@@ -9,7 +9,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, per_axis, rate_only
 
 LEAST_RATE = 1e-3
-"""rad/s, where nothing turns."""
+"""rad/s: lower bound of the fastest rate, for recordings without rotation."""
 
 
 class GyroScaleNonlinearity(Effect):
@@ -20,7 +20,7 @@ class GyroScaleNonlinearity(Effect):
     applies_elsewhere = True
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:
-        # A hundredth of the fastest turn.
+        # 1 % of the fastest rate.
         fastest = max(float(np.abs(context.axis_rate).max()), LEAST_RATE)
         per = {"c": 0.01 / fastest**2, "q": 0.01 / fastest}
         return np.array([per[name[0]] for name in variant.names])

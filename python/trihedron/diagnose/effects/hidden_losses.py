@@ -1,4 +1,4 @@
-"""Losses that the joint of their two sides hides in quick motion: gravity tells what is missing (eq. 8.16b)."""
+"""Losses that quick motion hides from the join of the two sides: gravity determines the count (eq. 8.16b)."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from trihedron.diagnose.session.solve import move_residuals
 from trihedron.diagnose.session.state import SessionState
 
 NARROW = 3
-"""Samples on either side that a joint takes in quick motion."""
+"""Samples on either side that a join uses in quick motion."""
 PLACE_S, TRIAL_S = 0.01, 0.03
-"""How far places that are tried stand apart; and how much is put there to see what a loss does."""
+"""Spacing of the places tried, s; length of the trial insertion for the linear response of the residuals, s."""
 MOST_IN_A_MOVE = 3
 FEWEST_OF_PARABOLA = 6
-"""Samples from which a parabola tells a slope better than their first step does: twice what it takes up."""
+"""Samples from which the slope of a parabola is more precise than the first step: twice its number of parameters."""
 
 
 def hidden_losses(obs: Observations, state: SessionState, m: int, usual: float, limit: float) -> list[Loss]:
     """Losses in one move that contradicts a session (``state``) beyond a chi-square of ``limit``, the largest first.
 
-    A place and a count are as likely as both sensors join there and as gravity and rest then agree, in chi-squares of
-    what is ordinary in this move and of what moves miss gravity by anyway (``usual``).
+    A place and a count score by how well both sensors join there and by the misfit of gravity and velocity after the
+    move, each in units of its usual chi-square: that of joins in this move, and ``usual`` of the other moves.
     """
     found: list[Loss] = []
     gain, places = _of_joints(obs, m)
@@ -48,13 +48,13 @@ def hidden_losses(obs: Observations, state: SessionState, m: int, usual: float, 
         loss = Loss(int(places[at]), m, int(n), float(score[at, n]), (float(score[at, n]),))
         after = residual_after(obs, state, m, held | {loss.sample: loss.count})
         if gain[at, n] < LEAST_GAIN or float(after @ after) > MUST_HALVE * misfit:
-            break  # a scale that bends, a range that ends: gravity alone is no witness of a gap
+            break  # nonlinear scale or a range limit: a better misfit alone does not prove a gap
         found.append(loss)
     return found
 
 
 def _of_joints(obs: Observations, m: int) -> tuple[FloatArray, npt.NDArray[np.intp]]:
-    """(places, counts) chi-square that a count wins over none at every place of a move, and the places (samples)."""
+    """(places, counts) chi-square that a count gains over zero at every place of a move, and the places (samples)."""
     a, b = obs.move_ranges[m]
     stride = max(1, round(PLACE_S * obs.recording.rate_hz))
     k = np.arange(NARROW - 1, b - a - NARROW, stride)
@@ -67,7 +67,7 @@ def _of_joints(obs: Observations, m: int) -> tuple[FloatArray, npt.NDArray[np.in
 
 
 def residual_after(obs: Observations, state: SessionState, m: int, losses: dict[int, int]) -> FloatArray:
-    """(5,) what gravity and velocity miss after one move with samples put back behind those named."""
+    """(5,) residuals of gravity and velocity after one move with ``losses`` inserted, in standard errors."""
     a, b = obs.move_ranges[m]
     assert obs.raw_rate is not None
     force, rate, time = obs.raw_force[a:b], obs.raw_rate[a:b], obs.time_s[a:b]
@@ -106,8 +106,8 @@ def bridge(values: FloatArray, k: int, n: int) -> FloatArray:
 
 
 def _edge(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Value and slope at the first of samples (m, ...): of a parabola through them where there are enough, for across a
-    wide gap the noise of one step would weigh as much as the gap is long."""
+    """Value and slope at the first of the samples (m, ...), from a parabola where there are enough: the noise of a
+    single step would be multiplied by the length of the gap."""
     if len(values) < FEWEST_OF_PARABOLA:
         return values[0], values[1] - values[0]
     x = np.arange(len(values))

@@ -1,8 +1,8 @@
-"""Readings that come late: what a delay and a low-pass add, to all orders that a recording can tell.
+"""Late readings: what a delay and a low-pass add, to all orders that a recording can determine.
 
-A reading y that trails the truth x by a pure delay δ has x(t) = y(t + δ); behind a low-pass of first order
-x = y + τ y', of second order (Butterworth) x = y + τ y' + τ²/2 y''. All three begin with τ y': what tells them apart is
-the next term. Columns are made for a time of a grid and scale with its parameter, which must come out near one.
+A reading y that trails the truth x by a pure delay δ has x(t) = y(t + δ); after a low-pass of first order
+x = y + τ y', of second order (Butterworth) x = y + τ y' + τ²/2 y''. All begin with τ y'; the next term separates
+them. Columns are computed for a time of a grid and scale with their parameter, which must come out near one.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 
 TIMES_S = (0.004, 0.008, 0.016, 0.032, 0.064)
-"""Times tried, each twice the one before: a parameter between 1/√2 and √2 of its own covers all between."""
+"""Times tried, s, each twice the one before: a parameter from 1/√2 to √2 covers the times between."""
 NEAR_ONE = (0.6, 1.6)
-"""A time that its own column does not confirm: the next of the grid fits better, or the mechanism does not."""
+"""Range of a confirmed parameter: outside it another time of the grid fits better, or the mechanism does not."""
 LEAST_STEPS = 0.25
-"""A shorter time constant decays by e⁻⁴ within a sample: its column is that of one delay."""
+"""In sample intervals: a shorter time constant decays by e⁻⁴ within a sample, and its column is that of a delay."""
 
 
 def times_for(context: Context) -> tuple[float, ...]:
@@ -28,9 +28,9 @@ def times_for(context: Context) -> tuple[float, ...]:
 
 
 def shifted(context: Context, values: FloatArray, ahead_s: float) -> FloatArray:
-    """(points, 3) values read ``ahead_s`` later inside moves, their ends held; unchanged in poses.
+    """(points, 3) values at a time ``ahead_s`` later inside moves, constant beyond their ends; unchanged in poses.
 
-    By the cubic spline with level ends of every move: a straight line between samples would be a low-pass of its own.
+    By a cubic spline per move with zero slope at its ends: linear interpolation would be a low-pass of its own.
     """
     return _core.move_shifted(
         context.time_s, np.ascontiguousarray(np.asarray_chkfinite(values)), context.move_edges, ahead_s
@@ -50,6 +50,6 @@ def by_low_pass(context: Context, values: FloatArray, time_s: float) -> FloatArr
 
 
 def is_confirmed(value: FloatArray, covariance: FloatArray) -> bool:
-    """Whether a scaled parameter is near one, within three standard errors."""
+    """Whether a scaled parameter is positive and near one (``NEAR_ONE``), within three standard errors."""
     sigma = 3.0 * float(np.sqrt(max(float(covariance[0, 0]), 0.0)))
     return bool(NEAR_ONE[0] - sigma < value[0] < NEAR_ONE[1] + sigma and value[0] > 0.0)

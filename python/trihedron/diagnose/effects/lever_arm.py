@@ -1,4 +1,4 @@
-"""The accelerometer triad sits away from the centre of rotation."""
+"""The accelerometer triad is away from the centre of rotation."""
 
 from __future__ import annotations
 
@@ -17,48 +17,48 @@ from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import why_not
 
 MIN_SHARE = 0.1
-"""One arm must predict at least this share of the motion of moves it was not fitted to: a hand also just travels, but
-its travel follows no turn, and leaves 5 % at most (21 simulated sessions without an arm)."""
+"""Least share of the motion in other moves that one arm must predict. The travel of a hand does not follow the
+rotation: without an arm it leaves at most 5 % (21 simulated sessions)."""
 MOSTLY = 0.5
-"""Share from which an arm is what a session's moves do; below, the hand mostly travels, and the arm is a remark."""
+"""Share from which the arm explains most of a session's motion; below it the arm ranks behind all other effects."""
 FEWEST_MOVES = 6
-"""Twice the arm's three numbers: the scatter between moves is its error bar."""
+"""Twice the three unknowns of the arm: its uncertainty comes from the scatter between moves."""
 TOO_FLAT = 1e6
-"""Condition above which a component of the arm moves the readings a thousandth as much as another: it is not seen."""
+"""Condition number above which a component of the arm changes the readings a thousand times less than another."""
 P_LIMIT = 1e-5
-"""False alarms of Hotelling's test on moves whose own travel does not follow the turn."""
+"""False-alarm rate of Hotelling's test for moves whose travel does not follow the rotation."""
 SMOOTHED, SMOOTHED_S = 5, 0.04
-"""Samples, and seconds, of the mean that both sides pass: angular acceleration is a difference of noisy rates."""
+"""Window of the mean applied to both sides, samples and s: angular acceleration is a difference of noisy rates."""
 N_SHAPES = 24
-"""Polynomials of time in which a move is written. A hand's travel is made of the slow ones: of five simulated hands
-with arms of 2 to 3 cm none stands out at 1e-5 where samples count alike, one with 10 shapes, three with 24."""
+"""Polynomials of time per move. The travel of a hand is made of slow ones: of five simulated hands with arms of 2 to
+3 cm none is detected at 1e-5 with equal weights of the samples, one with 10 polynomials, three with 24."""
 SAMPLES_PER_SHAPE = 3
-"""Readings of a short move (the fifth part is shorter) for each."""
+"""Readings per polynomial in a short move (the 20 % quantile of the lengths)."""
 SHORT = 0.2
 FEWEST_PER_SHAPE = 2
-"""Moves with fewer readings for each shape are left out: their shapes are no longer different curves."""
+"""Readings per polynomial below which a move is excluded: its polynomials are not independent."""
 SHRUNK = (0.02, 100.0)
-"""Of the mean variance of a shape, added to each: 24 by 24 covariances come from as few as 18 curves. With the second,
-shapes count alike, which a few moves with long arms need; the better of the two answers, paid for twice."""
+"""Share of the mean variance added to each polynomial's: a 24 by 24 covariance comes from as few as 18 curves. The
+second gives nearly equal weights, better for few moves with long arms; p is doubled for the choice."""
 N_WEIGHINGS, N_AGAIN = 6, 3
-"""Rounds from nothing known, and from where one move less changes little."""
+"""Iterations from unit weights, and from the full fit without one group of moves."""
 MOST_GROUPS = 40
-"""Parts of a session left out in turn: from so many on the error bar's own error (a ninth) no longer matters, and the
-time of a session with many moves stays linear in them."""
+"""Largest number of jackknife groups: beyond it the relative error of the uncertainty (a ninth) hardly falls, and
+the run time stays linear in the moves."""
 QUIETEST = 0.5
-"""Of the median: no move counts for more than twice the median one, however little the hand travels in it."""
+"""In medians: a move's misfit counts as at least this, so that its weight is at most twice the median one."""
 N_ARM = 3
-"""Unknowns of an arm; behind them a delay between the sensors, which turned gravity would read as one."""
+"""Unknowns of an arm. A delay between the sensors is fitted beside it: turning gravity would imitate an arm."""
 ROUNDING = 1e-9
-"""Of an arm's square that of a delay is larger by: a delay of a tenth of a second stays one."""
+"""Relative to the arm's diagonal, added to that of the delay against a singular matrix; no bias at a delay of 0.1 s."""
 
 
 class LeverArm(DirectEffect):
     """In moves f - (−g) follows α×r + ω×(ω×r) with one r for all of them.
 
-    A hand's own travel is unknown acceleration, much of it slow, so the scatter of the arm from move to move, not the
-    sample noise, decides (jackknife over moves), moves are held out, and what hands do not do weighs most: the
-    covariance of the travel's shapes in time is estimated from all moves, in the frame in which each began.
+    The travel of the hand is an unknown, mostly slow acceleration. Significance therefore comes from the scatter of the
+    arm between moves (jackknife), not from sample noise. The covariance of the travel in time, in the frame at each
+    move's start, is estimated from all moves, so that motion which hands do little of has most weight.
     """
 
     id = "lever-arm"
@@ -77,7 +77,7 @@ class LeverArm(DirectEffect):
         share = 1.0 - after / before
         if share < MIN_SHARE or len(SHRUNK) * found.p_value > P_LIMIT:
             return None
-        # Rms of what hands do little of: every shape and move by its weight, the same before and after.
+        # Weighted rms over polynomials and moves, with the same weights before and after.
         scale = 3.0 * float(np.trace(by.shapes)) * float(by.weight.sum())
         before_rms, after_rms = float(np.sqrt(before / scale)), float(np.sqrt(after / scale))
         noise = float(np.sqrt((context.noise_floor[0] ** 2).mean()))
@@ -88,7 +88,7 @@ class LeverArm(DirectEffect):
             for axis, v, s in zip(AXES, found.value[:N_ARM], sigma, strict=True)
         )
         length = float(np.linalg.norm(found.value[:N_ARM]))
-        # Real motion explains nothing of how gravity and rest disagree: it stands behind what does.
+        # Real motion explains no misfit of gravity or velocity: it ranks behind the effects that do.
         whole, left = (float(one.sum()) for one in _held_out(moves, found, np.eye(moves.n_shapes)))
         strength = float(len(by.weight) * np.log(whole / left)) if 1.0 - left / whole > MOSTLY else 0.0
         return Evidence(
@@ -99,8 +99,8 @@ class LeverArm(DirectEffect):
 
 @dataclass(frozen=True, eq=False)
 class _Moves:
-    """Moves in shapes of time, in the frame in which each began: ``target`` (m, shapes, 3) the force beside gravity,
-    ``columns`` (m, shapes, 3, 4) what a metre of arm along each axis and a second of delay would make of it."""
+    """Moves as polynomials of time, in the frame at their start: ``target`` (m, shapes, 3) force without gravity
+    [m/s²], ``columns`` (m, shapes, 3, 4) its derivative by the arm along each axis [per m] and by a delay [per s]."""
 
     target: FloatArray
     columns: FloatArray
@@ -114,8 +114,8 @@ class _Moves:
 @dataclass(frozen=True, eq=False)
 class _Arm:
     """``value`` (4,) arm [m] and delay [s], the arm's jackknife ``covariance`` (3, 3) and Hotelling's ``p_value``;
-    ``without_one`` (m, 4) the value without each move and those left out with it, ``delay_without_one`` (m,) that of a
-    delay alone."""
+    ``without_one`` (m, 4) the value without each move's jackknife group, ``delay_without_one`` (m,) the delay fitted
+    alone without it."""
 
     value: FloatArray
     covariance: FloatArray
@@ -125,7 +125,7 @@ class _Arm:
 
 
 def _true_moves(context: Context) -> list[slice]:
-    """Moves without readings at the end of a range, which are false."""
+    """Moves without readings at a range limit, which are false."""
     if not context.moves:
         return []
     clipped = clipped_samples(context.obs)
@@ -148,7 +148,7 @@ def _written(context: Context) -> _Moves:
         a = np.gradient(w, t, axis=0)
         gravity = _smooth(context.gravity_in_moves[where], width)
         e = _smooth(context.force[where], width) - gravity
-        # a × r + w × (w × r), as a matrix on r; a delay reads gravity as it turned: d/dt of -g is -w × (-g).
+        # α × r + ω × (ω × r) as a matrix on r; a delay changes gravity by d/dt of -g, which is -ω × (-g).
         made = np.concatenate([_cross(a) + _cross(w) @ _cross(w), -np.cross(w, gravity)[:, :, None]], axis=2)
         begun = context.fitted.line.path.attitude[where.start - poses : where.stop - poses].transpose(0, 2, 1)
         shapes = _shapes(t, n_shapes)
@@ -180,16 +180,16 @@ def _normal(moves: _Moves, by: _Weighed) -> tuple[FloatArray, FloatArray]:
     flat = moves.columns.reshape(m, -1, N_ARM + 1)
     weighted = by.weight[:, None, None] * (by.shapes @ moves.columns.reshape(m, moves.n_shapes, -1)).reshape(flat.shape)
     normal = flat.transpose(0, 2, 1) @ weighted
-    # Turns about the vertical alone show no delay; it is zero then.
+    # Rotations about the vertical alone do not determine the delay; it is zero then.
     normal[:, N_ARM, N_ARM] += ROUNDING * np.trace(normal[:, :N_ARM, :N_ARM], axis1=1, axis2=2)
     return normal, (weighted.transpose(0, 2, 1) @ moves.target.reshape(m, -1, 1))[:, :, 0]
 
 
 def _weighed(moves: _Moves, by: _Weighed, shrunk: float, n: int) -> _Weighed:
-    """The answer again, ``n`` times, in the noise that the last one left."""
+    """``n`` iterations of the weighted least squares, each with covariance and weights from the last residuals."""
     for _ in range(n):
         left = moves.target - moves.columns @ by.value
-        # (shapes, 3 m): one product instead of one for each move.
+        # (shapes, 3 m): one matrix product instead of one per move.
         rows = left.transpose(1, 0, 2).reshape(moves.n_shapes, -1)
         covariance = (rows * np.repeat(by.weight, 3)) @ rows.T / (3.0 * len(left))
         mean = float(np.trace(covariance)) / moves.n_shapes
@@ -203,10 +203,10 @@ def _weighed(moves: _Moves, by: _Weighed, shrunk: float, n: int) -> _Weighed:
 
 
 def _fitted(moves: _Moves, shrunk: float) -> tuple[_Arm, _Weighed]:
-    """The arm, each move (or fortieth of the moves) left out in turn for its error bar: covariance and weights are made
-    again without it.
+    """The arm with its jackknife covariance: each move (or group of moves) is left out in turn, covariance and weights
+    are estimated again without it.
 
-    A move that decides alone, or makes the noise in which it stands out, makes that wide.
+    A single move that determines the arm, or the noise in which it is significant, so widens the covariance.
     """
     m = len(moves.target)
     start = _Weighed(np.zeros(N_ARM + 1), np.eye(moves.n_shapes), np.ones(m))
@@ -231,12 +231,12 @@ def _fitted(moves: _Moves, shrunk: float) -> tuple[_Arm, _Weighed]:
 
 
 def _squares(left: FloatArray, shapes: FloatArray) -> FloatArray:
-    """(m,) sums of squares of curves (m, shapes, 3), their covariance in time divided out."""
+    """(m,) sums of squares of curves (m, shapes, 3) in the metric ``shapes``, their inverse covariance in time."""
     return np.asarray((left * (shapes @ left)).sum(axis=(1, 2)))
 
 
 def _held_out(moves: _Moves, found: _Arm, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(m,) squares that a delay alone leaves of each move, and an arm beside it, both fitted without that move."""
+    """(m,) squares left in each move by a delay alone and by arm and delay, fitted without that move's group."""
     alone = moves.target - moves.columns[..., N_ARM] * found.delay_without_one[:, None, None]
     beside = moves.target - np.einsum("mkia,ma->mki", moves.columns, found.without_one)
     return _squares(alone, shapes), _squares(beside, shapes)
@@ -251,7 +251,7 @@ def _cross(v: FloatArray) -> FloatArray:
 
 
 def _smooth(x: FloatArray, width: int) -> FloatArray:
-    """Running mean: both sides of the comparison pass the same filter, so that derivatives are not noise."""
+    """Running mean, applied alike to both sides of the comparison, so that differences are less noisy."""
     if len(x) < width:
         return x
     padded = np.pad(x, ((width // 2, width // 2), (0, 0)), mode="edge")

@@ -21,8 +21,8 @@ class PeriodicInterference(DirectEffect):
         lines = find_lines(context.obs)
         if not lines:
             return None
-        # Long holds resolve lines a hundredth of the noise high: what its domain calls a disagreement has a name here,
-        # if readings not yet seen are predicted better by it.
+        # Long poses resolve lines of a hundredth of the noise: such a line is named where it disagrees in its domain
+        # and improves the prediction of held-out readings.
         lines = [line for line in lines if line.has_size and line.power_after < line.power_before]
         if not lines:
             return None

@@ -1,4 +1,4 @@
-"""Readings at the limits that a recording carries, inside its moves."""
+"""Readings at the range limits of a recording, inside its moves."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from trihedron.records.channel_facts import Limit
 class Plateau:
     """One run at a limit inside a move: samples ``[start, stop)``.
 
-    ``is_rail``: every sample is the limit's code, which is proof enough; else the run lies on a level within noise.
+    ``is_rail``: every sample is the limit's code, which alone proves clipping; otherwise the run is level within noise.
     """
 
     limit: Limit
@@ -25,18 +25,18 @@ class Plateau:
 
     @property
     def axis(self) -> int:
-        """Its channel."""
+        """Axis of its channel."""
         return self.limit.axis
 
     @property
     def sign(self) -> int:
-        """The side of the channel."""
+        """+1 at the upper limit, -1 at the lower."""
         return 1 if self.limit.is_high else -1
 
 
 @lru_cache(maxsize=16)
 def plateaus_of(obs: Observations, *, is_gyro: bool) -> list[Plateau]:
-    """Runs at the limits of one sensor inside the moves as they are now observed."""
+    """Runs at the limits of one sensor inside the moves of ``obs``."""
     name = "gyroscope" if is_gyro else "accelerometer"
     if (obs.raw_rate if is_gyro else obs.raw_force) is None or not obs.move_ranges:
         return []

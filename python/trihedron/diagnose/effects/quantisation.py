@@ -1,4 +1,4 @@
-"""Resolution too coarse for the noise: means of poses sit on steps."""
+"""Resolution too coarse for the noise: pose means follow the staircase of the ADC."""
 
 from __future__ import annotations
 
@@ -16,36 +16,36 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 
 COARSE = 0.45
-"""Noise below this share of a step leaves readings on two or three codes: their mean sits on a staircase."""
+"""Noise, in LSB, below which readings take two or three codes and their mean follows a staircase."""
 MISSED = 25.0
-"""Readings that a code never read was to have: chance leaves it empty once in 10¹¹."""
+"""Expected readings of an empty code from which it counts as missing: by chance once in 10¹¹."""
 SIGMA_GRID = np.geomspace(0.03, 2.0, 36)
-"""Noise before the converter that is tried, in steps."""
+"""Values tried for the noise before the ADC, in LSB."""
 MOST_CODES = 0.2
-"""Codes per reading: on a grid every code is read five times or more, readings without one are all different."""
+"""Codes per reading: with an LSB every code is read five times or more; readings without one all differ."""
 FEWEST_CODES = 2
-"""A grid is one step at least: still readings of a coarse converter may stand on two codes only."""
+"""Codes that show an LSB: static readings of a coarse ADC may take only two."""
 REACHES = 0.5
-"""Noise, in steps, that leaves a third of the readings off their code: its neighbours are to be expected then."""
+"""Noise, in LSB, at which a third of the readings leave their code, so that neighbouring codes are expected."""
 MOSTLY = 0.5
-"""Share of the still readings on one code, from which a zone around it is looked for."""
+"""Share of the static readings on one code from which a dead zone around it is tested."""
 ZONE_STEPS, JUST_OUTSIDE = 3.5, 20
-"""A zone is wider than the gap of three steps that two missing codes leave. Were readings spread evenly to twice its
-width, twenty would all lie in the outer half once in 2²⁰."""
+"""A dead zone is wider, in LSB, than the gap that two missing codes leave; readings required in the outer half of twice
+its width: evenly spread readings would all lie there by chance once in 2²⁰."""
 FEWEST_READINGS = 4
-"""Readings of a pose whose codes say anything of its scatter."""
+"""Readings of a pose from which its codes determine a scatter."""
 NOISE_ENOUGH = 0.75
-"""Scatter, in steps, with which averaging resolves: less the twelfth of rounding 0.69 of noise, the staircase of the
-mean is then exp(-2π²·0.69²)/π, 3·10⁻⁵ steps. Around a missing code steps are twice as wide."""
+"""Scatter, in LSB, at which averaging resolves the LSB: without the rounding variance of 1/12 it is a noise of 0.69,
+and the staircase of the mean is exp(-2π²·0.69²)/π = 3·10⁻⁵ LSB. Around a missing code steps are twice as wide."""
 
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """The grid of one channel: step in raw units, noise before the converter, and what each pose's mean truly was.
+    """The LSB of one channel: ``step`` in raw units, noise before the ADC, and corrections of the pose means.
 
-    ``sigma`` in raw units, ``scatter`` the noise the plain readings seem to have; ``mean_shift`` (poses,) best mean
-    minus plain mean and ``mean_sigma`` (poses,) its error, raw units; ``missing`` codes skipped amid visited ones;
-    ``dead`` half-width of the zone around one code in which nothing moves, raw units.
+    ``sigma`` that noise and ``scatter`` the scatter of the readings, raw units; ``mean_shift`` (poses,) posterior mean
+    minus plain mean and ``mean_sigma`` (poses,) its uncertainty, raw units; ``missing`` number of codes skipped between
+    visited ones; ``dead`` half-width of the zone around one code without any reading, raw units.
     """
 
     channel: int
@@ -59,15 +59,15 @@ class Lattice:
 
 
 def missing_codes(poses: list[FloatArray], sigma: float, step: float) -> int | None:
-    """Number of codes skipped amid visited ones on the converter's grid, or ``None`` where the poses show no grid."""
+    """Number of codes skipped between visited ones, or ``None`` where the poses show no LSB."""
     values = np.concatenate(poses)
     codes = np.unique(values)
     if step == 0.0 or len(codes) < FEWEST_CODES or len(codes) > MOST_CODES * len(values):
         return None
-    # A code is missing where a pose's own readings lie on both sides of it: noise has one summit, so at least the
-    # geometric mean of its neighbours' counts was to be expected there.
+    # A code is missing where a pose's own readings lie on both sides of it: noise is unimodal, so at least the
+    # geometric mean of its neighbours' counts is expected there.
     expected: dict[int, float] = {}
-    # Gap by gap: over hundreds of codes even a step known to a part in a thousand would miss its place.
+    # Gap by gap: over hundreds of codes a relative error of 0.1 % of the step would add up to a whole code.
     place = np.concatenate([[0], np.cumsum(np.rint(np.diff(codes) / step))]).astype(int)
     visited = set(place.tolist())
     for one in poses if sigma > REACHES * step else []:
@@ -80,12 +80,12 @@ def missing_codes(poses: list[FloatArray], sigma: float, step: float) -> int | N
 
 
 def before_adc(poses: list[FloatArray], step: float) -> tuple[float, FloatArray, FloatArray]:
-    """Noise in front of the converter and the true mean of every pose, by likelihood of the codes seen.
+    """Noise before the ADC and mean of every pose, by the likelihood of the codes (interval-censored normal readings).
 
-    A hold that sits on a code's middle shows no scatter and one on its edge half a step, whatever the noise: the plain
-    scatter says nothing about noise below half a step, the shares of the codes do (interval-censored normal readings).
+    A pose whose mean is at the centre of a code has no scatter, at its edge half an LSB, whatever the noise: below half
+    an LSB the scatter does not determine the noise, but the shares of the codes do.
 
-    Returns sigma in steps, and per pose the posterior mean minus the plain mean and the posterior sigma, in steps.
+    Returns sigma in LSB, and per pose the posterior mean minus the plain mean and the posterior sigma, in LSB.
     """
     offsets = np.linspace(-0.75, 0.75, 61)
     tables = []
@@ -115,7 +115,7 @@ def before_adc(poses: list[FloatArray], step: float) -> tuple[float, FloatArray,
 
 
 def dead_zone(values: FloatArray, everything: FloatArray, step: float) -> float:
-    """Half-width of a zone around the commonest still code that no reading of the recording enters, or 0."""
+    """Half-width of a zone around the commonest static code that no reading of the recording enters, or 0."""
     codes, counts = np.unique(values, return_counts=True)
     zero = float(codes[counts.argmax()])
     if counts.max() < MOSTLY * len(values):
@@ -124,13 +124,13 @@ def dead_zone(values: FloatArray, everything: FloatArray, step: float) -> float:
     if len(np.unique(away)) < 3:
         return 0.0
     nearest = float(away.min())
-    # Readings just outside must be common: a gap that the motion merely never stopped in is no zone.
+    # Readings just outside must be common: few readings may miss a zone by chance.
     beyond = int((away < 2.0 * nearest).sum())
     return nearest if nearest > ZONE_STEPS * step and beyond >= JUST_OUTSIDE else 0.0
 
 
 class Quantisation(DirectEffect):
-    """Steps so wide against the noise that averaging no longer resolves between them."""
+    """An LSB so large against the noise that averaging does not resolve it."""
 
     id = "quantisation"
     is_proof = True
@@ -148,7 +148,7 @@ class Quantisation(DirectEffect):
 
         worst = max(found, key=lambda one: one.step / one.sigma)
         strength = float(sum((one.step / one.sigma) ** 2 for one in found) * obs.n_poses)
-        grid = worst.step**2 / 12.0  # variance of the staircase, beside that of the noise in front of it
+        grid = worst.step**2 / 12.0  # variance of the staircase; that of the noise before the ADC is added below
         names = tuple(CHANNELS[one.channel] for one in found)
         told = self.told(
             "steps", channels=names, is_dead=bool(worst.dead), dead=worst.dead, step=worst.step,
@@ -157,7 +157,7 @@ class Quantisation(DirectEffect):
         return Evidence(
             1e-300, strength, _parameters(context, found), told, "within-static", Where(names),
             reweigh=reweigh, share=grid / (grid + worst.sigma**2),
-            restate=lambda later: _parameters(later, found),  # the staircase had bent the scale factors
+            restate=lambda later: _parameters(later, found),  # the staircase had biased the scale factors
         )  # fmt: skip
 
     def _channel(self, obs: Observations, c: int) -> Lattice | None:
@@ -192,13 +192,13 @@ class Quantisation(DirectEffect):
 
 
 def _parameters(context: Context, found: list[Lattice]) -> tuple[EffectParameter, ...]:
-    """Steps in SI, codes that are missing, zones in which nothing moves."""
+    """LSB in SI, number of missing codes, half-width of dead zones."""
     parameters = []
     for one in found:
         scale, relative = _scale_of(context, one.channel)
         unit = "m/s^2" if one.channel < 3 else "rad/s"
         name = CHANNELS[one.channel]
-        # The step is exact in raw units; in SI it is as good as the channel's scale factor.
+        # The LSB is exact in raw units; in SI it has the relative uncertainty of the scale factor.
         sigma = max(relative, 1e-6) * one.step * scale
         parameters.append(EffectParameter(f"lsb_{name}", one.step * scale, sigma, unit))
         if one.missing:
@@ -209,7 +209,7 @@ def _parameters(context: Context, found: list[Lattice]) -> tuple[EffectParameter
 
 
 def _scale_of(context: Context, channel: int) -> tuple[float, float]:
-    """SI per raw unit along one channel's axis, and its relative standard error."""
+    """SI per raw unit along one channel's axis, and its relative standard uncertainty."""
     is_accel, k = channel < 3, channel % 3
     S = context.fitted.state.accel_S if is_accel else context.fitted.state.gyro_S
     place = (0, 2, 5)[k] if is_accel else 9 + 4 * k  # S is lower triangular for the accelerometer
@@ -219,11 +219,11 @@ def _scale_of(context: Context, channel: int) -> tuple[float, float]:
 
 
 LEAST_LEFT = 0.01
-"""Share of a mean's variance that stays, at least, once its codes are resolved."""
+"""Least share of a mean's variance that remains once its codes are resolved."""
 
 
 def _resolved(obs: Observations, one: Lattice) -> Observations:
-    """Observations with one channel's pose means and noise as the codes truly tell them."""
+    """Observations with one channel's pose means and noise as estimated from the codes."""
     is_accel = one.channel < 3
     k = one.channel % 3
     mean = (obs.pose_force if is_accel else obs.pose_rate).copy()  # type: ignore[union-attr]
@@ -231,12 +231,12 @@ def _resolved(obs: Observations, one: Lattice) -> Observations:
     density = (obs.force_density if is_accel else obs.rate_density).copy()  # type: ignore[union-attr]
     mean[:, k] += one.mean_shift
     sigma[:, k] = np.hypot(sigma[:, k] * min(one.sigma / max(one.scatter, 1e-300), 1.0), one.mean_sigma)
-    # In motion the staircase is crossed all the time: its error is white, a twelfth of a step squared per reading.
+    # In motion the readings cross many codes: the rounding error is white, of variance LSB²/12 per reading.
     density[k] = np.sqrt((one.sigma**2 + one.step**2 / 12.0) / obs.recording.rate_hz)
     if is_accel:
         along = obs.force_up
         if along is not None:
-            # The vertical's share of what the codes change.
+            # Change of the variance along the vertical.
             up, error = along
             changed = up[:, k] ** 2 * (sigma[:, k] ** 2 - obs.pose_force_sigma[:, k] ** 2)
             along = up, np.sqrt(np.maximum(error**2 + changed, LEAST_LEFT * error**2))

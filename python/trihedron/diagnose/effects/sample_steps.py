@@ -1,4 +1,4 @@
-"""Time errors read from the samples themselves: how far each step is from the one its surroundings announce."""
+"""Time errors from the samples: how far each step of a reading deviates from the steps around it."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from trihedron.diagnose.effects.plateaus import plateaus_of
 from trihedron.diagnose.session.observations import Observations
 
 HALF_WINDOW = 6
-"""Samples on either side from which the local motion is learnt."""
+"""Samples on either side that determine the local motion."""
 MOST_LOST, LONGEST_LOSS_S = 60, 0.15
-"""Samples and seconds, whichever is more, over which a motion may be joined: a fifth of a quick move of the hand."""
+"""Longest gap, samples or seconds, whichever is more, that is tried: a fifth of a quick hand move."""
 AGREEMENT = 30.0
-"""Chi-square that one sensor may lose by the count both share."""
+"""Chi-square by which the common count may fit one sensor worse than its own best count."""
 AGREEMENT_SHARE = 0.01
-"""The same as a share of the joint's own chi-square: a large gap is no exact cubic."""
+"""The same as a share of the chi-square without samples inserted: a large gap is no exact cubic."""
 LEAST_GAIN = 40.0
-"""Chi-square a count must win: by chance once in 4·10⁹, once in 650 sessions of 10⁵ intervals and 60 counts each."""
+"""Chi-square that a count must gain: by chance once in 4·10⁹, once in 650 sessions of 10⁵ intervals and 60 counts."""
 OVER_USUAL, LEFT_SHARE = 5.0, 0.1
-"""It must also win five times what joints nearby cost anyway, and leave little: none was found in 48
-healthy sessions."""
+"""The gain must also be five times the usual chi-square of joins nearby, and the remainder small: no loss is found
+in 48 healthy sessions."""
 
 
 @dataclass(frozen=True, eq=False)
 class StepErrors:
-    """Per inner interval of every move, the extra time each sensor sees in its step, with its noise.
+    """Extra time that each sensor sees in its step, per inner interval of every move, with its noise.
 
     ``sample`` (k,) first sample of the interval, ``move`` (k,); ``extra_s`` (k, sensors), ``sigma_s`` (k, sensors).
     """
@@ -52,7 +52,7 @@ def _whitened(obs: Observations) -> list[FloatArray]:
 
 @lru_cache(maxsize=8)
 def clipped_samples(obs: Observations) -> npt.NDArray[np.bool_]:
-    """Samples on or next to a plateau at the end of the range: their steps say nothing about time."""
+    """(n,) samples within ``HALF_WINDOW`` of a plateau at a range limit: their steps give no time error."""
     mask = np.zeros(len(obs.time_s), dtype=bool)
     for is_gyro in (False, True):
         for run in plateaus_of(obs, is_gyro=is_gyro):
@@ -61,16 +61,16 @@ def clipped_samples(obs: Observations) -> npt.NDArray[np.bool_]:
 
 
 def step_errors(context: Context) -> StepErrors:
-    """The step errors of the recording as it is now observed, found once."""
+    """The step errors of the recording as currently observed; cached."""
     return _step_errors(context.obs)
 
 
 @lru_cache(maxsize=8)
 def _step_errors(obs: Observations) -> StepErrors:
-    """A step against the slope of a line through the samples around it (the two of the step left out).
+    """A step minus the mean of the two steps beside it, in units of the local slope of the signal.
 
-    The slope comes from a wide window, so that shaking does not pass for motion; each sensor is judged for itself, so
-    that only what both see at once is time.
+    The slope is that of a line through the six samples on either side, the two of the step left out, so that vibration
+    is not taken for motion. Each sensor is evaluated by itself: only an error common to both is one of time.
     """
     sensors = _whitened(obs)
     clipped = clipped_samples(obs)
@@ -90,7 +90,7 @@ def _step_errors(obs: Observations) -> StepErrors:
             z = x[a:b]
             gathered = np.stack([z[k + int(o + 0.5)] for o in offsets])
             slope = np.tensordot(weights, gathered, 1) / step_s
-            # Third derivative: the line's slope errs by it; taking the cubic part out leaves only higher orders.
+            # Zero for a parabola; the third derivative and higher orders remain.
             jump = z[k + 1] - z[k]
             near = 0.5 * ((z[k] - z[k - 1]) + (z[k + 2] - z[k + 1]))
             error = jump - near
@@ -113,7 +113,7 @@ def _step_errors(obs: Observations) -> StepErrors:
 
 @dataclass(frozen=True)
 class Loss:
-    """Samples missing behind ``sample`` of ``move``: how many, and the chi-square that the count explains."""
+    """Samples missing behind ``sample`` of ``move``: their number, and the chi-square that it gains."""
 
     sample: int
     move: int
@@ -123,13 +123,13 @@ class Loss:
 
 
 def most_lost(obs: Observations) -> int:
-    """Samples that may be missing at one place, at most."""
+    """Largest number of samples tried at one place."""
     return max(MOST_LOST, round(LONGEST_LOSS_S * obs.recording.rate_hz))
 
 
 @lru_cache(maxsize=4)
 def _joints(w: int, order: int, most: int) -> FloatArray:
-    """(counts, 2w, 2w) projectors onto what no polynomial of so many coefficients joins across n missing samples."""
+    """(counts, 2w, 2w) residual projectors of a polynomial of ``order`` coefficients across n missing samples."""
     projectors = []
     for n in range(most + 1):
         t = np.r_[np.arange(-w, 0) + 0.5, np.arange(w) + 0.5 + n] / (w + n / 2)
@@ -139,36 +139,36 @@ def _joints(w: int, order: int, most: int) -> FloatArray:
 
 
 def _unjoined(projector: FloatArray, windows: FloatArray) -> FloatArray:
-    """(k,) squares of what a join leaves of ``windows`` (2w, k, axes): a projector is its own square."""
+    """(k,) sum of squared residuals of ``windows`` (2w, k, axes) for one count: a projector is its own square."""
     left = (projector @ windows.reshape(len(windows), -1)).reshape(windows.shape)
     return np.asarray(np.einsum("ikc,ikc->k", left, left))
 
 
 def _trials(projectors: FloatArray, windows: FloatArray) -> FloatArray:
-    """(k, counts) the same for every count of missing samples."""
+    """(k, counts) sum of squared residuals of ``windows`` (2w, k, axes) for every count of missing samples."""
     left = projectors.reshape(-1, len(windows)) @ windows.reshape(len(windows), -1)
     left = left.reshape(len(projectors), *windows.shape)
     return np.asarray(np.einsum("nikc,nikc->kn", left, left))
 
 
 def joint_costs(obs: Observations, samples: npt.NDArray[np.intp], w: int, most: int) -> FloatArray:
-    """(k, counts, sensors) what a cubic through ``w`` samples before and after leaves, none to ``most`` put between."""
+    """(k, counts, sensors) chi-square of a cubic through ``w`` samples on either side, 0 to ``most`` inserted."""
     sensors = _whitened(obs)
     windows = [np.stack([x[samples + o] for o in range(1 - w, w + 1)]) for x in sensors]
     return np.stack([_trials(_joints(w, 4, most), v) for v in windows], axis=2)
 
 
 def find_losses(context: Context) -> list[Loss]:
-    """The losses of the recording as it is now observed, found once."""
+    """The losses of the recording as currently observed; cached."""
     return list(_losses(context.obs))
 
 
 @lru_cache(maxsize=8)
 def _losses(obs: Observations) -> list[Loss]:
-    """Intervals where the motion on either side joins smoothly only if samples are put between (eq. 8.16).
+    """Intervals where the motion on either side joins smoothly only if samples are inserted (eq. 8.16).
 
-    For a trial count n one cubic is laid through six samples before and six after, those after moved by n steps. The
-    count that joins all channels best is taken if no sensor objects and what is left is ordinary.
+    For a trial count n one cubic is fitted to six samples before and six after, those after shifted by n steps. The
+    count that fits all channels best is accepted if no sensor contradicts it and the remaining chi-square is usual.
     """
     sensors = _whitened(obs)
     clipped = clipped_samples(obs)
@@ -186,22 +186,22 @@ def _losses(obs: Observations) -> list[Loss]:
         windows = [np.stack([x[a + k + o] for o in range(1 - w, w + 1)]) for x in sensors]
         zero = np.stack([_unjoined(stack[0], v) for v in windows], axis=1)
         dof = 3 * (2 * w - 4)
-        # What a join costs anyway where the motion is as quick as here: jitter and curvature are no losses.
+        # Usual chi-square of joins in motion as quick as here: jitter and curvature are no losses.
         ordinary = np.stack(
             [percentile_filter(zero[:, c], 75, size=8 * w + 1, mode="nearest") for c in range(zero.shape[1])], axis=1
         )
-        # Only steps that stand out are worth a search; the quieter sensor may be too noisy to show the jump.
+        # Only steps that stand out are searched; the quieter sensor may be too noisy to show the jump.
         suspect = np.flatnonzero((zero > 3.0 * np.maximum(ordinary, dof)).any(axis=1))
         if len(suspect) == 0:
             continue
         trial = np.stack([_trials(stack, v[:, suspect]) for v in windows], axis=2)
-        # Quick motion over a wide gap is no cubic: a quintic where the cubic leaves too much.
+        # Quick motion over a wide gap is no cubic: a quintic is used where the cubic leaves too much.
         quick = (trial.min(axis=1) > 3.0 * np.maximum(ordinary[suspect], dof)).any(axis=1)
         if quick.any():
             rows = suspect[quick]
             trial[quick] = np.stack([_trials(stiffer, v[:, rows]) for v in windows], axis=2)
         total = trial.sum(axis=2)
-        # Where the minimum is flat the smallest count that joins as well: gravity after the move tells more exactly.
+        # Where the minimum is flat the smallest count is taken: the tilt error after the move gives the exact one.
         best = (total <= total.min(axis=1, keepdims=True) + AGREEMENT).argmax(axis=1)
         for row, s in enumerate(suspect):
             n = int(best[row])
@@ -210,12 +210,12 @@ def _losses(obs: Observations) -> list[Loss]:
             left = trial[row, n]
             gains = zero[s] - left
             usual = np.maximum(ordinary[s], dof)
-            # The gain must also exceed what a trial count wins where the signal is merely rough (shaking, jitter).
+            # The gain must also exceed that of a count where the signal is merely rough (vibration, jitter).
             clear = (gains > LEAST_GAIN) & (gains > OVER_USUAL * usual) & (left < LEFT_SHARE * zero[s] + 3.0 * usual)
-            # A sensor that sees nothing of it must at least not object; one that sees it must see the same count.
+            # A sensor that does not show the loss must not contradict it; one that shows it must give the same count.
             silent = ~clear & (left < 2.0 * usual)
             good = bool(clear.any() and (clear | silent).all())
-            # A count that suits one sensor much better than the common one is no loss of samples.
+            # A sensor that fits another count much better contradicts the loss.
             agree = all(
                 trial[row, n, c] - trial[row, :, c].min() <= max(AGREEMENT, AGREEMENT_SHARE * zero[s, c])
                 for c in range(len(windows))

@@ -1,4 +1,4 @@
-"""Range limit reached: the reading stays on a plateau while the motion goes on."""
+"""Range limit reached: the reading stays on a plateau while the motion continues."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 
 NEAR_LIMIT = 0.97
-"""Moves that come this close to a known limit on any axis are left out: the limit is the sensor's, not one axis's."""
+"""Share of a limit above which a move is excluded, on any axis: the limit belongs to the sensor, not to one axis."""
 CLEARLY = 5.0
-"""How much worse than the other moves those at a limit must contradict gravity and rest."""
+"""Factor by which the misfit of moves at a limit must exceed that of the other moves."""
 MEDIAN_CHI2 = 0.455
-"""Median of a chi-square of one degree of freedom."""
+"""Median of a chi-square with one degree of freedom."""
 CONTRADICTION = 4.0
-"""Chi-square per row of the moves concerned above which their readings are false."""
+"""Chi-square per row of the moves at a limit above which their readings are false."""
 FEWEST_OTHERS = 10
-"""Rows of other moves whose median says what is usual: it is then known to three quarters, against ``CLEARLY`` of 5."""
+"""Rows of other moves from which their median is used: its relative error is then 75 %, against ``CLEARLY`` of 5."""
 ABOVE_REST = 1.2
-"""A range that ends below 1.2 g is reached by poses and gentle moves alike."""
+"""Poses and gentle moves alike come close to a range limit below 1.2 g."""
 
 
 class _Saturation(DirectEffect):
@@ -49,9 +49,9 @@ class _Saturation(DirectEffect):
         if not runs:
             return None
         touched = sorted({m for m, (a, b) in enumerate(obs.move_ranges) for r in runs if a <= r.start < b})
-        # Turns at one steady speed share a level too. A false reading contradicts gravity or rest after the move, and
-        # does so more than moves that stay within the range. A false rate contradicts gravity first: rest alone is
-        # contradicted by an arm between the sensors and the axis of a table as well.
+        # Rotations at a constant rate give plateaus too. A false reading contradicts gravity or velocity after the
+        # move, and more than in moves within the range. For a gyro only gravity counts: velocity also contradicts where
+        # the accelerometer is away from the axis of a table.
         system = context.fitted.system
         domains = (MOVES,) if is_gyro else (MOVES, DYNAMICS)
         move_rows = np.isin(system.domain, domains) & (system.walk == 0)
@@ -60,7 +60,7 @@ class _Saturation(DirectEffect):
         misfit = float(np.mean(squared[move_rows & at_limit]))
         others = squared[move_rows & ~at_limit]
         usual = float(np.median(others) / MEDIAN_CHI2) if len(others) >= FEWEST_OTHERS else 0.0
-        # Plateaus on one level time and again need no such comparison: where most moves are clipped, all disagree.
+        # Repeated plateaus on one level need no comparison: where most moves are clipped, all disagree.
         sides = Counter((run.axis, run.sign) for run in runs)
         repeats = max(sides.values()) >= MIN_PLATEAUS
         contradicts = misfit > CONTRADICTION and (repeats or misfit > CLEARLY * usual)
@@ -81,7 +81,7 @@ class _Saturation(DirectEffect):
         channels = tuple(sorted({prefix + AXES[r.axis] for r in runs}))
         statement = self.told("plateaus", plateaus=len(runs), samples=n, touched=len(touched), moves=obs.n_moves)
         # Chance that smooth peaks of different moves end within one noise band of each other, times the chance that
-        # sound moves disagree so much more than the others.
+        # undisturbed moves disagree so much more than the others.
         p = (2 * BAND_SIGMA * float(np.min(sigma / np.ptp(raw, axis=0)))) ** (len(runs) - 1)
         n_rows = int((move_rows & at_limit).sum())
         p *= float(chdtrc(n_rows, misfit * n_rows / max(usual, 1.0)))
@@ -91,11 +91,11 @@ class _Saturation(DirectEffect):
         return Evidence(
             p, -2.0 * np.log(p), parameters, statement, "moves" if is_gyro else "dynamics",
             Where(channels, obs.move_names(touched[:8]), times), reweigh=reweigh,
-            restate=lambda later: self._limits(later, runs, sigma),  # false moves had bent the scale factors
+            restate=lambda later: self._limits(later, runs, sigma),  # false moves had biased the scale factors
         )  # fmt: skip
 
     def _scale_and_bias(self, context: Context) -> tuple[FloatArray, FloatArray]:
-        """SI per raw unit along each axis, and what a centred raw reading of zero means in SI."""
+        """SI per raw unit along each axis, and the SI value of a centred raw reading of zero."""
         if self.sensor == "gyro":
             return context.si_per_raw("gyroscope"), np.zeros(3)
         return context.si_per_raw("accelerometer"), context.fitted.state.accel_b
@@ -111,11 +111,11 @@ class _Saturation(DirectEffect):
         limit = min(abs((run.limit.value - origin[run.axis]) * scale[run.axis] + bias[run.axis]) for run in runs)
         close = {m for m, (a, b) in enumerate(obs.move_ranges)
                  if (np.abs(raw[a:b] * scale + bias).max(axis=0) > NEAR_LIMIT * limit).any()}  # fmt: skip
-        # An accelerometer that ends at little more than 1 g comes close in every pose: then only plateaus count.
+        # An accelerometer with a range of little more than 1 g comes close in every pose: then only plateaus count.
         return sorted(close | set(touched)) if is_gyro or limit > ABOVE_REST * state.gravity else touched
 
     def _limits(self, context: Context, runs: list[Plateau], sigma: FloatArray) -> tuple[EffectParameter, ...]:
-        """Limits in SI along every channel, with the exact code where readings end on one."""
+        """Limits in SI along every channel, with the exact code where the limit is one code."""
         scale, bias = self._scale_and_bias(context)
         obs = context.obs
         is_gyro = self.sensor == "gyro"

@@ -10,11 +10,11 @@ from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per
 from trihedron.diagnose.effects.late_readings import NEAR_ONE, by_low_pass, times_for
 
 SIGMAS = 3.0
-"""How far below zero a lag may come out by chance; a filter that answers before it is asked does not exist."""
+"""Standard errors by which a lag may be negative: filters are causal."""
 
 
 class SensorLag(Effect):
-    """Lag of one sensor, first order (per axis too) or second: its reading trails the motion by τ."""
+    """Lag τ of one sensor's reading behind the motion, of first order (also per axis) or second order."""
 
     id = "sensor-lag"
     needs_moves = True
@@ -67,4 +67,4 @@ def _second_order(context: Context, name: str, time_s: float, label: str) -> Var
 
 
 FIRST_ORDER_S = 0.01
-"""Unit of the first-order columns: their parameter is a lag in hundredths of a second."""
+"""s: unit of the first-order columns; their parameter is a lag in hundredths of a second."""

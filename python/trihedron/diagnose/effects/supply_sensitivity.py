@@ -10,7 +10,7 @@ from trihedron.records.words import why_not
 
 
 class SupplySensitivity(Effect):
-    """Scale and offset that follow the logged supply voltage."""
+    """Scale and offset proportional to the logged supply voltage."""
 
     id = "supply-sensitivity"
     applies_elsewhere = True

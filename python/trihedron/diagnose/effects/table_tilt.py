@@ -1,4 +1,4 @@
-"""A table that is not level, seen by turning the sensor on it."""
+"""A table that is not level, detected by rotating the sensor on it."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 
 FEWEST_TO_SCATTER = 3
-"""Turns from which their own scatter says anything."""
+"""Rotations from which their scatter is used."""
 LEAST_SINE = 0.3
-"""Sine of half the turn: one under 35° moves the vertical by less than 0.6 of the tilt."""
+"""Least sine of half the rotation: below 35° the vertical moves by less than 0.6 of the tilt."""
 P_LIMIT = 1e-4
-"""False alarms of the χ² test on a level table: in 24 healthy sessions on a table none was named."""
+"""False-alarm rate of the χ² test on a level table: no tilt in 24 healthy sessions on a table."""
 ORDINARY_DEG = 0.05
 """Feet, dust and hands tilt a case by a few hundredths of a degree on any table."""
 
 
 def _error_of_mean(values: FloatArray, weights: FloatArray, noise: FloatArray) -> float:
-    """Standard error of a weighted mean of few values: as they scatter, or as their noise says where that is more.
+    """Standard error of a weighted mean of few values: the larger of that by their scatter and that by their noise.
 
-    Neighbouring turns share a pose, and a scatter of four values is itself known to 40 %: of a t distribution with so
-    few degrees of freedom as much lies within two of what is given as of a normal one.
+    Neighbouring rotations share a pose, and a scatter of four values has an uncertainty of 40 %. It is widened so that
+    two standard errors of a t distribution cover as much as those of a normal one.
     """
     share = weights / weights.sum()
     by_noise = float(np.sqrt((share**2 * noise**2).sum()))
@@ -39,7 +39,7 @@ def _error_of_mean(values: FloatArray, weights: FloatArray, noise: FloatArray) -
 
 
 class TableTilt(TableEffect):
-    """Turning on a tilted table swings the vertical about the table's normal: it comes back only after a full turn."""
+    """Rotating on a tilted table turns the vertical about the table's normal; it returns only after a full turn."""
 
     id = "table-tilt"
 

@@ -1,4 +1,4 @@
-"""Turns on a table by multiples of a right angle: what they say about the turns and the table."""
+"""Rotations on a table by multiples of 90°."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from trihedron.diagnose.effects.direct import DirectEffect
 from trihedron.records.words import why_not
 
 NEAR_DEG = 12.0
-"""A turn meant to be a multiple of 90° lands within this; hand moves land anywhere."""
+"""Distance from a multiple of 90° within which an intended one ends; moves by hand end anywhere."""
 MOST_SWING_DEG = 8.0
-"""On a table tilted by 4° a half turn swings the vertical in the body by twice that."""
+"""On a table tilted by 4° half a turn moves the vertical in the body by twice that."""
 MOST_ACROSS = 0.25
 """Rate across the vertical over that about it: on a table the axis stays within 14° of the vertical."""
 FEWEST_TURNS, NEARLY_ALL = 4, 0.7
-"""Hand moves land near a multiple by chance in 27 %: three of four do in 6 %, eight of ten in 1 of 1500 sessions."""
+"""Hand moves end near a multiple by chance in 27 %: three of four do in 6 %, eight of ten in 1 of 1500 sessions."""
 HALF_RIGHT_RAD = np.pi / 4
-"""A turn by less is nearer to none than to a right angle."""
+"""45°: a smaller angle is nearer to 0° than to 90°."""
 
 
 @dataclass(frozen=True, eq=False)
 class TableTurn:
-    """One move about the vertical between two poses of the same face: angle and its distance from the multiple."""
+    """One move about the vertical between two poses of the same face: angle and its error to a multiple of 90°."""
 
     move: int
     angle_rad: float
@@ -33,7 +33,7 @@ class TableTurn:
 
 
 def table_turns(context: Context) -> list[TableTurn]:
-    """Moves whose axis is the vertical throughout: the vertical ends where it began in the body."""
+    """Moves about the vertical throughout: the vertical in the body is the same before and after."""
     state = context.fitted.state
     out = []
     for m, where in enumerate(context.moves):
@@ -53,7 +53,7 @@ def table_turns(context: Context) -> list[TableTurn]:
 
 
 def meant_as_multiples(turns: list[TableTurn]) -> bool:
-    """Whether these are turns against a wall: at least four, nearly all close to a multiple of 90°."""
+    """Whether the rotations are meant as multiples of 90°: at least four, nearly all close to one."""
     near = [abs(np.degrees(turn.error_rad)) < NEAR_DEG for turn in turns]
     return len(turns) >= FEWEST_TURNS and float(np.mean(near)) > NEARLY_ALL
 

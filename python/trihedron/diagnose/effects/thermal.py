@@ -1,4 +1,4 @@
-"""What follows a logged temperature: one effect, of either sensor, of its bias or of its scale."""
+"""Bias or scale of either sensor that depends on a logged temperature."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from trihedron.records.words import why_not
 
 
 class Thermal(Effect):
-    """Seen where a temperature was logged and moved."""
+    """Applies where a temperature was logged and changed."""
 
     applies_elsewhere = True
 
@@ -44,7 +44,7 @@ class ThermalScale(Thermal):
 
 
 class AccelThermalScale(ThermalScale):
-    """Of the accelerometer."""
+    """Accelerometer scale."""
 
     id = "accel-thermal-scale"
     leaves_open = ("accel-bias", "accel-scale")
@@ -52,7 +52,7 @@ class AccelThermalScale(ThermalScale):
 
 
 class GyroThermalScale(ThermalScale):
-    """Of the gyro."""
+    """Gyro scale."""
 
     id = "gyro-thermal-scale"
     is_gyro = True
@@ -61,10 +61,10 @@ class GyroThermalScale(ThermalScale):
 
 
 class ThermalBias(Thermal):
-    """Bias linear, then quadratic in temperature; with its rate of change, or a branch of its own while it cools."""
+    """Bias linear or quadratic in temperature; with its rate of change, or with another branch while it cools."""
 
     per_kelvin: ClassVar[float]
-    """How far parts move, one sigma, SI."""
+    """Typical bias change per kelvin, one sigma, SI."""
     is_gyro: ClassVar[bool] = False
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:
@@ -77,7 +77,7 @@ class ThermalBias(Thermal):
 
 
 class AccelThermalBias(ThermalBias):
-    """Of the accelerometer: half a mg per kelvin."""
+    """Accelerometer bias: half a mg per kelvin."""
 
     id = "accel-thermal-bias"
     leaves_open = ("accel-bias",)
@@ -86,7 +86,7 @@ class AccelThermalBias(ThermalBias):
 
 
 class GyroThermalBias(ThermalBias):
-    """Of the gyro: 0.02 °/s per kelvin."""
+    """Gyro bias: 0.02 °/s per kelvin."""
 
     id = "gyro-thermal-bias"
     is_gyro = True

@@ -1,4 +1,4 @@
-"""How a bias may follow a logged temperature: linear, quadratic, with its rate, unlike while heating and cooling."""
+"""Bias against a logged temperature: linear, quadratic, with its rate, different while heating and cooling."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from trihedron.diagnose.effects.contract import Variant, per_axis
 from trihedron.diagnose.session.state import Distortion
 
 LEAST_RATE_RANGE = 0.3
-"""Share of its largest value that the rate of temperature must differ by between points, to be told from a constant."""
+"""Range of the rate of temperature over its largest value, below which it is confounded with a constant."""
 BRANCH_K_S = 0.002
-"""Rate of change at which three quarters of a branch are reached: an oven has ten times as much, a room a tenth."""
+"""Rate of change at which a branch reaches three quarters: an oven has ten times as much, a room a tenth."""
 
 
 def thermal_sizes(context: Context, variant: Variant, per_kelvin: float) -> FloatArray:
-    """(k,) how large the numbers of a forward model are where a bias changes by so much per kelvin, one sigma.
+    """(k,) expected size of the parameters, one sigma, where a bias changes by ``per_kelvin``.
 
-    What bends, follows the rate or stays behind moves the bias by a third of what the linear part does.
+    The quadratic, rate and hysteresis terms change the bias by a third of what the linear term does.
     """
     assert context.temperature is not None
     swing = float(np.ptp(context.temperature))
@@ -37,7 +37,7 @@ def thermal_bias_variants(
     only: Callable[[FloatArray], Distortion],
     unit: str,
 ) -> list[Variant]:
-    """Forward models, simplest first. Temperature is counted from its mean over the poses, its rate from 0."""
+    """Forward models, simplest first. Temperature is relative to its mean over the poses, its rate to 0."""
     assert context.temperature is not None
     three = np.ones(3)
     t = context.temperature[:, None] * three
@@ -51,7 +51,7 @@ def thermal_bias_variants(
         ),
     ]  # fmt: skip
     speed = context.temperature_rate
-    # Taken off another log the shape is what was fitted, whatever that log's temperature does.
+    # Compensation of another log (no poses) needs the fitted shape, whatever that log's temperature does.
     is_fitted = context.obs.n_poses > 0
     if speed is None:
         return out

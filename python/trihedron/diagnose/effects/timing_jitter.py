@@ -1,4 +1,4 @@
-"""Samples taken at other instants than their time timestamps say, every one by a little."""
+"""Sampling instants that scatter about the timestamps."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.records.diagnosis import EffectParameter
 
 WINDOW_S = 4.0
-"""An even clock may drift over longer times than this."""
+"""s: an even clock may drift over longer times than this."""
 _CONTRAST = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0
-"""A sample against the cubic through its four neighbours, on an even grid."""
+"""A sample minus the cubic through its four neighbours, on an even grid."""
 CLEAR = 0.1
-"""Standard error below which the share of the scatter that readings follow decides between none and all."""
+"""Standard error of ``followed`` below which 0 and 1 are separated."""
 EVEN = 0.02
-"""Scatter of timestamps, in steps, no more than their digits: a tenth of a millisecond at 200 Hz makes 0.006."""
+"""Scatter of timestamps, in steps, that rounding explains: a tenth of a millisecond at 200 Hz makes 0.006."""
 JOLT = 6.0
-"""Robust standard deviations beyond which a reading is a jolt: normal noise goes there once in 5·10⁸."""
+"""Robust standard deviations beyond which a reading is a jolt: normal noise exceeds them once in 5·10⁸."""
 
 
 @dataclass(frozen=True, eq=False)
 class TimestampErrors:
-    """Scatter of the timestamps about an even clock and the share of it that the readings follow, 1 or 0.
+    """Scatter of the timestamps about an even clock, and the share of it that the readings follow (1 or 0).
 
-    ``even_s`` (n,) the even clock, ``rms_s`` scatter, ``followed`` with standard error ``sigma``; ``gain`` how much
-    less chi-square the readings cost on the even clock than on the timestamps.
+    ``even_s`` (n,) the even clock, ``rms_s`` the scatter, ``followed`` the share with standard error ``sigma``;
+    ``gain`` the chi-square of the readings on the timestamps minus that on the even clock.
     """
 
     even_s: FloatArray
@@ -43,10 +43,10 @@ class TimestampErrors:
 
 
 def timestamp_errors(obs: Observations) -> TimestampErrors | None:
-    """Regress what the readings leave a smooth course by on what the timestamps' scatter would make of it.
+    """Regress the readings' deviation from a smooth curve on the deviation that the timestamps' scatter would cause.
 
-    A sample taken δ late reads x' δ more. If the timestamps are right, the readings on an even grid jump by it; if the
-    samples were taken evenly and only the timestamps scatter, they do not.
+    A sample taken δ late reads x' δ more. If the timestamps are right, the readings on an even grid deviate by it; if
+    the samples were taken evenly and only the timestamps scatter, they do not.
     """
     t = obs.time_s
     n = len(t)
@@ -73,7 +73,7 @@ def timestamp_errors(obs: Observations) -> TimestampErrors | None:
             usual = 1.4826 * np.median(np.abs(e)) if len(e) else 0.0
             if usual == 0.0:
                 continue
-            keep = np.abs(e) < JOLT * usual  # jolts are no errors of time
+            keep = np.abs(e) < JOLT * usual  # jolts are no time errors
             top += float((e * p)[keep].sum() / usual**2)
             square += float((p**2)[keep].sum() / usual**2)
             both += float(((e - p) ** 2 - e**2)[keep].sum() / usual**2)
@@ -83,20 +83,19 @@ def timestamp_errors(obs: Observations) -> TimestampErrors | None:
 
 
 STEP_FACTOR = 5.0
-"""A jitter of σ_t moves a step error by (1.5² + 1.5² + 0.5² + 0.5²) σ_t²."""
+"""Variance of a step error over the variance of the jitter: 1.5² + 1.5² + 0.5² + 0.5²."""
 SHARP, FEWEST_SHARP = 0.5, 50
-"""Intervals are used whose noise is below half a step of time, fifty at least: four blocks of twelve give the error."""
+"""Largest noise, in sample intervals; fewest intervals: four blocks of twelve give the error."""
 SURE = 5.0
-"""Standard errors of the common error of time: 3·10⁻⁷ by chance; the most in 48 healthy sessions
-is 1.9."""
+"""Standard errors of the common time error: 3·10⁻⁷ by chance; at most 1.9 in 48 healthy sessions."""
 ORDINARY = 0.01
-"""Jitter, in steps, that the common curvature of a smooth motion is mistaken for: not worth a name alone."""
+"""Jitter, in sample intervals, below which the common curvature of a smooth motion may cause it: not named."""
 
 
 def common_time_error(steps: StepErrors, step_s: float) -> tuple[float, float, int]:
-    """Covariance of the extra times the two sensors see, its standard error (s²), and the number of intervals.
+    """Covariance of the extra times that the two sensors see, its standard error (s²), and the number of intervals.
 
-    Noise, curvature and shaking differ between the sensors; an error of time is the same in both.
+    Noise, curvature and vibration differ between the sensors; an error of time is the same in both.
     """
     if steps.extra_s.shape[1] < 2:
         return 0.0, np.inf, 0
@@ -104,13 +103,13 @@ def common_time_error(steps: StepErrors, step_s: float) -> tuple[float, float, i
     n = int(sharp.sum())
     if n < FEWEST_SHARP:
         return 0.0, np.inf, n
-    # Clipped at five scatters, so that single losses do not decide.
+    # Clipped at five robust standard deviations, so that single losses do not dominate.
     e = steps.extra_s[sharp]
     bound = 5.0 * 1.4826 * np.median(np.abs(e), axis=0)
     product = np.prod(np.clip(e, -bound, bound), axis=1)
     weight = 1.0 / (np.prod(steps.sigma_s[sharp], axis=1) + (0.05 * step_s) ** 2)
     value = float((weight * product).sum() / weight.sum())
-    # Neighbouring step errors share samples (correlation over three): the error of the mean is that of blocks.
+    # Neighbouring step errors share samples (correlation over three): the error of the mean comes from blocks.
     blocks = np.array_split(np.arange(n), max(n // 12, 4))
     means = np.array([float((weight[b] * product[b]).sum()) for b in blocks])
     sums = np.array([float(weight[b].sum()) for b in blocks])
@@ -119,7 +118,7 @@ def common_time_error(steps: StepErrors, step_s: float) -> tuple[float, float, i
 
 
 class TimingJitter(DirectEffect):
-    """Steps of both sensors scatter together, in proportion to the slope of the signal."""
+    """Step errors of both sensors scatter together, in proportion to the slope of the signal."""
 
     id = "timing-jitter"
     needs_moves = True
@@ -136,7 +135,7 @@ class TimingJitter(DirectEffect):
 
         def reweigh(obs: Observations) -> Observations:
             if len(even) != len(obs.time_s):
-                return obs  # samples were put in since
+                return obs  # samples were inserted since
             again = observe(obs.recording.with_same_readings(time_s=even), obs.segments, obs.averaging)
             return replace(
                 again,

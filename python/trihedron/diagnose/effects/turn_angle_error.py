@@ -1,4 +1,4 @@
-"""Turns that are not the multiple of a right angle they were meant to be."""
+"""Rotations on a table that differ from their intended multiple of 90°."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 
 OFF_SIGMA = 4.0
-"""A turn is named that is off by so much: one right turn of 16 000 is."""
+"""Deviation in sigma from which a rotation is named: by chance one of 16 000."""
 P_LIMIT = 1e-4
-"""False alarms of the χ² test on all turns together: in 24 healthy sessions the worst turn was 1.6 σ off."""
+"""False-alarm rate of the χ² test on all rotations together: at most 1.6 σ in 24 healthy sessions."""
 
 
 class TurnAngleError(TableEffect):
-    """Table turns against a wall miss their multiple of 90° by more than the gyro's own error."""
+    """Rotations on a table against a stop deviate from their multiple of 90° by more than the gyro's own error."""
 
     id = "turn-angle-error"
 
@@ -50,10 +50,10 @@ class TurnAngleError(TableEffect):
 
 
 def _without_common_scale(context: Context, turns: list[TableTurn]) -> tuple[FloatArray, FloatArray]:
-    """Errors of the turns with what one wrong scale per body axis would make of them taken out, and their noise [rad].
+    """Errors of the rotations without the part that one scale error per body axis explains, and their noise [rad].
 
-    A scale error grows with the angle and is the same for every turn about an axis; the median of error over angle is
-    not bent by single wrong turns.
+    A scale error grows with the angle and is the same for every rotation about an axis. The weighted median of error
+    over angle is robust against single wrong rotations.
     """
     noise = context.noise_floor[1].mean() / np.sqrt(context.obs.recording.rate_hz)
     axes = np.array(

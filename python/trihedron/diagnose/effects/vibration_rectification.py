@@ -1,4 +1,4 @@
-"""Bias that follows the power of vibration."""
+"""Bias that depends on the power of vibration."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per
 from trihedron.records.words import why_not
 
 ACCEL_PER_POWER, GYRO_PER_POWER = 2e-3, 1e-3
-"""1/(m/s²), 20 mg/g², and (rad/s)/(m/s²)²: what vibrating consumer parts show."""
+"""1/(m/s²), 20 mg/g², and (rad/s)/(m/s²)²: prior sigma for vibrating consumer parts."""
 STANDS_OUT = 1.5
-"""Power of a pose over the median pose: the variance of 300 white readings is known to 8 %; the most in 48
-healthy sessions is 1.13."""
+"""Power of a pose over the median pose: the variance of 300 white readings has an uncertainty of 8 %; at most 1.13 in
+48 healthy sessions."""
 
 
 class VibrationRectification(Effect):
     """Bias proportional to vibration power above the quiet floor, per axis."""
 
     id = "vibration-rectification"
-    accounts_for = ("within-static",)  # the shaking that it follows
+    accounts_for = ("within-static",)  # the vibration itself
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
         return np.full(3, GYRO_PER_POWER if variant.distortion.force is None else ACCEL_PER_POWER)
@@ -33,7 +33,7 @@ class VibrationRectification(Effect):
 
     def variants(self, context: Context) -> list[Variant]:
         excess = context.vibration_power
-        # What shakes on the way is hard to tell from the haste of the hand: once with it, once without.
+        # In moves vibration is hard to separate from quick motion: one variant with it, one without.
         still = np.where(np.arange(len(excess))[:, None] < context.obs.n_poses, excess, 0.0)
         names, units = per_axis("accel_bias_per_power"), ("1/(m/s^2)",) * 3
         out = [

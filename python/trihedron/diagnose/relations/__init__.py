@@ -1,1 +1,1 @@
-"""Relations that compete with names: what a session follows that no effect of the catalogue describes."""
+"""Empirical relations that compete with the effects of the catalogue: dependence on a variable, without a mechanism."""

@@ -1,4 +1,4 @@
-"""Relations tried beside the winner: columns, priors and price like those of an effect (METHODS 16, eq. 11.19)."""
+"""Relations tried beside accepted effects, with columns, priors and penalty alike (docs/relations.md, eq. 11.19)."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from trihedron.diagnose.hypothesis import Hypothesis, Term, again
 from trihedron.diagnose.relations.signals import HISTORY, NOT_TURNED, ROOM_VECTOR, Signal, room, signals
 
 N_FITTED = 3
-"""Relations whose strengths of noise are found anew before the best is chosen."""
+"""Relations that are evaluated with noise strengths refitted before the best is chosen."""
 ALL_AXES = (0, 1, 2)
 ANY_BY_ANY = ("rate", HISTORY, "rate products")
-"""Families of vectors: three of their variables may act on any axis together."""
+"""Families of vectors: three of their variables together may act on any axis."""
 MOST_RELATIONS = 3
-"""A longer list is no law that a person would check."""
+"""A longer list is no relation that a person would check."""
 
 
 class Empirical(Effect):
-    """What readings follow without a mechanism: an effect in all but the name, and so in no catalogue."""
+    """Dependence of readings on a variable without a mechanism: an effect that is in no catalogue."""
 
     id = ""
 
     def variants(self, context: Context) -> list[Variant]:
-        """None of its own: the search makes them."""
+        """None: the search builds them."""
         del context
         return []
 
@@ -40,9 +40,9 @@ EMPIRICAL = Empirical()
 
 @dataclass(frozen=True, eq=False)
 class Follows:
-    """One relation: the variables, the axes (numbers) whose readings follow them, and its term of the hypothesis.
+    """One relation: its variables, the numbers of the axes that depend on them, and its term of the hypothesis.
 
-    Parameters run over the axes, for each of them over the names.
+    Parameters run over the axes, and for each over the names.
     """
 
     signal: Signal
@@ -57,11 +57,11 @@ class Related:
     model: Hypothesis
     relations: tuple[Follows, ...]
     steps: tuple[Hypothesis, ...]
-    """What every relation was added to."""
+    """The hypothesis that each relation was added to."""
 
     @property
     def score(self) -> float:
-        """Twice the log-evidence of the whole, less what its terms cost."""
+        """Twice the log-evidence of the whole, less the penalties of its terms."""
         return 2.0 * self.model.log_evidence - sum(term.paid for term in self.model.terms)
 
 
@@ -83,11 +83,11 @@ def related(model: Hypothesis, limit: float) -> Related:
 
 
 def _best(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> Follows | None:
-    """The relation that gains most of those that look best at fixed strengths, each family once."""
+    """The relation that gains most, noise strengths refitted, of the leading ones at fixed strengths."""
     context = model.context
     leading: list[list[Leader]] = []
     n_tried = 0
-    # One family at a time: the columns of all of them together are larger than the log.
+    # One family at a time: all columns together need more memory than the log.
     for whole in _families(context):
         signal = whole.signal
         ways = [way for way in _ways(signal) if (signal.sensor, tuple(signal.names[k] for k in way[0])) not in known]
@@ -97,7 +97,7 @@ def _best(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> 
         n_tried += len(ways)
         leading = _led(leading, signal, ways, [look.gain for look in looks])
     paid = 2.0 * float(np.log(max(n_tried, 1) * len(PRIOR_SCALES)))
-    # Led under several strengths: with the larger gain, which comes last.
+    # The same relation may lead at several strengths: the one with the largest gain, the last, is kept.
     ahead = {(id(one[1]), one[2]): one for one in sorted(chain(*leading), key=lambda one: one[0])}.values()
     each = [_part(context, signal, way, scale, paid) for gain, signal, way, scale in ahead if 2.0 * gain > paid]
     if not each:
@@ -110,9 +110,9 @@ def _best(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> 
 
 
 def _led(leading: list[list[Leader]], signal: Signal, ways: list[Way], gains: list[FloatArray]) -> list[list[Leader]]:
-    """The leaders under every strength of noise, and of one family more the way that gains most under each.
+    """The leaders at every noise strength, with the best way of one more family added.
 
-    Quiet noise takes what it leaves for what many columns explain, loud noise for what one does.
+    At low noise strengths relations of many columns gain most, at high ones those of one.
     """
     if not ways:
         return leading
@@ -121,19 +121,19 @@ def _led(leading: list[list[Leader]], signal: Signal, ways: list[Way], gains: li
     for look, kept in enumerate(out):
         way, scale = np.unravel_index(int(stacked[:, :, look].argmax()), stacked.shape[:2])
         kept.append((float(stacked[way, scale, look]), signal, ways[way], PRIOR_SCALES[scale]))
-        # Only the leaders keep their columns.
+        # Columns are computed again for the leading ways only.
         out[look] = sorted(kept, key=lambda one: -one[0])[:N_FITTED]
     return out
 
 
 Way = tuple[tuple[int, ...], tuple[int, ...]]
-"""Numbers of the variables, and of the axes that follow them."""
+"""Numbers of the variables, and of the axes that depend on them."""
 Leader = tuple[float, Signal, Way, float]
-"""Gain in log-evidence, what is followed, in which way, and how large beside what is expected."""
+"""Gain in log-evidence, signal, way, and prior scale."""
 
 
 def _ways(signal: Signal) -> list[Way]:
-    """Each variable on each axis and on all of them; the first three, and three more, as any axis by any axis."""
+    """Each variable on each axis and on all of them; of vectors three together, as any axis by any axis."""
     if signal.family == "room":
         return [(tuple(range(len(signal.names))), ALL_AXES)]
     always = tuple(k for k, name in enumerate(signal.names) if name == NOT_TURNED)
@@ -157,7 +157,7 @@ def _families(context: Context) -> Iterator[Follows]:
 
 
 def _part(context: Context, whole: Signal, way: Way, scale: float, paid: float) -> Follows:
-    """Some variables of a family, expected as large as fits, and what their choice paid."""
+    """Some variables of a family with their prior scale, and the penalty of the choice."""
     names, axes = way
     signal = replace(
         whole, names=tuple(whole.names[k] for k in names), units=tuple(whole.units[k] for k in names),
@@ -177,9 +177,9 @@ def _follows(context: Context, signal: Signal, axes: tuple[int, ...]) -> Follows
 
 
 def _room(context: Context) -> Iterator[Follows]:
-    """The rates that follow a vector fixed in the room, each gyro by itself.
+    """Rates that depend on a vector fixed in the room, each gyro separately.
 
-    Its vertical part alone is a g-sensitivity, which has a name: that stands while the horizontal parts add nothing.
+    Its vertical part alone is a g-sensitivity, an effect of the catalogue: the horizontal parts must add to it.
     """
     seen = room(context) if context.obs.raw_rate is not None else None
     if seen is not None:

@@ -1,7 +1,7 @@
-"""Physical variables that readings may follow outside the catalogue, as columns at every point (docs/relations.md).
+"""Physical variables outside the catalogue that readings may depend on, as columns at every point (docs/relations.md).
 
-A variable that an effect of the catalogue follows already (temperature, supply, its own force squared) is not among
-them: there the name is the better answer.
+Variables of the catalogue's effects (temperature, supply, the square of an axis's own force) are not included: there
+the effect is the better explanation.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from trihedron.diagnose.context import Context
 Sensor = Literal["accelerometer", "gyroscope"]
 ROOM_VECTOR = "vector fixed in the room"
 HISTORY, NOT_TURNED = "last rotation", "before any rotation"
-"""What a rotation leaves behind; a pose that none led to (the first, one after a gap) may hold any of it."""
+"""Family of the last rotation; poses without a known one (the first, or one after a gap) have their own column."""
 
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """Variables that go together: ``values`` (points, k), ``names`` and ``units`` (k,) as they are said.
+    """Variables that belong together: ``values`` (points, k), ``names`` and ``units`` (k,) as reported.
 
-    ``family`` chooses the words for the experiment; ``is_motion`` marks what vanishes at rest.
+    ``family`` selects the text of the experiment; ``is_motion`` marks variables that are zero in static poses.
     """
 
     sensor: Sensor
@@ -37,7 +37,7 @@ class Signal:
 
 
 def signals(context: Context) -> list[Signal]:
-    """Every variable that this session has, of both sensors, those at rest about their mean over the poses."""
+    """Every variable of this session, for both sensors; those present in poses minus their mean over the poses."""
     out = _history(context, "accelerometer") + _warming(context, "accelerometer") + _forces(context, "accelerometer")
     out += [
         Signal("accelerometer", "rate", (f"w_{AXES[a]}",), context.rate[:, [a]], ("rad/s",), True) for a in range(3)
@@ -50,7 +50,7 @@ def signals(context: Context) -> list[Signal]:
 
 
 def room(context: Context) -> FloatArray | None:
-    """(points, 3, 3) axes of the level frame seen from the body: two horizontal ones, then the vertical one.
+    """(points, 3, 3) axes of the level frame in body coordinates: two horizontal ones, then the vertical one.
 
     ``None`` where a chain of moves is broken.
     """
@@ -86,7 +86,7 @@ def _gyro_only(context: Context) -> list[Signal]:
 
 
 def _history(context: Context, sensor: Sensor) -> list[Signal]:
-    """The rotation that led to a pose, about the axes of the gyros themselves: a small one has their sign."""
+    """The rotation before a pose, about the gyro axes: the sign of a small one is used too."""
     turn = np.zeros_like(context.fitted.state.up)
     unknown = np.ones((len(turn), 1))
     for where, (_, after) in zip(context.moves, context.obs.move_poses, strict=True):

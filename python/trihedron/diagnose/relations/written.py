@@ -1,4 +1,4 @@
-"""A relation written out as a file of the effects' folder, for `diagnose`, `apply` and `calibrate --extended`."""
+"""A relation as source of a user's own effect, for `diagnose`, `apply` and `calibrate --extended`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from trihedron.records.diagnosis import Relation
 def effect_file(relation: Relation, effect_id: str = "named-relation") -> str | None:
     """Source of an effect with the relation's terms (docs/adding-an-effect.md); ``None`` where a term needs the past.
 
-    Relations of force and rate follow from every sample; a previous pose, a last rotation or
-    a heading do not.
+    Relations of force and rate can be computed from every sample; a previous pose, a last rotation or a heading cannot.
     """
     columns: list[tuple[int, str, str, str]] = []
     for coefficient in relation.coefficients:
@@ -59,7 +58,7 @@ class {class_name}(Effect):
 
 
 def _expression(name: str) -> str | None:
-    """How a term of the dictionary reads in a context."""
+    """Python expression of a term in the generated effect, or ``None``."""
     table = {"|w|": "np.linalg.norm(w, axis=1)"}
     for i, a in enumerate(AXES):
         table |= {

@@ -1,1 +1,1 @@
-"""Where model and recording differ: one test per domain, and what carries the disagreement."""
+"""Where model and recording differ: one test per domain, with the channels and segments of the misfit."""

@@ -1,4 +1,4 @@
-"""An effect as a curve over the one variable that drives it, found from its columns, with what every pose shows."""
+"""An effect as a curve over the one variable that drives it, from its columns, with the residual of every pose."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ class _Shown:
 
 
 def residuals_before_after(before: Fit, after: Fit, named: Collection[int] = ()) -> tuple[DomainResiduals, ...]:
-    """Both fits' residuals in physical units, for the domains that the recording has.
+    """Residuals of both fits in physical units, for the domains that the recording has.
 
-    At rest the bias is one for the session: the numbers are those that S, b and the effects alone leave. Of sensors
-    (0, 1) whose bias was ``named`` to drift or to differ from pose to pose it is each pose's own after.
+    In static poses the bias is one for the session: these are the residuals of S, b and the effects alone. For sensors
+    (0, 1) whose bias drift or repeatability was ``named``, the later fit uses the bias of each pose.
     """
     a, b = _shown(before), _shown(after, named)
     out = []
@@ -86,7 +86,7 @@ def _shown(fitted: Fit, named: Collection[int] = ()) -> dict[str, _Shown]:
 
 
 def with_covariance(model: LinearModel, fitted: Fit) -> LinearModel:
-    """The linear model with the full covariance of its numbers, in the order of a calibration file.
+    """The linear model with the full covariance of its parameters, in the order of a calibration file.
 
     On raw readings: S row by row, then b, of the gyro with one bias for the session (eq. 11.16).
     """
@@ -95,21 +95,21 @@ def with_covariance(model: LinearModel, fitted: Fit) -> LinearModel:
 
 
 N_BINS = 80
-"""Parts of a variable's range in which a column is a number: the square of a force bends by 0.3 % within one."""
+"""Bins of a variable's range in which a column is taken as constant: the square of a force changes by 0.3 % in one."""
 LEAST_TOLD = 0.98
-"""Part of a column's variance that its variable tells; a column of two variables keeps tenths of it."""
+"""Least share of a column's variance explained by its variable; a column of two variables leaves tenths."""
 STRAIGHT = 0.99
-"""Part of a column that lies along one direction: what acts on one sensor axis does."""
+"""Least share of a column along one direction: an effect on one sensor axis has all of it there."""
 LEAST_PART = 0.4
-"""Of gravity along an axis: a pose with less of it says little of that axis."""
+"""Component of gravity along an axis, relative to g, below which a pose does not determine that axis."""
 BEYOND = 0.1
-"""How far a curve goes on where no pose lies, as a part of the range of the poses."""
+"""Extension of a curve beyond the poses, as a share of their range."""
 SIDES = (("accelerometer", "force", "static-accel"), ("gyroscope", "rate", "static-gyro"))
 
 
 @dataclass(frozen=True, eq=False)
 class Driver:
-    """A variable at every point (points,), SI, and whose axis it is."""
+    """A variable at every point (points,), SI, and the axis it belongs to."""
 
     name: str
     axis: int
@@ -128,12 +128,12 @@ class _Column:
 
     @property
     def key(self) -> tuple[int, str, int, bool]:
-        """What is drawn as one curve."""
+        """Columns with this key are drawn as one curve."""
         return int(np.abs(self.direction).argmax()), self.driver.name, self.driver.axis, self.is_relative
 
 
 def drivers(context: Context) -> list[Driver]:
-    """Every variable that a column may be a function of, the plainest first."""
+    """Every variable that a column may be a function of, the simplest first."""
     out = [Driver("force", j, context.axis_force[:, j]) for j in range(3)]
     out += [Driver("rate", j, context.axis_rate[:, j]) for j in range(3)]
     means = context.references
@@ -157,8 +157,8 @@ def effect_curves(
 ) -> tuple[EffectCurve, ...]:
     """Curves of an effect whose ``columns`` (points, 3, k) of force and rate have parameters ``value`` (k,).
 
-    ``residuals`` are the poses' with everything accepted. A parameter whose column is a function of no one variable has
-    no curve.
+    ``residuals`` are those of the poses with everything accepted. A parameter whose column depends on more than one
+    variable has no curve.
     """
     known = drivers(context)
     by_domain = {one.domain: one for one in residuals}
@@ -178,7 +178,7 @@ def effect_curves(
 def bias_curves(
     context: Context, sensor: int, path: FloatArray, std: FloatArray, residuals: Sequence[DomainResiduals]
 ) -> tuple[EffectCurve, ...]:
-    """A bias that walks as curves over time: ``path`` (poses, 3) with standard errors (3,), SI."""
+    """A bias random walk as curves over time: ``path`` (poses, 3) with standard uncertainties (3,), SI."""
     name, _, domain = SIDES[sensor]
     h = context.obs.n_poses
     left = next((one for one in residuals if one.domain == domain), None)
@@ -198,7 +198,7 @@ def bias_curves(
 
 
 def _driven(context: Context, known: Sequence[Driver], column: FloatArray, k: int) -> _Column | None:
-    """The variable that a column (points, 3) is a function of, by itself or as a part of the sensor's own reading."""
+    """The variable that a column (points, 3) is a function of, directly or as a share of the sensor's own reading."""
     _, strength, rows = np.linalg.svd(column, full_matrices=False)
     if strength[0] <= 0.0 or strength[0] ** 2 < STRAIGHT * float(strength @ strength):
         return None
@@ -219,7 +219,7 @@ def _driven(context: Context, known: Sequence[Driver], column: FloatArray, k: in
 
 
 def _range(context: Context, driver: Driver) -> tuple[float, float]:
-    """Where poses lie and somewhat beyond; the whole range of what no pose varies."""
+    """The range of the poses, slightly extended; the whole range of a variable that is constant in poses."""
     posed = driver.values[: context.obs.n_poses]
     low, high = float(posed.min()), float(posed.max())
     if high - low <= 1e-6 * float(np.ptp(driver.values)):
@@ -228,7 +228,7 @@ def _range(context: Context, driver: Driver) -> tuple[float, float]:
 
 
 def _bins(context: Context, driver: Driver, g: FloatArray) -> tuple[IntArray, IntArray]:
-    """Bin of every point (points,), -1 outside, and how many points each bin holds."""
+    """Bin of every point (points,), -1 outside, and the number of points in each bin."""
     low, high = _range(context, driver)
     place = np.floor((driver.values - low) / max(high - low, 1e-300) * (N_BINS - 1e-9)).astype(np.intp)
     place[~np.isfinite(g) | (place < 0) | (place >= N_BINS)] = -1
@@ -241,7 +241,7 @@ def _means(place: IntArray, count: IntArray, values: FloatArray) -> FloatArray:
 
 
 def _is_told(context: Context, driver: Driver, g: FloatArray) -> bool:
-    """Whether a column is a function of a variable: hardly any of its variance is within bins."""
+    """Whether a column is a function of a variable: almost none of its variance is within bins."""
     place, count = _bins(context, driver, g)
     inside = place >= 0
     if inside.sum() < 2 * N_BINS or np.ptp(driver.values[inside]) <= 0.0:
@@ -266,7 +266,7 @@ def _curve(
     poses, data = _of_poses(context, sensor, first, left)
     posed = np.stack([one.g[: context.obs.n_poses] for one in group], axis=1)
     if name not in ("force", "rate"):
-        # Its level is the bias's, or the scale's: a curve is known about its mean.
+        # The level is absorbed by bias or scale: the curve is relative to its mean.
         level = np.nanmean(posed, axis=0) if np.isfinite(posed).any(axis=0).all() else table.mean(axis=0)
         table, posed = table - level, posed - level
     return EffectCurve(
@@ -282,14 +282,14 @@ def _curve(
 
 
 def _of_poses(context: Context, sensor: str, one: _Column, left: DomainResiduals | None) -> tuple[IntArray, FloatArray]:
-    """Poses that say something of an axis (n,), and what is left of each along it (n,)."""
+    """Poses that determine an axis (n,), and the residual of each along it (n,)."""
     h = context.obs.n_poses
     nothing = np.zeros(0, dtype=np.intp), np.zeros(0)
     if left is None or len(left.after) != h or (one.driver.name == "rate"):
         return nothing
     if sensor == "gyroscope":
         return nothing if one.is_relative else (np.arange(h), left.after @ one.direction)
-    # A norm tells what lies along gravity.
+    # The norm determines only the component along gravity.
     up = context.force[:h] / np.linalg.norm(context.force[:h], axis=1)[:, None]
     part = up @ one.direction
     said = np.flatnonzero(np.abs(part) >= LEAST_PART)

@@ -1,4 +1,4 @@
-"""Does a domain agree with its predicted noise, and where does it not?"""
+"""Test of each domain against its predicted noise, and where the misfit is."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from trihedron.session.noise import NOISE_CORNER_S
 
 
 class Seen(Protocol):
-    """What a sharper look at the sampling found: lost samples, instants that are not those of the timestamps."""
+    """Result of a test on the sampling: lost samples, or sampling instants that differ from the timestamps."""
 
     @property
     def p_value(self) -> float:
-        """Before payment for the search."""
+        """Not corrected for multiple testing."""
 
     @property
     def strength(self) -> float:
@@ -36,14 +36,14 @@ class Seen(Protocol):
 
     @property
     def reweigh(self) -> Callable[[Any], Any] | None:
-        """What it changes in the observations."""
+        """The change of the observations that corrects it, or None."""
 
 
 def judge_timing(common: tuple[float, float, int], found: Sequence[Seen], alpha: float) -> DomainTest:
-    """Chi-square: squared z of the common time error, plus what lost samples explain; p of the sharper look.
+    """Chi-square: squared z of the common time error, plus the gain of lost samples; p-value of their own tests.
 
-    ``common`` is the covariance of the times that the two sensors see, its standard error [s²] (infinite where too few
-    intervals show it) and the number of intervals.
+    ``common`` is the covariance of the time errors of the two sensors, its standard error [s²] (infinite with too few
+    intervals) and the number of intervals.
     """
     value, spread, n = common
     if not np.isfinite(spread):
@@ -65,15 +65,15 @@ ROW_DOMAINS: dict[int, Domain] = {
     DYNAMICS: "dynamics",
 }
 N_DOMAINS_TESTED = 6.0
-"""Four of poses and moves, two of samples: the rate of false alarms is shared by them."""
+"""Four domains of poses and moves, two of samples: they share the false-alarm rate."""
 ROWS_OF_MOVE = 5
-"""In order: gravity after it (2), velocity over it (3)."""
+"""In order: gravity after the move (2), velocity over it (3)."""
 LEAST_DOF = 0.5
-"""Degrees of freedom below which the fit has used a domain up."""
+"""Degrees of freedom below which the fit has used up a domain."""
 HEAVY, CARRIES = 9.0, 0.2
-"""A segment beyond three sigma, and a channel with a fifth of the misfit, are named as its place."""
+"""A segment beyond three sigma, and a channel with a fifth of the misfit, are named as its location."""
 NOISE_DOF = 100.0
-"""The predicted noise is itself measured in the recording: to about 7 %, as 100 degrees of freedom give."""
+"""Degrees of freedom of the predicted noise, which is measured in the recording to about 7 %."""
 
 _CHANNELS = {
     STATIC_ACCEL: ("ax", "ay", "az"),
@@ -86,7 +86,7 @@ _CHANNELS = {
 def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
     """Chi-square of every row domain against its degrees of freedom (eq. 8.7).
 
-    ``alpha`` is the chance that a healthy recording disagrees in any domain; it is shared by six domains.
+    ``alpha`` is the chance that a healthy recording disagrees in any domain; six domains share it.
     """
     used, share = fitted.leverage, alpha / N_DOMAINS_TESTED
     physical, rms_unit = physical_rms(fitted)
@@ -96,7 +96,7 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
         dof = float((1.0 - used[rows]).sum())
         if dof < LEAST_DOF:
             continue
-        # Where moves miss by more than their noise they count by what they show: judged they are by what was predicted.
+        # The noise of moves was widened to their residuals: the test uses the noise predicted before.
         excess = dict(zip((MOVES, DYNAMICS), fitted.line.core.strengths[3], strict=True)).get(label, 1.0)
         chi2 = float(((fitted.system.residual[rows] * _unsettled(fitted, label, rows)) ** 2).sum()) * excess**2
         per_dof = chi2 / dof
@@ -107,7 +107,7 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
         if not disagrees and label in (STATIC_ACCEL, STATIC_GYRO):
             inside, changing = _inside_poses(fitted, label), _strayed(fitted, label)
             other = min((inside, changing), key=lambda look: look[0])
-            # Two more looks at the same domain.
+            # Two more tests in the same domain.
             if 2.0 * other[0] < share:
                 p, disagrees, where = 2.0 * other[0], True, other[2]
                 per_dof, limit = max(per_dof, other[1]), None
@@ -117,7 +117,7 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
 
 
 def _unsettled(fitted: Fit, label: int, rows: npt.NDArray[np.bool_]) -> FloatArray:
-    """(rows,) what makes residuals of rates at rest those over their own noise again, where creep was added to it."""
+    """(rows,) factors that restore residuals of static rates over their own noise, without the settling added to it."""
     obs, system = fitted.line.obs, fitted.system
     noise, spread = obs.pose_rate_noise, obs.pose_rate_sigma
     out = np.ones(int(np.count_nonzero(rows)))
@@ -130,10 +130,10 @@ def _unsettled(fitted: Fit, label: int, rows: npt.NDArray[np.bool_]) -> FloatArr
 
 
 def _inside_poses(fitted: Fit, label: int) -> tuple[float, float, Where]:
-    """p, ratio of variances and place of biases that change inside some poses: their means' error bars swallow it."""
+    """p, ratio of variances and location of biases that change inside poses: larger errors of the means hide these."""
     side = fitted.line.distortion.force if label == STATIC_ACCEL else fitted.line.distortion.rate
     if side is not None:
-        return 1.0, 1.0, Where()  # what an effect changes inside a pose is not known here
+        return 1.0, 1.0, Where()  # the change inside a pose that an effect causes is not known here
     k = 0 if label == STATIC_ACCEL else 1
     found = jumps_in_poses(fitted.line.obs)
     poses, t = found.poses[k], fitted.line.obs.time_s
@@ -143,15 +143,15 @@ def _inside_poses(fitted: Fit, label: int) -> tuple[float, float, Where]:
 
 
 AT_END = 1.01
-"""Share of a bound within which a search ends there."""
+"""Ratio to a bound below which a strength counts as at the bound."""
 AT_EDGE = 1.5
-"""Rms of the walk over the error of a pose's mean, its strength at the end of its range: of 120 healthy sessions (60
-with consumer 1/f noise), in which it is there for 57 gyros and 74 accelerometers, 1.05 is the most; a bias
-that jumps between poses passes, or drifts by two errors."""
+"""Rms of a walk at its upper bound, in standard errors of a pose mean, from which it disagrees: at most 1.05 in 120
+healthy sessions (60 with consumer 1/f noise), where 57 gyros and 74 accelerometers are at the bound; a bias that
+jumps between poses, or drifts by two such errors, exceeds it."""
 
 
 def _strayed(fitted: Fit, label: int) -> tuple[float, float, Where]:
-    """p (0 or 1), ratio of variances: a walk as strong as the model allows stands in for something else."""
+    """p (0 or 1), ratio of variances and channels: a bias random walk at its upper bound absorbs another effect."""
     k = 0 if label == STATIC_ACCEL else 1
     stray = None if fitted.has_free_strengths else hidden_biases(fitted)[k]
     if stray is None or not stray.is_strayed:
@@ -161,8 +161,8 @@ def _strayed(fitted: Fit, label: int) -> tuple[float, float, Where]:
 
 @dataclass(frozen=True)
 class HiddenBias:
-    """What the model's walk of a sensor's bias absorbed, SI: ``rms`` about its mean, ``noise`` the median error of a
-    pose's mean, with scatter where that was named, and whether the walk is as strong as the model allows."""
+    """Bias changes that the random walk of a sensor absorbed, SI: ``rms`` about the mean, ``noise`` the median error of
+    a pose mean, with scatter where that was named, and whether the walk is at its upper bound."""
 
     rms: float
     noise: float
@@ -170,12 +170,12 @@ class HiddenBias:
 
     @property
     def is_strayed(self) -> bool:
-        """Whether the walk is at the end of its range and farther than noise explains."""
+        """Whether the walk is at its upper bound and larger than noise explains."""
         return self.is_at_edge and self.rms >= AT_EDGE * self.noise
 
 
 def hidden_biases(fitted: Fit) -> tuple[HiddenBias, HiddenBias | None]:
-    """Accelerometer, gyro: biases of the poses about their session mean, absorbed by hidden states."""
+    """Accelerometer, gyro: biases of the poses about their session mean, as the random walk absorbed them."""
     state, obs = fitted.state, fitted.line.obs
     edge = [corner <= AT_END * NOISE_CORNER_S for corner in fitted.line.core.strengths[0]]
     out: list[HiddenBias | None] = []
@@ -219,7 +219,7 @@ def locate(fitted: Fit, label: int) -> Where:
 
 
 def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[dict[int, float], dict[int, str]]:
-    """Rms of each row domain in physical units: norm error of poses, rate at rest, degrees after moves, velocity.
+    """Rms of each row domain in physical units: norm error of poses, static rate, degrees after moves, velocity.
 
     ``rows_residual`` replaces the fit's own whitened residuals, e.g. by held-out ones.
     """

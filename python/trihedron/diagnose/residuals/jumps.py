@@ -1,4 +1,4 @@
-"""Zeros that jump inside poses: a step through a pose against a smooth curve (eq. 8.7a)."""
+"""Biases that jump inside poses: a step through a pose against a smooth curve (eq. 8.7a)."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
 
 N_BLOCKS, EDGE = 16, 3
-"""A pose is seen as so many block means; a step leaves at least so many on either side, so that what the hand's jolt
-does in the first block is none."""
+"""Block means per pose, and least number of them on either side of a step, so that a jolt in the first block is no
+step."""
 SMOOTH = 3
-"""Degree of the curve that a step must beat: creep, warm-up and slow noise are smooth."""
+"""Degree of the polynomial that a step must beat: settling, warm-up and slow noise are smooth."""
 LEAST_SAMPLES = 3 * N_BLOCKS
-"""Readings of a pose below which its blocks say nothing."""
+"""Readings of a pose below which its blocks are not used."""
 LOUD = 3.0
-"""Variance of the blocks about the step over the usual, from which a pose holds something else than one step."""
+"""Variance of the blocks about the step over the usual one, above which more than one step is in the pose."""
 COUNTS = 6.0
-"""Chi-square by which a step must beat the curve to count: white noise does it in one pose of some hundred."""
+"""Chi-square by which a step must beat the curve to count: white noise does so in about one pose of a hundred."""
 TURNS = 4.0
-"""How much larger than usual what the other sensor reads at the step marks it as motion (a pose that slips)."""
+"""Reading of the other sensor at the step, relative to its usual one, from which the step is motion (a pose slips)."""
 LAG = 4
-"""Blocks between two whose difference, over that of neighbours, says the colour of the noise: squared, 1 when it is
-white, 2 for flicker, 5.5 for a walk."""
+"""Distance in blocks whose differences, squared and over those of neighbours, give the colour of the noise: 1 for white
+noise, 2 for flicker, 5.5 for a walk."""
 COLOUR_SPREAD = 0.85
-"""Standard deviation of that ratio's logarithm, times the root of the number of poses (drawn for all colours)."""
+"""Standard deviation of that ratio's logarithm, times √(number of poses) (simulated for all colours)."""
 FLICKER, WALK = (0.0, 0.5, 1.0, 2.0), (0.3, 0.5, 1.0, 4.0)
-"""Flicker, or a walk, over white noise of one, that a pool of poses is drawn with."""
+"""Amplitudes of flicker, or of a walk, over unit white noise that the simulated poses have."""
 N_POOL, N_DRAWS, SEED = 20_000, 20_000, 1
 FEWEST_POSES = 12
 N_LOOKS = 3
-"""Axes."""
+"""Axes tested."""
 
 
 @dataclass(frozen=True, eq=False)
 class Jumps:
-    """``p_value`` (two sensors) of zeros that jump in some poses, ``ratio`` how much larger the steps are than noise
-    (as a variance), ``holds`` which: accelerometer, gyro."""
+    """``p_value`` of biases that jump in some poses, ``ratio`` variance of the steps over that of noise, ``poses`` with
+    such steps; each for accelerometer, gyro."""
 
     p_value: tuple[float, float]
     ratio: tuple[float, float]
@@ -50,8 +50,8 @@ class Jumps:
 
 @dataclass(frozen=True, eq=False)
 class _Steps:
-    """(poses, axes): chi-square by which the best step beats the smooth curve, its block, the variance that it leaves
-    per degree of freedom; blocks (poses, blocks, axes) in units of their noise."""
+    """(poses, axes): chi-square by which the best step beats the smooth curve, its block, the remaining variance per
+    degree of freedom; blocks (poses, blocks, axes) in units of their noise."""
 
     beats: FloatArray
     at: npt.NDArray[np.intp]
@@ -61,11 +61,11 @@ class _Steps:
 
 @lru_cache(maxsize=4)
 def jumps_in_poses(obs: Observations) -> Jumps:
-    """Whether some poses are better described by a step than slow noise ever is.
+    """Test whether a step describes some poses better than slow noise can.
 
-    Noise beats a cubic by a step with a chance that its colour sets: the p-value is that of the colours between white
-    and a walk, each weighed by how well it agrees with the differences inside the poses.
-    A step at which the other sensor reads a motion is a pose that slipped.
+    In noise a step beats a cubic by a chance that depends on its colour: the p-value averages over the colours from
+    white to a walk, each weighted by its agreement with the differences inside the poses. A step at which the other
+    sensor reads a motion is a pose that slipped.
     """
     still = np.array([not pose.is_unsteady for pose in obs.segments.poses])
     still &= np.array([pose.stop - pose.start >= LEAST_SAMPLES for pose in obs.segments.poses])
@@ -91,7 +91,7 @@ def jumps_in_poses(obs: Observations) -> Jumps:
 
 
 def _block_means(obs: Observations, raw: FloatArray, which: npt.NDArray[np.intp]) -> FloatArray:
-    """(poses, blocks, axes) means of equal stretches, over the noise that neighbours show, whatever the length."""
+    """(poses, blocks, axes) means of equal parts in units of the noise between neighbours, whatever their length."""
     out = []
     for i in which:
         values = raw[obs.segments.poses[i].samples()]
@@ -104,7 +104,7 @@ def _block_means(obs: Observations, raw: FloatArray, which: npt.NDArray[np.intp]
             out.append(np.add.reduceat(np.where(known, values, 0.0), first, axis=0) / present * lasts)
     blocks = np.array(out)
     change = np.diff(blocks, axis=1)
-    # Robust: the median over all poses of squared changes (0.455 of a chi-square's mean), half of it one block's.
+    # Robust: the median over all poses of squared differences (0.455 of a chi-square's mean), half of it per block.
     noise = np.sqrt(np.median(change**2, axis=(0, 1)) / 0.4549 / 2.0)
     return np.asarray(blocks / np.where(noise > 0.0, noise, np.inf))
 
@@ -116,7 +116,7 @@ def _steps(blocks: FloatArray) -> _Steps:
     curve = (np.einsum("nbc,bd->ndc", x, basis) ** 2).sum(axis=1)
     k = np.arange(EDGE, N_BLOCKS - EDGE + 1)
     before = np.cumsum(x, axis=1)[:, k - 1]
-    # A step between k and n - k blocks explains S_k²/k + S_k²/(n - k): what is centred sums to nothing.
+    # A step between k and n - k blocks explains S_k²/k + S_k²/(n - k), because the centred blocks sum to zero.
     step = before**2 * (1.0 / k + 1.0 / (N_BLOCKS - k))[None, :, None]
     best = step.argmax(axis=1)
     explained = step.max(axis=1)
@@ -124,13 +124,13 @@ def _steps(blocks: FloatArray) -> _Steps:
 
 
 def _colour(blocks: FloatArray) -> float:
-    """Logarithm of the ratio of squared differences, blocks some apart over neighbours (medians, jumps aside)."""
+    """Logarithm of the ratio of median squared differences, blocks ``LAG`` apart over neighbours."""
     near, far = (float(np.median((blocks[:, lag:] - blocks[:, :-lag]) ** 2)) for lag in (1, LAG))
     return float(np.log(far / near))
 
 
 def _moved(own: _Steps, other: _Steps | None, sensor: int) -> npt.NDArray[np.bool_]:
-    """(poses, axes) whether the other sensor sees motion at the step: a change that lasts, of a gyro also a pulse."""
+    """(poses, axes) whether the other sensor sees motion at the step: a lasting change, of a gyro also a pulse."""
     if other is None:
         return np.zeros(own.beats.shape, dtype=bool)
     n_poses = len(own.beats)
@@ -147,17 +147,17 @@ def _moved(own: _Steps, other: _Steps | None, sensor: int) -> npt.NDArray[np.boo
 
 
 def _chance(n_poses: int, total: float, colour: float) -> float:
-    """Of a sum as large in noise whose differences are of this colour."""
+    """Probability of a sum as large in noise whose differences have this colour."""
     colours, sums = _nulls(n_poses)
     agree = np.exp(-0.5 * n_poses * ((colour - colours) / COLOUR_SPREAD) ** 2)
     larger = (1 + (sums >= total).sum(axis=1)) / (N_DRAWS + 1)
-    # Redder than a walk is as red as one.
+    # Noise redder than a walk is treated as a walk.
     return float(agree @ larger / agree.sum()) if agree.sum() > 0.0 else float(larger[-1])
 
 
 @lru_cache(maxsize=16)
 def _nulls(n: int) -> tuple[FloatArray, FloatArray]:
-    """(colours,) and (colours, draws): the sum for ``n`` poses of noise of each colour."""
+    """(colours,) and (colours, draws): simulated sums for ``n`` poses of noise of each colour."""
     rng = np.random.default_rng(SEED)
     colours, pools = _pools()
     return colours, np.array([pool[rng.integers(0, len(pool), (N_DRAWS, n))].sum(axis=1) for pool in pools])
@@ -165,10 +165,10 @@ def _nulls(n: int) -> tuple[FloatArray, FloatArray]:
 
 @lru_cache(maxsize=1)
 def _pools() -> tuple[FloatArray, FloatArray]:
-    """(colours,) and (colours, poses): what single poses of every noise count."""
+    """(colours,) and (colours, poses): simulated contributions of single poses of every noise."""
     rng = np.random.default_rng(SEED)
     white, other = rng.normal(size=(2, N_POOL, 4 * N_BLOCKS))
-    # 1/f by Kasdin's filter (fractional integration of order one half), and white noise summed up.
+    # 1/f noise by Kasdin's filter (fractional integration of order one half); the walk is summed white noise.
     taps = np.ones(4 * N_BLOCKS)
     for j in range(1, len(taps)):
         taps[j] = taps[j - 1] * (j - 0.5) / j

@@ -1,4 +1,4 @@
-"""Rates at rest that are motion: a support that gives turns the sensor, and gravity says so (eq. 8.7d)."""
+"""Static rates caused by motion: a soft support rotates the sensor, and gravity shows it (eq. 8.7d)."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.observations import Observations
 
 FEWEST_POSES = 6
-"""Poses below which their settling has no variance of its own."""
+"""Poses below which settling is not estimated."""
 N_BLOCKS = 6
-"""Stretches of a pose whose means separate a rate that dies away from one that stays."""
+"""Parts of a pose whose means separate a rate that decays from a constant one."""
 SETTLES_S = (0.7, 1.4, 2.8, 5.6)
-"""Time constants with which supports give: foam and skin, not hours of a glue."""
+"""Time constants of supports, s: foam and skin, not the hours of a glue."""
 SIZES = np.concatenate([[0.0], np.logspace(-1.0, 4.0, 31)])
-"""Scatter and settling tried, in rms of the readings' error: a quarter of an LSB is 10 %."""
+"""Values tried for scatter and settling, in rms error of the readings: a quarter of an LSB is 10 %."""
 LEVEL = 0.5
-"""Cosine to the vertical that parts the level axes (0) from it (1)."""
+"""Cosine to the vertical that separates the level axes (0) from it (1)."""
 CERTAIN = 20.0
-"""Twice the log-likelihood that settling wins beside scatter: one in 10⁵ of chi-square with one degree of freedom, with
-four time constants counted."""
+"""Twice the log-likelihood that settling must gain beside scatter: p = 10⁻⁵ of chi-square with one degree of freedom,
+for four time constants."""
 STILL_SCATTERS = 0.01
-"""p-value of a scatter beside settling from which the scatter stands."""
+"""p-value of a scatter beside settling, below which the scatter is kept."""
 
 
 @dataclass(frozen=True)
 class Settling:
-    """Rates at rest described by settling alone, by scatter alone, by both: twice the log-likelihood over neither.
+    """Gain in twice the log-likelihood of static rates by settling alone, by scatter alone, and by both.
 
-    ``rate_rad_s`` is the settling's standard deviation on setting down beside scatter, ``tau_s`` how fast it dies away.
+    ``rate_rad_s`` is the standard deviation of the settling rate at the start of poses, ``tau_s`` its time constant.
     """
 
     settling: float
@@ -43,22 +43,22 @@ class Settling:
 
     @property
     def is_motion(self) -> bool:
-        """Whether settling describes them at least as well as scatter and leaves nothing for it to explain."""
+        """Whether settling describes the rates at least as well as scatter and leaves no significant scatter."""
         beside = max(self.both - self.settling, 0.0)
         p = 0.5 * float(chdtrc(1.0, beside)) if beside > 0.0 else 1.0
         return self.settling > self.scatter and p > STILL_SCATTERS
 
     @property
     def is_seen(self) -> bool:
-        """Whether there is settling for certain, with or without scatter beside it."""
+        """Whether settling is certain, with or without scatter beside it."""
         return self.both - self.scatter > CERTAIN
 
 
 def settling(context: Context) -> Settling:
     """Settling against scatter in the rates of the poses: w = z + s + k exp(-t/τ), tilt k τ (1 - exp(-t/τ)) (eq. 8.7d).
 
-    ``s`` and ``k`` are drawn anew in every pose, the same on all axes; the accelerometer shows what of ``k`` lies
-    across the vertical, the shape in time all of it. One bias ``z`` for the session, restricted likelihood.
+    ``s`` and ``k`` are drawn anew in every pose, with one variance for all axes. The accelerometer shows the part of
+    ``k`` across the vertical, the shape in time all of it. One bias ``z`` for the session, restricted likelihood.
     """
     directions = _directions(context)
     tables = [table for tau in SETTLES_S if (table := _table(directions, tau)) is not None]
@@ -79,8 +79,8 @@ def settling(context: Context) -> Settling:
 
 
 def with_settling(context: Context, found: Settling) -> Observations:
-    """Rates at rest as uncertain as poses turn, moves as the verticals at their ends: a pose that settles is not where
-    its mean is (eq. 8.7f). That the rates at rest disagree is still judged by their own noise.
+    """Observations with the noise of static rates, and of the verticals at the ends of moves, widened by settling: the
+    ends of a settling pose differ from its mean (eq. 8.7f). The test of static rates still uses their own noise.
     """
     obs = context.obs
     assert obs.pose_rate_sigma is not None
@@ -104,9 +104,9 @@ def with_settling(context: Context, found: Settling) -> Observations:
 
 @dataclass(frozen=True, eq=False)
 class _Table:
-    """Sums over the readings of every pose and direction (n,), noise divided out: products of the columns of scatter
+    """Sums over the readings of every pose and direction (n,), in units of noise: products of the columns of scatter
     ``a`` and settling ``b`` with one another and with the readings ``y``; ``axes`` (n, 3) the directions in the body;
-    ``unit`` the error of a pose's mean, rad/s."""
+    ``unit`` the error of a pose mean, rad/s."""
 
     aa: FloatArray
     ab: FloatArray
@@ -120,7 +120,7 @@ class _Table:
     def log_likelihood(self, scatter: FloatArray, settling: FloatArray) -> FloatArray:
         """(m,) restricted log-likelihood of variances (m,) of scatter and settling; the bias has a flat prior."""
         p, q = scatter[:, None], settling[:, None]
-        # (I + V G)⁻¹ V of two columns, written out.
+        # (I + V G)⁻¹ V of two columns, in closed form.
         det = (1.0 + p * self.aa) * (1.0 + q * self.bb) - p * q * self.ab**2
         m00, m11, m01 = p * (1.0 + q * self.bb) / det, q * (1.0 + p * self.aa) / det, -p * q * self.ab / det
         aa = self.aa - (m00 * self.aa**2 + 2.0 * m01 * self.aa * self.ab + m11 * self.ab**2)
@@ -136,13 +136,13 @@ class _Table:
 
 
 CONTRASTS = np.linalg.qr(np.column_stack([np.ones(N_BLOCKS), np.eye(N_BLOCKS)[:, 1:]]))[0][:, 1:].T
-"""(5, 6) what the means of stretches differ by."""
+"""(5, 6) orthonormal contrasts of the six part means."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Direction:
-    """One direction ``axis`` of a pose, whatever fades: readings ``y`` in units of their ``error``, rates first; the
-    stretches of the pose from ``begins`` to ``ends``, s; ``tilt`` the noise of a level axis, zero for the others."""
+    """One direction ``axis`` (3,) of a pose: readings ``y`` in units of their noise, rates first; ``error`` noise of a
+    rate; parts of the pose from ``begins`` to ``ends``, s; ``tilt`` noise of the tilt about a level axis, else zero."""
 
     axis: FloatArray
     y: FloatArray
@@ -166,7 +166,7 @@ def _directions(context: Context) -> list[_Direction]:
         rate = np.nanmean(obs.raw_rate[span].reshape(N_BLOCKS, n, 3), axis=1) @ state.gyro_S.T
         force = np.nanmean(obs.raw_force[span].reshape(N_BLOCKS, n, 3), axis=1) @ state.accel_S.T / state.gravity
         up = state.up[i]
-        # What the vertical has turned by since the mean of the pose, across it.
+        # Rotation of the vertical since the mean of the pose, across it.
         angle = np.cross(force - force.mean(axis=0), up)
         begins = np.arange(N_BLOCKS) * n / obs.recording.rate_hz
         ends = begins + n / obs.recording.rate_hz
@@ -174,7 +174,7 @@ def _directions(context: Context) -> list[_Direction]:
             own = float(np.sqrt(((axis @ state.gyro_S) ** 2 * noise[i] ** 2).sum() * N_BLOCKS))
             y, tilt = rate @ axis / own, 0.0
             if abs(float(axis @ up)) < LEVEL:
-                # Turned force reads along the other level axis; its white noise is that of the quiet floor.
+                # A tilt changes the force along the other level axis; its white noise is that of the quiet floor.
                 across = np.cross(axis, up) @ state.accel_S
                 tilt = float(np.sqrt((across**2 * obs.pose_force_sigma[i] ** 2).sum() * N_BLOCKS)) / state.gravity
                 y = np.concatenate([y, CONTRASTS @ angle @ axis / tilt])

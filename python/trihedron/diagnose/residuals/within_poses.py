@@ -1,4 +1,4 @@
-"""Inside the poses: lines in the spectrum, poses noisier than the others, drift, resolution."""
+"""Inside the poses: spectral lines, and poses noisier than the others."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
 
 
 MIN_LINE_SHARE = 0.03
-"""Long holds resolve lines far below the noise: below this share of its variance a line changes nothing that the model
-says, and a line that is no disagreement needs no name."""
+"""Share of the variance below which a line is ignored: long poses resolve lines far below the noise that change no
+result."""
 GRID = 41
-"""Frequencies tried at a time, from one resolution below to one above: half a lobe has ten."""
+"""Frequencies per refinement, from one resolution below to one above: half a lobe has ten."""
 LOUD = 3.0
 """Variance of a pose over that of the others from which it disagrees, and is named: real noise is not exactly Gaussian
-or white, and a pose on another support has half as much again."""
+or white, and a pose on another support has 50 % more."""
 SHORTEST = 32
-"""Readings of a piece of a pose: twice as many have 33 frequencies, two windows of the median."""
+"""Readings of a piece of a pose: twice as many give 33 frequencies, two windows of the median."""
 ENOUGH_STRETCHES = 6
-"""Spectra in the average before longer ones are preferred: it is then known to 40 %."""
+"""Fewest spectra in the average, which has a relative error of 40 % then; with fewer their length is halved."""
 PARTS = 8
-"""Parts of a pose, every other one of which predicts those between."""
+"""Parts of a pose; the even ones predict the odd ones and vice versa."""
 STEADY = 0.3
-"""Power of a line in the second halves of poses over that in the first: a support that rings (2 to 6 Hz, gone in half a
-second) keeps a tenth and less in poses of 2 s."""
+"""Power of a line in the second halves of poses over that in the first: ringing of a support (2 to 6 Hz, over in half a
+second) leaves a tenth or less in poses of 2 s."""
 COHERENT = 4.0
-"""Standard errors of an amplitude that keeps its phase through the recording: by noise alone once in 3000 lines."""
+"""Standard errors of its amplitude from which a line is coherent through the recording: by noise once in 3000."""
 
 
 @dataclass(frozen=True)
@@ -59,20 +59,20 @@ class Line:
 
     @property
     def share(self) -> float:
-        """Variance of the line over that of the readings at rest."""
+        """Variance of the line over that of the static readings."""
         return 0.5 * self.amplitude**2 / max(self.rms_before, 1e-300) ** 2
 
     @property
     def has_size(self) -> bool:
-        """Whether it carries a share of the readings that is worth a word; its domain and its effect ask the same."""
+        """Whether its share is large enough to be reported; the domain and the effect use the same limit."""
         return self.share > MIN_LINE_SHARE
 
 
 def pose_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
-    """``(first sample, (n, 6 or 3) raw readings minus their hold mean)`` of every pose."""
+    """``(first sample, (n, 6 or 3) raw readings minus their mean)`` of every contiguous piece of the quiet poses."""
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     out = []
-    # A line is looked for where the place is quiet: shaking has a spectrum of its own.
+    # Lines are searched in quiet poses: vibration has a spectrum of its own.
     quiet: npt.NDArray[np.bool_] = np.asarray((pose_scatter(obs).ratio < 2.0).all(axis=1))
     if quiet.sum() < 3:
         quiet[:] = True
@@ -90,7 +90,7 @@ def pose_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
 
 
 def _averaged_spectrum(pieces: list[tuple[int, FloatArray]], n: int) -> tuple[FloatArray, int]:
-    """Mean periodogram (n//2+1, channels) of non-overlapping stretches of n samples, and how many there were."""
+    """Mean periodogram (n//2+1, channels) of non-overlapping parts of n samples, and their number."""
     total, count = None, 0
     window = np.hanning(n)[:, None]
     for _, piece in pieces:
@@ -105,7 +105,7 @@ def _averaged_spectrum(pieces: list[tuple[int, FloatArray]], n: int) -> tuple[Fl
 
 @lru_cache(maxsize=4)
 def find_lines(obs: Observations, p_limit: float = 1e-4) -> list[Line]:
-    """Lines that stand out of the smooth spectrum of the poses, one at most per channel."""
+    """Lines above the smooth spectrum of the poses, at most one per channel."""
     pieces = pose_pieces(obs)
     if not pieces:
         return []
@@ -138,12 +138,12 @@ def find_lines(obs: Observations, p_limit: float = 1e-4) -> list[Line]:
             if line is not None and not _dies_away(pieces, c, line.frequency_hz / rate, density):
                 out.append(line)
                 break
-            lowest = 2 * k  # above what rings, whose poses ring at frequencies of their own
+            lowest = 2 * k  # above the ringing, whose frequency differs from pose to pose
     return out
 
 
 def _dies_away(pieces: list[tuple[int, FloatArray]], c: int, per_sample: float, density: float) -> bool:
-    """Whether it is the ring of supports, loud on setting down and gone by the second half of the poses."""
+    """Whether a line is ringing of the supports: strong at the start of poses and weak in their second half."""
     power = np.zeros(2)
     for _, piece in pieces:
         for k, half in enumerate(np.array_split(piece[:, c], 2)):
@@ -174,7 +174,7 @@ def _refine(
 
     everything = np.ones(len(t), dtype=bool)
     span = float(t[-1] - t[0])
-    # From the coarse bin down to the resolution of the whole recording, in steps no wider than half a lobe.
+    # From the coarse bin to the resolution of the whole recording, in steps no wider than half a lobe.
     best_f, width = f0, resolution
     length = min(max(len(part) for _, part in pieces) / obs.recording.rate_hz, span)
     stretch = length
@@ -197,7 +197,7 @@ def _refine(
     noise = np.sqrt(density)
     sigma = float(noise * np.sqrt(2.0 / len(t)))
     if amplitude < COHERENT * sigma:
-        # Not coherent through the recording: the line is real, its amplitude is that of single holds.
+        # Not coherent through the recording: the line is real, its amplitude is that of single poses.
         stretches = [(obs.time_s[a : a + len(part)], part[:, c]) for a, part in pieces]
         return _wandering(stretches, c, f0, resolution, p, noise)
     train, _ = project(best_f, early)
@@ -214,9 +214,9 @@ def _refine(
 def _wandering(
     stretches: list[tuple[FloatArray, FloatArray]], c: int, f0: float, resolution: float, p: float, noise: float
 ) -> Line:
-    """A line that keeps its phase in a pose only: every other part of a pose predicts the parts between.
+    """A line whose phase is constant only within a pose: every other part of a pose predicts the parts between.
 
-    Its amplitude is that of single poses less what noise alone would show there (2σ²·2/n).
+    Its amplitude is that of single poses less the contribution of noise alone (2σ²·2/n).
     """
     tried = f0 + np.linspace(-resolution, resolution, GRID)
     step = float(tried[1] - tried[0])
@@ -248,7 +248,7 @@ def _wandering(
 
 
 def project_piece(t: FloatArray, x: FloatArray, f: float) -> float:
-    """Amplitude of a sinusoid of known frequency in one stretch."""
+    """Amplitude of a sinusoid of known frequency in one piece."""
     basis = np.column_stack([np.cos(2 * np.pi * f * t), np.sin(2 * np.pi * f * t)])
     coefficient, *_ = np.linalg.lstsq(basis, x, rcond=None)
     return float(np.hypot(*coefficient))
@@ -256,7 +256,7 @@ def project_piece(t: FloatArray, x: FloatArray, f: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PoseScatter:
-    """Fast scatter of every pose against the common level: variances ``ratio`` (poses, channels), ``dof`` (poses,)."""
+    """Fast scatter of every pose: ``ratio`` of its variance to the common one (poses, channels), ``dof`` (poses,)."""
 
     ratio: FloatArray
     dof: FloatArray
@@ -265,7 +265,7 @@ class PoseScatter:
 
 @lru_cache(maxsize=4)
 def pose_scatter(obs: Observations) -> PoseScatter:
-    """Variance of first differences per pose over the median of all: blind to slow drift, sharp on shaking."""
+    """Variance of first differences per pose over the median of all: sensitive to vibration, not to slow drift."""
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     ratio, dof = [], []
     for pose in obs.segments.poses:
@@ -273,10 +273,10 @@ def pose_scatter(obs: Observations) -> PoseScatter:
         steps = np.diff(part, axis=0)
         own = np.var(steps, axis=0)
         ratio.append(np.nanvar(steps, axis=0) if np.isnan(own).any() else own)
-        # Neighbouring differences share a sample: two thirds as many independent ones.
+        # Neighbouring differences share a sample: two thirds as many are independent.
         dof.append((len(part) - 1) * 2.0 / 3.0)
     ratio_array, dof_array = np.array(ratio), np.array(dof)
-    # Readings that toggle between two neighbouring codes scatter by up to half a step squared without any shaking.
+    # Readings that toggle between two neighbouring codes scatter by up to half an LSB squared without any vibration.
     centre = np.maximum(np.median(ratio_array, axis=0), 0.5 * obs.recording.facts.steps[: x.shape[1]] ** 2)
     centre[centre == 0] = 1.0
     relative = ratio_array / centre
@@ -285,10 +285,10 @@ def pose_scatter(obs: Observations) -> PoseScatter:
 
 
 def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
-    """Lines and noisy poses, as one domain; the p-value is the smallest, paid for by the number of looks."""
+    """Lines and noisy poses, as one domain; the p-value is the smallest, corrected for the number of tests."""
     scatter = pose_scatter(obs)
     n_looks = scatter.p_value.size
-    # A pose that was found shaking is said to, and weighed by its own scatter: nothing is left to explain.
+    # A pose already marked as vibrating is weighted by its own scatter: it is no disagreement.
     steady = np.array([not pose.is_unsteady for pose in obs.segments.poses])
     loud = np.where(steady[:, None] & (scatter.ratio > LOUD), scatter.p_value, 1.0)
     p_scatter = float(min(1.0, loud.min() * n_looks)) if n_looks else 1.0

@@ -1,1 +1,1 @@
-"""Logs that hold one or two orientations: no calibration, but biases against temperature and time, and lines."""
+"""Logs of one or two orientations: no calibration, but biases against temperature and time, and spectral lines."""

@@ -1,4 +1,4 @@
-"""The diagnosis of a log that holds one or two orientations (docs/static-logs.md)."""
+"""The diagnosis of a log with one or two orientations (docs/static-logs.md)."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ Sensor = Literal["accelerometer", "gyroscope"]
 PREFIX: dict[Sensor, str] = {"accelerometer": "accel", "gyroscope": "gyro"}
 DOMAIN: dict[Sensor, Domain] = {"accelerometer": "static-accel", "gyroscope": "static-gyro"}
 BEYOND_NOISE = 3.0
-"""Rms of a drift over the error of one mean; of a walk, over what noise that turns into one after 20 s (K = √3 N/τ)
-could walk: as among poses."""
+"""Least rms of a drift, in errors of one mean; of a walk, in the walk that white noise equals after 20 s (K = √3 N/τ),
+as among poses."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Samples:
-    """What the spectrum of a log at rest needs of observations: readings with their slow part taken off."""
+    """The part of observations that the spectrum of a static log needs: readings with their slow part subtracted."""
 
     recording: Recording
     time_s: FloatArray
@@ -46,19 +46,19 @@ class _Samples:
     segments: Any
 
     def pose_names(self, which: Iterable[int]) -> tuple[str, ...]:
-        """Stretches at rest by their number from 1."""
+        """Names of the static pieces, numbered from 1."""
         return tuple(f"pose {i + 1}" for i in which)
 
 
 def diagnose_rest(recording: Recording, model: LinearModel, gravity_m_s2: float, alpha: float) -> Diagnosis:
-    """Zeros against temperature and time, and lines, of a log whose orientations carry no calibration.
+    """Biases against temperature and time, and spectral lines, of a log with too few orientations for a calibration.
 
     Parameters
     ----------
     recording : Recording
         A static log, a chamber log, two orientations: with an accelerometer.
     model : LinearModel
-        Nominal or given S, b of both sensors: only sizes in physical units come from it.
+            Nominal or given S, b of both sensors, used only for sizes in physical units.
     """
     pieces = rest_pieces(recording)
     domains: list[DomainTest] = []
@@ -108,7 +108,7 @@ def _sizes(model: LinearModel, sensor: Sensor) -> FloatArray:
 
 
 def _unit(recording: Recording, model: LinearModel, sensor: Sensor) -> str:
-    """SI, or ``raw`` where neither the log nor a given calibration says what a count of the gyro is."""
+    """SI, or ``raw`` where neither the log nor a given calibration states the unit of a gyro's count."""
     if sensor == "accelerometer":
         return "m/s^2"
     side = model.gyroscope
@@ -131,7 +131,7 @@ def _noise(recording: Recording, pieces: RestPieces | None, model: LinearModel) 
 def _biases(
     pieces: RestPieces, sensor: Sensor, size: FloatArray, unit: str, alpha: float
 ) -> tuple[DomainTest, DomainTest, list[AcceptedEffect], list[Candidate]]:
-    """One sensor's biases: as they run, what temperature or a smooth drift takes of them, what stays."""
+    """One sensor's biases: tests before and after removing the thermal curve or smooth drift found, and the effects."""
     prefix = PREFIX[sensor]
     sigma = pieces.force_sigma if sensor == "accelerometer" else pieces.rate_sigma
     assert sigma is not None
@@ -174,7 +174,7 @@ def _about_poses(pieces: RestPieces, sensor: Sensor) -> FloatArray:
 
 
 def _domain(domain: Domain, x: FloatArray, own: FloatArray, unit: str, *, is_named: bool, alpha: float) -> DomainTest:
-    """Zeros about the mean of their orientation, in their own unit; they disagree where an effect was named.
+    """Biases about the mean of their orientation, in ``unit``; the domain disagrees where an effect was named.
 
     A bias that walks is no disagreement by itself: without an effect nothing contradicts the model.
     """
@@ -187,7 +187,7 @@ def _domain(domain: Domain, x: FloatArray, own: FloatArray, unit: str, *, is_nam
 
 
 def _case(unit: str) -> str:
-    """Sizes are told in the unit that people use; counts of an unknown scale stay counts."""
+    """Case of the sentence: sizes in customary units, or in counts where the scale is unknown."""
     return "at-rest" if unit in ("rad/s", "m/s^2") else "at-rest-counts"
 
 
@@ -253,9 +253,9 @@ def _model(variant: str, series: Mapping[str, Any]) -> MappingProxyType[str, Any
 
 
 def _drift(pieces: RestPieces, sensor: Sensor) -> tuple[DriftCurve | None, float, bool]:
-    """The curve of biases that change slowly, p of any slow change, and whether a walk alone does not make it.
+    """The curve of slowly changing biases, p of any slow change, and whether a walk alone does not explain it.
 
-    ``None`` where they do not change slowly. A walk is what every sensor's noise becomes; a smooth drift is not.
+    ``None`` where they do not change slowly. The noise of every sensor becomes a walk; a smooth drift is an effect.
     """
     parts = [pieces.readings(sensor, axis, []) for axis in range(3)]
     together = BiasReadings(
@@ -298,7 +298,7 @@ def _drifting(
 def _lines(
     recording: Recording, pieces: RestPieces, model: LinearModel, alpha: float
 ) -> tuple[DomainTest, AcceptedEffect | None]:
-    """Spectral lines of the pieces, their slow part taken off, and whether pieces are unlike in noise."""
+    """Spectral lines of the pieces, their slow part subtracted, and the test of noise that differs between pieces."""
     assert recording.accelerometer is not None
     t = recording.time_s
 

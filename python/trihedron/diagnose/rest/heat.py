@@ -1,4 +1,4 @@
-"""Zeros of one or two orientations against a logged temperature: shape, branches, what stays (docs/static-logs.md)."""
+"""Biases of one or two orientations against a logged temperature: curve, branches, residuals (docs/static-logs.md)."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class DriftCurve:
 
     @property
     def range(self) -> FloatArray:
-        """(axes,) from the lowest to the highest value."""
+        """(axes,) difference between the highest and the lowest value."""
         return np.asarray(np.ptp(self.values, axis=1))
 
 
 def covariance_of(process: BiasProcess, axis: int, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(n, n) covariance of the readings, and the share of walk and drift in it."""
+    """(n, n) covariance of the readings, and the part of it due to walk and drift."""
     r = process.readings
     W, D, _, _ = unit_kernels(r)
     s, w, d = (process.axis_factor[axis] * sigma) ** 2
@@ -43,9 +43,9 @@ def covariance_of(process: BiasProcess, axis: int, sigma: FloatArray) -> tuple[F
 
 
 def smooth_curve(process: BiasProcess, keep: list[int], sigma: FloatArray, time_s: FloatArray) -> DriftCurve:
-    """Mean and standard error of walk plus drift at ``time_s`` (m,), its mean over those times taken off.
+    """Mean and standard error of walk plus drift at ``time_s`` (m,), relative to its mean over those times.
 
-    Of readings of a length, which see three walks along the vertical (``direction`` of three columns), three curves.
+    Norm readings, which contain three walks along the vertical (``direction`` of three columns), give three curves.
     """
     r = process.readings
     X = r.design[:, keep]
@@ -57,7 +57,7 @@ def smooth_curve(process: BiasProcess, keep: list[int], sigma: FloatArray, time_
         low, high = np.minimum.outer(a, b), np.maximum.outer(a, b)
         bent = low**2 * (3.0 * high - low) / 6.0 + INITIAL_SLOPE * np.outer(a, b)
         if length is not None:
-            # A value of the walk against its mean over a stretch around it.
+            # Covariance of a value of the walk with its mean over an interval around it.
             inside = np.maximum(0.5 * length - np.abs(a[:, None] - b), 0.0)
             low = low - inside**2 / (2.0 * np.maximum(length, 1e-12))
         return np.asarray(w / walk * low + d / drift * bent)
@@ -81,19 +81,19 @@ def smooth_curve(process: BiasProcess, keep: list[int], sigma: FloatArray, time_
     return DriftCurve(time_s, np.array(values), np.array(errors))
 
 
-# Whether the biases of a static log change slowly, and whether a walk alone makes that (docs/static-logs.md, R.9).
+# Whether the biases of a static log change slowly, and whether a walk alone explains it (docs/static-logs.md, R.9).
 
 SMOOTH = 8.75
 """1 % point of 3/8 χ²(1) + 3/8 χ²(2) + 1/8 χ²(3): one strength more where the others may be 0."""
 SLOW = 0.01
-"""p-value from which biases are said to change slowly: false in 1 % of logs whose biases only scatter."""
+"""p-value below which biases change slowly: false in 1 % of logs whose biases only scatter."""
 
 
 @dataclass(frozen=True, eq=False)
 class SlowChange:
-    """How biases change: ``sigma`` (3,) likeliest scatter, walk and drift, rms about the mean in the readings' unit.
+    """Changes of the biases: ``sigma`` (3,) scatter, walk and drift, rms about the mean, in the readings' unit.
 
-    ``p_value`` of any slow change beside scatter; ``drift_ratio`` twice the log-likelihood that a smooth drift wins
+    ``p_value`` of any slow change beside scatter; ``drift_ratio`` twice the log-likelihood that a smooth drift gains
     beside scatter and walk.
     """
 
@@ -109,12 +109,12 @@ class SlowChange:
 
     @property
     def is_smooth(self) -> bool:
-        """Whether a walk alone does not make it."""
+        """Whether a walk alone does not explain the change."""
         return self.drift_ratio > SMOOTH
 
 
 def slow_change(readings: BiasReadings) -> SlowChange:
-    """Test the biases of one log, every column of its design allowed for."""
+    """Test the biases of one log, with every column of its design included."""
     process = BiasProcess.of(readings)
     every = list(range(readings.design.shape[1]))
     top, sigma = process.maximum((SCATTER, WALK, DRIFT), every, restricted=True)
@@ -122,30 +122,30 @@ def slow_change(readings: BiasReadings) -> SlowChange:
         process.maximum(free, every, restricted=True)[0] for free in ((SCATTER,), (SCATTER, WALK), (SCATTER, DRIFT))
     )
     ratio = 2.0 * (max(walk, drift) - alone)
-    # Two tries, each with the tail of ½χ²(0) + ½χ²(1): one strength on the edge of its range.
+    # Two tests, each with the tail of ½χ²(0) + ½χ²(1): one strength at the boundary of its range.
     p_value = min(1.0, float(chdtrc(1.0, ratio))) if ratio > 0.0 else 1.0
     return SlowChange(process, sigma, p_value, 2.0 * (top - walk))
 
 
 LEAST_SWING_K = 0.5
-"""A logged temperature that changes by less explains no zero."""
+"""A logged temperature that changes by less is not used."""
 MIN_BIC = 10.0
 """Kass and Raftery's bound for very strong evidence, as among poses."""
 FOLDS = 12
 TEMPERATURE_BINS, FEWEST_BINS = 12, 3
-"""Bins of temperature, and how many must have been passed both ways for a difference between branches."""
+"""Bins of temperature, and the least number passed both while heating and cooling for a difference of branches."""
 VISIBLE = 0.98
-"""Held-out rms must fall to this: the same bound as for every effect."""
+"""Held-out rms must fall below this factor: the same bound as for every effect."""
 ALL = (SCATTER, WALK, DRIFT)
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One sensor's zeros as a function of temperature, raw units per power of kelvin.
+    """One sensor's bias as a function of temperature, raw units per power of kelvin.
 
-    ``names`` (k,) of the terms, ``value``, ``std`` (3, k); ``swing`` (3,) through which the curve runs, ``rest`` (n, 3)
-    what it leaves, ``raw`` (n, 3) the readings without it, about the mean of their orientation; ``gain`` twice the
-    log-likelihood won beside scatter, walk and drift, ``cost`` what its terms pay.
+    ``names`` (k,) of the terms, ``value``, ``std`` (3, k); ``swing`` (3,) range of the curve, ``rest`` (n, 3)
+    residuals, ``raw`` (n, 3) readings without the curve, about the mean of their orientation; ``gain`` twice the
+    log-likelihood gained beside scatter, walk and drift, ``cost`` the penalty of its terms.
     """
 
     names: tuple[str, ...]
@@ -163,10 +163,10 @@ class Curve:
 
 
 def thermal_curve(pieces: RestPieces, sensor: str) -> Curve | None:
-    """The simplest curve that the zeros demand, every strength of scatter, walk and drift beside it; ``None`` if none.
+    """The simplest significant curve of the biases, scatter, walk and drift being free beside it; ``None`` if none.
 
-    Temperature enters to the first, second, third power, then its rate of change, then a branch of its own while it
-    falls; each joins where ΔBIC over three axes exceeds 10.
+    Temperature enters to the first, second, third power, then its rate of change, then a different branch while it
+    falls; each is added where ΔBIC over three axes exceeds 10.
     """
     heat, speed = pieces.temperature, pieces.temperature_rate
     if heat is None or speed is None or np.ptp(heat) < LEAST_SWING_K:
@@ -187,7 +187,7 @@ def thermal_curve(pieces: RestPieces, sensor: str) -> Curve | None:
     best, gained = nothing, 0.0
     for name in terms:
         value = _likelihood(pieces, sensor, [terms[k][0] for k in (*chosen, name)])
-        # A higher power may be what makes a lower one pay: both are tried before the lower one is refused.
+        # A lower power may be significant only with the next one: both are tried before the lower one is dropped.
         if 2.0 * (value - best) - cost > MIN_BIC:
             chosen.append(name)
             best = value
@@ -253,7 +253,7 @@ def _curve(
 
 
 def _held_out(pieces: RestPieces, values: FloatArray, X: FloatArray) -> tuple[float, float]:
-    """Rms over blocks of neighbouring pieces that a plain fit of zeros, then of zeros and curve, did not see."""
+    """Held-out rms of blocks of neighbouring pieces, by a plain fit of biases, then of biases and curve."""
     levels = np.column_stack([(pieces.pose == p).astype(np.float64) for p in range(pieces.n_poses)])
     fold = np.minimum(np.arange(len(values)) * FOLDS // len(values), FOLDS - 1)
     errors = []
@@ -273,10 +273,10 @@ def _held_out(pieces: RestPieces, values: FloatArray, X: FloatArray) -> tuple[fl
 
 
 def branch_gap(pieces: RestPieces, rest: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """(3,) mean difference between heating and cooling at one temperature of what a curve leaves, and its error.
+    """(3,) mean difference of the residuals between heating and cooling at one temperature, and its standard error.
 
-    ``rest`` (n, 3); the error is that of a mean over temperatures, whose differences scatter. ``None`` where no
-    temperature was passed both ways. Hysteresis and drift in time both make it.
+    ``rest`` (n, 3); the error is that of a mean over temperature bins. ``None`` where too few bins were passed both
+    ways. Hysteresis and drift in time both cause it.
     """
     heat, speed = pieces.temperature, pieces.temperature_rate
     assert heat is not None

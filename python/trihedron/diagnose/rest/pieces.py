@@ -1,4 +1,4 @@
-"""A long log cut into still pieces, whatever its segmentation makes of a zero that drifts (docs/static-logs.md)."""
+"""A long log cut into static pieces, independent of its segmentation, for biases that drift (docs/static-logs.md)."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from trihedron.records import Recording
 from trihedron.records.channel_facts import ChannelFacts
 
 N_PIECES = 80
-"""Pieces of a log: enough for a curve of third order on both branches of a temperature cycle, and quick."""
+"""Pieces of a log: enough for a curve of third order on both branches of a temperature cycle, and fast."""
 FEWEST_PIECES = 24
 FEWEST_SAMPLES = 8
-"""Samples of half a piece below which its mean has no error of its own."""
+"""Samples of half a piece from which the standard error of its mean is known."""
 QUIET_QUANTILE, LOUD = 0.2, 4.0
-"""Variance of first differences over that of the quietest fifth from which a piece is taken as moving: noise of a part
+"""Variance of first differences over that of the quietest fifth, above which a piece is moving: the noise of a part
 changes by a factor of two over a hundred kelvin."""
 TURNS_RAD = 0.02
-"""A piece whose halves point this far apart moves: a zero of 0.1 g that drifts through a log turns it by a tenth."""
+"""Angle between the halves of a moving piece, at least: a bias that drifts by 0.1 g in a log causes a tenth of it."""
 SAME_POSE_RAD = 0.12
-"""Pieces whose force points less than 7° apart hold one orientation: a drifting zero of 0.1 g turns it by less."""
+"""Angle below which pieces have one orientation (7°): a bias that drifts by 0.1 g turns the force by less."""
 MOSTLY_STILL = 0.6
-"""Share of a log that must be still: in one that moves, what is slow is taken for still."""
+"""Share of a log that must be static: in one that moves, slow motion would count as static."""
 LEAST_SHARE, FEWEST_OF_POSE = 0.04, 4
-"""An orientation that fewer pieces hold is handling."""
+"""Share and number of pieces below which an orientation is handling."""
 TEMPERATURE_WINDOW_S = 10.0
-"""Mean of the logged temperature: takes its digits away, and no chip heats faster than in tens of seconds."""
+"""Window of the mean of a logged temperature: removes its resolution; no chip heats faster than in tens of seconds."""
 
 
 @dataclass(frozen=True, eq=False)
 class RestPieces:
-    """Means over the halves of still pieces of a log, raw units: n = 2 per piece, in the order of time.
+    """Means over the halves of static pieces of a log, raw units: n = 2 per piece, in the order of time.
 
     ``pose`` (n,) number of the orientation, ``piece`` (n,) of the piece, ``spans`` their sample ranges; ``force``,
     ``rate`` (n, 3) means, ``force_sigma``, ``rate_sigma`` (3,) white noise of one sample, ``count`` (n,) samples of
@@ -61,7 +61,7 @@ class RestPieces:
         return int(self.pose.max()) + 1
 
     def readings(self, sensor: str, axis: int, columns: list[FloatArray]) -> BiasReadings:
-        """One axis as the process of zeros takes it: a zero for every orientation, then ``columns`` (n,) each."""
+        """Readings of one axis for the bias process: columns of a bias per orientation, then ``columns`` (n,) each."""
         values, sigma = (self.force, self.force_sigma) if sensor == "accelerometer" else (self.rate, self.rate_sigma)
         assert values is not None
         assert sigma is not None
@@ -74,7 +74,7 @@ class RestPieces:
 
 
 def rest_pieces(recording: Recording) -> RestPieces | None:
-    """The still pieces of a log, orientations that are hardly held left out; ``None`` where too little is still."""
+    """The static pieces of a log without rare orientations; ``None`` where too little of the log is static."""
     assert recording.accelerometer is not None
     n = recording.n_samples
     half = max(n // (2 * N_PIECES), FEWEST_SAMPLES)
@@ -119,7 +119,7 @@ def rest_pieces(recording: Recording) -> RestPieces | None:
 
 
 def _at_least(sigma: FloatArray, facts: ChannelFacts) -> FloatArray:
-    """Noise of a sample, not below that of a converter's step: a log that repeats one code is not free of noise."""
+    """Noise of a sensor, at least that of rounding: a log that repeats one code is not free of noise."""
     return np.asarray(np.maximum(sigma, facts.step / np.sqrt(12.0)))
 
 
@@ -130,7 +130,7 @@ def _logged(recording: Recording, starts: npt.NDArray[np.int64], half: int) -> t
     t = recording.time_s
     good = np.isfinite(logged)
     filled = np.interp(t, t[good], logged[good])
-    # Its rate over a piece: steps of a tenth of a kelvin are gone, the branches are not.
+    # Smoothed over a piece: steps of a tenth of a kelvin are removed, heating and cooling remain.
     width = max(TEMPERATURE_WINDOW_S * recording.rate_hz, float(half))
     speed = smoothed_slope(filled, t, width)
     spans = [(a + k * half, a + (k + 1) * half) for a in starts for k in (0, 1)]
@@ -138,7 +138,7 @@ def _logged(recording: Recording, starts: npt.NDArray[np.int64], half: int) -> t
 
 
 def _orientations(force: FloatArray) -> npt.NDArray[np.int64]:
-    """(n,) number of the orientation of every piece, the most held first; -1 where it is handling."""
+    """(n,) number of the orientation of every piece, the most frequent first; -1 for handling."""
     up = force / np.linalg.norm(force, axis=1, keepdims=True)
     out = np.full(len(up), -1, dtype=np.int64)
     found = 0
@@ -146,7 +146,7 @@ def _orientations(force: FloatArray) -> npt.NDArray[np.int64]:
         free = np.flatnonzero(out < 0)
         near = np.arccos(np.clip(up[free] @ up[free].T, -1.0, 1.0)) < SAME_POSE_RAD
         members = free[near[near.sum(axis=1).argmax()]]
-        # A zero that drifts smears an orientation: once more about the mean of those found.
+        # A drifting bias widens an orientation: select once more about the mean of the members found.
         centre = up[members].mean(axis=0)
         members = free[np.arccos(np.clip(up[free] @ (centre / np.linalg.norm(centre)), -1.0, 1.0)) < SAME_POSE_RAD]
         if len(members) < max(LEAST_SHARE * len(up), FEWEST_OF_POSE):

@@ -1,9 +1,9 @@
-"""One Gaussian process for a bias at rest: scatter, walk, drift (docs/static-logs.md, R.7, R.8).
+"""One Gaussian process for a bias in static poses: scatter, walk, drift (docs/static-logs.md, R.7, R.8).
 
 Per axis ``y = X θ + e``, flat prior on θ, ``V = φ² diag σ² + σ_s² (ones within a pose) + σ_w² W + σ_d² D``; W is a
 random walk, D an integrated walk whose initial slope is random too, both scaled so that σ_w and σ_d are the expected
-rms about the mean of the session. All three strengths are always free: coefficients are judged against whichever the
-zeros have.
+rms about the mean of the session. All three strengths are always free, so that coefficients are tested against the
+noise that the biases have.
 """
 
 from __future__ import annotations
@@ -20,32 +20,32 @@ from trihedron.arrays import FloatArray
 
 SCATTER, WALK, DRIFT = 0, 1, 2
 INITIAL_SLOPE = 1.0
-"""Variance of the drift's slope at the start over what it gains in the session: a straight line is a drift too."""
+"""Variance of the drift's initial slope over its increase in the session: a straight line is a drift too."""
 LEVELS = 6
-"""Levels of each σ on the grid besides 0, a factor of 2.5 to 4 apart: the best is refined."""
+"""Levels of each σ on the grid besides 0, a factor of 2.5 to 4 apart; the best is refined."""
 POLISH = (1.8, 1.35, 1.15)
-"""Factors by which the best grid point is refined, one after another."""
+"""Factors by which the best grid point is refined in turn."""
 AXIS_FACTORS = tuple(float(2.0 ** (k / 2)) for k in range(-6, 7))
 UNEQUAL_AXES = 20.0
-"""Twice the log-likelihood that sizes of their own must win: χ² of two degrees of freedom passes it in 5e-5."""
+"""Twice the log-likelihood that different sizes per axis must gain: p = 5e-5 of χ² with two degrees of freedom."""
 AROUND = (0.3, 0.5, 0.7, 0.85, 1.0, 1.2, 1.45, 2.0, 3.3)
-"""Levels of a σ about its best value over which coefficients are averaged: a session tells a strength to 10 to 30 %."""
+"""Levels of a σ relative to its best value over which coefficients are averaged: its uncertainty is 10 to 30 %."""
 NOISE_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0, 9.0, 25.0, 100.0)
-"""Factors on the stated variances of the means, tried where the halves of the poses contradict them."""
+"""Factors on the stated variances of the means, tried where the halves of the poses contradict these."""
 NOISE_BLAMED = 10.8
-"""Twice the log-likelihood another noise of the means must win: χ² of one degree of freedom passes it in 1e-3."""
+"""Twice the log-likelihood that another noise of the means must gain: p = 1e-3 of χ² with one degree of freedom."""
 CONTRADICTED = 0.5e-3
 """p-value of either side at which halves of poses contradict their stated errors: false in 1e-3 of sessions."""
 
 
 @dataclass(frozen=True, eq=False)
 class BiasReadings:
-    """Zeros of one sensor, two means a pose or more, in the order of time.
+    """Biases of one sensor, two means per pose or more, in the order of time.
 
     ``values``, ``sigma`` (axes, n) the means and their standard errors; ``time_s`` (n,) their middles, ``length_s``
-    (n,) how long each was averaged, ``pose`` (n,) number of the pose; ``design`` (n, p) columns of the mean, the
-    constant first; ``direction`` (n, k) along which k independent walks are seen: ones (n, 1) for the axes of a gyro,
-    the vertical (n, 3) for the length of specific force.
+    (n,) the duration of each, ``pose`` (n,) number of the pose; ``design`` (n, p) columns of the mean, the constant
+    first; ``direction`` (n, k) components of k independent walks in each: ones (n, 1) for the axes of a gyro, the
+    vertical (n, 3) for the norm of specific force.
     """
 
     values: FloatArray
@@ -58,7 +58,7 @@ class BiasReadings:
 
 
 def unit_kernels(r: BiasReadings) -> tuple[FloatArray, FloatArray, float, float]:
-    """``(W, D, walk, drift)``: kernels (n, n) of unit mean square about the mean, and what they were divided by."""
+    """``(W, D, walk, drift)``: kernels (n, n) of unit mean square about the mean, and their divisors."""
     span = max(float(r.time_s[-1] - r.time_s[0]), 1e-9)
     t = (r.time_s - r.time_s[0]) / span
     low, high = np.minimum.outer(t, t), np.maximum.outer(t, t)
@@ -67,7 +67,7 @@ def unit_kernels(r: BiasReadings) -> tuple[FloatArray, FloatArray, float, float]
     for k, kernel in enumerate((low, low**2 * (3.0 * high - low) / 6.0 + INITIAL_SLOPE * np.outer(t, t))):
         size = max(float(np.mean(np.diag(kernel)) - kernel.mean()), 1e-12)
         if k == 0:
-            # A mean over a stretch of a walk varies less than its middle, by a sixth of what is walked in it.
+            # The mean over an interval of a walk has less variance than its middle, by a sixth of that gained in it.
             kernel = kernel - np.diag(r.length_s / span / 6.0)
         out.append(along * kernel / size)
         sizes.append(size)
@@ -76,7 +76,7 @@ def unit_kernels(r: BiasReadings) -> tuple[FloatArray, FloatArray, float, float]
 
 @dataclass(frozen=True, eq=False)
 class Grams:
-    """Whitened products of readings and design for every point of a grid of strengths: (axes, g), (axes, g, c, c)."""
+    """Whitened products of readings and design for every grid point of the strengths: (axes, g), (axes, g, c, c)."""
 
     sigmas: FloatArray
     log_det: FloatArray
@@ -113,7 +113,7 @@ class Grams:
 
 @dataclass(frozen=True, eq=False)
 class BiasProcess:
-    """The likelihood of zeros under every mixture of scatter, walk and drift.
+    """The likelihood of biases under every mixture of scatter, walk and drift.
 
     ``axis_factor`` (axes,) are sizes of the axes relative to each other, ``noise_factor`` multiplies the stated
     variances of the means.
@@ -125,7 +125,7 @@ class BiasProcess:
 
     @staticmethod
     def of(readings: BiasReadings) -> BiasProcess:
-        """The process with relative sizes of the axes and the noise of the means as the readings show them."""
+        """The process with relative sizes of the axes and the noise of the means estimated from the readings."""
         process = BiasProcess(readings, np.ones(len(readings.values)))
         contradicted = process.halves_contradict()
         if contradicted:
@@ -134,7 +134,7 @@ class BiasProcess:
             tried = [replace(process, noise_factor=f) for f in factors]
             tops = [p.maximum((SCATTER, WALK, DRIFT), columns, restricted=True)[0] for p in tried]
             k = int(np.argmax(tops))
-            # A walk within poses makes halves differ too: the noise is blamed where that is clearly likelier (1e-3).
+            # A walk within poses makes halves differ too: the noise is changed only where clearly likelier (1e-3).
             if 2.0 * (tops[k] - tops[0]) > NOISE_BLAMED:
                 process = tried[k]
         return process._with_axis_factors()
@@ -151,10 +151,10 @@ class BiasProcess:
         return int(p < CONTRADICTED) - int(1.0 - p < CONTRADICTED)
 
     def _with_axis_factors(self) -> BiasProcess:
-        """Sizes of the axes relative to each other, where equal ones are plainly refuted.
+        """The process with sizes of the axes relative to each other, where equal ones are clearly refuted.
 
-        Three axes together tell a strength better than each its own: with freely fitted factors the errors of
-        coefficients came out 25 % too small under a walk, with this limit 2 %.
+        Three axes together determine a strength better than each alone: with freely fitted factors the uncertainties of
+        coefficients were 25 % too small under a walk, with this limit 2 %.
         """
         if len(self.axis_factor) == 1:
             return self
@@ -173,13 +173,13 @@ class BiasProcess:
 
     @cached_property
     def sizes(self) -> tuple[float, float]:
-        """What walk and drift are divided by."""
+        """Divisors of walk and drift."""
         _, _, walk, drift = unit_kernels(self.readings)
         return walk, drift
 
     @cached_property
     def levels(self) -> FloatArray:
-        """(LEVELS + 1,) σ of the grid: 0, then from a fifth of the means' own error to twice the whole spread."""
+        """(LEVELS + 1,) σ of the grid: 0, then from a fifth of the means' error to twice the total scatter."""
         r = self.readings
         own = float(np.median(r.sigma)) * np.sqrt(self.noise_factor)
         spread = float(np.sqrt(np.mean((r.values - np.median(r.values, axis=1, keepdims=True)) ** 2)))
@@ -246,7 +246,7 @@ class BiasProcess:
     def mixture(self, keep: list[int]) -> tuple[FloatArray, FloatArray]:
         """Coefficients (axes, k) and covariances (axes, k, k) averaged over the strengths by their likelihood (R.8).
 
-        Flat in log σ from the lowest level to the highest, with the weight of one level on 0.
+        The prior is flat in log σ from the lowest level to the highest, with the weight of one level at 0.
         """
         part, prior = self._around_best(keep)
         value = part.log_likelihood(keep, restricted=True).sum(axis=0)
@@ -259,7 +259,7 @@ class BiasProcess:
         return mean, spread
 
     def _around_best(self, keep: list[int]) -> tuple[Grams, FloatArray]:
-        """A grid as fine as the likelihood is sharp about its maximum, and the prior weight (g,) of its points."""
+        """A fine grid around the maximum of the likelihood, and the prior weight (g,) of its points."""
         _, best = self.maximum((0, 1, 2), keep, restricted=True)
         one_level = float(np.log(self.levels[2] / self.levels[1]))
         axes, weights = [], []

@@ -1,4 +1,4 @@
-"""What the recording says, arranged for the twin: pose means with their noise, and the samples of every move."""
+"""Observations of a session: pose means with their noise, and the samples of every move."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ from trihedron.session.lines_at_rest import means_beside_lines
 from trihedron.session.noise import Along, along_gradient, measure_noise
 
 UNSTEADY = 2.0
-"""Error of a pose's mean over that of the session's usual pose, from which the pose itself was not still: errors of
-means are known to a fifth."""
+"""Error of a pose's mean over that of a usual pose in the session, above which the pose was not static: errors of means
+have an uncertainty of a fifth."""
 LONGEST_MOVE_S = 180.0
-"""A hand move takes seconds, a careful change of fixture minutes; over longer the bias decides what is integrated."""
+"""Longest move that is integrated, s: hand moves take seconds, a fixture minutes; beyond it the bias dominates."""
 
 
 @dataclass(frozen=True, eq=False)
 class Observations:
     """Raw readings of one recording, centred, with the layout of its poses and moves.
 
-    ``segments`` has its poses cut at bumps, ``whole`` as they were found.
+    ``segments`` has its poses cut at disturbances, ``whole`` as they were found.
     ``raw_force`` (n, 3), ``raw_rate`` (n, 3) are raw readings minus ``force_origin`` / ``rate_origin`` (the mean over
     the poses): counts around 32768 would cost the normal equations ten digits. ``pose_force``, ``pose_rate`` (h, 3) are
     the centred pose means, ``pose_force_sigma``, ``pose_rate_sigma`` (h, 3) their standard errors. ``move_ranges`` are
     half-open sample ranges that include the last sample of the pose before and the first of the pose after, so that
-    neighbouring still samples bracket the whole motion; ``move_poses`` (m, 2) their poses. ``force_density`` and
-    ``rate_density`` (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sample instants about
-    their timestamps, once a diagnosis has found it; ``bumped_s`` are stretches of poses that were seen disturbed.
+    static samples bracket the whole motion; ``move_poses`` (m, 2) their poses. ``force_density`` and ``rate_density``
+    (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sampling instants about their timestamps,
+    once a diagnosis has found it; ``bumped_s`` are disturbed intervals of poses, s.
     ``unresolved`` maps a move's two poses to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
-    by motion faster than the samples, by noise slower than a move and by shaking that stands in a pose's end.
-    ``pose_settling`` (h, 3), once it was seen: by how much (one sigma,
-    raw units) poses turn that settle; it is in ``pose_rate_sigma``.
+    by motion faster than the samples, by noise slower than a move and by vibration at the end of a pose.
+    ``pose_settling`` (h, 3), where detected: error of the mean rate by settling (one sigma, raw units), included in
+    ``pose_rate_sigma``.
     ``force_up`` are verticals (h, 3), raw unit vectors, and the errors (h,) of the means along them; ``force_scatter``
-    and ``rate_scatter`` are how far 1/f noise lets a bias scatter, raw; ``averaging`` by how much the sensors average
-    over the sample interval (0 to 1).
+    and ``rate_scatter`` are the bias scatter that 1/f noise explains, raw; ``averaging`` is the share of the sample
+    interval that the sensors average over (0 to 1).
     """
 
     recording: Recording
@@ -82,7 +82,7 @@ class Observations:
         return len(self.move_ranges)
 
     def pose_names(self, which: Iterable[int]) -> tuple[str, ...]:
-        """Poses by their numbers in the recording, from 1, before they were cut at bumps."""
+        """Poses by their numbers in the recording, from 1, before they were cut at disturbances."""
         poses = self.segments.poses
         return tuple(self.whole.pose_name(poses[i].start, poses[i].stop) for i in which)
 
@@ -92,24 +92,24 @@ class Observations:
 
     @property
     def pose_rate_noise(self) -> FloatArray | None:
-        """(h, 3) standard errors of the gyro's means without the creep of poses."""
+        """(h, 3) standard errors of the gyro's means without settling."""
         if self.pose_rate_sigma is None or self.pose_settling is None:
             return self.pose_rate_sigma
         return np.sqrt(self.pose_rate_sigma**2 - self.pose_settling**2)
 
     def norm_sigma(self, gradient: FloatArray) -> FloatArray:
-        """(h,) standard errors of the length of gravity, SI, that grows with the raw means by ``gradient`` (h, 3)."""
+        """(h,) standard errors of the norm of gravity, SI, whose gradient by the raw means is ``gradient`` (h, 3)."""
         return along_gradient(self.pose_force_sigma, self.force_up, gradient)
 
     @cached_property
     def _still(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], FloatArray]:
-        """Samples of all poses one after the other, the first of each among them, and how many each has."""
+        """Samples of all poses concatenated, the first index of each pose, and the number of its samples."""
         samples = [pose.samples() for pose in self.segments.poses]
         lengths = np.array([len(one) for one in samples])
         return np.concatenate(samples), np.cumsum(lengths) - lengths, lengths.astype(np.float64)
 
     def pose_means(self, samples: FloatArray) -> FloatArray:
-        """(poses, ...) means over each pose of a whole-recording signal (n, ...), missing readings left out."""
+        """(poses, ...) means over each pose of a whole-recording signal (n, ...), without missing readings."""
         index, first, n = self._still
         values = samples[index]
         sums = np.add.reduceat(values, first, axis=0)
@@ -126,7 +126,7 @@ class Observations:
         return self.part_means(2)
 
     def part_means(self, parts: int) -> tuple[FloatArray, FloatArray | None]:
-        """(poses, parts, 3) the same over that many equal parts."""
+        """(poses, parts, 3) raw means over that many equal parts of every pose, accelerometer and gyro."""
 
         def of(raw: FloatArray) -> FloatArray:
             every = [np.array_split(raw[pose.start : pose.stop], parts) for pose in self.segments.poses]
@@ -145,12 +145,12 @@ class Observations:
         return out
 
     def _sharpened(self, readings: FloatArray) -> FloatArray:
-        """Readings (n, 3) in the middle of the intervals over which they were averaged."""
+        """Readings (n, 3) at the middle of the intervals over which they were averaged."""
         return np.ascontiguousarray(sharpened(readings, self.time_s, self.averaging))
 
     @cached_property
     def core_moves(self) -> _core.SessionMoves:
-        """The samples of the moves, arranged once for many fits."""
+        """The samples of the moves in the core, prepared once for many fits."""
         unresolved = np.zeros((self.n_moves, 2, 3))
         for m, (before, after) in enumerate(self.move_poses):
             found = self.unresolved.get((int(before), int(after)))
@@ -168,7 +168,7 @@ class Observations:
 
 
 def observe(recording: Recording, segments: Segments, averaging: float = 0.0) -> Observations:
-    """Arrange a segmented recording for the twin.
+    """Observations of a segmented recording.
 
     Raises
     ------
@@ -198,7 +198,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         start, stop = max(move.start - 1, 0), min(move.stop + 1, recording.n_samples)
         values = recording.accelerometer[start:stop]
         finite = np.isfinite(values).all() and (raw_rate is None or np.isfinite(raw_rate[start:stop]).all())
-        # Hours between two poses are no move whose angle or velocity could be followed.
+        # Between poses hours apart neither angle nor velocity can be integrated.
         is_short = recording.time_s[stop - 1] - recording.time_s[start] <= LONGEST_MOVE_S
         if finite and is_short and stop - start >= 3:
             ranges.append((start, stop))
@@ -236,10 +236,10 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
 
 
 def _turned_at_ends(rate_sigma: FloatArray, lasts_s: FloatArray) -> FloatArray:
-    """(poses, 3) variance, (raw unit · s)², of the angle between a pose's mean and its end where it was not still.
+    """(poses, 3) variance, (raw unit · s)², of the angle between a pose's mean and its ends where it was not static.
 
-    A rate that changes inside a pose (the tail of a move, a push) makes its mean uncertain, and turns its ends away
-    from its middle by as much, times half of the pose. Poses with the session's usual noise have none.
+    A rate that changes inside a pose (the tail of a move, a push) makes its mean uncertain, and rotates its ends
+    against its middle by that error times half the pose. It is zero for poses with the session's usual noise.
     """
     usual = np.median(rate_sigma**2 * lasts_s[:, None], axis=0) / lasts_s[:, None]
     return np.maximum(rate_sigma**2 - UNSTEADY**2 * usual, 0.0) * (0.5 * lasts_s[:, None]) ** 2

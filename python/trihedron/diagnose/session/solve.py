@@ -1,6 +1,6 @@
 """Inference on a session: fit, marginal likelihood, score tests, held-out prediction (docs/model-session.md).
 
-A thin front of :class:`trihedron._core.SessionModel`, which holds rows and normal equations.
+A thin interface to :class:`trihedron._core.SessionModel`, which computes rows and normal equations.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ FOLDS = 8
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A session at its optimum: the point and the rows there.
+    """A session at its optimum: the state and the rows there.
 
-    The arithmetic stays in ``line.core``; what the rest of the diagnosis asks for is here.
+    The computation is in ``line.core``; this class has what the diagnosis needs of it.
     """
 
     state: SessionState
@@ -56,7 +56,7 @@ class Fit:
 
     @cached_property
     def leverage(self) -> FloatArray:
-        """(rows,) share of every row that the fit used up; a block has the sum of 1 minus it as degrees of freedom."""
+        """(rows,) leverage of every row; the degrees of freedom of a block are the sum of 1 minus it."""
         return self.line.core.leverage()
 
     @property
@@ -75,14 +75,14 @@ class Fit:
         return self.line.core.log_marginal
 
     def covariance(self) -> FloatArray:
-        """(18 + effects, same) covariance of what all poses share: S_a lower, b_a, S_w on centred readings, effects."""
+        """(18 + effects, same) covariance of the shared unknowns: S_a lower, b_a, S_w on centred readings, effects."""
         return self.line.core.border_covariance()
 
     @cached_property
     def linear(self) -> tuple[FloatArray, FloatArray]:
-        """(24, 24) covariance of ``(S_a, b_a, S_w, b_w)`` on raw readings; ``b_w`` with one bias for the session.
+        """(24, 24) covariance of ``(S_a, b_a, S_w, b_w)`` on raw readings, and ``b_w`` with one bias for the session.
 
-        Error bars allow for zeros that scatter, as those of a calibration do (eq. 11.12b).
+        It includes bias scatter from pose to pose, as that of a calibration does (eq. 11.12b).
         """
         obs, core = self.line.obs, self.line.core
         if not self.has_free_strengths:
@@ -100,7 +100,7 @@ def fit(
     prior: Prior | None = None,
     within: Bounds | None = None,
 ) -> Fit:
-    """Gauss-Newton on every row to convergence, noise corners as they are (eq. 11.9), or free ``within`` bounds."""
+    """Gauss-Newton on every row to convergence, noise corners as in ``start`` (eq. 11.9), or free ``within`` bounds."""
     if len(start.effect) != distortion.n_parameters:
         start = replace(start, effect=np.zeros(distortion.n_parameters))
     core = core_model(obs, start.gravity, prior).fit(
@@ -115,23 +115,23 @@ def fit(
 
 
 def tune_noise(obs: Observations, start: SessionState, distortion: Distortion, prior: Prior | None) -> Fit:
-    """The same with walks as strong as is likeliest, no stronger than the noise of parts makes them (eq. 11.18)."""
+    """As :func:`fit`, with bias walks of maximum likelihood, bounded by the noise of parts (eq. 11.18)."""
     return fit(obs, start, distortion, prior, PART_NOISE)
 
 
 def move_residuals(obs: Observations, state: SessionState) -> FloatArray:
-    """(moves, 5) what gravity and velocity miss after every move at a point, nothing fitted, over its noise."""
+    """(moves, 5) residuals of gravity and velocity after every move at a fixed state, in units of their noise."""
     out: FloatArray = core_model(obs, state.gravity, None).move_residuals(core_state(state))
     return out
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Held-out prediction of rows: innovation chi-square per fold and domain, its volume, and the innovations.
+    """Held-out prediction of rows: innovation chi-square per fold and domain, log-determinant, and the innovations.
 
     ``fold_chi2`` (folds, domains), ``fold_log_det`` (folds,) log-determinant of the predicted covariance, ``n_rows``
     (domains,), ``residual`` (rows,) whitened innovations; ``innovation`` (rows,) the same over each row's own noise
-    alone, so that a model which merely predicts less sharply does not look better in physical units.
+    alone, so that a model with a wider prediction does not look better in physical units.
     """
 
     fold_chi2: FloatArray
@@ -168,8 +168,8 @@ def folds_of(fitted: Fit) -> list[npt.NDArray[np.bool_]]:
 def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]]) -> Prediction:
     """Predict every fold's rows from the others (blocked cross-validation, eq. 11.15).
 
-    The held-out hold's own vertical and biases are unknown to the training rows; a weak prior (its column scale) keeps
-    them proper, and it is the same for every model that is compared.
+    The training rows do not determine the vertical and biases of a held-out pose. A weak prior (its column scale) makes
+    them finite; it is the same for every model that is compared.
     """
     flags = np.array(folds, dtype=bool).reshape(len(folds), len(fitted.system.residual))
     return Prediction(*fitted.line.core.held_out(np.ascontiguousarray(flags)))

@@ -1,4 +1,4 @@
-"""From a calibration to the twin's start, and back from the twin to a linear model."""
+"""From a calibration to the start of the session fit, and from a fitted session to a linear model."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from trihedron.records.diagnosis import LinearModel
 from trihedron.units import acceleration_to_si, rate_to_si
 
 OPEN_BIAS_M_S2, OPEN_SCALE = 0.3, 0.03
-"""Standard errors above which the poses have not determined the accelerometer."""
+"""Standard uncertainties above which the poses do not determine the accelerometer: bias, relative scale."""
 WHOLE_SCALE = 0.01
-"""Error of a gyro's scale (relative) taken from table turns meant as whole right angles."""
+"""Relative uncertainty of a gyro scale from table rotations taken as multiples of 90°."""
 TYPICAL_BIAS_M_S2, TYPICAL_SCALE, TYPICAL_ANGLE = 0.5, 0.05, 0.03
-"""How far an instrument strays from a plain triad of its nominal scale: zero, scale (relative), axes (rad)."""
+"""Prior σ about a plain triad of nominal scale: bias, relative scale, axis angles (rad)."""
 TABLE_TURN_RAD, WHOLE_TURN_RAD = 0.05, 0.07
-"""A turn that leaves the vertical within 3° is one about it; turns meant as multiples of 90° miss by 4° on average."""
+"""Largest angle of the vertical in a rotation about it (3°); largest mean error of multiples of 90° (4°)."""
 LEAST_ANGLE_RAD = 0.5
-"""Angle between two verticals from which a move tells the gyro's scale: known to 1° each, to 5 % at worst."""
+"""Angle between two verticals from which a move determines the gyro scale: errors of 1° each make it 5 % at worst."""
 FEWEST_TURNS, BEST_MISS = 4, 0.5
-"""Turns of an axis, and how much better than the median of all trial scales the best must make them right angles: turns
-by any angle miss by 22° whatever the scale."""
+"""Fewest rotations about an axis; largest error of the best trial scale over the median of all: rotations by arbitrary
+angles differ from multiples of 90° by 22° at any scale."""
 
 
 def lower_frame(S: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """``(Q, L)`` with S = Q L, L lower triangular with the signs of S's own diagonal kept where they are clear."""
+    """``(Q, L)`` with S = Q L, L lower triangular, the signs of its diagonal those of S where these are clear."""
     flip = np.eye(3)[::-1]
     q, r = np.linalg.qr(S @ flip)
     Q, L = q @ flip, flip @ r @ flip
@@ -62,7 +62,7 @@ def start_state(obs: Observations, calibration: Calibration) -> SessionState:
 
 
 def is_open(calibration: Calibration) -> bool:
-    """Whether the poses left directions of the accelerometer's model undetermined (too few faces up)."""
+    """Whether the poses leave parameters of the accelerometer undetermined (too few faces up)."""
     sensor = calibration.accelerometer
     sigma = np.sqrt(np.diag(np.asarray(sensor.covariance))[:12])
     scale = float(np.abs(np.linalg.det(sensor.S))) ** (1.0 / 3.0)
@@ -71,10 +71,10 @@ def is_open(calibration: Calibration) -> bool:
 
 
 def nominal_start(obs: Observations, calibration: Calibration) -> tuple[SessionState, Prior]:
-    """Where the poses do not determine the model: a plain triad of the unit's scale, and how far real ones stray.
+    """Start for undetermined models: a plain triad of nominal scale, and a prior as wide as parts vary.
 
-    The accelerometer's scale is that of its unit, or of counts the one that makes |g| of the typical pose; the gyro's
-    that of its unit, or of counts the one that turns gravity by what the poses show. Axes are taken as documented.
+    The accelerometer's scale is that of its unit, or of counts the one that gives |g| in the typical pose; the gyro's
+    that of its unit, or of counts the one that rotates gravity as the poses show. Axes are taken as documented.
     """
     known_scale = acceleration_to_si(obs.recording.accelerometer_unit)
     raw = obs.pose_force + obs.force_origin
@@ -109,10 +109,10 @@ def nominal_start(obs: Observations, calibration: Calibration) -> tuple[SessionS
 
 
 def _rate_scales_of_counts(obs: Observations, up: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-    """(3,) scale of every gyro in counts: what turns gravity by what the poses show, then what makes table turns whole.
+    """(3,) gyro scales in counts: from the rotation of gravity between poses, then from rotations on a table.
 
-    Turns about the vertical leave gravity where it was; if those about one axis are all near multiples of a right angle
-    for one scale within a quarter of the first guess, that is the scale, and the second answer says so.
+    Rotations about the vertical leave gravity unchanged. If those about one axis are all near multiples of 90° for one
+    scale near the first estimate (factor 0.8 to 1.25), that scale is used, and the second value (3,) is true.
     """
     assert obs.raw_rate is not None
     ratios, turns = [], []
@@ -139,7 +139,7 @@ def _rate_scales_of_counts(obs: Observations, up: FloatArray) -> tuple[FloatArra
 
 
 def prior_of(obs: Observations, calibration: Calibration) -> Prior:
-    """A given calibration as knowledge about the 18 unknowns, in the lower frame on centred readings."""
+    """A given calibration as a prior on the 18 unknowns, in the lower frame on centred readings."""
     Q, L = lower_frame(calibration.accelerometer.S)
     b = Q.T @ calibration.accelerometer.b + L @ obs.force_origin
     gyro_S = np.eye(3) if calibration.gyroscope is None else Q.T @ calibration.gyroscope.S
@@ -160,7 +160,7 @@ def prior_of(obs: Observations, calibration: Calibration) -> Prior:
     if calibration.gyroscope is None:
         cov[12:, 12:] = np.eye(12)
     out = A @ cov @ A.T
-    # A published calibration carries no error bars: then it is taken at its last printed digits.
+    # A published calibration without uncertainties is taken as exact to its last printed digits.
     floor = (1e-6 * np.maximum(np.abs(mean), 1e-3 * np.abs(mean).max())) ** 2
     out[np.diag_indices_from(out)] += floor
     return Prior(mean, out)
@@ -191,7 +191,7 @@ def linear_model(fitted: Fit) -> LinearModel:
 
 
 def extended_sensor(model: MappingProxyType[str, Any], si_unit: str) -> SensorCalibration:
-    """A linear model's sensor as a calibration record (diagonal covariance: numbers, not their fit)."""
+    """A linear model's sensor as a calibration record, with a diagonal covariance."""
     variance = np.concatenate([np.square(model["sigma_S"]).ravel(), np.square(model["sigma_b"])])
     return SensorCalibration(
         S=np.array(model["S"]),

@@ -1,4 +1,4 @@
-"""The session model as the diagnosis sees it: a point in its unknowns, what effects add, and the rows judged there.
+"""The session model of the diagnosis: its state, what effects add, and the residual rows.
 
 Unknowns: accelerometer S (lower) and b, gyro S, and for every pose the vertical in the body (2 angles), the gyro bias
 and the slow part of the accelerometer bias. Both biases are random walks whose strength comes from the corner time of
@@ -20,14 +20,14 @@ from trihedron.diagnose.session.observations import Observations
 from trihedron.session.noise import START_STRENGTHS, Strengths, scatter_unit
 
 BLOCKS_OF_WIDTH = 10
-"""Blocks whose means stand for a width of the smoothing: it is wider than its blocks by a part in 2400, and a window of
-thousands of samples is one of dozens."""
+"""Blocks of samples per smoothing width: the blocks widen it by a part in 2400, and reduce windows of thousands of
+samples to dozens of means."""
 
 
 def smoothed_slope(values: FloatArray, time_s: FloatArray, width: float) -> FloatArray:
     """(n,) rate of change, per second, of ``values`` (n,) smoothed by a Gaussian of ``width`` samples.
 
-    Timestamps are smoothed alike: a straight line keeps its slope across pauses, and to the ends.
+    Timestamps are smoothed too: a straight line keeps its slope across pauses, and to the ends.
     """
     length = max(round(width / BLOCKS_OF_WIDTH), 1)
     starts = np.arange(0, len(values), length)
@@ -40,16 +40,16 @@ def smoothed_slope(values: FloatArray, time_s: FloatArray, width: float) -> Floa
 
 
 STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)
-"""Labels of residual rows; ``PRIOR`` rows keep flat directions finite and belong to no domain."""
+"""Labels of residual rows; ``PRIOR`` rows keep undetermined directions finite and belong to no domain."""
 
 _LOWER: tuple[tuple[int, int], ...] = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
 
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Values the fit is pulled to with their covariance (18 unknowns, centred model).
+    """Prior mean and covariance of the 18 unknowns of the centred model.
 
-    A given calibration, which the recording may contradict, or, if ``is_weak``, what holds for any such instrument.
+    A given calibration, which the recording may contradict, or, if ``is_weak``, the range of any such instrument.
     """
 
     mean: FloatArray
@@ -59,9 +59,9 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class SessionState:
-    """State of the model. ``accel_S``, ``accel_b``, ``gyro_S`` act on centred raw readings; the rest is per pose.
+    """State of the session. ``accel_S``, ``accel_b``, ``gyro_S`` act on centred raw readings; the rest is per pose.
 
-    Biases are in SI; ``strengths`` are those of the session's noise.
+    Biases are in SI; ``strengths`` are the noise strengths of the session.
     """
 
     gravity: float
@@ -77,7 +77,7 @@ class SessionState:
 
 @dataclass(frozen=True, eq=False)
 class Distortion:
-    """What effects add to the corrected readings, linear in their parameters: SI, instrument frame.
+    """What effects add to the corrected readings, linear in their parameters: SI, body frame.
 
     ``force`` and ``rate`` (points, 3, K) or None, at the points of :class:`Trajectory` (poses, then move samples).
     """
@@ -117,11 +117,11 @@ def stacked(parts: list[Distortion]) -> Distortion:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """The motion as the twin sees it, at its *points*: one per pose, then every sample of every move.
+    """The motion of the session state at its *points*: one per pose, then every sample of every move.
 
-    ``force`` (points, 3) specific force and ``rate`` (points, 3) angular rate in SI, corrected by the twin (distortions
-    of accepted effects removed); ``attitude`` (move samples, 3, 3) rotation since the move began; ``move_slices`` the
-    points of each move.
+    ``force`` (points, 3) specific force and ``rate`` (points, 3) angular rate in SI, corrected by S, b and the accepted
+    effects; ``attitude`` (move samples, 3, 3) rotation since the move began; ``move_slices`` the points of each move;
+    ``point_samples`` (points,) index of the sample.
     """
 
     force: FloatArray
@@ -135,8 +135,8 @@ class Trajectory:
 class System:
     """Whitened residuals of a fit and their labels, (rows,) each.
 
-    ``domain`` and ``segment`` (number of the pose or move) say what a row judges, ``channel`` its axis; ``walk`` is 0
-    for readings, 1 and 2 for walks of the accelerometer's and the gyro's bias, more for what else is not a reading.
+    ``domain`` and ``segment`` (number of the pose or move) state what a row tests, ``channel`` its axis; ``walk`` is 0
+    for readings, 1 and 2 for walks of the accelerometer's and the gyro's bias, above 2 for other rows without readings.
     """
 
     residual: FloatArray
@@ -148,7 +148,7 @@ class System:
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """The rows of one fit and the means to add columns to them."""
+    """The rows of one fit, and columns of further effects."""
 
     obs: Observations
     state: SessionState
@@ -175,13 +175,13 @@ class Linearisation:
 
     @cached_property
     def accel_white(self) -> FloatArray:
-        """(poses, 3, 3) from an error in SI to a whitened row of the accelerometer at rest."""
+        """(poses, 3, 3) matrix from an error in SI to the whitened rows of a static accelerometer reading."""
         inverse = np.linalg.inv(self.state.accel_S)
         return core_poses(self.obs).force_white() @ inverse
 
     @cached_property
     def gyro_white(self) -> FloatArray | None:
-        """(poses, 3, 3) the same of the gyro; ``None`` without one."""
+        """(poses, 3, 3) matrix from an error in SI to the whitened rows of a static rate; ``None`` without a gyro."""
         if self.obs.pose_rate_sigma is None:
             return None
         inverse = np.linalg.inv(self.state.gyro_S)
@@ -194,17 +194,17 @@ class Linearisation:
 
     @cached_property
     def move_white(self) -> FloatArray:
-        """(moves, 5, 5) from an error in SI to whitened rows."""
+        """(moves, 5, 5) matrix from an error in SI to whitened rows."""
         return self.core.whitening()
 
 
 def contiguous(values: FloatArray | None) -> FloatArray | None:
-    """Values as the core reads them."""
+    """Values as a contiguous float64 array for the core."""
     return None if values is None else np.ascontiguousarray(values, dtype=np.float64)
 
 
 def core_poses(obs: Observations) -> _core.SessionPoses:
-    """The poses of some observations, in the core."""
+    """The poses of some observations, as input of the core."""
     has_rate = obs.pose_rate is not None and obs.pose_rate_sigma is not None and obs.rate_density is not None
     return _core.SessionPoses(
         time_s=np.ascontiguousarray(obs.pose_time_s, dtype=np.float64),
@@ -239,7 +239,7 @@ def core_model(
 
 
 def core_state(state: SessionState) -> _core.SessionState:
-    """A point in the unknowns of the Rust model: biases in raw units."""
+    """A state of the session as input of the Rust model: biases in raw units."""
     return _core.SessionState(
         force_scale=np.ascontiguousarray(state.accel_S),
         force_bias=np.ascontiguousarray(state.accel_b),
@@ -252,7 +252,7 @@ def core_state(state: SessionState) -> _core.SessionState:
 
 
 def state_of(core: _core.SessionFit, gravity_m_s2: float) -> SessionState:
-    """The point where a fit ended, biases in SI."""
+    """The state where a fit ended, biases in SI."""
     accel_S, gyro_S = np.asarray(core.force_scale), np.asarray(core.rate_scale)
     return SessionState(
         gravity=gravity_m_s2, accel_S=accel_S, accel_b=np.asarray(core.force_bias), gyro_S=gyro_S,

@@ -1,1 +1,1 @@
-"""What is said of effects: the closed catalogue of their words, by the effect's id."""
+"""Words about effects: the closed catalogue, by the effect's id."""

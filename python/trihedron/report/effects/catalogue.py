@@ -1,4 +1,4 @@
-"""The closed catalogue of what is said of effects, by effect and case."""
+"""The closed catalogue of sentences about effects, by effect and case."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ OF_ANY: Mapping[str, str] = MappingProxyType(
         "drifts by as much.|}",
     }
 )
-"""Sentences that every effect may be told in."""
+"""Sentences that any effect may use, by case."""
 
 
 def effect_words(effect_id: str, case: str, values: Mapping[str, Any]) -> str:
-    """What is said of an effect; one that came from outside the package has the sentences of any.
+    """The sentence about an effect; an effect from outside the package has only those of ``OF_ANY``.
 
     Raises
     ------
     KeyError
-        When the catalogue has no such case, or a place of it has no value.
+        When the catalogue has no such case, or a placeholder of it has no value.
     """
     entry = CATALOGUE.get(effect_id)
     if case in OF_ANY:
@@ -41,7 +41,7 @@ def effect_words(effect_id: str, case: str, values: Mapping[str, Any]) -> str:
 
 
 def experiment(effect_id: str, *, at_rest: bool) -> str:
-    """What to record so that the effect cannot be mistaken for another; empty for one from outside the package."""
+    """The recording that separates the effect from others; empty for one from outside the package."""
     entry = CATALOGUE.get(effect_id)
     return "" if entry is None else entry.experiment_at_rest if at_rest else entry.experiment
 
@@ -52,6 +52,6 @@ def why_not(name: str, values: Mapping[str, Any]) -> str:
     Raises
     ------
     KeyError
-        When there is no such reason, or a place of it has no value.
+        When there is no such reason, or a placeholder of it has no value.
     """
     return filled(REASONS[name], values, {})

@@ -1,4 +1,4 @@
-"""What is said of one effect."""
+"""Words about one effect."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from types import MappingProxyType
 class EffectWords:
     """Words of the effect ``id``.
 
-    ``mechanism`` completes "the model lacks this: ..."; ``experiment`` tells what to record so that it cannot be
-    mistaken for another, ``experiment_at_rest`` the same of a log of one or two orientations. ``said`` is the sentence
-    of an accepted effect by the case that the effect states, with places for values (``report/findings/wording.py``);
-    without one it is the mechanism with its strongest term. ``lines`` are the parts of places ``{name:each}``.
+    ``mechanism`` completes "the model lacks this: ..."; ``experiment`` is the recording that separates it from other
+    effects, ``experiment_at_rest`` the same for a log of one or two orientations. ``said`` are sentences about the
+    accepted effect by case, with placeholders for values (``report/findings/wording.py``); without one the sentence is
+    the mechanism with its strongest term. ``lines`` are the parts of placeholders ``{name:each}``.
     """
 
     id: str

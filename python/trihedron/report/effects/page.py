@@ -1,4 +1,4 @@
-"""The catalogue as a page of the documents; the site is built with it."""
+"""The catalogue of effects as a page of the documentation."""
 
 from __future__ import annotations
 

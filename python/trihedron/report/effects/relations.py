@@ -1,4 +1,4 @@
-"""What would prove a relation that no mechanism explains, and what it resembles, by the family of its variables."""
+"""Experiments that test an empirical relation, and mechanisms that it resembles, by the family of its variables."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 @dataclass(frozen=True)
 class FamilyWords:
-    """``experiment`` that would prove a relation of this family; ``resembles``: mechanisms with such variables."""
+    """``experiment`` that tests a relation of this family; ``resembles``: mechanisms with such variables."""
 
     experiment: str
     resembles: tuple[str, ...] = ()
@@ -49,9 +49,9 @@ FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
         "force rate": FamilyWords("shake along one axis without turning"),
     }
 )
-"""By the family that ``diagnose/relations`` gives its variables; a family not named here has no words."""
+"""Words by family of variables, as defined in ``diagnose/relations``; other families have none."""
 
 
 def family_words(family: str) -> FamilyWords:
-    """Experiment and resemblances of a family of variables; empty for one that the catalogue does not hold."""
+    """Experiment and resembling mechanisms of a family of variables; empty for one not in the catalogue."""
     return FAMILIES.get(family, FamilyWords(""))

@@ -1,4 +1,4 @@
-"""Words of the effects of both sensors, of the log, and of how the session was done."""
+"""Words of the effects of both sensors, of the log, and of the session."""
 
 from __future__ import annotations
 

@@ -28,12 +28,12 @@ def drifts(sensor: str, unit: str, walk: str, at_rest: str = "") -> Mapping[str,
 
 
 def follows_temperature(sensor: str, unit: str) -> Mapping[str, str]:
-    """Bias against temperature in a log of one or two orientations, and what it could be confounded with."""
+    """Bias over temperature in a log of one or two orientations, and effects that it is confounded with."""
     return MappingProxyType({case: _thermal(sensor, own) for case, own in _units(unit)})
 
 
 def _units(unit: str) -> tuple[tuple[str, str], ...]:
-    """Cases of a log at rest, with their unit: readings of unknown scale stay counts."""
+    """Cases of a static log, with their unit: readings of unknown scale stay counts."""
     return (("at-rest", unit), ("at-rest-counts", "counts"))
 
 
@@ -57,7 +57,7 @@ def _thermal(sensor: str, unit: str) -> str:
 
 
 def saturates(effect_id: str, sensor: str) -> EffectWords:
-    """A range limit."""
+    """Words of the effect of a range limit."""
     end = f"the {sensor} reaches its range limit"
     return EffectWords(
         effect_id,

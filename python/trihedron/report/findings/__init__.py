@@ -1,4 +1,4 @@
-"""What the tool noticed, in words: the closed catalogue of sentences, and findings as a reader wants them told."""
+"""Findings in words: the closed catalogue of sentences, and findings merged in reading order."""
 
 from trihedron.report.findings.grouping import combined, findings_block, ranged, verdict_of
 

@@ -1,4 +1,4 @@
-"""What is said about a fitted accelerometer."""
+"""Findings about a fitted accelerometer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said where stages meet: gravity, limits, temperature, many recordings, what is applied or compared."""
+"""Findings of ``api``: gravity, limits, temperature, many recordings, applied and compared calibrations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The closed catalogue of findings: every sentence the tool says about a recording, by code and case."""
+"""The closed catalogue of findings: every sentence about a recording, by code and case."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ CATALOGUE: Mapping[tuple[FindingCode, str], Entry] = MappingProxyType(
 def words_of(
     code: FindingCode, case: str, severity: Severity | None, values: Mapping[str, Any]
 ) -> tuple[Severity, str, str, str]:
-    """Severity, what was seen, the likely cause and the next action.
+    """Severity, observation, likely cause and next action.
 
     Raises
     ------
     KeyError
-        When the catalogue has no such entry, or a place of it has no value.
+        When the catalogue has no such entry, or a placeholder of it has no value.
     """
     entry = CATALOGUE[code, case]
     seen, cause, action = (filled(text, values, entry.lines) for text in (entry.seen, entry.cause, entry.action))

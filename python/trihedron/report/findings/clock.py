@@ -1,4 +1,4 @@
-"""What is said about time: timestamps, rates, gaps, and the clock that a recording gets."""
+"""Findings about time: timestamps, rates, gaps, and the clock of a recording."""
 
 from __future__ import annotations
 

@@ -12,11 +12,11 @@ from trihedron.report.findings.wording import places
 
 @dataclass(frozen=True)
 class Entry:
-    """What is said when a stage notices ``code`` (and, where one code has several occasions, the ``case`` of it).
+    """Sentences of the finding ``code`` (and of one ``case``, where a code has several).
 
-    ``severity`` is the usual one, ``or_severity`` another that the stage may state instead. ``seen``, ``cause`` and
-    ``action`` have places for values (``wording.py``); ``numbers`` names values told to machines only, ``lines`` the
-    sentence part of one group in a place ``{name:each}`` (its places are ``v0``, ``v1`` ...).
+    ``severity`` is the default, ``or_severity`` another that the stage may state instead. ``seen``, ``cause`` and
+    ``action`` have placeholders for values (``wording.py``); ``numbers`` names values for JSON only, ``lines`` the
+    sentence part for one group in a placeholder ``{name:each}`` (with placeholders ``v0``, ``v1`` ...).
     """
 
     code: FindingCode
@@ -31,5 +31,5 @@ class Entry:
 
     @property
     def places(self) -> frozenset[str]:
-        """Names of all values that a stage gives."""
+        """Names of all values that a stage must pass."""
         return places(self.seen) | places(self.cause) | places(self.action) | frozenset(self.numbers)

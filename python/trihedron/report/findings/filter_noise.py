@@ -1,4 +1,4 @@
-"""What is said of noise for a filter."""
+"""Findings about filter noise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Findings in reading order, each said once, and the sentence they add up to."""
+"""Findings in reading order, with equal ones merged, and the verdict that follows from them."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ _CONSEQUENCE = (
     FindingCode.WEAKLY_OBSERVABLE,
     FindingCode.GYRO_G_SENSITIVITY,
 )
-"""What concerns the whole result, the gravest first; it comes before what concerns a part of the recording."""
-# A number that is a value; one that names a thing (pose 3) is recognised by the word before it.
+"""Findings about the whole result, the gravest first; they come before those about a part of the recording."""
+# A number that is a value; a number in a name (pose 3) is recognised by the word before it.
 _NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+−-]?\d+)?")
 _NAMED = re.compile(r"^(Move|Pose|Turn) (\d+)(?: \([^)]*\))?,? (.*)$", re.DOTALL)
 _AXIS = re.compile(r"^((?:gyro|accel)(?:\s\w+)?|ch\d+|\w+ [xyz123]): (.*)$", re.DOTALL | re.IGNORECASE)
 
 
 def findings_block(findings: Iterable[Finding]) -> FindingList | Paragraph:
-    """Gravest first; within a severity by consequence, then in the order of the stages; what recurs, once."""
+    """Findings, gravest first; within a severity by consequence, then in the order of the stages; equal ones merged."""
     ordered = tuple(map(_sentence, sorted(combined(findings), key=_weight)))
     return FindingList(ordered) if ordered else Paragraph("None.")
 
@@ -44,7 +44,7 @@ def _weight(finding: Finding) -> tuple[int, int]:
 
 
 def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) -> str:
-    """``bad`` with what the first serious finding says first; ``usable`` with the number of warnings; or ``good``."""
+    """``bad`` with the first clause of the gravest finding; ``usable`` with the number of warnings; or ``good``."""
     found = sorted(combined(findings), key=_weight)
     serious = [finding for finding in found if finding.severity is Severity.SERIOUS]
     n_warnings = sum(finding.severity is Severity.WARNING for finding in found)
@@ -54,7 +54,7 @@ def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) ->
 
 
 def combined(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """What several axes, poses or moves have in common as one finding that names them all."""
+    """Findings with those that several axes, poses or moves have in common merged into one that lists them."""
     groups: dict[tuple[str, str, str, str], list[Finding]] = {}
     for finding in findings:
         key = (finding.code.value, finding.severity.value, finding.cause, finding.action)
@@ -66,7 +66,7 @@ def combined(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def _together(sentences: Sequence[str]) -> str:
-    """One sentence for all that differ in nothing but their subject and their numbers; else one after another."""
+    """One sentence for all that differ only in their subject and numbers; else one after another."""
     for pattern, name in ((_AXIS, _axes), (_NAMED, _things)):
         parts = [pattern.match(text) for text in sentences]
         if all(parts):
@@ -95,7 +95,7 @@ def _things(parts: Sequence[re.Match[str]], rest: str) -> str:
 
 
 def ranged(sentences: Sequence[str]) -> str | None:
-    """The sentence they share, with ranges where its numbers differ; None where more than numbers differs."""
+    """The common sentence with ranges in place of numbers that differ; None where the texts differ."""
     skeleton = _NUMBER.sub("\0", sentences[0])
     if any(_NUMBER.sub("\0", text) != skeleton for text in sentences[1:]):
         return None
@@ -117,5 +117,5 @@ def _capital(text: str) -> str:
 
 
 def _sentence(finding: Finding) -> Finding:
-    """What was seen, with a capital letter."""
+    """The finding with observation and cause beginning with a capital letter."""
     return replace(finding, seen=_capital(finding.seen), cause=_capital(finding.cause))

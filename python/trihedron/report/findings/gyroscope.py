@@ -1,4 +1,4 @@
-"""What is said about a fitted gyro: by moves, by turns of known angle, by the fit of a whole session."""
+"""Findings about a fitted gyro: by moves, by turns of known angle, by the fit of a whole session."""
 
 from __future__ import annotations
 

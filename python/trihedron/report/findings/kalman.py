@@ -1,4 +1,4 @@
-"""What is said about a Kalman filter's answer and its innovations."""
+"""Findings about a Kalman filter's result and its innovations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said about a log at rest and the noise terms it shows."""
+"""Findings about a static log and its noise terms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The catalogue as a page of the documents; the site is built with it."""
+"""The catalogue of findings as a page of the documentation."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _told(entry: Entry) -> str:
 
 
 def shown(template: str) -> str:
-    """A sentence with the names of its values in their places, and both branches where it has two."""
+    """A sentence with the names of its values in place of the values, and both branches where it has two."""
     words = []
     for text, name, how, _ in Formatter().parse(template):
         words.append(text.replace("*", r"\*").replace("<", "&lt;"))

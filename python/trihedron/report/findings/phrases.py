@@ -1,4 +1,4 @@
-"""Parts of sentences that stages choose by id: what is least known, what to add, why a fit ended."""
+"""Parts of sentences that stages select by id: least determined parameters, poses to add, reasons of a stop."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LINES: Mapping[str, str] = MappingProxyType(
         "streams": "{v0} ({v1} messages)",
     }
 )
-"""What is said of each of several."""
+"""Sentence parts that are repeated for each of several groups of values."""
 
 PHRASES: Mapping[str, str] = MappingProxyType(
     {
@@ -53,7 +53,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "too-many-iterations": "stopped: iteration limit reached before convergence",
         "closed-form": "closed form",
         "linear-least-squares": "linear least squares",
-        # what a model's numbers resemble
+        # likely mistakes in a model's parameters
         "biases-never-added": "All simulated {sensor} biases are 0: was the drawn bias never applied?",
         "accelerometer-scales-relative": "Scales of the accelerometer are relative to the mean of its three axes: the "
         "{side} is in counts ({per_g:.5g} per g), whose nominal size is not known.",
@@ -87,13 +87,13 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "unit-with-rate": "{unit} ({rate_hz:.4g} Hz)",
         "amount-of-scatter": "{value:.3g} {unit} in {name}",
         "amount-of-change": "{value:+.3g} ± {std:.2g} {unit} in {name}",
-        # what an exception said, or a finding, or an effect: a sentence becomes a clause of another
+        # the text of an exception, a finding or an effect as a clause of another sentence
         "because": "{sentence:clause}",
         "quoted": "{sentence}",
         # why an effect was not compensated
         "effect-unknown": "this version does not know it",
         "effect-of-session": "it belongs to that session, not to the sensor",
-        # why a recording does not go with the others
+        # why a recording cannot be combined with the others
         "another-correction": "its readings were corrected on board by other parameters than those of the first",
         "not-trusted": "its own calibration is not to be trusted: {seen:opening}",
         "sensor-not-calibrated": "its {sensor} was not calibrated",
@@ -110,6 +110,6 @@ def phrase(name: str, values: Mapping[str, Any]) -> str:
     Raises
     ------
     KeyError
-        When there is no such phrase, or a place of it has no value.
+        When there is no such phrase, or a placeholder of it has no value.
     """
     return filled(PHRASES[name], values, LINES)

@@ -1,4 +1,4 @@
-"""What is said about a file: its columns, units, rows and devices."""
+"""Findings about a file: its columns, units, rows and devices."""
 
 from __future__ import annotations
 

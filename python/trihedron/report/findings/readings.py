@@ -1,4 +1,4 @@
-"""What is said about the readings themselves: missing, repeated, frozen, clipped, coarse."""
+"""Findings about the readings: missing, repeated, frozen, clipped, coarse."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said where a log is held against a known motion, or against another log."""
+"""Findings about the comparison of a log with known motion, or with another log."""
 
 from __future__ import annotations
 

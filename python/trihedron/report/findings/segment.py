@@ -1,4 +1,4 @@
-"""What is said about poses and moves."""
+"""Findings about poses and moves."""
 
 from __future__ import annotations
 

@@ -1,25 +1,25 @@
-"""Sentences with places for values: ``{rms_m_s2:.3g mm/s²}`` is the value in that unit with three digits.
+"""Sentences with placeholders for values: ``{rms_m_s2:.3g mm/s²}`` is the value in that unit with three digits.
 
-A place is a name and, after the colon, how its value becomes words:
+A placeholder is a name and, after the colon, the format of its value:
 
 ``.3g`` · ``.3g mm/s²``  a number, in the unit named there (values are SI); ``abs .3g %`` without its sign;
                          ``.3g !%`` without the unit's name
-``all .2g °/s``          several numbers in one unit, which is named once: ``0.1, 0.2 °/s``
+``all .2g °/s``          several numbers in one unit, which is printed once: ``0.1, 0.2 °/s``
 ``# pose``               ``1 pose``, ``3 poses``
-``?drifts|drift``        the first words where the value is 1 or true, else the second; they may hold places
-``<below|above``         the first words where the value is negative, else the second; they may hold places
-``&, the ``              several words, joined by what stands after the ``&``; ``and``: ``x, y and z``
+``?drifts|drift``        the first words where the value is 1 or true, else the second; placeholders are allowed
+``<below|above``         the first words where the value is negative, else the second; placeholders are allowed
+``&, the ``              several words, joined by the text after the ``&``; ``and``: ``x, y and z``
 ``together``             ``x, y + z``
 ``sentences``            ``X. Y.``
-``clause``               a sentence without its stop
+``clause``               a sentence without its full stop
 ``opening``              its first clause alone
 ``unit``                 ``m/s²`` for ``m/s^2``
-``first 8``              ``3, 5, 6``, with ``...`` behind the eighth
+``first 8``              ``3, 5, 6``, with ``...`` after the eighth
 ``numbered``             several words as ``(1) ...; (2) ...``
 ``axis``                 ``X`` for 1 or ``x``
-``axes`` · ``axes and ``  several of them, joined by comma or by the word: ``X, Y``, ``X and Z``
+``axes`` · ``axes and ``  several axes, joined by comma or by the word: ``X, Y``, ``X and Z``
 ``letter``               ``x`` for 1
-``run``                  several groups of values, each by the entry's line of that name, with nothing between
+``run``                  several groups of values, each by the entry's line of that name, without a separator
 ``each`` · ``each; ``    several groups of values, each by the entry's line of that name, joined by comma or ``; ``
 """
 
@@ -45,11 +45,11 @@ UNITS: Mapping[str, Callable[[float], float]] = {
 }
 
 BRANCHES = "?<"
-"""First letters of rules that choose between two branches."""
+"""First characters of formats that select one of two branches."""
 
 
 def places(template: str) -> frozenset[str]:
-    """Names of the values that a sentence has places for."""
+    """Names of the placeholders of a sentence."""
     found: set[str] = set()
     for _, name, how, _ in Formatter().parse(template):
         if name:
@@ -58,12 +58,12 @@ def places(template: str) -> frozenset[str]:
 
 
 def filled(template: str, values: Mapping[str, Any], lines: Mapping[str, str]) -> str:
-    """The sentence with its values.
+    """The sentence with its values inserted.
 
     Raises
     ------
     KeyError
-        When a place has no value.
+        When a placeholder has no value.
     """
     words = []
     for text, name, how, _ in Formatter().parse(template):
@@ -77,13 +77,13 @@ def filled(template: str, values: Mapping[str, Any], lines: Mapping[str, str]) -
 
 
 def _chosen(values: Mapping[str, Any], name: str, how: str, lines: Mapping[str, str]) -> str:
-    """The words of one of two branches; those of the other need no values."""
+    """The words of the selected branch; placeholders of the other need no values."""
     first, second = branches(how)
     return filled(first if (values[name] == 1 if how[0] == "?" else values[name] < 0) else second, values, lines)
 
 
 def branches(how: str) -> tuple[str, str]:
-    """The two branches of a rule: a bar outside all braces parts them."""
+    """The two branches of a format, separated by a bar outside all braces."""
     depth = 0
     for i, letter in enumerate(how):
         depth += (letter == "{") - (letter == "}")
@@ -133,7 +133,7 @@ def _in_words(value: Any, how: str, line: str) -> str:
 
 
 def axis_name(axis: int | str) -> str:
-    """``X``, as printed on the board, of X or ``x``."""
+    """``X``, as printed on the board, for 1 or ``x``."""
     return axis.upper() if isinstance(axis, str) else XYZ[int(axis) - 1]
 
 
@@ -149,7 +149,7 @@ def _number(value: float, how: str) -> str:
 
 
 def _digits(value: float, digits: str) -> str:
-    """With an exponent as in tables: ``7.3e−5``."""
+    """A number with an exponent as in tables: ``7.3e−5``."""
     mantissa, e, power = format(value, digits).partition("e")
     return f"{mantissa}e{int(power)}".replace("e-", f"e{MINUS}") if e else mantissa
 
@@ -159,5 +159,5 @@ def _plural(noun: str) -> str:
 
 
 def opening(text: str) -> str:
-    """What a text says first, without a stop: the whole of it stands elsewhere."""
+    """The first clause of a text, without a full stop."""
     return re.split(r"(?<=\D)\. (?=[A-Z])|; ", text, maxsplit=1)[0].rstrip(".")
