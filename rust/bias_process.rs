@@ -66,7 +66,7 @@ impl Readings {
     pub fn check(&self) -> Result<()> {
         let n = self.time.len();
         if n == 0 || self.columns == 0 {
-            return Err(Error::bad_input("a zero process needs readings"));
+            return Err(Error::bad_input("a bias process needs readings"));
         }
         if self.rows.len() != n * self.columns
             || self.variance.len() != n

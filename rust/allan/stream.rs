@@ -272,7 +272,7 @@ impl Stream {
         }
         if out.clusters.is_empty() {
             return Err(Error::not_determined(format!(
-                "{n} readings are too few for the cluster sizes asked for"
+                "{n} readings are too few for the requested cluster sizes"
             )));
         }
         Ok(out)

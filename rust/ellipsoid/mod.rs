@@ -93,7 +93,7 @@ pub fn fit_quadric(u: &[Vector3<f64>]) -> Result<Quadric> {
     let n = u.len();
     if n < 9 {
         return Err(Error::not_determined(format!(
-            "{n} still poses cannot determine the nine numbers of an ellipsoid: record at least nine, better eighteen \
+            "{n} static poses cannot determine the nine parameters of an ellipsoid: record at least nine, better eighteen \
              (six faces and twelve edges of a cube); {}",
             missing_directions(u)
         )));
@@ -105,7 +105,7 @@ pub fn fit_quadric(u: &[Vector3<f64>]) -> Result<Quadric> {
     let svd = h.svd(true, true);
     if svd.rank(1e-9 * svd.singular_values[0]) < 9 {
         return Err(Error::not_determined(format!(
-            "the still poses do not determine an ellipsoid: {}",
+            "the static poses do not determine an ellipsoid: {}",
             missing_directions(u)
         )));
     }
@@ -136,7 +136,7 @@ pub fn fit_ellipsoid(u: &[Vector3<f64>]) -> Result<Quadric> {
     let s22 = scatter.fixed_view::<4, 4>(6, 6).into_owned();
     let trouble = || {
         Error::not_determined(format!(
-            "no ellipsoid fits the still poses: {}",
+            "no ellipsoid fits the static poses: {}",
             missing_directions(u)
         ))
     };
@@ -214,7 +214,7 @@ pub fn calibrate(readings: &[Vector3<f64>], gravity: f64, frame: Frame) -> Resul
         Ok(model)
     } else {
         Err(Error::not_determined(
-            "the ellipsoid through the still poses has no finite size: check the readings",
+            "the ellipsoid through the static poses has no finite size: check the readings",
         ))
     }
 }
@@ -236,7 +236,7 @@ fn by_rows(
         })
         .ok_or_else(|| {
             Error::not_determined(format!(
-                "the quadric through the still poses is not an ellipsoid: {}",
+                "the quadric through the static poses is not an ellipsoid: {}",
                 missing_directions(&u)
             ))
         })

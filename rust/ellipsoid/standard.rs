@@ -31,7 +31,7 @@ impl Standardisation {
         }
         if size <= 1e-12 * (1.0 + centre.norm()) {
             return Err(Error::not_determined(
-                "all still poses read the same: turn the sensor into different orientations between holds",
+                "all static poses read the same: turn the sensor into different orientations between poses",
             ));
         }
         Ok(Self { centre, size })

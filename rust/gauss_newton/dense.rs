@@ -126,7 +126,7 @@ impl<P: Problem> Descent for Dense<'_, P> {
         let linear = self.problem.linearise(x)?;
         if linear.r_factor.iter().any(|value| !value.is_finite()) {
             return Err(Error::bad_input(
-                "the residuals or their derivatives are not finite at the start of the fit; check the input for NaN",
+                "the residuals or their derivatives are not finite; check the input for NaN",
             ));
         }
         // Marquardt's scaling, never decreasing: a parameter whose column vanishes would take unbounded steps.

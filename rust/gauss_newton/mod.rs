@@ -185,7 +185,7 @@ pub fn descend<D: Descent>(
         iterations += 1;
         if !local.cost().is_finite() || !local.is_finite() {
             return Err(Error::bad_input(
-                "the residuals or their derivatives are not finite at the start of the fit; check the input for NaN",
+                "the residuals or their derivatives are not finite; check the input for NaN",
             ));
         }
         let gradient = local.gradient_cosine();

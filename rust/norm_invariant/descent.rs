@@ -40,7 +40,7 @@ impl Direct<'_> {
 
     fn normal(&self, x: &[f64]) -> Result<sums::Normal> {
         sums::normal(&self.charged, &self.at(x))
-            .ok_or_else(|| Error::bad_input("there are no still poses to fit"))
+            .ok_or_else(|| Error::bad_input("there are no static poses to fit"))
     }
 
     fn is_collapsed(&self, at: &At) -> bool {

@@ -110,7 +110,7 @@ impl Readings<'_> {
 
     fn check(&self) -> Result<()> {
         if self.values.is_empty() {
-            return Err(Error::bad_input("there are no still poses to fit"));
+            return Err(Error::bad_input("there are no static poses to fit"));
         }
         if !self.pose.is_empty() {
             let last = self.pose.iter().max().copied().unwrap_or(0);

@@ -85,7 +85,7 @@ impl<'a> Starts<'a> {
 
     fn none(&self) -> Error {
         Error::not_determined(format!(
-            "the still poses give no starting point: {}",
+            "the static poses give no starting point: {}",
             ellipsoid::missing_directions(&self.standardised())
         ))
     }

@@ -125,7 +125,7 @@ impl SpectralBins {
     fn know(&self, terms: &[usize]) -> PyResult<()> {
         if terms.iter().any(|&k| k >= self.bins.basis.len()) {
             return Err(pyo3::exceptions::PyValueError::new_err(format!(
-                "there are {} terms, asked for {terms:?}",
+                "there are {} terms, requested {terms:?}",
                 self.bins.basis.len()
             )));
         }

@@ -221,7 +221,7 @@ impl Session {
         let h = self.n_poses();
         if h < 2 {
             return Err(Error::bad_input(format!(
-                "a session needs at least 2 still poses, got {h}"
+                "a session needs at least 2 static poses, got {h}"
             )));
         }
         let sizes = [self.time_s.len(), self.force.sigma.len()];

@@ -72,7 +72,7 @@ impl Converter {
         let is_sound = self.lsb >= 0.0 && self.dead_band >= 0.0 && self.low < self.high;
         if !is_sound || self.missing_every == 1 {
             return Err(Error::bad_input(format!(
-                "the converter is malformed: step {}, range {} to {}, dead band {}, one code missing in {}",
+                "the ADC is malformed: step {}, range {} to {}, dead band {}, one code missing in {}",
                 self.lsb, self.low, self.high, self.dead_band, self.missing_every
             )));
         }

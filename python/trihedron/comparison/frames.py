@@ -111,9 +111,8 @@ _CAUSE = {
 
 def _remark(what: What, ratio: float, interval: tuple[float, float], k: int, alpha: float) -> str:
     of = "The gravity errors in poses" if what == "poses" else "The tilt errors after rotations"
-    verb = "miss" if what == "poses" else "misses"
     return (
-        f"{of} of the model, moved as the log was, {verb} {ratio:.2f} times as far as the log's "
+        f"{of} of the model, moved as the log was, are {ratio:.2f} times as large as the log's "
         f"({100.0 * (1.0 - 2.0 * alpha):g} % {interval[0]:.2f} to {interval[1]:.2f}, {k} simulations); "
         f"{_CAUSE[what, ratio > 1.0]}."
     )

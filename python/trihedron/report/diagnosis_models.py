@@ -105,7 +105,7 @@ def candidates_table(diagnosis: Diagnosis) -> Table:
         )
         for c in tried
     ]
-    caption = "Effects that were tried; score: twice the log-evidence that one gains, less its price"
+    caption = "Effects that were tried; score: twice the log-evidence that one gains, corrected for multiple testing"
     return Table(("effect", "score", "at most (95 %)", "outcome"), tuple(rows), caption)
 
 

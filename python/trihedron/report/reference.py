@@ -198,7 +198,7 @@ def _vector(one: Estimate, scale: float) -> str:
 
 
 def _left(fit: FitToReference, scale: float, unit: str) -> str:
-    text = f"{plain_number(scale * fit.rms)} {unit} rms left up to {plain_number(fit.band_hz, 2)} Hz"
+    text = f"{plain_number(scale * fit.rms)} {unit} rms unexplained, up to {plain_number(fit.band_hz, 2)} Hz"
     text += f", {plain_number(scale * fit.rms_held_out)} {unit} cross-validated in sixteenths"
     if fit.n_left_out:
         text += f"; {fit.n_left_out} of {fit.n_rows} windows excluded"

@@ -62,8 +62,8 @@ def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
         caption = f"{found.effects[0].id}: its parameters in all recordings together and in each, with 95 % intervals."
     elif found.candidates:
         chart = partial(candidates_chart, found.candidates)
-        caption = "What each effect would gain with one size in all recordings (twice the log-evidence, less what it "
-        caption += "is corrected for being one of many): left of 0 nothing."
+        caption = "What each effect would gain with one size in all recordings (twice the log-evidence, corrected "
+        caption += "for multiple testing): left of 0 nothing."
     else:
         return None
     return Picture("shared", caption, chart)
