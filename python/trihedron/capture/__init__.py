@@ -1,6 +1,6 @@
-"""CAPTURE: from a board on the desk to a log, and a guide through its calibration.
+"""Capture: recording a log from a connected board, and a guide through its calibration.
 
-``open_source`` → ``find_protocol`` → :class:`Recorder`, an iterator of blocks that writes the log meanwhile:
+``open_source`` → ``find_protocol`` → :class:`Recorder`, an iterator of blocks that also writes the log:
 
 >>> from trihedron.capture import Recorder, find_protocol, open_source
 >>> source = open_source("/dev/ttyUSB0")  # doctest: +SKIP

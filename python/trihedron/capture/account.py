@@ -1,4 +1,4 @@
-"""What became of everything that was sent, and how the clocks went together: the account of a capture."""
+"""Summary of a capture: frames saved, lost and corrupt, and the device's clock against the host's."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from trihedron.arrivals import ClockLine
 from trihedron.capture.timeline import Timeline
 
 MOST_PPM = 20_000.0
-"""Beyond two per cent it is no clock's error: a replay at another speed, or a unit of time that was misread."""
+"""A larger rate difference is no clock error, but a replay at another speed or a misread unit of time."""
 
 
 @dataclass
 class Tally:
-    """What became of frames: ``lost`` are missing by the device's own counter or clock; ``garbled`` were whole but
-    contradicted their neighbours' (they are among the lost); ``repeated`` came twice. Over ``uncounted`` pauses more
-    may be lost than the count says."""
+    """Counts of frames: ``lost`` are missing by the device's counter or clock; ``garbled`` were complete, but their
+    counter or timestamp contradicted their neighbours' (also counted as lost); ``repeated`` arrived twice. In
+    ``uncounted`` pauses more may be lost than counted."""
 
     saved: int = 0
     lost: int = 0
@@ -27,7 +27,7 @@ class Tally:
 
 @dataclass
 class Count:
-    """What became of everything that was sent."""
+    """Counts of frames, corrupt pieces, skipped bytes and disconnections of a capture."""
 
     tally: Tally = field(default_factory=Tally)
     corrupt: int = 0
@@ -38,16 +38,16 @@ class Count:
 
     @property
     def lost(self) -> int:
-        """Frames that were sent and are not in the log: by counter or clock, else as far as remains were seen."""
+        """Frames sent but not in the log: by counter or clock; without either, the number of corrupt pieces."""
         return self.corrupt if self.counted_by == "nothing" else self.tally.lost
 
     @property
     def is_least(self) -> bool:
-        """Whether more may be lost: a count began anew, or is so short that it may have gone round in a pause."""
+        """Whether ``lost`` is a lower bound: the counter restarted, or may have wrapped unnoticed in a pause."""
         return self.counted_by != "nothing" and bool(self.tally.restarts or self.tally.uncounted)
 
     def sentence(self) -> str:
-        """For people and for the header."""
+        """The counts as one sentence, for the screen and the log's header."""
         how = {
             "counter": "by the device's counter",
             "clock": "by the device's clock",
@@ -67,7 +67,7 @@ class Count:
 
 
 def clock_sentence(line: ClockLine | None, timeline: Timeline | None) -> str:
-    """Offset, rate and arrival jitter, for people and for the header."""
+    """Offset, rate and arrival jitter as one sentence, for the screen and the log's header."""
     if line is None or timeline is None:
         return "not fitted: too short or not live"
     late = f"bytes arrive {1e3 * line.jitter_rms_s:.3g} ms rms and {1e3 * line.jitter_95_s:.3g} ms (95 %) late"

@@ -1,4 +1,4 @@
-"""Which baud and which protocol: every candidate reads the same bytes, and the one that understands most wins."""
+"""Detects baud rate and protocol: every candidate decodes the same bytes, and the one that decodes most is taken."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ _STREAMS: tuple[tuple[bytes, str, str], ...] = (
     (rb"\$(?:G[PNALB]|BD)[A-Z]{3},", "NMEA text of a receiver, which holds no IMU", "name the port of the IMU"),
 )
 MOST_BETWEEN = 2048
-"""Bytes between two messages: in noise two given bytes are met every 65 536."""
+"""Largest mean spacing of message starts [bytes]: in random bytes two given ones occur once in 65 536."""
 
 
 def foreign(heard: Iterable[bytes]) -> tuple[str, str] | None:
-    """What one of the pieces is, and what to do instead; None where nothing known begins its messages."""
+    """A known format among the pieces that is not decoded here, and what to do instead; None where there is none."""
     for data in heard:
         for start, kind, remedy in _FILES:
             if re.match(start, data, re.DOTALL):
@@ -71,7 +71,7 @@ def foreign(heard: Iterable[bytes]) -> tuple[str, str] | None:
 
 
 def _of_one_layout(data: bytes) -> bool:
-    """0xFA, groups, fields: the same four bytes at one distance from message to message."""
+    """Whether the bytes are VectorNav binary: a header of 0xFA, groups and fields, repeated at a constant distance."""
     for head in {match[0] for match in re.finditer(rb"\xfa[\x01-\x3f]..", data, re.DOTALL)}:
         places = [match.start() for match in re.finditer(re.escape(head), data)]
         steps = [b - a for a, b in pairwise(places)]
@@ -81,18 +81,18 @@ def _of_one_layout(data: bytes) -> bool:
 
 
 BAUDS = (115_200, 921_600, 57_600, 9_600, 230_400, 460_800, 38_400, 1_000_000, 2_000_000, 19_200, 3_000_000)
-"""In the order of how often boards use them."""
+"""Baud rates to try, the most common first."""
 
 LISTEN_S = 0.5
 LONGEST_LISTEN_S = 2.0
 ENOUGH_FRAMES = 6
 GOOD_SHARE = 0.5
-"""Of the bytes: a wrong baud or protocol understands next to none, a right one nearly all."""
+"""Smallest share of bytes decoded: a wrong baud rate or protocol decodes almost none, the right one nearly all."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """The protocol that understands a stream, and the bytes that were read to find it."""
+    """The detected protocol, the bytes read to detect it, and the share of them that it decodes."""
 
     protocol: str
     make_decoder: Callable[[], Decoder]
@@ -101,7 +101,7 @@ class Found:
 
 
 def share_understood(make: Callable[[], Decoder], data: bytes) -> tuple[float, int]:
-    """Share of the bytes that belong to frames, and how many frames: bytes before the first frame do not count."""
+    """Share of the bytes that belong to frames (0 to 1), and the number of frames."""
     decoder = make()
     frames: list[Frame] = [*decoder.feed(data), *decoder.finish()]
     if not data or not frames:
@@ -117,12 +117,12 @@ def find_protocol(
     name_columns: NameColumns = name_by_position,
     silence_s: float = 5.0,
 ) -> Found:
-    """Listen, at every baud where none was given, until one protocol (of all, or the one given) understands.
+    """Read bytes, at every usual baud rate where none is given, until one protocol (or the given one) decodes them.
 
     Raises
     ------
     CaptureError
-        When the device is silent, or nothing understands what it sends.
+        When the device sends nothing, or no protocol decodes what it sends.
     """
     names: Sequence[str | FrameDeclaration] = list(PROTOCOLS) if protocol is None else [protocol]
     makers = [(_name(name), decoder_factory(name, name_columns)) for name in names]
@@ -137,7 +137,7 @@ def find_protocol(
         data = _listen(source, LISTEN_S, wait)
         found = _judged(makers, data)
         if found is None and data and baud is None and len(data) < 200:
-            # A slow device: listen longer before this baud is given up.
+            # A slow device: read for longer before this baud rate is rejected.
             data += _listen(source, LONGEST_LISTEN_S, 0.0)
             found = _judged(makers, data)
         if found is not None:
@@ -181,7 +181,7 @@ def _judged(makers: list[tuple[str, Callable[[], Decoder]]], data: bytes) -> Fou
 
 
 def _listen(source: Source, for_s: float, silence_s: float) -> bytes:
-    """Bytes of ``for_s`` seconds after the first one, which may take ``silence_s`` to come."""
+    """Bytes received within ``for_s`` [s] of the first one, for which to wait at most ``silence_s`` [s]."""
     data = b""
     until = time.monotonic() + max(silence_s, for_s)
     while time.monotonic() < until:

@@ -1,4 +1,4 @@
-"""What can go wrong between a board and a file, each as one sentence."""
+"""Errors of a capture; each message is one sentence."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from trihedron.errors import RefusedError
 
 
 class CaptureError(RefusedError):
-    """The question cannot be answered: one sentence says what, where and what to do."""
+    """A capture cannot start or continue; the message says what failed, where, and what to do."""
 
 
 class SourceLostError(CaptureError):
-    """The device went away while it was read; it may come back."""
+    """The device disconnected while it was read; it may reconnect."""
 
 
 class SourceEndedError(CaptureError):
-    """A file or a pipe was read to its end."""
+    """The end of a file or pipe."""
 
 
 class DiskError(CaptureError):
-    """The log could not be written on; ``rows_saved`` stand on the disk and stay readable."""
+    """Writing the log failed; ``rows_saved`` rows are on the disk and readable."""
 
     def __init__(self, sentence: str, rows_saved: int = 0) -> None:
         super().__init__(sentence)

@@ -1,7 +1,7 @@
-"""A guided calibration as a state machine without a screen: readings in, what to show out.
+"""A guided calibration as a state machine without a screen: readings in, instructions out.
 
-It knows no estimator: ``examine`` tells where the session stands (poses, uncertainties, the most useful next pose) and
-is called once per pose. Whoever composes it gives the real one (``trihedron.api.guiding``) or a stand-in.
+It contains no estimator: ``examine`` returns the state of the session (poses, uncertainties, the most useful next pose)
+and is called once per pose. The caller passes the real one (``trihedron.api.guiding``) or a substitute.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from trihedron.records.guiding import Accuracy, Examination, GuideView, Phase
 Examine = Callable[[], Examination]
 
 FIRST_POSE_S = 6.0
-"""The first pose also measures the noise."""
+"""The first pose is longer because it also measures the noise."""
 
 SAME_POSE_DEG = 15.0
 N_CHECKS = 3
@@ -27,18 +27,18 @@ MOVED_DEG = 8.0
 
 
 class Guide:
-    """Leads through a session: hold, move to the most useful pose, until the accuracy is reached, then poses to check.
+    """Guides a session: pose, move to the most useful pose, until the accuracy is reached; then poses to verify it.
 
     Parameters
     ----------
     accuracy : Accuracy
-        When to stop.
+        The accuracy at which to stop.
     examine : callable
-        Where the session stands now, from everything recorded so far.
+        Returns the state of the session from everything recorded so far.
     n_checks : int
-        Poses held back from the calibration, to verify it.
+        Number of verification poses, which are excluded from the calibration.
     most_poses : int
-        Where to stop asking when the accuracy is not reached.
+        Number of poses after which to stop although the accuracy is not reached.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class Guide:
         self.phase = Phase.BEGIN
         self.examination: Examination | None = None
         self.cut_s: float | None = None
-        """Where the poses held back begin, once there are any."""
+        """Time [s] at which the data of the calibration end and the verification poses begin; None until then."""
         self._examine = examine
         self._n_checks, self._most = n_checks, most_poses
         self._stillness = Stillness()
@@ -64,11 +64,11 @@ class Guide:
 
     @property
     def is_done(self) -> bool:
-        """Whether there is nothing more to ask for."""
+        """Whether the session is complete."""
         return self.phase is Phase.DONE
 
     def advance(self, time_s: FloatArray, readings: FloatArray) -> GuideView:
-        """Take readings (n, 3) or (n, 6), the accelerometer first, at ``time_s`` (n,), and say what to show."""
+        """Process readings (n, 3) or (n, 6), accelerometer first, at ``time_s`` (n,) [s]; return what to show."""
         if len(time_s) and not self.is_done:
             self._stillness.add(time_s, readings)
             self._time_s = float(time_s[-1])
@@ -109,7 +109,7 @@ class Guide:
             self._is_taken = False
             if self.phase is Phase.POSE:
                 self.phase = Phase.MOVE
-                self._asked_s = self._usual_s()  # what a pose that was left asked for is not asked of the next
+                self._asked_s = self._usual_s()  # a longer duration requested for the pose just left ends with it
             return
         if self._is_taken:
             if not self._has_moved():
@@ -127,7 +127,7 @@ class Guide:
         return float(np.degrees(np.arccos(np.clip(up @ self._taken_up, -1.0, 1.0)))) > MOVED_DEG
 
     def _take(self) -> None:
-        """The board has been held long enough: does the pose count, and what comes next?"""
+        """The pose has lasted long enough: examine the session, accept the pose or not, and choose what is next."""
         if self.phase is Phase.CHECK:
             self._take_check()
             return
@@ -183,7 +183,7 @@ class Guide:
         return FIRST_POSE_S if self.examination is None else self.examination.pose_s
 
     def _far_from_all(self) -> FloatArray:
-        """The direction farthest from every pose: where a calibration has most to prove."""
+        """The face, edge or corner direction farthest from every pose: the strictest verification of a calibration."""
         grid = np.array([direction for direction in product((-1.0, 0.0, 1.0), repeat=3) if any(direction)])
         unit: FloatArray = grid / np.linalg.norm(grid, axis=1)[:, None]
         known = [] if self.examination is None else list(self.examination.poses_up)
@@ -227,24 +227,24 @@ class Guide:
         return f"Turn: {known.next_words}.", known.why
 
 
-# Still or moving, at once: the spread of a quarter of a second against the calmest so far.
+# Immediate detection of stillness: the standard deviation over WINDOW_S against the lowest so far.
 #
-# The segmentation of the whole log decides later which poses count; this is for the eye and the ear while one waits.
+# The segmentation of the whole log decides later which poses count; this one only drives the display.
 
 WINDOW_S = 0.25
 LOUDER = 3.0
-"""Times the calmest spread: noise alone exceeds it in fewer than one window in 10⁶ (25 readings, six axes)."""
+"""Limit of a window's standard deviation over the calm one: noise exceeds it in < 10⁻⁶ of windows (25 rows, 6 axes)."""
 
 MEAN_SHIFT = 2.5
-"""Times the calmest spread, from window to window: noise of means is a fifth of it, a slow turn is not."""
+"""Limit of the change of mean between windows over the calm standard deviation; noise of a mean is a fifth of it."""
 
 CALM_QUANTILE = 0.1
 SHAKY = 1.8
-"""Times the calmest spread, during a whole pose: a table that vibrates, or a hand."""
+"""A window's standard deviation over the calm one above which a static board is on a vibrating table, or held."""
 
 
 class Stillness:
-    """Takes readings as they come; :attr:`still_for_s` says for how long the board has not moved."""
+    """Detects stillness from readings as they arrive; :attr:`still_for_s` is how long the board has been static."""
 
     def __init__(self) -> None:
         self.still_for_s = 0.0
@@ -257,7 +257,7 @@ class Stillness:
         self._still_from_s: float | None = None
 
     def add(self, time_s: FloatArray, readings: FloatArray) -> None:
-        """Readings (n, 3) or (n, 6) at ``time_s`` (n,)."""
+        """Add readings (n, 3) or (n, 6) at ``time_s`` (n,) [s]."""
         start = 0
         for i, t in enumerate(time_s):
             if self._since_s is None:
@@ -278,7 +278,7 @@ class Stillness:
         if len(self._spreads) > 4000:
             del self._spreads[::2]
         calm = np.quantile(np.array(self._spreads), CALM_QUANTILE, axis=0)
-        # A coarse ADC may show no spread at all where it stands still.
+        # With a coarse ADC the standard deviation in a pose may be 0.
         calm = np.maximum(calm, 0.05 * np.median(np.array(self._spreads), axis=0) + 1e-12)
         is_still = bool(np.all(spread <= LOUDER * calm + _step(rows)))
         if self._before is not None:
@@ -295,6 +295,6 @@ class Stillness:
 
 
 def _step(rows: FloatArray) -> FloatArray:
-    """One LSB per axis, where readings are whole numbers."""
+    """(k,) allowance per axis: 1 LSB where readings are whole numbers, else 0."""
     whole = np.all(rows == np.round(rows), axis=0)
     return np.where(whole, 1.0, 0.0)

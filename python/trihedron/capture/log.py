@@ -1,4 +1,4 @@
-"""The log of a capture: text that grows row by row, whole after every write, readable whenever it stops."""
+"""The log of a capture: text that grows row by row and is complete and readable after every write."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from pathlib import Path
 from trihedron.capture.errors import CaptureError, DiskError
 
 FLUSH_S = 0.1
-"""What a killed process loses at most, with the pieces that wait for their successors (docs/capture.md, section 4)."""
+"""Seconds between writes: the most that a killed process loses, besides waiting pieces (docs/capture.md, section 4)."""
 
 SYNC_S = 5.0
-"""How often the disk itself is asked to write, against a loss of power."""
+"""Seconds between syncs of the file to the disk, which limit the loss in a power failure."""
 
 _LINE = 240
-"""Bytes of each line of the header that is written again while the log grows."""
+"""Length in bytes of the header lines that are rewritten while the log grows."""
 
 FORMAT = "trihedron capture 1"
 
 
 class GrowingLog:
-    """Appends rows; nothing is rewritten but two lines of fixed length in the header.
+    """Appends rows; only two header lines of fixed length are rewritten.
 
     Raises
     ------
     CaptureError
-        When the file exists and ``overwrite`` is not said, or its folder cannot be written to.
+        When the file exists and ``overwrite`` is not set, or its folder cannot be written to.
     """
 
     def __init__(self, path: Path, *, overwrite: bool = False) -> None:
@@ -51,7 +51,7 @@ class GrowingLog:
         self._time_waiting = 0.0
 
     def begin(self, facts: dict[str, str], columns: list[str]) -> None:
-        """The header: facts that stay, two lines to be filled, the names of the columns."""
+        """Write the header: constant facts, two lines to be filled later, and the column names."""
         lines = [f"# {FORMAT}"]
         lines += [f"# {key}: {_plain(value)}" for key, value in facts.items()]
         text = "".join(f"{line}\n" for line in lines)
@@ -64,7 +64,7 @@ class GrowingLog:
         self._write(text + ",".join(columns) + "\n")
 
     def fill(self, key: str, value: str) -> None:
-        """Say anew one of the two lines of the header."""
+        """Rewrite one of the two header lines."""
         if key not in self._places:
             return
         line = f"# {key}: {_plain(value)}".encode("ascii", "replace")[: _LINE - 1].ljust(_LINE - 1) + b"\n"
@@ -74,22 +74,22 @@ class GrowingLog:
             raise self._refused(error) from None
 
     def row(self, text: str, time_s: float) -> None:
-        """One row, without its end of line."""
+        """Add one row, given without its end of line."""
         self._waiting.append(text)
         self._rows_waiting += 1
         self._time_waiting = time_s
 
     def remark(self, text: str) -> None:
-        """A line that readers pass over."""
+        """Add a comment line, which readers skip."""
         self._waiting.append(f"# {_plain(text)}")
 
     def flush(self, *, force: bool = False) -> None:
-        """Give to the system what waits, if it is time to.
+        """Write pending rows if ``FLUSH_S`` has passed or ``force`` is set.
 
         Raises
         ------
         DiskError
-            When the disk is full or gone; the rows before stay whole.
+            When the disk is full or cannot be written; rows written before are intact.
         """
         now = time.monotonic()
         if not (force or now - self._flushed_s >= FLUSH_S):
@@ -101,7 +101,7 @@ class GrowingLog:
             self.duration_s = self._time_waiting
             self._waiting.clear()
             self._rows_waiting = 0
-        # From the end of the write: a slow disk gets fewer and larger pieces.
+        # Counted from the end of the write: a slow disk gets fewer and larger pieces.
         self._flushed_s = time.monotonic()
         if now - self._synced_s >= SYNC_S:
             self._synced_s = now
@@ -111,7 +111,7 @@ class GrowingLog:
                 raise self._refused(error) from None
 
     def close(self) -> None:
-        """Write what waits, and let the file go."""
+        """Write pending rows and close the file."""
         if self._handle < 0:
             return
         try:
@@ -121,7 +121,7 @@ class GrowingLog:
             self._handle = -1
 
     def abandon(self) -> None:
-        """Let the file go as it stands."""
+        """Close the file without writing pending rows."""
         if self._handle >= 0:
             os.close(self._handle)
             self._handle = -1
@@ -141,7 +141,7 @@ class GrowingLog:
             data = data[n:]
 
     def _cut(self, start: int, written: bytes) -> None:
-        """Half a row at the end is taken back; whole rows of the piece stay and count."""
+        """Truncate an incomplete row at the end; count the complete rows of the piece as saved."""
         whole = written.rfind(b"\n") + 1
         kept = written[:whole]
         self.rows_saved += sum(1 for line in kept.split(b"\n") if line and not line.startswith(b"#"))
@@ -149,7 +149,7 @@ class GrowingLog:
         try:
             os.ftruncate(self._handle, self._size)
         except OSError:
-            # The reader reports an incomplete last line; nothing more can be done here.
+            # Nothing more can be done here; the reader reports an incomplete last line.
             return
 
     def _refused(self, error: OSError) -> DiskError:
@@ -163,5 +163,5 @@ class GrowingLog:
 
 
 def _plain(text: str) -> str:
-    """No commas, semicolons or ends of line: a header line must not look like a row of names."""
+    """The text without commas, semicolons or line ends: a header line must not look like column names."""
     return " ".join(text.replace(",", " ").replace(";", " ").split())

@@ -1,4 +1,4 @@
-"""The thread that only reads: nothing in it waits for a disk or a decoder."""
+"""Rows of a log, and the thread that only reads the source and never waits for a disk or a decoder."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from trihedron.capture.timeline import Timeline
 
 
 class Rows:
-    """What a recording has become so far; without a log (None) only times, indices and remarks are made.
+    """Times, indices, remarks and log rows of a recording; without a log (None) no rows are written.
 
     Parameters
     ----------
     log : GrowingLog or None
     source : Source
     rate_hz : float, optional
-        Rate of a device without a clock, where it is known.
+        Rate of a device without a clock, if known.
     """
 
     def __init__(self, log: GrowingLog | None, source: Source, rate_hz: float | None) -> None:
@@ -38,11 +38,11 @@ class Rows:
         self._remarks: list[str] = []
 
     def index(self, one: Placed) -> int:
-        """The frame's index in the log: it goes on where the connection before ended."""
+        """The frame's index in the log; it continues that of the previous connection."""
         return one.place + self._offset
 
     def begin(self, decoder: Decoder, timeline: Timeline) -> None:
-        """The header, once the first frame has told what there is."""
+        """Write the header; the first frame has shown which columns and clocks there are."""
         if self.is_begun:
             return
         self.is_begun = True
@@ -62,7 +62,7 @@ class Rows:
         self._log.begin(facts, [*names, *decoder.columns])
 
     def add(self, one: Placed, timeline: Timeline, *, is_first: bool, lost_while_away: int = 0) -> float:
-        """One row, and what is to be said of it; its time in seconds."""
+        """Write one row, and remarks on losses or a restart before it; return its time [s]."""
         if is_first and self._next_index:
             self._offset = self._next_index + lost_while_away - one.place
         index = self.index(one)
@@ -85,7 +85,7 @@ class Rows:
         return time_s
 
     def say(self, text: str) -> None:
-        """A remark, in the log where it has begun and with the next block."""
+        """Add a remark to the next block, and to the log if it has begun."""
         self._remarks.append(text)
         if self._log is not None and self.is_begun:
             self._log.remark(text)
@@ -96,23 +96,23 @@ class Rows:
         return remarks
 
     def say_facts(self, count: Count, clock: ClockLine | None, timeline: Timeline | None) -> None:
-        """Say the header's lines on frames and clocks anew."""
+        """Rewrite the header lines on frames and clocks."""
         if self._log is not None and self.is_begun:
             self._log.fill("frames", count.sentence())
             self._log.fill("clock", clock_sentence(clock, timeline))
 
     def flush(self, *, force: bool = False) -> None:
-        """Hand waiting rows to the disk: when it is time, or now."""
+        """Write pending rows if it is time to, or at once with ``force``."""
         if self._log is not None:
             self._log.flush(force=force)
 
     def abandon(self) -> None:
-        """Close after a failure; what can be saved is."""
+        """Close the log after a failure, without writing pending rows."""
         if self._log is not None:
             self._log.abandon()
 
     def close(self) -> None:
-        """The end: everything is written, and a log without a row is not left behind."""
+        """Write pending rows and close the log; delete a log without any row."""
         if self._log is None:
             return
         self._log.close()
@@ -124,34 +124,34 @@ RETRY_S = 0.25
 MOST_QUEUED_BYTES = 512 * 1024 * 1024
 
 READ_AHEAD_BYTES = 1 << 20
-"""A file can be read faster than it is decoded; a device cannot be asked to wait."""
+"""Bytes that may wait in the queue when reading a file, which can pause; a device cannot."""
 
 
 class SourceReturned(Exception):
-    """The device is back."""
+    """The device has reconnected."""
 
 
 class Stopped(Exception):
-    """The user said stop."""
+    """The user has stopped the capture."""
 
 
 class ReadingThread:
-    """Reads a source into a queue, waits for a device that went away, and says what happened in order.
+    """Reads a source into a queue, waits for a disconnected device, and queues these events in order.
 
     Parameters
     ----------
     source : Source
     first_bytes : bytes
-        What was read already; it is the first item.
+        Bytes that were read before; they are the first item.
     wait_for_return_s : float
-        How long to wait for a device that went away.
+        How long to wait for a disconnected device [s].
     now_s : callable
-        The host's clock in seconds.
+        Returns the time of the host's clock [s].
 
     Notes
     -----
     Items are ``(host_s, bytes)`` or ``(host_s, exception)``: `SourceLostError`, `SourceReturned`, `SourceEndedError`,
-    `Stopped`, or what the source raised; after one of the last three nothing follows.
+    `Stopped`, or another exception of the source; one of the last three is the last item.
     """
 
     def __init__(
@@ -164,21 +164,21 @@ class ReadingThread:
         self._thread = threading.Thread(target=self._read, name="capture reader", daemon=True)
 
     def start(self) -> None:
-        """Begin to read."""
+        """Start reading."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Take no more bytes; what came stays in the queue."""
+        """Stop reading; bytes received before stay in the queue."""
         self._stop.set()
 
     def join(self, timeout_s: float) -> None:
-        """Stop and wait until the thread has ended; one that never began has."""
+        """Stop, and wait until the thread has ended if it was started."""
         self._stop.set()
         if self._thread.ident is not None:
             self._thread.join(timeout=timeout_s)
 
     def get(self, timeout_s: float) -> tuple[float, bytes | Exception]:
-        """The next item; raises ``queue.Empty`` where none came in time."""
+        """The next item; raises ``queue.Empty`` where none arrives within ``timeout_s``."""
         host_s, item = self._queue.get(timeout=timeout_s)
         if isinstance(item, bytes):
             self._taken_bytes += len(item)
@@ -206,7 +206,7 @@ class ReadingThread:
                     return
                 self._put(SourceReturned(self._source.name))
                 continue
-            except Exception as error:  # handed to the loop, which raises it
+            except Exception as error:  # passed to the recorder's loop, which raises it
                 self._put(error)
                 return
             if data:

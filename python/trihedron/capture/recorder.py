@@ -1,4 +1,4 @@
-"""From bytes to rows: a thread that only reads, and a loop that decodes, counts, times and writes."""
+"""Records a stream: a thread that only reads, and a loop that decodes, counts, assigns times and writes."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from trihedron.capture.sources import Source
 from trihedron.capture.timeline import Timeline
 
 SETTLE_S = 0.6
-"""Without a device clock, rows wait this long at the start of a connection, until arrivals tell their rate."""
+"""Without a device clock, rows wait this long [s] at the start of a connection, until arrivals give their rate."""
 
 FILL_S = 2.0
-"""How often the header's lines on frames and clocks are said anew."""
+"""Seconds between updates of the header lines on frames and clocks."""
 
 AWAY_MARGIN, AWAY_FRAMES = 2.0, 64
-"""A counter that went on while the device was away cannot be further on than twice what the host's clock allows, and
-the frames that waited in buffers; beyond that it began anew."""
+"""While the device is disconnected its counter advances by at most twice the frames that the host's clock allows, and
+64 frames from buffers; beyond that it has restarted."""
 
 WAIT_FOR_RETURN_S = 60.0
 SILENCE_S = 5.0
@@ -38,7 +38,7 @@ SILENCE_S = 5.0
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Frames that came together: ``time_s`` and ``host_s`` (n,), ``index`` (n,), ``values`` (n, k) in ``columns``."""
+    """Frames emitted together: ``time_s`` and ``host_s`` (n,) [s], ``index`` (n,), ``values`` (n, k) of ``columns``."""
 
     time_s: FloatArray
     host_s: FloatArray
@@ -49,25 +49,25 @@ class Block:
 
 
 class Recorder:
-    """Reads a source until it ends or :meth:`stop`; iterating gives :class:`Block` after block, the log grows.
+    """Reads a source until it ends or :meth:`stop`; iterating yields :class:`Block` after block and writes the log.
 
     Parameters
     ----------
     source, make_decoder
-        Where bytes come from and how they are understood; a decoder is made anew for every connection.
+        The source of bytes, and the function that makes a decoder for every connection.
     path : Path or None
-        The log to write; without one nothing is kept.
+        The log to write; without one nothing is saved.
     rate_hz : float, optional
-        Rate of a device without a clock, where it is known.
+        Rate of a device without a clock, if known.
     wait_for_return_s : float
-        How long to wait for a device that went away.
+        How long to wait for a disconnected device [s].
     first_bytes : bytes
-        What was read already to find out the protocol.
+        Bytes that were read to detect the protocol.
 
     Raises
     ------
     CaptureError
-        From iterating: a silent device, a full disk, no frames at all; one sentence that says what was saved.
+        From iterating: a silent device, a full disk, no frames at all; the message says what was saved.
     """
 
     def __init__(
@@ -97,8 +97,8 @@ class Recorder:
         self._sequence: Sequence | None = None
         self._timeline: Timeline | None = None
         self._new_connection = True
-        self._past = (0, 0, Tally())  # what earlier connections counted
-        self._before: Sequence | None = None  # of the connection before
+        self._past = (0, 0, Tally())  # counts of earlier connections
+        self._before: Sequence | None = None  # sequence of the previous connection
         self._first_host_s = self._last_host_s = 0.0
         self._held: list[Placed] = []
         self._held_since_s: float | None = None
@@ -109,18 +109,18 @@ class Recorder:
         )
 
     def stop(self) -> None:
-        """Take no more bytes; what came is still written."""
+        """Stop reading; bytes received before are still written."""
         self._reading.stop()
 
     def _now_s(self) -> float:
         return time.monotonic() - self._start_s
 
     def write_now(self) -> None:
-        """Put everything that has come into the log, so that it can be read while it grows."""
+        """Write all pending rows, so that the log can be read while it grows."""
         self._rows.flush(force=True)
 
     def clock_text(self) -> str:
-        """How the host's clock and the device's go together."""
+        """Offset and rate of the device's clock against the host's, as one sentence."""
         return clock_sentence(self.clock, self._timeline)
 
     def __iter__(self) -> Iterator[Block]:
@@ -192,7 +192,7 @@ class Recorder:
         return self._sequence.push(frames, host_s)
 
     def _emit(self, placed: list[Placed], host_s: float, *, is_last: bool = False) -> Iterator[Block]:
-        """Times and rows for frames that have their place; at the start some wait for a rate."""
+        """Assign times to placed frames and write their rows; at the start frames wait until the rate is known."""
         timeline = self._timeline
         if timeline is None or not (placed or self._held):
             return
@@ -238,7 +238,7 @@ class Recorder:
         return True
 
     def _lost_while_away(self, first: Placed) -> int:
-        """What the device's counter says of the time between two connections, and of pieces cut at either end."""
+        """Frames lost between two connections by the device's counter or clock, cut frames at either end included."""
         before, start_s, self._before = self._before, self._first_host_s, None
         self._first_host_s = first.host_s
         if before is None:
@@ -255,7 +255,7 @@ class Recorder:
         return missing
 
     def _part(self, host_s: float) -> Iterator[Block]:
-        """A connection ends: whole frames in what remains count, then decoder and sequence start anew."""
+        """End a connection: emit complete frames in the remaining bytes, then reset decoder and sequence."""
         decoder = self._decoder
         placed = self._place(decoder.finish(), host_s)
         if self._sequence is not None:
@@ -290,7 +290,7 @@ class Recorder:
         self._rows.say_facts(self.count, self.clock, self._timeline)
 
     def _give_up_if_wrong(self, host_s: float) -> None:
-        """Bytes for ten seconds and not one frame: another protocol or another baud."""
+        """Raise when ten seconds of bytes contain no frame: the protocol or the baud rate is wrong."""
         if self._rows.is_begun or self._held or host_s < 10.0 or self._sequence is not None:
             return
         raise CaptureError(
@@ -309,7 +309,7 @@ class Recorder:
 
 
 def _keep_layout(new: Decoder, old: Decoder) -> None:
-    """After a reconnection the columns are those of the log; a protocol that learns them must not learn others."""
+    """Keep the log's columns after a reconnection: a decoder that learns its columns must not learn others."""
     adopt = getattr(new, "adopt", None)
     if adopt is not None:
         adopt(old)

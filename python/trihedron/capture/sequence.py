@@ -1,7 +1,7 @@
-"""Which frame is which: indices from the device's own counter or clock, losses counted and placed.
+"""Indices of frames from the device's counter or clock, with losses counted and located.
 
-Most cheap protocols have no checksum, so a counter may itself be garbled. A frame that does not follow the last one
-by one step therefore waits until its successors say whether frames are missing before it, or its counter is wrong.
+Most simple protocols have no checksum, so a counter may itself be corrupt. A frame that does not follow the last one
+by one step therefore waits until later frames show whether frames are missing before it, or its counter is wrong.
 """
 
 from __future__ import annotations
@@ -15,38 +15,38 @@ from trihedron.capture.account import Tally
 from trihedron.capture.protocols.contract import Frame
 
 LEARN = 8
-"""Frames from which the clock's step is first taken (their median)."""
+"""Frames from which the clock's step is first estimated (mean of the steps up to 1.6 times their median)."""
 
 MOST_WAITING = 12
-"""Frames that may contradict each other before the longest run of increasing ones is believed."""
+"""Contradicting frames that may wait before the longest increasing run is accepted."""
 
 MOST_LOST = 10_000
-"""Frames: a counter that jumps further was reset, not overrun."""
+"""Frames; a counter that jumps further was reset."""
 
 MOST_SILENT_S = 3600.0
-"""A clock that jumps further was set, not overrun."""
+"""Seconds; a clock that jumps further was set."""
 
 LONG_GAP = 50
-"""Steps after which the error of the step itself hides where a timestamp should stand."""
+"""Steps after which the uncertainty of the step makes the expected timestamp useless."""
 
 AGREEMENT = 0.35
-"""Of a step: how far the difference of two timestamps may be from one step and still confirm both."""
+"""Largest deviation, in steps, of the difference of two timestamps from one step at which they confirm each other."""
 
 COARSE = 2.4
-"""Ticks per frame below which rounding moves a timestamp by a good part of a frame: a step of two may then be one, and
-single losses are not countable (only holes longer than ``COARSE_SPAN`` ticks)."""
+"""Ticks per frame below which rounding moves a timestamp by much of a frame: a step of two may then be one, and
+single losses cannot be counted (only gaps longer than ``COARSE_SPAN`` ticks)."""
 
 COARSE_SPAN = 8
 
 SENT_TWICE = 64
-"""Frames: as far back as a stretch may begin that comes a second time, frame by frame as it came the first."""
+"""Frames; the farthest back at which a section of the stream that is sent twice may begin."""
 
 _WRAPS = (1 << 8, 1 << 16, 1 << 32)
 
 
 class Placed(NamedTuple):
-    """A frame with its place in the stream; ``lost`` frames are missing before it, unless the device ``restarted``;
-    they may be more, ``is_wrapped``, where the count is so short that it may have wrapped meanwhile."""
+    """A frame with its index in the stream; ``lost`` frames are missing before it, unless the device ``restarted``.
+    With ``is_wrapped`` more may be missing, because a short counter may have wrapped."""
 
     place: int
     lost: int
@@ -57,16 +57,16 @@ class Placed(NamedTuple):
 
 
 class Sequence:
-    """Gives every frame its index.
+    """Assigns an index to every frame.
 
     Parameters
     ----------
     by_counter, by_clock : bool
-        What to count by; by neither every frame follows the one before.
+        Whether counter or clock determines indices; without both, frames are consecutive.
     modulus : int
-        Where counter or clock wraps; 0 where it does not.
+        Value at which counter or clock wraps; 0 if it does not.
     tick_s : float
-        One tick of the clock.
+        One tick of the clock [s].
     """
 
     def __init__(self, *, by_counter: bool = False, by_clock: bool = False, modulus: int = 0, tick_s: float = 0.0):
@@ -77,7 +77,7 @@ class Sequence:
         self.is_coarse = False
         self._last: int | None = None
         self._placed: deque[Frame] = deque(maxlen=SENT_TWICE + 1)
-        # How far the last timestamp stood after where a steady clock would have put it, in ticks.
+        # Delay of the last timestamp against a steady clock, in ticks.
         self._late = 0.0
         self._index = -1
         self._waiting: list[tuple[float, Frame]] = []
@@ -85,7 +85,7 @@ class Sequence:
         self.tally = Tally()
 
     def push(self, frames: list[Frame], host_s: float) -> list[Placed]:
-        """Place frames that arrived at one instant of the host's clock; some may wait for the next ones."""
+        """Place frames that arrived at ``host_s`` of the host's clock; some may wait for later ones."""
         out: list[Placed] = []
         if not (self._by_counter or self._by_clock):
             for frame in frames:
@@ -109,7 +109,7 @@ class Sequence:
         return out
 
     def finish(self) -> list[Placed]:
-        """Place what still waits: no more frames will come."""
+        """Place the frames that still wait, at the end of the stream."""
         out: list[Placed] = []
         if self._last is None and self._waiting:
             self._begin(out)
@@ -118,10 +118,10 @@ class Sequence:
         return out
 
     def missing_until(self, frame: Frame, most: int) -> int | None:
-        """Frames that the device counted between the last one placed here and ``frame`` of a later connection.
+        """Number of frames between the last one placed here and ``frame`` of a later connection, by counter or clock.
 
-        None where that cannot be known: nothing is counted by, the device began anew, more than ``most`` frames would
-        have had to pass, or a counter is so short that it may have wrapped meanwhile.
+        None where it is unknown: there is no counter and no usable clock, the device restarted, the number exceeds
+        ``most``, or the counter may have wrapped in between.
         """
         if self._last is None or not (self._by_counter or (self._by_clock and self._period > 0.0)) or self.is_coarse:
             return None
@@ -133,7 +133,7 @@ class Sequence:
 
     @property
     def period_s(self) -> float:
-        """Step of the device's clock, 0 while unknown."""
+        """Step of the device's clock [s], 0 while unknown."""
         return self._period * self._tick_s
 
     def _key(self, frame: Frame) -> int:
@@ -147,7 +147,7 @@ class Sequence:
             difference %= modulus
             return difference - modulus if difference > modulus // 2 else difference
         if difference < 0 and self._by_counter:
-            # A number printed as text does not say where it wraps.
+            # The modulus of a counter printed as text is unknown: try the usual ones.
             for wrap in _WRAPS:
                 if 0 < difference + wrap <= 64:
                     return difference + wrap
@@ -163,20 +163,20 @@ class Sequence:
         return steps if steps else (1 if difference > 0 else -1)
 
     def _follows(self, a: int, b: int) -> bool:
-        """Whether two frames agree that none is missing between them: the evidence that both counts are right."""
+        """Whether two keys differ by one step, which is evidence that both are right."""
         if self._by_counter or self.is_coarse:
             return self._steps(a, b) == 1
         return abs(self._difference(a, b) / self._period - 1.0) < AGREEMENT
 
     def _agree_of_three(self) -> bool:
-        """Where equal timestamps are usual, a frame sent twice would confirm itself: a third one has to go on."""
+        """Whether three waiting keys increase; with a coarse clock a frame sent twice would confirm itself."""
         if len(self._waiting) < 3:
             return False
         first, second, third = (self._key(frame) for _, frame in self._waiting[-3:])
         return self._follows(first, second) and self._difference(first, third) > 0
 
     def _ahead(self, key: int) -> int:
-        """Steps from the last frame placed, whose own timestamp may have been early or late."""
+        """Steps from the last placed frame to ``key``, corrected for the delay of the last timestamp."""
         assert self._last is not None
         difference = self._difference(self._last, key)
         if self._by_counter or self.is_coarse or difference == 0:
@@ -196,11 +196,11 @@ class Sequence:
         if self._by_clock and self._period == 0.0:
             forward = [d for d in differences if d > 0] or [1]
             usual = [d for d in forward if d <= 1.6 * median(forward)]
-            # Equal timestamps are neighbours within one tick, not repeats.
+            # Equal timestamps are consecutive frames within one tick, not repeats.
             n = len(usual) + sum(d == 0 for d in differences)
             self._period = sum(usual) / n
             self.is_coarse = self._period < COARSE
-        # Start with the first frame that its successor, or the next but one, continues.
+        # Start with the first frame that one of the next three continues.
         steps = [[self._steps(a, b) for b in keys[i + 1 : i + 4]] for i, a in enumerate(keys)]
         first = next((i for i, ahead in enumerate(steps) if any(0 < s <= 4 for s in ahead)), 0)
         self.tally.garbled += first
@@ -213,11 +213,11 @@ class Sequence:
             self._resolve(out)
 
     def _resolve(self, out: list[Placed]) -> None:
-        """Decide what can be decided of the frames that wait; the newest has just been added."""
+        """Place the waiting frames if the newest, just added, decides their order."""
         waiting = self._waiting
         newest = self._key(waiting[-1][1])
         if self._ahead(newest) == len(waiting):
-            # Where it belongs if those between only have a wrong count, or a timestamp early or late.
+            # It is where it should be if those between only have a wrong counter, or an early or late timestamp.
             self._in_place(out)
             return
         if len(waiting) >= 2:
@@ -236,7 +236,7 @@ class Sequence:
             self._longest(out)
 
     def _in_place(self, out: list[Placed]) -> None:
-        """As many frames wait as there are steps to the newest: each has its own place."""
+        """Place all waiting frames: there are as many as steps to the newest, so none is missing."""
         first, n = self._index, len(self._waiting)
         newest = self._key(self._waiting[-1][1])
         for place in range(1, n):
@@ -249,7 +249,7 @@ class Sequence:
         self._accept(first + n - self._index, out)
 
     def _between(self, n: int, until: int, out: list[Placed]) -> None:
-        """Of the first ``n`` that wait, keep those that lie in order between the last and ``until``."""
+        """Of the first ``n`` waiting frames accept those in order between the last placed one and ``until``."""
         for _ in range(n):
             key = self._key(self._waiting[0][1])
             ahead, left = self._ahead(key), self._steps(key, until)
@@ -267,7 +267,7 @@ class Sequence:
             self.tally.garbled += 1
 
     def _restart(self, n: int, ahead: int, out: list[Placed]) -> None:
-        """Three frames in a row say that the count began anew (or that a stretch came twice)."""
+        """Three consecutive frames show that the counter restarted, or that a section was sent twice."""
         is_behind = -SENT_TWICE <= ahead <= 0 and not self._may_have_wrapped(self._waiting[-1][0])
         if is_behind and any(frame in self._placed for _, frame in self._waiting):
             self.tally.repeated += len(self._waiting)
@@ -282,7 +282,7 @@ class Sequence:
             self._accept(1, out)
 
     def _longest(self, out: list[Placed]) -> None:
-        """Believe the longest run of increasing keys, drop the rest."""
+        """Accept the longest run of increasing keys and drop the other waiting frames."""
         keys = [self._key(frame) for _, frame in self._waiting]
         best: list[list[int]] = []
         for i, key in enumerate(keys):
@@ -310,7 +310,7 @@ class Sequence:
             if restarted or ahead > LONG_GAP:
                 self._late = 0.0
             else:
-                # The step follows the clock slowly, the phase faster; a single timestamp moves neither much.
+                # The step is filtered slowly, the phase faster; the effect of one timestamp on the step is limited.
                 limit = 0.3 * self._period
                 gain = max(1e-3, 1.0 / (LEARN + self.tally.saved))
                 self._period += gain * min(max(surprise / ahead, -limit), limit)
@@ -327,7 +327,7 @@ class Sequence:
         out.append(Placed(self._index, ahead - 1, restarted, host_s, frame, is_wrapped))
 
     def _may_have_wrapped(self, host_s: float) -> bool:
-        """Whether nothing came for so long that a counter as short as this one may have gone round."""
+        """Whether the pause before ``host_s`` is long enough for the counter to have advanced by half its modulus."""
         span_s = self._last_host_s - self._first_host_s
         if not (self._by_counter and self._modulus and span_s > 0.0):
             return False

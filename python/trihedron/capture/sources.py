@@ -1,4 +1,4 @@
-"""Where bytes come from: a serial port (and which there are), a TCP connection, a file, standard input."""
+"""Sources of bytes: serial ports (and their list), TCP connections, files, standard input."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Port:
-    """One port: its name, what the system says of it, and whether this user may open it."""
+    """One port: its name, the system's description, its USB identifiers, and whether this user may open it."""
 
     device: str
     description: str
@@ -30,7 +30,7 @@ class Port:
 
 
 def list_ports() -> list[Port]:
-    """Ports in the order of their names; those of USB devices first.
+    """Serial ports sorted by name, those of USB devices first.
 
     Raises
     ------
@@ -50,32 +50,32 @@ def list_ports() -> list[Port]:
 
 
 GATHER_S = 0.008
-"""After the first byte of a piece, how long to wait for more: at 1 kHz it saves nine wake-ups of ten."""
+"""Time to wait for more bytes after the first one of a piece [s]; at 1 kHz it saves nine of ten wake-ups."""
 
 POLL_S = 0.1
 
 
 class Source(Protocol):
-    """Bytes as they come. ``is_live`` says that the moment of arrival means something."""
+    """A source of bytes. With ``is_live`` bytes arrive in real time, so their arrival times can be used."""
 
     name: str
     is_live: bool
 
     def read(self) -> bytes:
-        """The next piece; empty when nothing came for ``POLL_S``. Raises SourceLostError or SourceEndedError."""
+        """The next piece, empty if none arrives within ``POLL_S``. Raises SourceLostError or SourceEndedError."""
         ...
 
     def reopen(self) -> bool:
-        """Try once to have it back after it was lost."""
+        """Try once to open the source again after it was lost; return whether that succeeded."""
         ...
 
     def close(self) -> None:
-        """Let it go."""
+        """Close the source."""
         ...
 
 
 def import_serial() -> type[serial.Serial]:
-    """pyserial's port.
+    """The class of pyserial's ports.
 
     Raises
     ------
@@ -101,7 +101,7 @@ class SerialSource:
         self._serial = _open_serial(port, baud)
 
     def set_baud(self, baud: int) -> bool:
-        """Change the rate and forget what came at the old one; False where the port cannot go that fast."""
+        """Set the baud rate and discard bytes received at the old one; False where the port does not support it."""
         try:
             self._serial.baudrate = baud
             self._serial.reset_input_buffer()
@@ -117,7 +117,7 @@ class SerialSource:
         try:
             first: bytes = port.read(1)
             if not first:
-                # A pseudo-terminal or an adapter that is gone may read as silence.
+                # A pseudo-terminal or an adapter that was removed may read as silence; this raises then.
                 _ = port.in_waiting
                 return b""
             time.sleep(GATHER_S)
@@ -127,7 +127,7 @@ class SerialSource:
             raise SourceLostError(f"{self.port} went away ({_reason(error)}).") from None
 
     def reopen(self) -> bool:
-        """The same name again, or the same USB device under another name."""
+        """Open the port again by its name, or the same USB device under another name."""
         self.close()
         for port in dict.fromkeys([self.port, *_same_device(self._identity)]):
             if not os.path.exists(port) and not port.upper().startswith("COM"):
@@ -142,17 +142,17 @@ class SerialSource:
         return False
 
     def close(self) -> None:
-        """Let the port go."""
+        """Close the port."""
         try:
             self._serial.close()
         except OSError:
-            # It is gone already.
+            # The device was removed already.
             return
 
 
 def _reason(error: Exception) -> str:
     text = str(getattr(error, "strerror", None) or error)
-    # pyserial says so in many words when a port reads as ready and gives nothing.
+    # pyserial raises with a long text when a port is ready to read but returns nothing.
     is_gone = isinstance(error, TypeError) or "disconnected" in text or getattr(error, "errno", None) == errno.EIO
     return "unplugged" if is_gone else text[:80]
 
@@ -258,7 +258,7 @@ class TcpSource:
 
 
 class FileSource:
-    """A file of bytes as a device sent them, or a named pipe."""
+    """A file of bytes recorded from a device, or a named pipe."""
 
     def __init__(self, path: Path) -> None:
         self.name = str(path)
@@ -278,7 +278,7 @@ class FileSource:
         return bytes(data)
 
     def reopen(self) -> bool:
-        """A file does not come back."""
+        """False: a file cannot be opened again."""
         return False
 
     def close(self) -> None:
@@ -308,20 +308,20 @@ class StdinSource:
         return data
 
     def reopen(self) -> bool:
-        """A pipe does not come back."""
+        """False: standard input cannot be opened again."""
         return False
 
     def close(self) -> None:
-        """Nothing to close."""
+        """Do nothing: standard input stays open."""
 
 
 def open_source(where: str, baud: int | None = None) -> Source:
-    """A port (``/dev/ttyUSB0``, ``COM3``), ``tcp://host:port``, a file, or ``-`` for standard input.
+    """Open a port (``/dev/ttyUSB0``, ``COM3``), ``tcp://host:port``, a file, or ``-`` for standard input.
 
     Raises
     ------
     CaptureError
-        One sentence: which, why not, and what to do.
+        When it cannot be opened; the message says which, why, and what to do.
     """
     if where == "-":
         return StdinSource()

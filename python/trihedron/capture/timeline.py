@@ -1,4 +1,4 @@
-"""Seconds of every frame while it is recorded."""
+"""Time of every frame while it is recorded."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from trihedron.arrivals import ClockFit
 
 
 class Timeline:
-    """Seconds of every frame for the log: the device's clock where it has one, else its frames paced by the host's.
+    """Time of every frame [s]: by the device's clock if it has one, else by frame index and the rate of arrivals.
 
-    One connection is one stretch; a new stretch goes on where the host's clock says.
+    The time of a connection continues that of the previous one, after the gap measured by the host's clock.
     """
 
     def __init__(self, *, tick_s: float, modulus: int, nominal_rate_hz: float | None = None) -> None:
@@ -27,21 +27,21 @@ class Timeline:
 
     @property
     def has_device_clock(self) -> bool:
-        """Whether times are the device's."""
+        """Whether times are from the device's clock."""
         return self._tick_s > 0.0
 
     @property
     def tick_s(self) -> float:
-        """One tick of the device's clock; 0 without one."""
+        """One tick of the device's clock [s]; 0 without one."""
         return self._tick_s
 
     def expect(self, period_s: float) -> None:
-        """A first guess of the seconds per frame, from the first arrivals; a rate that was given stays."""
+        """Set the first estimate of the seconds per frame, from the first arrivals; a given rate is kept."""
         if not self._is_given and self._period == 0.0:
             self._period = period_s
 
     def place(self, index: int, ticks: int | None, host_s: float, *, restarted: bool) -> float:
-        """Time of one frame, never before the one before."""
+        """Time of one frame [s], never earlier than that of the previous frame."""
         if self._index is None or restarted:
             self._begin(index, ticks, host_s)
         elif self.has_device_clock and ticks is not None and self._ticks is not None:
@@ -58,7 +58,7 @@ class Timeline:
         return self._time_s
 
     def arrived(self, host_s: float) -> None:
-        """The piece of bytes that held the last placed frame came now."""
+        """Add the arrival time ``host_s`` of the bytes that contained the last placed frame to the clock fit."""
         if self._index is None:
             return
         if self.has_device_clock:
@@ -74,7 +74,7 @@ class Timeline:
         self._ticks, self._elapsed, self._index0 = ticks, 0, index
 
     def _step(self, index: int) -> float:
-        """Seconds per frame by the arrivals so far, and a little more or less to stay beside them."""
+        """Seconds per frame: the given rate, or the slope of the arrivals so far, fitted anew after every 20 % more."""
         if self._is_given:
             return self._period
         if index - self._index0 >= self._next_look_s:
@@ -86,4 +86,4 @@ class Timeline:
 
 
 STARTING_STEP_S = 0.01
-"""Taken in the first second, while the arrivals do not tell the rate."""
+"""Seconds per frame assumed until the arrivals determine the rate."""

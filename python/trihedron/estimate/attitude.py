@@ -1,4 +1,4 @@
-"""Attitude from a rate: the one integral that everyone who has a gyro wants."""
+"""Attitude by integration of an angular rate."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 
 Form = Literal["matrices", "quaternions", "vectors"]
-"""How attitudes are written."""
+"""Representation of an attitude."""
 RateShape = Literal["constant", "linear", "coning"]
-"""How the rate runs between two samples."""
+"""Interpolation of the rate between two samples."""
 
 _FORMS: dict[str, int] = {"matrices": 0, "quaternions": 1, "vectors": 2}
 _DEGREES: dict[str, int] = {"constant": 0, "linear": 1, "coning": 3}
 _ORTHOGONAL = 1e-6
-"""Departure of RᵀR from 1 above which nine numbers are no attitude: six printed digits pass, a scale error does not."""
+"""Tolerance of RᵀR - 1 for a rotation and of |q| - 1 for a quaternion: six printed digits pass, a scale error fails."""
 
 
 def integrate_rate(
@@ -36,7 +36,7 @@ def integrate_rate(
     Parameters
     ----------
     time_s : (n,)
-        Instants [s], rising, at any spacing; a timestamp may repeat (nothing turns in between).
+        Timestamps [s], ascending, at any spacing; between equal timestamps the rotation is zero.
     rate : (n, 3)
         Angular rate [rad/s] along the axes of the body, bias and scale corrected (:func:`trihedron.apply`).
     form : "matrices", "quaternions" or "vectors"
@@ -47,9 +47,9 @@ def integrate_rate(
         until the next (first order), or a cubic through four samples (fourth order, with the coning inside a step;
         several times slower).
     start : matrix (3, 3), quaternion (4,) or rotation vector (3,), optional
-        Attitude at the first sample; none turned otherwise.
+        Attitude at the first sample; the identity otherwise.
     last_only : bool
-        Only the last attitude, ``(3, 3)``, ``(4,)`` or ``(3,)``: twice as fast, and no memory.
+        Only the last attitude, ``(3, 3)``, ``(4,)`` or ``(3,)``: twice as fast, without an array of n attitudes.
 
     Returns
     -------
@@ -65,8 +65,8 @@ def integrate_rate(
 
     Notes
     -----
-    Equation (5.3) of ``docs/model-gyroscope.md``. Errors of a million steps are some 1e-13 rad of arithmetic; what
-    limits an attitude is the bias of the gyro, which adds its error times the time.
+    Equation (5.3) of ``docs/model-gyroscope.md``. Rounding adds some 1e-13 rad over a million steps. The accuracy is
+    limited by the gyro bias: its error times the time is the attitude error.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def integrate_rate(
 
 
 def _quaternion(start: FloatArray) -> FloatArray:
-    """(4,) x y z w of an attitude in any form."""
+    """Unit quaternion (4,) x y z w of an attitude: rotation matrix (3, 3), rotation vector (3,) or quaternion (4,)."""
     if start.shape == (3, 3):
         if not np.abs(start.T @ start - np.eye(3)).max() < _ORTHOGONAL or np.linalg.det(start) < 0.0:
             raise RefusedError("the start is no attitude: its columns are not orthogonal unit vectors of a right hand")
@@ -98,7 +98,7 @@ def _quaternion(start: FloatArray) -> FloatArray:
         if not np.isfinite(start).all():
             raise RefusedError("the start is no attitude: its rotation vector is not finite")
         angle = float(np.linalg.norm(start))
-        # sin(x)/x through NumPy's own sinc, which is in units of π.
+        # np.sinc(x) is sin(πx)/(πx).
         return np.append(0.5 * np.sinc(0.5 * angle / np.pi) * start, np.cos(0.5 * angle))
     if start.shape == (4,) and abs(float(np.linalg.norm(start)) - 1.0) < _ORTHOGONAL:
         return start / np.linalg.norm(start)

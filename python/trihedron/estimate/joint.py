@@ -1,4 +1,4 @@
-"""Both sensors in one fit: the reference answer, with the covariance of all 24 parameters."""
+"""Joint fit of both sensors: the reference solution, with the covariance of all 24 parameters."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 
 FALSE_ALARM = 1e-3
-"""Chance that a sound recording is taken for one whose moves contradict its poses."""
+"""Probability that the moves of a sound recording are found to contradict its poses."""
 
 
 def pull_allowed(alone: SensorCalibration) -> float:
-    """Limit of that rise; where the norms alone exceed their noise, χ² counts in units of that excess (F test)."""
+    """Limit of :func:`pull_on_accelerometer`: χ² with 9 degrees of freedom; F where the norms exceed their noise."""
     quality = alone.quality
     if quality is None or quality.dof < 1 or probability.chdtrc(quality.dof, quality.chi2) >= 0.01:
         return float(probability.chdtri(9, FALSE_ALARM))
@@ -29,9 +29,9 @@ def pull_allowed(alone: SensorCalibration) -> float:
 
 
 def pull_on_accelerometer(alone: SensorCalibration, joint: SensorCalibration) -> float:
-    """By how much the moves raise χ² of the poses' norms: χ² with at most 9 degrees of freedom if both agree.
+    """Increase of χ² of the poses' norms by the moves: χ² with at most 9 degrees of freedom if both agree.
 
-    A bias that drifts raises it, and contradicts nothing: it counts in units of what one bias for the session misses.
+    Bias drift raises χ² without a contradiction: the increase is divided by the joint fit's ``covariance_scale``.
     """
     if alone.quality is None or joint.quality is None:
         return 0.0
@@ -49,14 +49,14 @@ def calibrate_joint(
     """Fit ``S_f, b_f, S_ω`` to the norm of every pose and the rotation of every move at once (equation 5.7).
 
     The noise of a pose's mean enters its norm and both neighbouring moves, with its full covariance. The frame is
-    the lower one: nothing in the data turns the trihedron as a whole. ``accelerometer`` is the start.
+    lower-triangular: the data do not determine the rotation of the triad against the case.
 
     Parameters
     ----------
     recording, segments : Recording, Segments
         Raw readings of both sensors, their poses and moves.
     accelerometer : SensorCalibration
-        Solution of the accelerometer alone (its quality tells how far its residual exceeds the noise).
+        Solution of the accelerometer alone, from which the fit starts (``quality``: its residual against noise).
     gravity_m_s2, gravity_source : float, str
         Magnitude of gravity and where it comes from.
     options : MoveOptions
@@ -100,7 +100,7 @@ def calibrate_joint(
 
 
 def _poses_above_noise(quality: FitQuality, solution: SessionSolution) -> tuple[Finding, ...]:
-    """Gravity at rest, missed by more than the noise of the means: what the session fit makes of that."""
+    """Finding where the gravity error in static poses exceeds the noise of the means, with the bias repeatability."""
     if covariance_scale(quality.chi2, quality.dof) == 1.0:
         return ()
     return (

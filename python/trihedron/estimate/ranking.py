@@ -1,4 +1,4 @@
-"""Several calibrations judged on one recording: predictive density, intervals, and the mistake in a wrong one."""
+"""Several calibrations compared on one recording: predictive density, intervals, and the mistake in a wrong one."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from trihedron.records.ranking import Interval, Suspicion
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians
 
 RESAMPLES = 2000
-"""Of the bootstrap: the ends of a 95 % interval are then known to a tenth of its half width."""
+"""Bootstrap resamples: the ends of a 95 % interval are accurate to a tenth of its half width."""
 STEPS = 20
-"""Of Gauss and Newton for a bias of three numbers: it converges in four."""
+"""Gauss-Newton steps for a bias (3,): it converges in four."""
 
 
 def densities(verifications: list[Verification]) -> list[FloatArray]:
-    """Log predictive density of every pose, move and rest rate by each calibration, over what all of them predict.
+    """Log predictive density of every pose, move and static rate under each calibration, over what all of them predict.
 
-    Each domain (length of gravity, tilt, rate at rest) is Gaussian about zero with the calibration's own rms: a
-    calibration that misses twice as far is log 2 behind in every point.
+    Each domain (norm of gravity, tilt error, static rate) is Gaussian about zero with the calibration's own rms: twice
+    the rms lowers the log density by log 2 per point.
     """
     has_angle = all(len(v.angle_deg) for v in verifications)
     has_rest = all(len(v.static_rate) for v in verifications)
@@ -43,7 +43,7 @@ def densities(verifications: list[Verification]) -> list[FloatArray]:
 
 
 def rms_interval(errors: FloatArray) -> Interval:
-    """95 % interval of the rms of errors (n,) by resampling them; NaN of fewer than two."""
+    """95 % bootstrap interval of the rms of errors (n,); NaN for fewer than two."""
     if len(errors) < 2:
         return float("nan"), float("nan")
     rng = np.random.default_rng(0)
@@ -53,7 +53,7 @@ def rms_interval(errors: FloatArray) -> Interval:
 
 
 def with_bias_of_log(calibration: Calibration, segments: Segments, gravity_m_s2: float) -> Calibration:
-    """The calibration with the biases that its file does not hold taken from the poses of the log."""
+    """The calibration, with biases that its file does not state estimated from the poses of the log."""
     without = calibration.extensions.get("without_bias", ())
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     if "accelerometer" in without and segments.accelerometer_mean is not None:  # type: ignore[operator]
@@ -64,7 +64,7 @@ def with_bias_of_log(calibration: Calibration, segments: Segments, gravity_m_s2:
 
 
 def _accelerometer_bias(sensor: SensorCalibration, means: FloatArray, gravity_m_s2: float) -> FloatArray:
-    """b with which ``|S a + b|`` of the poses is nearest to gravity."""
+    """b (3,) [m/s²] by least squares of ``|S a + b| - |g|`` over the poses' means (n, 3), with S fixed."""
     force, b = means @ sensor.S.T, np.zeros(3)
     for _ in range(STEPS):
         total = force + b
@@ -77,7 +77,7 @@ def _accelerometer_bias(sensor: SensorCalibration, means: FloatArray, gravity_m_
 def suspicions_of(
     calibration: Calibration, own: Calibration, recording: Recording, segments: Segments, gravity_m_s2: float
 ) -> tuple[Suspicion, ...]:
-    """The mistake in the accelerometer's and in the gyro's part, where undoing one makes it fit."""
+    """The single mistake of either sensor's parameters whose correction makes the calibration fit the recording."""
     assert segments.accelerometer_mean is not None
     means, zero = segments.accelerometer_mean, np.zeros((segments.n_poses, 3))
 
@@ -93,7 +93,7 @@ def suspicions_of(
     if gyro is None or own_gyro is None or segments.gyroscope_mean is None or not segments.moves:
         return tuple(out)
     measured = measure_moves(recording, segments, own.accelerometer)
-    # A wrong accelerometer would be seen in the tilt as well.
+    # A wrong accelerometer causes tilt errors too: the log's own replaces it.
     base = calibration if found is None else own
     tilt = _Tilt(segments, measured)
     rates = segments.gyroscope_mean
@@ -108,7 +108,7 @@ def suspicions_of(
 
 
 class _Tilt:
-    """Gravity carried through the moves of one log, by any S of the gyro."""
+    """Tilt errors after the moves of one log, for any S of the gyro."""
 
     def __init__(self, segments: Segments, measured: MoveMeasurements) -> None:
         self._segments, self._measured = segments, measured
@@ -123,33 +123,33 @@ def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-# Which single mistake, undone, makes a calibration fit a recording: sign of a bias, direction, unit, axes, gravity.
+# Single mistakes that are tried: sign of a bias, direction (correct or distort), unit, axes, gravity.
 
 Pair = tuple[FloatArray, FloatArray]
 
 TEXTBOOK_M_S2 = 10.0
-"""The largest gravity that anybody calibrates with."""
+"""The largest gravity in use for calibration."""
 NEAREST = 4
-"""Mistakes whose undoing is tried on the rotations."""
+"""Number of mistakes whose correction is tested by tilt errors after rotations."""
 HALF = 0.5
-"""A mistake is named where undoing it at least halves the miss."""
+"""A mistake is reported only if its correction at least halves the rms error."""
 NEAR = 4.0
-"""... and leaves no more than this many times what the log's own calibration leaves, which knows the log."""
+"""... and only if the rms error left is at most this many times that of the log's own calibration (in sample)."""
 
 
 @dataclass(frozen=True)
 class Misses:
-    """How far a pair (S, b) of one sensor misses, and how far the log's own does."""
+    """Rms error as a function of one sensor's (S, b), and the rms error ``own`` of the log's own calibration."""
 
     rms: Callable[[FloatArray, FloatArray], float]
     own: float
 
 
 def accelerometer_suspicion(S: FloatArray, b: FloatArray, norm: Misses, gravity_m_s2: float) -> Suspicion | None:
-    """Of the accelerometer by the length of gravity at rest; no pose knows how the triad as a whole is turned."""
+    """The accelerometer's mistake by gravity errors in static poses, which do not depend on a rotation of the triad."""
     tried = [*_common(S, b), *_units(S, b, STANDARD_GRAVITY_M_S2), *_axes(S, b)]
     best = _best(tried, norm, norm.rms(S, b))
-    # A gravity is a factor that may be anything the Earth has; it is fitted, so it comes last.
+    # Gravity is a fitted factor between the smallest on Earth and the textbook's: it is preferred only if it fits best.
     factors = np.linspace(normal_gravity(0.0, 5000.0), TEXTBOOK_M_S2, 401) / gravity_m_s2
     scaled = min(factors, key=lambda k: norm.rms(S / k, b / k))
     wrong = _best([("gravity", S / scaled, b / scaled, float(scaled))], norm, norm.rms(S, b))
@@ -161,9 +161,9 @@ def accelerometer_suspicion(S: FloatArray, b: FloatArray, norm: Misses, gravity_
 def gyroscope_suspicion(
     S: FloatArray, b: FloatArray, own_S: FloatArray, tilt: Misses, rest: Misses
 ) -> Suspicion | None:
-    """Of the gyro by tilt after rotations (S), where that is sound by the rate at rest (b).
+    """The gyro's mistake: of S by tilt errors after rotations; where these show none, of b by static rates.
 
-    Rotations are integrated for the mistakes alone whose undoing comes nearest to the log's own ``own_S`` (3, 3).
+    Rotations are integrated only for the ``NEAREST`` corrections of S closest to the log's own ``own_S`` (3, 3).
     """
     degree = degrees_from_radians(1.0)
     tried = [*_common(S, b), *_units(S, b, degree), *_axes(S, b)]
@@ -203,13 +203,13 @@ def _axes(S: FloatArray, b: FloatArray) -> Iterator[tuple[str, FloatArray, Float
 
 
 def _best(tried: list[tuple[str, FloatArray, FloatArray, float]], misses: Misses, base: float) -> Suspicion | None:
-    """The mistake whose undoing leaves least, where it at least halves the miss and comes near the log's own."""
+    """The mistake whose correction leaves the least rms error, if within ``HALF`` and ``NEAR``; else ``None``."""
     if base <= NEAR * misses.own:
         return None
     results = [(misses.rms(S, b), kind, factor) for kind, S, b, factor in tried]
     least = min((rms for rms, _, _ in results), default=np.inf)
     if not least < HALF * base or least > NEAR * misses.own:
         return None
-    # Of mistakes that are undone as well as one another, the first of the list is the simplest.
+    # Corrections within 1 % of the least are equivalent: the first of the list is the simplest.
     rms, kind, factor = next(one for one in results if one[0] <= 1.01 * least)
     return Suspicion(kind, base, rms, factor)

@@ -1,5 +1,4 @@
-"""A calibration against a recording that it was not made from: norm of gravity at rest, gravity carried through
-moves."""
+"""A calibration against another recording: gravity error in static poses and tilt error after rotations."""
 
 from __future__ import annotations
 
@@ -26,10 +25,10 @@ from trihedron.records import (
 )
 
 FALSE_ALARM = 1e-3
-"""Chance that a calibration that holds is said to be exceeded."""
+"""Probability that errors of a valid calibration are found to exceed noise and uncertainty."""
 FAR_BEYOND = 10.0
-"""A miss this many times what noise and stated errors allow: the calibration is not this sensor's, or no longer.
-Other sessions of one unit reach 0.5 to 3 at rest and 2 to 9 through moves (kim, mimu4444, phone), another unit 8 to 60.
+"""Ratio of an error to noise and stated uncertainty above which the calibration is not, or no longer, this sensor's.
+Other sessions of one unit reach 0.5 to 3 in poses and 2 to 9 after moves (kim, mimu4444, phone), another unit 8 to 60.
 """
 
 
@@ -43,7 +42,7 @@ def verify_calibration(
 ) -> Verification:
     """Judge a calibration by the poses (docs/model.md, 10) and moves (equation 5.1) of another recording; no fit.
 
-    ``own`` is the calibration of that recording, by which parameters are judged; without it the gyro's bias alone is.
+    Parameters are compared with ``own``, the calibration of that recording; without it only the gyro bias is.
 
     Raises
     ------
@@ -119,7 +118,7 @@ def _worse_than_none(
     gravity_m_s2: float,
     errors: tuple[FloatArray, FloatArray],
 ) -> list[Finding]:
-    """Where readings taken at their unit's word serve better: whatever the file states of its uncertainty."""
+    """Findings where readings scaled by their unit alone have smaller errors, whatever uncertainty the file states."""
     error, angle = errors
     assert segments.accelerometer_mean is not None
     noise = _variance(segments.norm_sigma, segments.n_poses)
@@ -137,9 +136,9 @@ def _worse_than_none(
 
 
 def _bias_findings(gyroscope: SensorCalibration | None, rest: FloatArray) -> list[Finding]:
-    """A gyro bias that is another one than the scatter of the poses and the stated uncertainty allow.
+    """Finding where the gyro bias differs by more than ``FAR_BEYOND`` σ, of the poses' scatter and stated uncertainty.
 
-    Sessions of one unit differ by 0.1 to 1.5 times that (mimu4444, kim, getovermassif).
+    Sessions of one unit differ by 0.1 to 1.5 σ (mimu4444, kim, getovermassif).
     """
     if gyroscope is None or len(rest) < 2:
         return []
@@ -152,7 +151,7 @@ def _bias_findings(gyroscope: SensorCalibration | None, rest: FloatArray) -> lis
 
 
 def _is_larger(errors: FloatArray, others: FloatArray) -> bool:
-    """Whether squared errors (n,) or (n, k) are larger than others of the same poses or moves, beyond their scatter."""
+    """Whether squared errors (n,) or (n, k) exceed ``others`` of the same poses or moves: paired one-sided t test."""
     more = errors**2 - others**2
     more = more if more.ndim == 1 else more.sum(axis=1)
     n = len(more)
@@ -172,8 +171,8 @@ def _variance(sigma: FloatArray | None, n: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Carriage:
-    """Angles (m,) [deg] between gravity carried through moves and gravity measured after them, the noise of that, and
-    the same with the calibration's uncertainty; ``which`` (m,) moves these are and which were excluded."""
+    """Tilt errors (m,) [deg] after rotations, their noise, and noise with the calibration's uncertainty;
+    ``which`` (m,) and ``left_out`` are the indices of these moves and of the excluded ones."""
 
     angle_deg: FloatArray
     noise_deg: FloatArray
@@ -185,8 +184,8 @@ class Carriage:
 def _carried(
     calibration: Calibration, gyroscope: SensorCalibration, recording: Recording, segments: Segments
 ) -> Carriage:
-    """The figure that a calibration publishes of its own session (docs/model-session.md), with a bias per pose, here
-    with S and b held at the calibration's; of the same moves: not of those that were at the gyro's limit for long."""
+    """Tilt errors after rotations as in a calibration's report (docs/model-session.md): S of the calibration, a bias
+    per pose, without moves that were at the gyro's range limit for long."""
     accelerometer = calibration.accelerometer
     measured = measure_moves(recording, segments, accelerometer)
     seen = carried_by(calibration, gyroscope.S, measured, segments)

@@ -1,4 +1,4 @@
-"""Every parameter of a calibration against what a recording says of it, and both against no calibration at all."""
+"""Every parameter of a calibration against its estimate from a recording, and readings without a calibration."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from trihedron.sensor_model import in_frame
 from trihedron.units import acceleration_to_si, rate_to_si
 
 FALSE_ALARM = 1e-3
-"""Chance that any parameter of a calibration that holds is said to have shifted."""
+"""Probability that any parameter of a valid calibration is reported as shifted."""
 TOO_VAGUE = 10.0
-"""A log whose own uncertainty of a parameter is this many times the stated one says nothing of it."""
+"""A parameter is not judged where the log's uncertainty of it exceeds this many times the stated one."""
 
 
 def judge_parameters(known: Calibration, own: Calibration | None, segments: Segments) -> tuple[JudgedParameter, ...]:
     """Differences (file less log) of parameters that do not depend on the frame, with both standard uncertainties.
 
-    ``own`` is the calibration of the log itself, ``None`` where it cannot carry one: then the gyro's bias alone is
-    judged, by the poses, as it always is. A stated covariance of several sessions includes their repeatability.
+    ``own`` is the calibration of the log itself, ``None`` where the log does not determine one: only the gyro bias is
+    then judged, always by the mean of the poses. A covariance from several sessions includes their repeatability.
     """
     numbers, sigma, anchor = _numbers(known)
     n = len(numbers)
@@ -56,7 +56,7 @@ def judge_parameters(known: Calibration, own: Calibration | None, segments: Segm
 
 
 def shift_findings(parameters: tuple[JudgedParameter, ...]) -> list[Finding]:
-    """Parameters beyond their uncertainty, where the file states one."""
+    """Finding with the parameters that differ by more than chance allows, where the file states uncertainties."""
     judged = [one for one in parameters if one.is_judged]
     if not judged or not any(one.sigma_file > 0.0 for one in parameters):
         return []
@@ -80,7 +80,7 @@ def _label(one: JudgedParameter) -> str:
 
 
 def uncalibrated(known: Calibration, own: Calibration | None, recording: Recording) -> Calibration:
-    """Readings at their unit's word: ideal axes, no bias; counts by the one scale that the log's own fit gives."""
+    """Calibration of ideal axes without bias, with the unit's nominal scale; for counts, the log's own mean scale."""
     accel = acceleration_to_si(recording.accelerometer_unit)
     gyro = rate_to_si(recording.gyroscope_unit)
     base = own or known
@@ -109,7 +109,7 @@ def uncalibrated(known: Calibration, own: Calibration | None, recording: Recordi
 
 
 def _numbers(calibration: Calibration, anchor: Anchor | None = None) -> tuple[FloatArray, FloatArray, Anchor]:
-    """Parameters, their standard uncertainties, and the anchor they are counted from."""
+    """Frame-independent parameters (9,) or (18,), their standard uncertainties, and the anchor they refer to."""
     lower = in_frame(calibration, "lower")
     accel, gyro = lower.accelerometer, lower.gyroscope
     S_g, b_g = (None, None) if gyro is None else (gyro.S, gyro.b)
@@ -120,7 +120,7 @@ def _numbers(calibration: Calibration, anchor: Anchor | None = None) -> tuple[Fl
 
 
 def _resting(gyroscope: SensorCalibration, means: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Rate read at rest along each axis [rad/s] (3,), and the uncertainty of its mean by the scatter of the poses."""
+    """Mean static rate along each axis [rad/s] (3,), and its standard uncertainty from the scatter of the poses."""
     k = np.exp(invariants(gyroscope.S, gyroscope.b).log_scale)
     rates = means / k
     n = len(rates)

@@ -1,1 +1,1 @@
-"""Our own files: every reader and writer of them, the exports to other programs, and how a file is put in place."""
+"""Readers and writers of trihedron's own files, exports to other programs, and writing of files in one step."""

@@ -1,7 +1,7 @@
-"""The calibration file: JSON that states its own equation, direction, units and certainty (docs/calibration-file.md).
+"""The calibration file: JSON that states its equation, direction, units and uncertainty (docs/calibration-file.md).
 
-Numbers are written with all their digits, so that reading a file gives back exactly what was written. A file is checked
-against the schema shipped with the package before anything is believed of it.
+Numbers are written with all digits, so that reading a file returns exactly what was written. A file is checked against
+the schema in the package before any of its content is used.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class CalibrationFileError(RefusedError):
 
 
 def write_calibration(calibration: Calibration, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write a calibration file in one step, never over another file unless told to.
+    """Write a calibration file in one step; an existing file is replaced only with ``overwrite``.
 
     Raises
     ------
@@ -75,12 +75,12 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
     Returns
     -------
     Calibration
-        What ``write_calibration`` or the command wrote, to the last bit.
+        The calibration that ``write_calibration`` or the command wrote, to the last bit.
 
     Raises
     ------
     CalibrationFileError
-        When the file is missing, is not JSON, is not a calibration, or is of a format this version does not know.
+        When the file is missing, is not JSON, is not a calibration, or is of a newer format than this version reads.
 
     Examples
     --------
@@ -93,7 +93,7 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
 
 
 def calibration_text(calibration: Calibration) -> str:
-    """The file's content."""
+    """The content of a calibration file."""
     return printable_json(_folded(calibration_document(calibration))) + "\n"
 
 
@@ -103,7 +103,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        When a sensor's covariance disagrees with its block of the full one: the file keeps each number once.
+        When a sensor's covariance differs from its block of the full one: the file stores each number once.
     """
     sensors = {"accelerometer": calibration.accelerometer, "gyroscope": calibration.gyroscope}
     for k, (name, sensor) in enumerate(sensors.items()):
@@ -135,12 +135,12 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
 
 
 def calibration_from_document(document: object, source: str = "document") -> Calibration:
-    """The calibration that a document states; ``source`` names it in complaints.
+    """The calibration in a document; ``source`` is its name in error messages.
 
     Raises
     ------
     CalibrationFileError
-        When it does not follow the schema, or states what cannot be.
+        When it does not follow the schema or its content is invalid.
     """
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise CalibrationFileError(
@@ -170,7 +170,7 @@ def schema() -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Arrays, tuples and mappings as JSON types; what is not a finite number becomes ``null``."""
+    """Arrays, tuples and mappings as JSON types; a number that is not finite becomes ``null``."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, float):
@@ -185,7 +185,7 @@ def plain(value: Any) -> Any:
 
 
 def _check_schema(document: dict[str, Any], source: str) -> None:
-    # Imported here: it costs more than reading the file.
+    # Imported here because the import takes longer than reading the file.
     from jsonschema import Draft202012Validator
     from jsonschema.exceptions import best_match
 
@@ -226,7 +226,7 @@ def _sensor_document(sensor: SensorCalibration) -> dict[str, Any]:
 
 
 def _array(value: Any) -> npt.NDArray[np.float64]:
-    """Numbers back into an array; ``null`` was not a finite number."""
+    """Array from JSON numbers; ``null`` becomes NaN."""
     return np.array(value, dtype=np.float64)
 
 
@@ -269,7 +269,7 @@ def _from_checked(document: dict[str, Any]) -> Calibration:
 
 
 def _folded(value: Any, indent: str = "") -> str:
-    """JSON with one line per row of numbers: a matrix looks like one."""
+    """JSON with one line per row of numbers, so that a matrix is readable."""
     inner = indent + "  "
     if isinstance(value, dict) and value:
         items = (f"{inner}{json.dumps(key)}: {_folded(item, inner)}" for key, item in value.items())

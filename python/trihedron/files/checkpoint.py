@@ -1,4 +1,4 @@
-"""How far one pass over a long log is, kept on disk: a run that was stopped goes on from there."""
+"""Progress of one pass over a long log, saved on disk so that an interrupted run can continue."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from trihedron.errors import RefusedError
 from trihedron.files.output import write_whole
 
 EVERY_S = 30.0
-"""Between two times of keeping: what a stopped run does again, and far longer than writing takes."""
+"""Seconds between checkpoints: the work that an interrupted run repeats, and far longer than writing takes."""
 _MADE_OF, _ROWS = "made_of", "rows"
 
 
 def made_of(path: Path, *said: object) -> str:
-    """What a pass must have been over to be gone on with: a file, by its size and time of change, and all that was
-    said about it."""
+    """Hash that identifies a pass: the file's path, size and modification time, and the options ``said``. A pass is
+    continued only if it is the same."""
     status = os.stat(path)
     known = [str(path.resolve()), status.st_size, status.st_mtime_ns, *said]
     return hashlib.sha256(json.dumps(known).encode()).hexdigest()
@@ -33,7 +33,7 @@ def made_of(path: Path, *said: object) -> str:
 
 @dataclass(eq=False)
 class Checkpoint:
-    """A file that holds the state of a pass; ``made_of`` says of which log and with which choices."""
+    """A file with the state of a pass; ``made_of`` identifies its log and options."""
 
     path: Path
     made_of: str
@@ -41,17 +41,17 @@ class Checkpoint:
     _kept_at: float = field(default_factory=time.monotonic, init=False)
 
     def load(self) -> tuple[int, dict[str, FloatArray]]:
-        """Rows that are done and the state after them; 0 and nothing where there is no such file.
+        """Number of rows processed and the state after them; 0 and an empty state where there is no file.
 
         Raises
         ------
         ValueError
-            When the file is no checkpoint, or one of another log or of other choices: it is left alone.
+            When the file is no checkpoint, or one of another log or other options; it is not changed.
         """
         if not self.path.exists():
             return 0, {}
         try:
-            # Written unpacked: a file that unpacks to more than it is was not written here.
+            # Checkpoints are stored uncompressed: a compressed file is another program's and may unpack to any size.
             with zipfile.ZipFile(self.path) as archive:
                 if any(member.compress_type != zipfile.ZIP_STORED for member in archive.infolist()):
                     raise RefusedError("packed")
@@ -70,7 +70,7 @@ class Checkpoint:
         return rows, found
 
     def keep(self, rows: int, state: Callable[[], Mapping[str, FloatArray]]) -> None:
-        """Write what ``state`` gives after ``rows`` rows, if the last time is long enough ago."""
+        """Save the result of ``state()`` after ``rows`` rows, if the last checkpoint is ``every_s`` old."""
         if time.monotonic() - self._kept_at < self.every_s:
             return
         stream = io.BytesIO()
@@ -79,5 +79,5 @@ class Checkpoint:
         self._kept_at = time.monotonic()
 
     def remove(self) -> None:
-        """The pass is over."""
+        """Delete the checkpoint, after the pass is complete."""
         self.path.unlink(missing_ok=True)

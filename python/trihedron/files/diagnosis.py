@@ -1,4 +1,4 @@
-"""The diagnosis as JSON, checked against the schema shipped with the package (docs/diagnosis.md)."""
+"""The diagnosis as JSON, checked against the schema in the package (docs/diagnosis.md)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class DiagnosisFileError(RefusedError):
 
 
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
-    """A diagnosis as plain JSON types, valid against the schema; what is not a finite number is ``null``.
+    """A diagnosis as plain JSON types, valid against the schema; a number that is not finite is ``null``.
 
     Raises
     ------
@@ -69,8 +69,8 @@ def schema() -> dict[str, Any]:
 
 
 def complaint_about(document: object) -> str:
-    """What the schema says against a document; empty when it follows."""
-    # Imported here: it costs more than reading the file.
+    """How a document violates the schema; empty when it follows it."""
+    # Imported here because the import takes longer than reading the file.
     from jsonschema import Draft202012Validator
     from jsonschema.exceptions import best_match
 

@@ -29,7 +29,7 @@ def read_frame_declaration(path: str | Path) -> FrameDeclaration:
     Raises
     ------
     ValueError
-        One sentence that names the file and the key that is wrong or missing.
+        When a key is wrong or missing; the message names the file and the key.
     """
     path = Path(path)
     try:

@@ -1,4 +1,4 @@
-"""Recordings written as tables that :func:`trihedron.read` takes back without a question: CSV, npz, Parquet."""
+"""Recordings written as tables that :func:`trihedron.read` reads without options: CSV, npz, Parquet."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ _TIME = "t [s]"
 
 
 def check_format(path: str | os.PathLike[str]) -> None:
-    """Refuse a name whose ending tells no format, before the work; ``-`` is CSV on stdout.
+    """Refuse a file name whose ending is not that of a format, before any work; ``-`` is CSV on stdout.
 
     Raises
     ------
     OutputError
-        Naming the endings there are.
+        When the ending is unknown; the message lists the valid ones.
     """
     if str(path) != "-" and Path(path).suffix.lower() not in LOG_SUFFIXES:
         raise OutputError(f"{path}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
 
 
 def write_recording(recording: Recording, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write time [s] as the log counts it, the sensors in their own units, and every other column; units in the names.
+    """Write time [s] from the log's own origin, the readings in raw units, and every other column; units in the names.
 
     ``-`` is CSV on stdout.
 
@@ -60,7 +60,7 @@ def write_recording(recording: Recording, path: str | os.PathLike[str], *, overw
 
 
 def _columns(recording: Recording) -> dict[str, FloatArray]:
-    # Nanoseconds: finer digits are rounding of 1/rate, and long in text.
+    # Rounded to nanoseconds: finer digits are the rounding of 1/rate and lengthen the text.
     columns: dict[str, FloatArray] = {_TIME: np.round(recording.start_epoch_s + recording.time_s, 9)}
     for letter, sensor, unit in (
         ("a", recording.accelerometer, recording.accelerometer_unit),
@@ -72,7 +72,7 @@ def _columns(recording: Recording) -> dict[str, FloatArray]:
 
 
 def _others(recording: Recording) -> dict[str, FloatArray]:
-    """Temperature, supply, and what the log holds besides, under its own names."""
+    """Temperature, supply, and the other columns of the log under their own names."""
     columns: dict[str, FloatArray] = dict(recording.auxiliary)
     if recording.temperature_degc is not None:
         columns["temperature [degC]"] = recording.temperature_degc
@@ -82,7 +82,7 @@ def _others(recording: Recording) -> dict[str, FloatArray]:
 
 
 def _frame(columns: dict[str, FloatArray]) -> pl.DataFrame:
-    """Whole numbers as integers: a log of counts reads as one."""
+    """The columns as a table; whole numbers are integers, so that a log of counts is read as counts."""
     series = {}
     for name, values in columns.items():
         whole = bool(np.all(np.isfinite(values))) and bool(np.all(values == np.round(values)))

@@ -1,4 +1,4 @@
-"""Noise figures read back from the JSON that ``trihedron allan`` writes."""
+"""Noise figures read from the JSON that ``trihedron allan`` writes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class NoiseFileError(RefusedError):
 def read_noise(path: str | os.PathLike[str]) -> tuple[dict[str, SensorNoise], float]:
     """White density and random walk of each sensor (root mean square of its axes), and the rate [Hz] of the static log.
 
-    An absent term comes as the limit that the log gives it.
+    For a term that was not detected the value is the upper limit from the log.
 
     Raises
     ------
@@ -33,12 +33,12 @@ def read_noise(path: str | os.PathLike[str]) -> tuple[dict[str, SensorNoise], fl
 
 
 def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict[str, SensorNoise], float]:
-    """The same of the document itself; ``source`` names it in complaints.
+    """As :func:`read_noise`, from the JSON document itself; ``source`` is its name in error messages.
 
     Raises
     ------
     NoiseFileError
-        When it holds no noise terms, or its readings are not in SI.
+        When it contains no noise terms, or its readings are not in SI.
     """
     try:
         axes = document["axes"]

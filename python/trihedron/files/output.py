@@ -1,7 +1,7 @@
-"""Files written: whole or not at all, never over another one unless told to, and never over what they were made from.
+"""Output files: written completely or not at all, over an existing file only on request, and never over an input.
 
-A plain file is written beside its place under a name of its own and moved there in one step. What is no plain file (a
-device, a pipe, a socket) is written to as it is, and never replaced.
+A regular file is written under a temporary name in the same folder and renamed in one step. Other outputs (a device, a
+pipe, a socket) are written to directly and never replaced.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ if sys.platform != "win32":
 
 MARK = ".trihedron-"
 _MOST_BYTES_OF_NAME = 180
-"""Of the output's own name in the temporary one: a name may have 255 bytes."""
+"""Bytes of the output's name used in the temporary name; a file name may have 255 bytes."""
 
 _UNDER_WAY: set[str] = set()
 
 
 class Temporary:
-    """A file beside ``target`` that is locked as long as its writer lives; gone at the end unless put in place."""
+    """A temporary file beside ``target``, locked while its process lives, and deleted unless put in place."""
 
     def __init__(self, target: Path) -> None:
         self.target = target
@@ -41,7 +41,7 @@ class Temporary:
             _UNDER_WAY.add(self.path)
             self.descriptor = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _CLOEXEC, 0o600)
             _lock(self.descriptor)
-            # Another run may have taken it for a leftover in the moment before the lock.
+            # Before the lock another process may have deleted it as a leftover.
             with suppress(OSError):
                 if os.path.samestat(os.stat(self.path), os.fstat(self.descriptor)):
                     return
@@ -51,21 +51,21 @@ class Temporary:
         return self
 
     def write(self, data: bytes) -> None:
-        """All of ``data``, on the disk when this returns."""
+        """Write all of ``data`` and sync it to the disk."""
         left = memoryview(data)
         while left:
             left = left[os.write(self.descriptor, left) :]
         os.fsync(self.descriptor)
 
     def put_in_place(self, mode: int | None, *, overwrite: bool = False) -> None:
-        """Become the target: in the place of an old file of ``mode``, or, where it is None, of nothing.
+        """Rename to the target, which replaces a file of permissions ``mode``, or is new where ``mode`` is None.
 
         Raises
         ------
         FileExistsError
-            When there was nothing and now there is something that ``overwrite`` does not cover.
+            When ``mode`` is None and a file has appeared, without ``overwrite``.
         """
-        # Made private above; a result is as readable as the one it replaces, or as any file the user makes.
+        # The file was created private; it gets the permissions of the file it replaces, or those of any new file.
         if mode is None:
             mask = os.umask(0)
             os.umask(mask)
@@ -74,7 +74,7 @@ class Temporary:
             os.replace(self.path, self.target)
             return
         try:
-            # A link fails where a file appeared in the meantime; a rename would replace it.
+            # A link fails where a file has appeared meanwhile; a rename would replace it.
             os.link(self.path, self.target)
         except FileExistsError:
             raise
@@ -94,14 +94,14 @@ class Temporary:
 
 
 def remove_unfinished() -> None:
-    """Take away the files that this process has under way: it is about to end in the middle."""
+    """Delete this process's unfinished temporary files, before it terminates early."""
     for path in list(_UNDER_WAY):
         with suppress(OSError):
             os.unlink(path)
 
 
 def clear_leftovers(folder: Path) -> None:
-    """Remove the unfinished files of runs that were killed: those that nobody holds locked any more."""
+    """Delete temporary files of killed processes: those that no process has locked."""
     with suppress(OSError):
         with os.scandir(folder) as entries:
             names = [entry.path for entry in entries if entry.name.startswith(".") and MARK in entry.name]
@@ -124,7 +124,7 @@ _NOFOLLOW = getattr(os, "O_NOFOLLOW", 0)
 
 
 def _lock(descriptor: int, *, wait: bool = True) -> bool:
-    """Whether the lock was had; where files cannot be locked, none is, and nothing is cleared away."""
+    """Lock the file; whether that succeeded. Where files cannot be locked, leftovers are never deleted."""
     if sys.platform == "win32":
         return wait
     try:
@@ -139,12 +139,12 @@ class OutputError(RefusedError):
 
 
 def check_report(path: Path) -> None:
-    """Refuse a report whose ending names no format.
+    """Refuse a report whose ending is not that of a format.
 
     Raises
     ------
     OutputError
-        Naming the endings that there are.
+        When the ending is unknown; the message lists the valid ones.
     """
     if path.suffix.lower() not in (".html", ".txt", ".json"):
         raise OutputError(f"{path}: the file's ending selects the format of a report; give .html, .txt or .json.")
@@ -153,9 +153,9 @@ def check_report(path: Path) -> None:
 def check_free(
     paths: Iterable[Path | None], *, overwrite: bool, inputs: Iterable[str | os.PathLike[str] | None] = ()
 ) -> None:
-    """Refuse before the work is done what would be refused after it.
+    """Refuse outputs that cannot be written, before the work is done.
 
-    ``inputs`` are the files that the outputs are made from: none of them may be written over, whatever ``overwrite``.
+    ``inputs`` are the files that the outputs are made from: none of them is overwritten, even with ``overwrite``.
 
     Raises
     ------
@@ -189,12 +189,12 @@ def _identity(path: str | os.PathLike[str]) -> tuple[int, int] | None:
         found = os.stat(path)
     except (OSError, ValueError):
         return None
-    # Reading from a terminal or a pipe and writing to it harms nothing.
+    # Reading from a terminal or a pipe and writing to it is harmless.
     return (found.st_dev, found.st_ino) if stat.S_ISREG(found.st_mode) else None
 
 
 def _status(path: Path) -> os.stat_result | None:
-    """What stands at a place, behind every link; None where there is nothing."""
+    """Status of the file at a path, links followed; None where there is none."""
     try:
         return os.stat(path)
     except FileNotFoundError:
@@ -202,7 +202,7 @@ def _status(path: Path) -> os.stat_result | None:
     except NotADirectoryError:
         raise OutputError(f"{path}: a part of this name is a file and not a folder; choose another name.") from None
     except (OSError, ValueError) as error:
-        # A loop of links, a name too long, a folder that may not be looked into.
+        # A loop of links, a name that is too long, a folder without permission.
         why = getattr(error, "strerror", None) or error
         raise OutputError(f"{str(path)!r}: this cannot be the name of an output ({why}); choose another.") from None
 
@@ -212,7 +212,7 @@ def _check_replaceable(path: Path, found: os.stat_result, *, overwrite: bool) ->
         raise OutputError(f"{path}: this is a directory; name a file inside it.")
     if not overwrite:
         raise OutputError(f"{path}: the file exists and was left alone; choose another name or add --force.")
-    # By its mode too: for the superuser everything is writable, and what was protected was protected on purpose.
+    # The mode is checked too: the superuser can write to everything, but a read-only file is protected on purpose.
     if not found.st_mode & 0o222 or not os.access(path, os.W_OK):
         raise OutputError(f"{path}: the file is read-only and was left alone; choose another name or `chmod u+w` it.")
 
@@ -225,9 +225,9 @@ def _check_folder(path: Path, folder: str) -> None:
 
 
 def write_whole(path: str | os.PathLike[str], content: str | bytes, *, overwrite: bool = False) -> None:
-    """Write a file in one step: a reader sees the old one or the new one, never half of it.
+    """Write a file in one step: a reader sees the old or the new content, never a part of it.
 
-    Through a link, the file that it names is written. What killed runs left in the folder is cleared away.
+    A link is followed. Temporary files of killed processes in the folder are deleted.
 
     Raises
     ------
@@ -253,18 +253,18 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes, *, overwrite
         raise OutputError(f"{target}: the system cannot write this file ({error.strerror or error}).") from None
 
 
-# Outputs that are no plain files: terminals, pipes, sockets, devices. They are written to where they are.
+# Outputs that are not regular files: terminals, pipes, sockets, devices. They are written to directly.
 
 _READER_WAIT_S = 5.0
-"""How long a pipe waits for its reader: two commands started together meet; one alone must not wait for ever."""
+"""Time to wait for the reader of a pipe [s]: enough for two commands started together, but not forever."""
 
 _OPEN_FILES = ("/dev/fd/", "/proc/self/fd/", "/dev/stdout", "/dev/stderr", "/dev/stdin")
 
 
 def is_stream(path: Path, found: os.stat_result | None) -> bool:
-    """Whether an output is written to as it stands: whatever exists and is neither a plain file nor a directory.
+    """Whether an output is written to directly: it exists and is neither a regular file nor a directory.
 
-    A name for a file that this process has open already (``/dev/stdout``) is one too, wherever it leads.
+    This includes names of files that this process has open (``/dev/stdout``), whatever they refer to.
     """
     if str(path).startswith(_OPEN_FILES):
         return True
@@ -272,12 +272,12 @@ def is_stream(path: Path, found: os.stat_result | None) -> bool:
 
 
 def write_stream(path: Path, found: os.stat_result | None, data: bytes) -> None:
-    """All of ``data`` to a device, pipe or socket.
+    """Write all of ``data`` to a device, pipe or socket.
 
     Raises
     ------
     OSError
-        When nobody reads a pipe, or the system refuses.
+        When a pipe has no reader, or the system refuses.
     """
     if found is not None and stat.S_ISSOCK(found.st_mode):
         with socket.socket(socket.AF_UNIX) as connection:
@@ -291,7 +291,7 @@ def write_stream(path: Path, found: os.stat_result | None, data: bytes) -> None:
 
 
 def _opened(path: Path, found: os.stat_result | None) -> int:
-    """A descriptor to write to; appending, where it is a file that a shell has opened already."""
+    """A descriptor for writing, in append mode except for pipes, since the shell may have opened the file."""
     if found is None or not stat.S_ISFIFO(found.st_mode):
         return os.open(path, os.O_WRONLY | os.O_APPEND | os.O_NOCTTY)
     waited = time.monotonic() + _READER_WAIT_S

@@ -1,4 +1,4 @@
-"""What cannot be a sensor's calibration, whoever wrote the file: refused before a number of it is used."""
+"""Plausibility checks of a calibration from any file, before its numbers are used."""
 
 from __future__ import annotations
 
@@ -8,27 +8,26 @@ from trihedron.errors import RefusedError
 from trihedron.records import Calibration, SensorCalibration
 
 LARGEST_CONDITION = 100.0
-"""Of S with its columns at one length: two axes 0.6 degrees apart. Beyond it the matrix is a mistake, not a sensor."""
+"""Largest condition number of S with unit columns: two axes 0.6 degrees apart. A larger one is a mistake."""
 
 LARGEST_SI_FACTOR = 5.0
-"""Of a scale where readings and result are in one unit: degrees for radians are a factor of 57, g for m/s^2 of 10."""
+"""Largest scale (or 1/scale) where raw and true unit are the same: deg for rad is a factor of 57, g for m/s^2 of 10."""
 
 LARGEST_NUMBER = 1e12
-"""Of S and b in SI: no sensor's, and code in single precision overflows beyond 1e38."""
+"""Largest element of S and b in SI; no sensor has it, and single precision overflows beyond 1e38."""
 
 ROUNDING = 1e-9
-"""Of the largest eigenvalue of a covariance scaled to unit diagonal: below zero by less is rounding of 24 columns."""
+"""Negative eigenvalue, per column, of a correlation matrix that counts as rounding error."""
 
 
 def require_plausible(calibration: Calibration) -> Calibration:
-    """A calibration that can be a sensor's.
+    """The calibration, if it is plausible for a sensor.
 
     Raises
     ------
     ValueError
-        When S is singular or nearly so, a scale is off its unit by a factor, a number is beyond any sensor's,
-        or a covariance is
-        none (a negative variance, correlations beyond one).
+        When S is (nearly) singular, a scale is wrong by the factor of a unit, a number is larger than any sensor's,
+        or a covariance is invalid (a negative variance, correlations beyond one).
     """
     for name, sensor in named_sensors(calibration):
         largest = max(float(np.abs(sensor.S).max()), float(np.abs(sensor.b).max()))
@@ -54,13 +53,13 @@ def require_plausible(calibration: Calibration) -> Calibration:
 
 
 def has_one_handedness(calibration: Calibration) -> bool:
-    """Whether both triads are right-handed or both left-handed: one part rarely mixes them."""
+    """Whether both triads are right-handed or both left-handed; one part rarely mixes them."""
     signs = {bool(np.linalg.det(sensor.S) > 0.0) for _, sensor in named_sensors(calibration)}
     return len(signs) < 2
 
 
 def named_sensors(calibration: Calibration) -> list[tuple[str, SensorCalibration]]:
-    """The sensors there are, with their names."""
+    """Name and calibration of each sensor that is calibrated."""
     pairs = (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope))
     return [(name, sensor) for name, sensor in pairs if sensor is not None]
 

@@ -1,4 +1,4 @@
-"""A user's scenario file, changed where a diagnosis says so; the rest stays, but for comments on what changed."""
+"""Changes a user's scenario file as a diagnosis requires; everything else is kept except comments on changed values."""
 
 from __future__ import annotations
 
@@ -59,13 +59,13 @@ def improved_scenario(
     Parameters
     ----------
     path : path
-        The file as the user wrote it.
+        The user's file.
     tables : mapping
         ``{"accelerometer": {"b": [...], "noise": {"N": [...]}}, ...}``: values that replace those of the file.
     effects : sequence of (id, size)
-        Effects to have, each with the keys of ``[[effect]]``; entries of the same id are replaced.
+        Effects to include, each with the keys of ``[[effect]]``; entries of the same id are replaced.
     removed : ids
-        Effects to take out.
+        Effects to remove.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def improved_scenario(
 
 
 def write_scenario(text: str, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Put an improved scenario in place.
+    """Write an improved scenario to a file.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def write_scenario(text: str, path: str | os.PathLike[str], *, overwrite: bool =
 
 
 def _under_own_head(text: str, name: str) -> str:
-    """The text with a line of ours for the comments above its first key, which spoke of the values as they were."""
+    """The text with one new comment in place of those above its first key, which describe the old values."""
     rest = list(dropwhile(lambda line: not line.strip() or line.startswith("#"), text.splitlines(keepends=True)))
     return f"# {name}, with the values of a recording in place of its own (diagnose --improved).\n{''.join(rest)}"
 
@@ -132,7 +132,7 @@ def _merge(parent: Any, name: str, values: Mapping[str, Any]) -> None:
 
 
 def _item(value: Any) -> Item:
-    """Plain TOML of a number, text, or nested sequence of them; eight digits, as many as any uncertainty leaves."""
+    """TOML item of a number, text, or nested sequence; eight digits, which is finer than any uncertainty."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
     item: Item = tomlkit.item(_rounded(value))
@@ -143,5 +143,5 @@ def _rounded(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_rounded(v) for v in value]
     if isinstance(value, (float, np.floating)):
-        return float(f"{float(value):.8g}") + 0.0  # no minus zero
+        return float(f"{float(value):.8g}") + 0.0  # avoids -0.0
     return value

@@ -1,4 +1,4 @@
-"""The truth behind a simulated log, in a file of its own: .npz with a JSON header, or the header alone as .json."""
+"""The truth of a simulated log in a separate file: .npz with a JSON header, or the header alone as .json."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _MATRICES = ("accelerometer_S", "accelerometer_b", "gyroscope_S", "gyroscope_b")
 
 
 def truth_document(truth: Truth) -> dict[str, Any]:
-    """The truth without its samples, as plain JSON types (SI)."""
+    """The truth without the arrays per sample, as plain JSON types (SI)."""
     return {
         "scenario": truth.scenario,
         "seed": truth.seed,
@@ -43,12 +43,12 @@ def truth_document(truth: Truth) -> dict[str, Any]:
 
 
 def write_truth(truth: Truth, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write the truth; ``.npz`` holds everything, ``.json`` all but the arrays per sample.
+    """Write the truth; ``.npz`` contains everything, ``.json`` all but the arrays per sample.
 
     Raises
     ------
     OutputError
-        When the ending is neither, or the file exists and may not be replaced.
+        When the ending is another one, or the file exists and may not be replaced.
     """
     target = Path(path)
     text = json.dumps(truth_document(truth), indent=1)
@@ -64,12 +64,12 @@ def write_truth(truth: Truth, path: str | os.PathLike[str], *, overwrite: bool =
 
 
 def read_truth(path: str | os.PathLike[str]) -> Truth:
-    """Read back what :func:`write_truth` wrote as ``.npz``.
+    """Read a truth file that :func:`write_truth` wrote as ``.npz``.
 
     Raises
     ------
     ValueError
-        When the file is not such a one.
+        When the file is not such a file.
     """
     try:
         with np.load(path, allow_pickle=False) as archive:

@@ -1,7 +1,7 @@
-"""READ: logs of any common layout in, one audited :class:`~trihedron.records.Recording` out.
+"""Reading: converts logs of any common layout to one audited :class:`~trihedron.records.Recording`.
 
-The file's first bytes tell its format; names, then readings tell its columns and units; every choice that was made is
-stated as a finding. A file that cannot become a recording raises :class:`ReadError` with one sentence.
+The format is recognised by the file's first bytes, columns and units by their names, then by the readings; every choice
+is stated as a finding. A file that cannot become a recording raises :class:`ReadError` with one sentence.
 """
 
 from trihedron.read.archive import devices_of

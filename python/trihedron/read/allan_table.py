@@ -1,4 +1,4 @@
-"""Tables of Allan deviations: those that ``trihedron allan --csv`` writes, and those that others publish."""
+"""Tables of Allan deviations, as ``trihedron allan --csv`` writes them, or as other programs do."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _LENGTH = {"n", "n_samples", "samples", "length"}
 
 @dataclass(frozen=True, eq=False)
 class AllanTable:
-    """Averaging times (k,) in s and deviations (k, channels); rate and length of the log where the file states them."""
+    """Averaging times (k,) [s] and deviations (k, channels); rate and length of the log if the file states them."""
 
     path: Path
     names: tuple[str, ...]
@@ -42,7 +42,7 @@ def read_allan_table(path: Path) -> AllanTable:
     Raises
     ------
     ReadError
-        When no averaging times or no deviations are recognised, or a cell is no number.
+        When no averaging times or no deviations are recognised, or a cell is not a number.
     """
     check_readable(path)
     try:

@@ -23,14 +23,14 @@ from trihedron.read.table import Table
 
 
 def devices_of(path: Path) -> int:
-    """Devices of a ``.npz`` archive with a block (n, devices, columns); 1 for every other file, readable or not."""
+    """Number of devices in a ``.npz`` archive with a block (n, devices, columns); 1 for any other or damaged file."""
     if path.suffix.lower() != ".npz":
         return 1
     try:
         with zipfile.ZipFile(path) as archive:
             return max((_devices(archive, name) for name in archive.namelist()), default=1)
     except (OSError, ValueError, zipfile.BadZipFile):
-        # Reading it will say what is wrong.
+        # Reading the file reports what is wrong.
         return 1
 
 
@@ -43,7 +43,7 @@ def _devices(archive: zipfile.ZipFile, name: str) -> int:
 
 
 _BLOCK_NAMES = ("counts", "data", "imu", "raw", "samples", "arr_0")
-# NumPy evaluates a header as Python text, so a damaged one fails in the ways of a parser.
+# NumPy evaluates a header as Python text, so a damaged one raises the errors of a parser.
 DAMAGE = (
     *(ValueError, TypeError, KeyError, IndexError, AttributeError, EOFError, OverflowError, MemoryError),
     *(SyntaxError, tokenize.TokenError, RecursionError, NotImplementedError),
@@ -61,7 +61,7 @@ def read_npy(path: Path) -> Table:
                 raise RefusedError(f"its header says {dtype} of shape {shape}, and it has another length")
             check_memory(path, cells, 1)
             stream.seek(0)
-            # Read, not mapped: a mapped file that somebody shortens ends the process.
+            # Read, not memory-mapped: the process crashes if a mapped file is truncated.
             array = np.load(stream, allow_pickle=False)
     except OSError as error:
         raise from_os_error(path, error) from None
@@ -73,7 +73,7 @@ def read_npy(path: Path) -> Table:
 
 
 def header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    """Shape, whether column after column, and type of the array that follows; the stream stands behind them."""
+    """Shape, whether in column-major order, and type of the array; the stream is then at the array's data."""
     version = np.lib.format.read_magic(stream)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, by_columns, dtype = read(stream)
@@ -98,7 +98,7 @@ def read_npz(path: Path, device: int | None) -> Table:
 
 
 def _check_members(path: Path, archive: Any) -> None:
-    """Refuse an archive whose members do not fit, by what it and they say of themselves."""
+    """Refuse an archive whose members do not fit into memory, or are shorter than their headers state."""
     packed = unpacked = 0
     for info in archive.zip.infolist():
         packed, said = packed + info.compress_size, info.file_size
@@ -169,7 +169,7 @@ def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], device: int | 
             continue
         check_memory(path, n_rows, array.shape[1])
         block = name in _BLOCK_NAMES or array.shape[1] > 3
-        # Columns of a block have no names of their own: the order is judged as in a text log without a header.
+        # Columns of a block have no names: their order is recognised as in a text log without a header.
         names += ["" if block else f"{name}[{i}]" for i in range(array.shape[1])]
         columns += [_column(array[:, i]) for i in range(array.shape[1])]
     if device is not None and not used_device:

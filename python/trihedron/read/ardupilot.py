@@ -22,7 +22,7 @@ from trihedron.read.table import StatedClock, Table
 from trihedron.records import Finding, FindingCode, Onboard
 
 _PARAMETERS = re.compile(r"INS_(ACC|GYR|TCAL)|AHRS_(ORIENTATION|CUSTOM_)")
-"""What the readings have been through is told by these (the INS library of ArduPilot)."""
+"""Parameters of the corrections that the board applies to readings (the INS library of ArduPilot)."""
 _TYPES = ["PARM", "IMU", "IMU2", "IMU3", "ACC", "GYR", "ACC1", "ACC2", "ACC3", "GYR1", "GYR2", "GYR3"]
 _TIMESTAMPS = (("SampleUS", "us"), ("TimeUS", "us"), ("TimeMS", "ms"))
 _FIELDS = {
@@ -34,12 +34,12 @@ _UNITS = {"Acc": "m/s^2", "Gyr": "rad/s"}
 
 
 def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
-    """IMU messages of one instance, or with topic ``ACC`` its raw accelerometer and gyro, each on its clock.
+    """IMU messages of one instance, or with topic ``ACC`` its raw accelerometer and gyro, each with its own timestamps.
 
     Raises
     ------
     ReadError
-        When pymavlink is not installed, the log is damaged, or holds several IMUs of which none was chosen.
+        When pymavlink is not installed, the log is damaged, or contains several IMUs and none is chosen.
     """
     try:
         from pymavlink import DFReader
@@ -48,9 +48,9 @@ def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
     rows: dict[tuple[str, str], list[list[float]]] = {}
     names: dict[tuple[str, str], list[str]] = {}
     held = Parameters(_PARAMETERS)
-    # What pymavlink meets on the way it prints on stderr; that it skipped damaged bytes is a finding.
+    # pymavlink prints problems on stderr; damaged bytes that it skipped become a finding.
     said = io.StringIO()
-    # Made before it is filled, so that its file can be closed when it gives up while it is filled.
+    # Created before it is initialised, so that its file can be closed when initialising fails.
     log: Any = DFReader.DFReader_binary.__new__(DFReader.DFReader_binary)
     try:
         with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said), _quiet():
@@ -60,12 +60,12 @@ def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
                     held.note(message.Name, message.Value, has_readings=bool(rows))
                 else:
                     _keep(message, rows, names)
-    # pymavlink answers damage with whatever its unpacking met.
+    # For damaged logs pymavlink raises errors of any kind.
     except Exception as error:
         raise ReadError(f"{path}: pymavlink cannot read this log ({first_line(error)}); copy it again.") from None
     finally:
         for name in ("data_map", "filehandle"):
-            # A map that pymavlink still looks into cannot be closed; it goes with the reader.
+            # A memory map that pymavlink still uses cannot be closed; it is freed with the reader.
             with contextlib.suppress(AttributeError, BufferError):
                 getattr(log, name).close()
     imu = [Stream("IMU", len(r), i) for (t, i), r in sorted(rows.items()) if t == "IMU"]
@@ -75,7 +75,7 @@ def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
     taken = pick(path, offered, choice, "this log")
     note = (*choice_note("log", taken, streams), *_skipped(said.getvalue()))
     sha256 = file_sha256(path)
-    # Readings of every message, ACC and GYR included, are logged behind offset, scale and the turn to the board's axes.
+    # Readings of every message, ACC and GYR included, are logged after offset, scale and rotation to the board's axes.
     onboard = held.onboard("ardupilot", (int(taken.instance),) * 2, "body")
     note = (*note, *said_of(onboard))
     if taken.topic == "IMU":
@@ -88,7 +88,7 @@ def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """The part of pymavlink that is written in C prints past Python, a line for each damaged byte."""
+    """Redirect file descriptor 2: pymavlink's C code prints to it directly, one line for each damaged byte."""
     kept = os.dup(2)
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
@@ -110,7 +110,7 @@ def _skipped(said: str) -> tuple[Finding, ...]:
 def _keep(
     message: Any, rows: dict[tuple[str, str], list[list[float]]], names: dict[tuple[str, str], list[str]]
 ) -> None:
-    """IMU2 of older logs is instance 1, as field I says in newer ones."""
+    """Append a message's fields to the rows of its type and instance; IMU2 of older logs is instance 1."""
     word, number = re.fullmatch(r"([A-Z]+)(\d?)", message.get_type()).groups()  # type: ignore[union-attr]
     fields = message.to_dict()
     instance = str(fields.get("I", int(number or 1) - 1))

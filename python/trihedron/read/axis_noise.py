@@ -1,4 +1,4 @@
-"""Noise coefficients that somebody wrote down: JSON, per term one number or one per axis."""
+"""Noise coefficients given by the user as JSON: per term one number, or one per axis."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def read_axis_noise(path: str | os.PathLike[str]) -> tuple[AxisNoise, AxisNoise,
     Raises
     ------
     ReadError
-        (a ``ValueError``) when the file is no such JSON, or a term is unknown or negative.
+        (a ``ValueError``) when the file is not such JSON, or a term is unknown or negative.
     """
     file = Path(path)
     said = read_json(file, "file of noise terms", "write one object with the noise terms", ReadError)

@@ -1,4 +1,4 @@
-"""Logs larger than memory: rows in pieces, from a NumPy array, a Parquet table or a text."""
+"""Logs larger than memory: rows in chunks, from a NumPy array, a Parquet table or a text."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from trihedron.read.text.layout import MISSING, Layout, detect
 
 @dataclass(frozen=True, eq=False)
 class RowsOnDisk:
-    """An array (n, k) of numbers in a file; ``by_columns`` says that it lies column after column."""
+    """An array (n, k) of numbers in a file; ``by_columns`` means column-major order."""
 
     path: Path
     shape: tuple[int, int]
@@ -31,12 +31,12 @@ class RowsOnDisk:
     by_columns: bool
 
     def read(self, start: int, stop: int) -> npt.NDArray[Any]:
-        """Rows ``[start, stop)`` (stop - start, k) in the type of the file.
+        """Rows ``[start, stop)`` as an array (stop - start, k) in the file's data type.
 
         Raises
         ------
         ReadError
-            When the file became shorter, or the system cannot read it.
+            When the file was truncated meanwhile, or the system cannot read it.
         """
         n, width = self.shape
         start, stop = min(max(start, 0), n), min(stop, n)
@@ -66,7 +66,7 @@ def rows_on_disk(path: Path) -> RowsOnDisk:
     Raises
     ------
     ReadError
-        When the file is damaged, or its array is no table of numbers.
+        When the file is damaged, or its array is not a table of numbers.
     """
     try:
         with path.open("rb") as stream:
@@ -85,11 +85,11 @@ def rows_on_disk(path: Path) -> RowsOnDisk:
 
 
 HEAD_BYTES = 1 << 16
-"""Lines that the layout is told from, as for a log that is read whole."""
+"""Bytes from which the layout is detected."""
 
 
 class TextOnDisk:
-    """The table of a text log's numbers under ``path``, in the folder for temporary files; gone with this object."""
+    """A Parquet table of a text log's numbers, at ``path`` in the temporary folder; deleted with this object."""
 
     def __init__(self, log: Path) -> None:
         layout = _layout_of(log)
@@ -106,12 +106,12 @@ class TextOnDisk:
 
 
 def _layout_of(log: Path) -> Layout:
-    """How the text is laid out.
+    """The layout of a text log.
 
     Raises
     ------
     ReadError
-        When this is no text of numbers that can be read in pieces.
+        When it is not a text of numbers that can be read in chunks.
     """
     ways = "only .npy, Parquet and plain text tables are read in pieces; write the log as one of these."
     try:
@@ -171,7 +171,7 @@ ROLES = ("ax", "ay", "az", "gx", "gy", "gz")
 
 @dataclass(frozen=True, eq=False)
 class ChunkedLog:
-    """A log of ``n_rows`` rows that is read piece by piece; ``roles`` name the columns that are read, in file order."""
+    """A log of ``n_rows`` rows that is read in chunks; ``roles`` name the columns that are read, in file order."""
 
     path: Path
     n_rows: int
@@ -179,10 +179,10 @@ class ChunkedLog:
     columns: tuple[int, ...]
     on_disk: RowsOnDisk | None = None
     table: TextOnDisk | None = None
-    """Of a text: the table that is read in its place."""
+    """For a text: the Parquet table that is read instead."""
 
     def chunks(self, rows: int = ROWS, first: int = 0) -> Iterator[npt.NDArray[np.float64]]:
-        """Arrays (k, columns) in order from row ``first`` on, in the type of the file."""
+        """Yield arrays (k, columns) in order from row ``first`` on, in the file's data type."""
         for start in range(first, self.n_rows, rows):
             yield self._part(start, min(start + rows, self.n_rows))
 
@@ -223,13 +223,13 @@ class ChunkedLog:
 
 
 def open_chunks(path: Path, columns: str) -> ChunkedLog:
-    """A NumPy, Parquet or text log whose columns are said: ``gx,gy,gz,ax,ay,az`` in file order, ``-`` for one not
-    wanted. A text is made a Parquet table first, in the folder for temporary files.
+    """A NumPy, Parquet or text log with given columns: ``gx,gy,gz,ax,ay,az`` in file order, ``-`` for one not
+    read. A text is first converted to a Parquet table in the temporary folder.
 
     Raises
     ------
     ReadError
-        When the file is none of these, or the columns do not fit it.
+        When the file has another format, or the columns do not fit it.
     """
     check_readable(path)
     try:

@@ -1,4 +1,4 @@
-"""Which column became what: as a finding, and as the option that says it."""
+"""The roles of a table's columns, as a finding and as the value of ``--columns``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from trihedron.records import Finding, FindingCode
 
 
 def mapping_of(columns: Columns, gyroscope: Triad | None = None) -> str:
-    """What ``--columns`` would be for time and both sensors; ``gyroscope`` where the columns name none."""
+    """The value of ``--columns`` for time and both sensors; ``gyroscope`` is used where ``columns`` has no gyro."""
     triads = (*(columns.accelerometer or ()), *(columns.gyroscope or gyroscope or ()))
     time = [] if columns.time is None else [f"time={columns.time + 1}"]
     roles = zip(("ax", "ay", "az", "gx", "gy", "gz"), triads, strict=True)
@@ -16,7 +16,7 @@ def mapping_of(columns: Columns, gyroscope: Triad | None = None) -> str:
 
 
 def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
-    """Which column became what, and what was kept aside."""
+    """The finding that states the role of each column, and the columns without a role."""
     roles = []
     for role in ("time", "accelerometer", "gyroscope", "temperature", "supply"):
         value = getattr(columns, role)

@@ -1,4 +1,4 @@
-"""What each column is: recognised by name, mapped by hand, or taken by position."""
+"""Roles of columns: recognised by name, given by the user, or by position."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _ALIASES = {
 }
 _SKIP = {"-", "_", "skip", ""}
 _BY_PLACE = (3, 4, 6, 7)
-"""Numbers of columns whose order is known without names."""
+"""Numbers of columns for which the order is known without names."""
 
 
 @dataclass(frozen=True)
 class Columns:
-    """Column numbers (from 0) by role, units where a name states them, and what there is to say about the choice."""
+    """Column numbers (from 0) by role, units that names state, and findings about the choice."""
 
     time: int | None = None
     accelerometer: Triad | None = None
@@ -58,7 +58,7 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
     """Roles of the columns of a table.
 
     ``mapping`` is ``"time=t,ax=3,..."`` (names or numbers from 1) or ``"t,ax,ay,az,-,gx,gy,gz"`` (roles in file order);
-    ``sensor`` says what bare ``x y z`` columns are.
+    ``sensor`` is the sensor of columns named ``x y z`` alone.
 
     Raises
     ------
@@ -90,8 +90,8 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
 
 
 def _stated(table: Table, chosen: Columns, explicit: Columns | None) -> Columns:
-    """Units of readings as the lines above state them, where names do not; clock columns as the format states them,
-    where the user did not name another."""
+    """Complete ``chosen``: units from the preamble where names state none; clock columns from the format where the
+    user names no other."""
     said = table.clock
     chosen = replace(
         chosen,
@@ -179,9 +179,9 @@ def _column_number(table: Table, text: str, role: str) -> int:
 
 
 def _positional(table: Table, sensor: Sensor | None) -> Columns:
-    """No names: the usual orders by number of columns."""
+    """Columns without names: the usual order for their number."""
     filled = [i for i, column in enumerate(table.columns) if len(column) and not (table.names and table.names[i])]
-    # Cells behind the last reading that never held a value.
+    # Columns after the last reading that contain no value at all.
     while filled and len(filled) not in _BY_PLACE and not np.isfinite(table.columns[filled[-1]]).any():
         filled.pop()
     n = len(filled)
@@ -240,11 +240,11 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
         units[guess] = parsed[bare[0][0]].unit_for(guess)
         if told is None:
             notes.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "x-y-z"))
-    # A program may keep a column for a clock that it does not have.
+    # A program may write an empty column for a clock that it does not have.
     times = [i for i, p in enumerate(parsed) if p.role == "time" and np.isfinite(table.columns[i]).any()]
     time = max(times, key=lambda i: (parsed[i].rank, -i)) if times else None
     if own_time is not None:
-        time = own_time  # the device's clock, beside the one of whoever listened
+        time = own_time  # the device's clock, not that of the receiving program
     first = {role: next((i for i, p in enumerate(parsed) if p.role == role), None) for role in _SINGLE}
     return Columns(
         time=time,
@@ -266,16 +266,16 @@ _WARMTH = ColumnName("temperature")
 
 
 def _is_warmth(name: str, values: FloatArray) -> bool:
-    """Whether a column called T that states no unit falls as a temperature does and a clock does not."""
+    """Whether a column named T without a unit decreases in too many rows for a clock, so that it is a temperature."""
     return name.strip() == "T" and bool(np.count_nonzero(np.diff(values) < 0.0) > _FALLS * len(values))
 
 
 _FALLS = 0.05
-"""Rows at which a clock goes back: where packets of two sensors are late, one in twenty at most."""
+"""Largest share of rows at which a clock goes back, for example because packets of two sensors are late."""
 
 
 def _nanoseconds_beside(names: tuple[str, ...], time: int | None) -> int | None:
-    """``stamp.nsecs`` beside ``stamp.secs``, as ROS writes it."""
+    """The column of nanoseconds that belongs to a time column of seconds, as ROS names them (``nsecs``, ``secs``)."""
     if time is None:
         return None
     plain = [re.sub(r"\s*[\[(].*", "", name.strip().lower()) for name in names]
@@ -291,7 +291,7 @@ _SINGLE = ("temperature", "supply", "counter")
 
 
 def sensor_of_file_name(name: str) -> Sensor | None:
-    """The sensor a file's name speaks of, where it speaks of one only."""
+    """The sensor that a file's name contains; None where it contains both or neither."""
     lower = name.lower()
     says_acc = bool(re.search(r"acc", lower))
     says_gyro = bool(re.search(r"gyr|angular|omega|rotationrate", lower))
@@ -301,7 +301,7 @@ def sensor_of_file_name(name: str) -> Sensor | None:
 
 
 def _triads(parsed: list[ColumnName], role: str) -> list[Triad]:
-    """Complete x, y, z groups of one role in file order."""
+    """Complete groups of x, y, z columns of one role, in file order."""
     groups: dict[str, dict[str, int]] = {}
     for i, name in enumerate(parsed):
         if name.role == role and name.axis:

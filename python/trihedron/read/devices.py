@@ -1,4 +1,4 @@
-"""Several devices or sensors in one table: separated, listed with their counts, and never merged without a word."""
+"""Several devices or sensors in one table: separated, listed with their row counts, and never merged silently."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ _BEFORE = re.compile(r"\s*(?P<device>[^\W_]+)[_.:/ -]+(?P<rest>[^\W\d_].*)")
 _BEHIND = re.compile(r"(?P<rest>.*?[^\W\d_])(?:[_.: -]+(?P<device>[^\W_]+)|(?P<number>\d))(?P<unit>\s*[\[(].*)?\s*")
 
 Devices = dict[str, dict[int, str]]
-"""Device → its columns → their names without it."""
+"""Device → column number → the column's name without that of the device."""
 
 
 def one_beside(table: Table, instance: str | None) -> Table:
-    """The columns of the device ``instance`` under their names without it, those of the others left out.
+    """The table with the columns of device ``instance``, named without the device; those of other devices are excluded.
 
-    The same table where no names tell devices apart, or one is not asked for and sensors are known without.
+    The table is unchanged where names do not identify devices, or none is chosen and sensors are recognised without.
 
     Raises
     ------
     ReadError
-        When no column is known without its device, and none was chosen.
+        When no sensor is recognised without a device, and none is chosen.
     """
     devices = _devices(table.names or ())
     if instance in devices:
@@ -57,7 +57,7 @@ def one_beside(table: Table, instance: str | None) -> Table:
 
 
 def _devices(names: tuple[str, ...]) -> Devices:
-    """Two devices or more that have the same columns, those of a whole sensor among them."""
+    """Devices that the names identify: two or more with the same columns, which include a complete sensor."""
     for form in (_BEFORE, _BEHIND):
         found: Devices = {}
         for i, name in enumerate(names):
@@ -80,7 +80,7 @@ def _of_sensors(columns: dict[int, str]) -> set[str]:
 MAX_DEVICES = 16
 MAX_ROWS = 50_000
 LONGEST_BURST = 256
-"""Rows of one device at a stretch that several may write in turn."""
+"""Largest displacement of rows against time order where several devices write in bursts."""
 _DEVICE_NAMES = frozenset(
     {
         "i",
@@ -112,12 +112,12 @@ _GYROSCOPE = re.compile(
     re.I,
 )
 _LETTERS = {"a": "accelerometer", "g": "gyroscope", "w": "gyroscope", "m": "magnetometer", "t": "temperature"}
-"""Records named by a letter, where all are: among devices A, B, ... no letter names a sensor."""
+"""Sensors of records named by a letter, used only where all records are: letters may also name devices A, B, ..."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What the user chose among what a file offers: device of an archive (from 1), topic or member, instance."""
+    """The user's choice among several logs in a file: device of an archive (from 1), topic or member, instance."""
 
     device: int | None = None
     topic: str | None = None
@@ -125,7 +125,7 @@ class Choice:
 
 
 def kind_of(word: str) -> str:
-    """``accelerometer``, ``gyroscope`` or "": whose readings a record of this name holds."""
+    """The sensor of records of this name: ``accelerometer``, ``gyroscope`` or "" for neither."""
     text = word.strip().replace("_", " ").strip("$:")
     if _ACCELEROMETER.fullmatch(text):
         return "accelerometer"
@@ -133,7 +133,7 @@ def kind_of(word: str) -> str:
 
 
 def pick_kind(words: list[str], kind: str) -> str | None:
-    """The record name to take for a sensor: uncorrected readings before corrected ones."""
+    """The record name to use for a sensor; uncorrected readings are preferred to corrected ones."""
     fitting = [word for word in words if kind_of(word) == kind]
     letters = [word.strip("$:").lower() for word in words]
     if not fitting and set(letters) <= _LETTERS.keys():
@@ -149,15 +149,16 @@ def one_device(
     readings: tuple[int, ...] = (),
     time: int | None = None,
 ) -> Table:
-    """The rows of one device, where a column tells several apart: ``device``, or one of those not ``used``, by
-    its name, or because the
-    ``readings`` of its devices take turns, in the order of ``time`` where there is one. Devices that take turns and no
-    column that says so are a serious finding; ``--instance 1`` then takes the first of each turn.
+    """The rows of one device, where a column identifies several.
+
+    The column is ``device``, or one not ``used`` that is recognised by its name, or because its codes alternate as the
+    ``readings`` do (in order of ``time`` if there is one). Alternating devices without such a column are a serious
+    finding; ``--instance 1`` then takes the first row of each turn.
 
     Raises
     ------
     ReadError
-        When there are several and none was chosen, or the chosen one is not there.
+        When there are several devices and none is chosen, or the chosen one does not exist.
     """
     column, words, codes = _device_column(table, used if device is None else set(), device)
     order = _in_time(table, time, MAX_ROWS)
@@ -196,7 +197,7 @@ def one_device(
 
 
 def chosen(where: Words, what: str, listed: Words, rows_left_out: int) -> Finding:
-    """The statement that one of several was taken."""
+    """The finding that one of several devices is read."""
     return Finding.of(
         FindingCode.DEVICE_CHOSEN,
         where=where,
@@ -207,7 +208,7 @@ def chosen(where: Words, what: str, listed: Words, rows_left_out: int) -> Findin
 
 
 def _changes_with(table: Table, time: int) -> Callable[[npt.NDArray[np.int64]], bool]:
-    """Whether codes (n,) change wherever the clock goes back, but where it wraps, and hardly elsewhere."""
+    """A test whether codes (n,) change where the clock goes back and almost nowhere else; False if the clock wraps."""
     raw = table.columns[time]
     back = np.flatnonzero(np.diff(raw) < 0.0)
     if not len(back) or unwrap(raw, table, None, [])[1]:
@@ -216,7 +217,7 @@ def _changes_with(table: Table, time: int) -> Callable[[npt.NDArray[np.int64]], 
 
 
 def _in_time(table: Table, time: int | None, most: int) -> npt.NDArray[np.int64]:
-    """Numbers of the first rows in the order of their time; in that of the file without one, or where it wraps."""
+    """Indices of the first rows in order of time; in file order without a time, or where the clock wraps."""
     as_they_stand = np.arange(min(table.n_rows, most))
     if time is None or len(table.columns[time]) != table.n_rows:
         return as_they_stand
@@ -230,7 +231,7 @@ def _n_in_turn(table: Table, readings: tuple[int, ...], order: npt.NDArray[np.in
 
 
 def _by_turn(table: Table, instance: str, n: int, time: int | None) -> Table:
-    """Every n-th row, where the timestamps say that no turn was left out."""
+    """Every n-th row, if the timestamps show that no device's row is missing."""
     if instance not in [str(k + 1) for k in range(n)]:
         raise ReadError(f"{table.path}: there is no instance {instance}; rows take turns between {n}, from 1.")
     order = _in_time(table, time, table.n_rows)
@@ -251,8 +252,8 @@ def _by_turn(table: Table, instance: str, n: int, time: int | None) -> Table:
 def _device_column(
     table: Table, used: set[int], only: int | None = None, fits: Callable[[npt.NDArray[np.int64]], bool] | None = None
 ) -> tuple[int, list[str], npt.NDArray[np.int64]]:
-    """Column, words and codes (n,): of column ``only``, of the first whose codes ``fits``, or of the first whose
-    name says device."""
+    """Column, words and codes (n,) of the device column: ``only``, or the first whose codes pass ``fits``, or the
+    first whose name means device."""
     none = np.zeros(0, dtype=np.int64)
     for i in range(len(table.columns)) if only is None else (only,):
         name = table.names[i] if table.names is not None else ""
@@ -278,7 +279,7 @@ def _device_column(
 
 
 def by_sensor(table: Table) -> tuple[Table, ...]:
-    """Accelerometer and gyro of a table in long form, where a column of words says whose row it is; else the table."""
+    """Accelerometer and gyro of a table in which a column of words names each row's sensor; else the table itself."""
     for i, (words, codes) in table.labels.items():
         names = {kind: pick_kind(list(words), kind) for kind in ("accelerometer", "gyroscope")}
         acc, gyr = names["accelerometer"], names["gyroscope"]
@@ -298,21 +299,20 @@ def by_sensor(table: Table) -> tuple[Table, ...]:
     return (table,)
 
 
-# Rows of several devices in one stream, told by the readings: every second (third, fourth) row is another sensor's.
+# Rows of several devices in one stream, detected from the readings: every second (third, fourth) row is from another.
 
 _MOST = 4
 _BLOCK = 24
-"""Rows of a block: a multiple of two, three and four."""
+"""Rows of a block; a multiple of two, three and four."""
 _ROWS = 48_000
 _CLEAR = 6.0
-"""Standard errors by which rows of one kind differ from the others, in the usual block at rest; of one sensor's white
-noise 0.7, and 1.3
-where its noise alternates (autocorrelation -0.5)."""
+"""Threshold, in standard errors, of the median difference between the rows of one device and the others in quiet
+blocks; a single sensor's white noise gives 0.7, alternating noise (autocorrelation -0.5) 1.3."""
 _SAME_SIGN = 0.9
 
 
 def n_interleaved(readings: FloatArray) -> int:
-    """How many devices take turns in rows (n, k) of readings; 1 where rows are one device's."""
+    """Number of devices that alternate in rows (n, k) of readings; 1 where all rows are from one device."""
     rows = readings[:_ROWS]
     blocks = len(rows) // _BLOCK
     if blocks < 8:
@@ -325,11 +325,11 @@ def n_interleaved(readings: FloatArray) -> int:
 
 
 def _takes_turns(parts: FloatArray, k: int) -> bool:
-    """Whether each k-th row of blocks (m, rows, channels) differs from the rest by far more than from its like."""
+    """Whether every k-th row of blocks (m, rows, channels) differs from the others far more than from its own kind."""
     n = parts.shape[1] // k
     noise = np.sqrt(np.mean((parts[:, k:] - parts[:, :-k]) ** 2, axis=1) / 2.0)
     change = np.abs(np.diff(parts, axis=1))
-    # Readings that toggle between two LSB are one sensor's.
+    # Readings of one sensor that toggle between two neighbouring LSB must not count as two sensors.
     step = np.where(change > 0.0, change, np.inf).min(axis=(0, 1))
     step = np.where(np.isfinite(step), step, 0.0)
     quiet = np.argsort(noise.sum(axis=1), kind="stable")[: max(len(parts) // 2, 8)]

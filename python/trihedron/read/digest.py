@@ -1,4 +1,4 @@
-"""SHA-256 of a file that is read: at once, or beside what is done with its readings."""
+"""SHA-256 of a file that is read: computed at once, or on a thread while the readings are processed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from threading import Thread
 from trihedron.read.errors import ReadError, from_os_error
 
 _CHUNK = 1 << 20
-"""Bytes at a time: they stay in the cache between being fetched and being digested."""
+"""Bytes read at a time; they stay in the processor's cache until they are digested."""
 
 
 def file_sha256(path: Path) -> str:
@@ -31,7 +31,7 @@ def file_sha256(path: Path) -> str:
 
 @contextmanager
 def kept_open(path: Path) -> Generator[FileIO, None, None]:
-    """The bytes of a file, closed where reading them fails: afterwards they belong to :class:`LateSha256`."""
+    """The opened file; closed if reading it fails, otherwise closed by :class:`LateSha256`."""
     try:
         stream = path.open("rb", buffering=0)
     except OSError as error:
@@ -44,11 +44,11 @@ def kept_open(path: Path) -> Generator[FileIO, None, None]:
 
 
 class LateSha256:
-    """SHA-256 of a file's first ``n_bytes``, taken on a thread of its own; ``stream`` is the file and is closed by it.
+    """SHA-256 of a file's first ``n_bytes``, computed on a separate thread, which closes ``stream``, the opened file.
 
-    Parsing keeps every core busy and judging the readings does not: the digest fills the gaps of the second instead of
-    delaying the first. Bytes that are appended meanwhile are not in it, as they are not in the readings. Nobody waits
-    for the digest of a file that turned out not to be a log: the thread ends with this object.
+    Parsing uses every core and the audit of the readings does not, so the digest runs during the audit instead of
+    delaying the parsing. Bytes appended meanwhile are excluded from it, as from the readings. The thread ends with this
+    object, so nothing waits for the digest of a file that is not a log.
     """
 
     def __init__(self, path: Path, stream: FileIO, n_bytes: int) -> None:
@@ -58,12 +58,12 @@ class LateSha256:
         Thread(target=_digest, args=(stream, n_bytes, self._future, wanted), name="digest", daemon=True).start()
 
     def hexdigest(self) -> str:
-        """The digest, hexadecimal, waited for.
+        """The digest, hexadecimal; waits until it is computed.
 
         Raises
         ------
         ReadError
-            When the file could not be read again, or is shorter than it was.
+            When the file cannot be read again, or was truncated.
         """
         try:
             digest = self._future.result()
@@ -91,6 +91,6 @@ def _digest(stream: FileIO, n_bytes: int, future: Future[str | None], wanted: we
 
 
 def hexdigest(*sha256: str | LateSha256) -> str:
-    """A digest that is known or waited for, hexadecimal; of several files that of their digests."""
+    """The digest of a file, hexadecimal, waited for if necessary; for several files, the digest of their digests."""
     known = [one if isinstance(one, str) else one.hexdigest() for one in sha256]
     return known[0] if len(known) == 1 else hashlib.sha256("".join(known).encode()).hexdigest()

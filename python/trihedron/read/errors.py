@@ -1,4 +1,4 @@
-"""What a reader says when a file cannot be read: one sentence, never a traceback."""
+"""Errors of files that cannot be read, each one sentence, and checks of a file before reading."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from trihedron.subprocesses import check_tables
 
 @contextmanager
 def panics_unprinted() -> Iterator[None]:
-    """Standard error, below Python, goes to a file meanwhile; what is no panic is written out afterwards.
+    """Redirect file descriptor 2 to a file; afterwards print its content unless it is a panic.
 
-    A panic of polars becomes an exception, but its hook has printed a backtrace before. Where standard error is closed
-    or is no file, nothing is redirected.
+    A panic of polars becomes an exception, but its hook prints a backtrace first. Nothing is redirected where standard
+    error is closed or is not a file.
     """
     try:
         sys.stderr.flush()
@@ -40,11 +40,11 @@ def panics_unprinted() -> Iterator[None]:
 
 
 class ReadError(RefusedError):
-    """A file that cannot become a recording. The text is one sentence: which file, which line, what to do."""
+    """A file that cannot become a recording. The message is one sentence: which file, which line, what to do."""
 
 
 def from_os_error(path: Path, error: OSError) -> ReadError:
-    """The operating system's refusal in the words of the person who asked."""
+    """The operating system's error as a :class:`ReadError` with advice."""
     if isinstance(error, FileNotFoundError):
         return ReadError(f"{path}: there is no such file; check the name and the folder.")
     if isinstance(error, IsADirectoryError):
@@ -55,12 +55,12 @@ def from_os_error(path: Path, error: OSError) -> ReadError:
 
 
 def refuse_after_fork(path: Path) -> None:
-    """Refuse what would wait for ever in a forked child.
+    """Refuse to use polars in a forked child process, where it would wait forever.
 
     Raises
     ------
     ReadError
-        Where the library that parses tables does not answer any more.
+        Where the library that parses tables cannot be used.
     """
     try:
         check_tables()
@@ -69,12 +69,12 @@ def refuse_after_fork(path: Path) -> None:
 
 
 def check_readable(path: Path) -> int:
-    """Size of a plain readable file in bytes.
+    """Size in bytes of a readable regular file.
 
     Raises
     ------
     ReadError
-        When it is missing, a directory, not a plain file, empty, or may not be read.
+        When it is missing, a directory, not a regular file, empty, or may not be read.
     """
     try:
         status = path.stat()

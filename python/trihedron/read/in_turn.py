@@ -1,4 +1,4 @@
-"""One table whose rows hold the accelerometer or the gyro, the other's cells empty: two logs, told by the rows."""
+"""Splits a table whose rows contain either the accelerometer or the gyro, with the other's cells empty, into two."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from trihedron.records import Finding, FindingCode
 
 _LOOKED_AT = 1000
 _USUALLY_BOTH = 0.9
-"""Share of the first rows with both sensors above which nothing more is asked: missing readings are lost ones."""
+"""Share of the first rows with both sensors above which the table is not split: missing readings are lost ones."""
 _SELDOM_BOTH = 0.5
-"""Share of a sensor's rows that the other one shares at most; timestamps of two clocks coincide now and then."""
+"""Largest share of a sensor's rows that also contain the other; timestamps of two clocks coincide now and then."""
 _IN_STEP = 0.9
-"""Share of a slower sensor's rows that follow each other by the same number of rows."""
+"""Smallest share of a slower sensor's rows at a constant distance in rows."""
 
 
 def by_rows(table: Table, mapping: str | None, sensor: Sensor | None) -> tuple[Table, ...]:
-    """The accelerometer's rows and the gyro's where they take turns, or where one fills every second, third ... row
-    only; else the table itself.
+    """The accelerometer's rows and the gyro's, where they alternate, or where one fills only every second, third ...
+    row; else the table itself.
 
     Raises
     ------
     ReadError
-        When rows take turns and no column holds their time, or as ``find_columns``.
+        When rows alternate and no column contains their time, or as ``find_columns``.
     """
     chosen = find_columns(table, mapping, sensor or table.sensor)
     if chosen.accelerometer is None or chosen.gyroscope is None:
@@ -78,7 +78,7 @@ def _is_every_other(rows: npt.NDArray[np.int64]) -> bool:
 
 
 def _without_counter(table: Table, counter: int | None) -> Table:
-    """A counter of all rows would count those of the other sensor as lost."""
+    """The table without a counter of all rows, by which the other sensor's rows would count as lost."""
     if counter is None or not len(table.columns[counter]) or np.median(np.diff(table.columns[counter])) != 1.0:
         return table
     columns = tuple(np.empty(0) if i == counter else column for i, column in enumerate(table.columns))
@@ -86,6 +86,6 @@ def _without_counter(table: Table, counter: int | None) -> Table:
 
 
 def _filled(table: Table) -> Table:
-    """Without the columns that hold nothing in these rows."""
+    """The table without the columns that are empty in these rows."""
     columns = tuple(c if len(c) and np.isfinite(c).any() else np.empty(0) for c in table.columns)
     return replace(table, columns=columns)

@@ -1,4 +1,4 @@
-"""KITTI's raw data: a folder ``oxts`` with a file of thirty numbers for each sample, and their times."""
+"""KITTI's raw data: a folder ``oxts`` with a file of thirty numbers for each sample, and a file of timestamps."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _FIRST_EXTRA = len(_NAMES.split())
 
 
 def oxts_folder(path: Path) -> Path | None:
-    """The folder of samples and times in ``path``, around it, or itself; None where it is no recording of KITTI."""
+    """The folder of samples and timestamps: ``path``, its ``oxts`` or its parent; None where it is no KITTI drive."""
     folders = (path, path / "oxts", path.parent)
     return next((f for f in folders if (f / "data").is_dir() and (f / "timestamps.txt").is_file()), None)
 
@@ -26,7 +26,7 @@ def read_kitti(folder: Path) -> Table:
     Raises
     ------
     ReadError
-        When a file is damaged, or there are not as many samples as times.
+        When a file is damaged, or the numbers of samples and timestamps differ.
     """
     digest = hashlib.sha256()
     rows: list[list[float]] = []

@@ -1,6 +1,6 @@
-"""Words that loggers translate, in English: Czech, Dutch, Finnish, French, German, Hungarian, Italian, Polish,
+"""English for column names in other languages: Czech, Dutch, Finnish, French, German, Hungarian, Italian, Polish,
 Portuguese, Russian, Scandinavian, Spanish, Turkish, Ukrainian, Chinese, Japanese, Korean, and the Greek letters of
-equations. A word not known here stays as it is, and its column unrecognised."""
+equations. An unknown word is unchanged, and its column is not recognised."""
 
 from __future__ import annotations
 
@@ -29,32 +29,32 @@ _MEANINGS = {
     "y": "у",
     "": "по 的",
 }
-"""English, and what stands for it as regular expressions of whole words without accents; ``х`` and ``у`` are the
-Cyrillic letters that look like x and y."""
+"""English words, and their translations as regular expressions of whole words without accents; ``х`` and ``у`` are
+the Cyrillic letters that look like x and y."""
 _ENGLISH = {english: re.compile("|".join(words.split())).fullmatch for english, words in _MEANINGS.items()}
 _SENSORS = (["acceleration"], ["gyro"])
 _OTHER_SCRIPT = "\u0370-\u03bb\u03bd-\u052f\u3040-\u30ff\u3400-\u9fff\uac00-\ud7af"
-"""Greek, Cyrillic, kana, Han and Hangul; not the Greek letter that stands for a millionth."""
+"""Greek, Cyrillic, kana, Han and Hangul; without the Greek letter that means micro."""
 _BETWEEN_SCRIPTS = re.compile(
     f"(?<=[{_OTHER_SCRIPT}])(?=[A-Za-z])|(?<=[A-Za-z])(?=[{_OTHER_SCRIPT}])|(?=[轴軸])|(?<=[轴軸])"
 )
 _LOST = re.compile("\ufffd{2,}")
-"""Letters of an encoding that is not UTF-8."""
+"""Replacement characters for letters that are not valid UTF-8."""
 
 
 def plain(text: str) -> str:
-    """Letters without their accents, ASCII brackets, and a blank where the script changes (``加速度X``)."""
+    """The text without accents, with ASCII brackets, and with a blank where the script changes (``加速度X``)."""
     if text.isascii():
         return text
-    # The marks of European letters; those of kana (U+3099) make other syllables.
+    # Only marks of European letters are removed; those of kana (U+3099) change the syllable.
     bare = "".join(c for c in unicodedata.normalize("NFD", text) if not "\u0300" <= c <= "\u036f")
     bare = unicodedata.normalize("NFC", bare).replace("μ", "µ").replace("º", "°").replace("（", "(").replace("）", ")")
-    # A word, though nobody knows which: "x" behind letters that are lost is no bare x.
+    # Unreadable letters become a word, so that an "x" after them is not a column named x alone.
     return _BETWEEN_SCRIPTS.sub(" ", _LOST.sub(" unreadable ", bare))
 
 
 def english(words: list[str]) -> list[str]:
-    """Lower-case words with those of other languages in English; an axis glued to a sensor stands alone."""
+    """Lower-case words translated to English; an axis letter attached to a sensor's name becomes a separate word."""
     out: list[str] = []
     for word in words:
         known = _translated(word)

@@ -1,11 +1,11 @@
-"""MATLAB files: whether their structure is sound enough for a library, and objects as tables.
+"""MATLAB files: a check of their structure before a library reads them, and MATLAB objects as tables.
 
-A MATLAB file before 7.3 walked through first: SciPy trusts its sizes, and over wrong ones it ends the program.
+The structure of a file before version 7.3 is checked first, because SciPy trusts its sizes and crashes on wrong ones.
 
 Level 5 MAT-files (The MathWorks, MAT-File Format): a header of 128 bytes, then elements of type, size and content; an
-array is an element of elements: flags, dimensions, name, and what its class asks for.
+array is an element that contains elements: flags, dimensions, name, and further ones that depend on its class.
 
-Tables and timetables of MATLAB, which are objects in its files: decoded by mat-io, one data frame each.
+Tables and timetables, which are objects in MATLAB files, are decoded by mat-io, one data frame each.
 
 MATLAB Mobile saves a timetable for each sensor (``Acceleration``, ``AngularVelocity``) with columns X, Y, Z.
 """
@@ -34,7 +34,7 @@ _AXES = {"x", "y", "z"}
 
 
 def read_objects(path: Path, choice: Choice) -> tuple[Table, ...]:
-    """The log in a MATLAB file of tables: one that holds it, or one for each sensor.
+    """The log in a MATLAB file of tables: one table, or one for each sensor.
 
     Raises
     ------
@@ -47,10 +47,10 @@ def read_objects(path: Path, choice: Choice) -> tuple[Table, ...]:
         raise missing_extra(path, "a MATLAB file of tables or timetables", "mat-io", "matlab") from None
     try:
         with warnings.catch_warnings():
-            # SciPy, which mat-io uses, warns of the objects' own bookkeeping.
+            # SciPy, which mat-io uses, warns about internal data of the objects.
             warnings.simplefilter("ignore")
             content = load_from_mat(str(path))
-    # mat-io answers damage with whatever its unpacking met.
+    # For damaged files mat-io raises errors of any kind.
     except Exception as error:
         raise ReadError(f"{path}: mat-io cannot read this MATLAB file ({first_line(error)}); save it again.") from None
     tables = {name: table for name, value in content.items() if (table := _table(path, name, value)) is not None}
@@ -77,7 +77,7 @@ def read_objects(path: Path, choice: Choice) -> tuple[Table, ...]:
 
 
 def _table(path: Path, name: str, value: Any) -> Table | None:
-    """A data frame as a table; columns that are axes alone take the name of their table."""
+    """A data frame as a table; columns named only x, y, z get the name of their table as prefix."""
     if not (hasattr(value, "columns") and hasattr(value, "dtypes")):
         return None
     items = frame_columns(value)
@@ -97,7 +97,7 @@ def _columns(table: Table) -> Columns | None:
 
 
 _SIZE = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
-"""Bytes of a value by type of element."""
+"""Bytes per value by element type."""
 _INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED, _UTF8 = 1, 5, 6, 14, 15, 16
 _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _FIRST_NUMBERS = 1, 2, 3, 4, 5, 6
 _LAST_NUMBERS, _FUNCTION, _OPAQUE = 15, 16, 17
@@ -107,7 +107,7 @@ _LONGEST_NAME = 1024
 
 
 class DamagedError(RefusedError):
-    """The walk met what no writer writes; the sentence says where."""
+    """The structure of the file is invalid; the message says where."""
 
 
 @dataclass(frozen=True)
@@ -119,12 +119,12 @@ class _Element:
 
 
 def check_matlab(content: bytes) -> None:
-    """Walk through all arrays of a file.
+    """Check all arrays of a file.
 
     Raises
     ------
     DamagedError
-        At the first size, type or dimension that does not fit the others.
+        At the first size, type or dimension that is inconsistent.
     """
     order = "<" if content[126:128] == b"IM" else ">"
     for element in _elements(content, _HEADER, len(content), order):
@@ -157,7 +157,7 @@ def _element(data: bytes, at: int, end: int, order: str) -> _Element:
     else:
         (size,) = struct.unpack_from(order + "I", data, at + 4)
         kind, start = word, at + 8
-        # Elements end at a multiple of eight bytes, but for compressed ones.
+        # Elements are padded to a multiple of eight bytes, except compressed ones.
         following = start + size + (0 if kind == _COMPRESSED else -size % 8)
     _expect(start + size <= end, at)
     return _Element(kind, start, size, min(following, end))
@@ -222,7 +222,7 @@ def _inner(data: bytes, element: _Element, order: str, depth: int) -> None:
 
 
 def _counted(count: int, at: int, end: int) -> range:
-    # Each array takes eight bytes at least.
+    # Each array takes at least eight bytes.
     _expect(count <= (end - at) // 8, at)
     return range(count)
 

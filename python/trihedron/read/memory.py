@@ -1,4 +1,4 @@
-"""Readings that are in memory already, as a table: arrays, structured and masked arrays, data frames, dictionaries."""
+"""Tables from readings in memory (arrays, structured and masked arrays, data frames, dictionaries); memory limits."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from trihedron.read.errors import ReadError
 from trihedron.read.table import Table
 
 BYTES_PER_CELL_AT_PEAK = 16
-"""A number (8 bytes), its share of the clock's timestamps and ticks, and of what one pass of the audit needs: 10^7 rows
-of 7 columns take 0.97 GB, 12 bytes per cell beside the interpreter's."""
+"""A number (8 bytes), and its share of the clock's timestamps and ticks and of the memory of one pass of the audit:
+10^7 rows of 7 columns take 0.97 GB, 12 bytes per cell besides the interpreter's."""
 KEPT_FREE = 150_000_000
-"""For a block of text that is being parsed, libraries not yet loaded, and threads."""
+"""Bytes reserved for a block of text that is being parsed, libraries not yet loaded, and threads."""
 MOST_RATIO = 500.0
-"""Logs of still sensors in whole counts shrink up to a hundred times; archives made to harm, a thousand and more."""
+"""Largest compression ratio: logs of static sensors in counts reach 100, malicious archives 1000 and more."""
 RATIO_MATTERS_FROM = 100_000_000
-"""Unpacked bytes below which no ratio does harm."""
+"""Unpacked bytes below which any ratio is harmless."""
 
 
 def available_memory_bytes() -> int | None:
-    """What this process may still take, of the machine, its container, its own limit; None where nothing tells."""
+    """Memory still available to this process, by machine, container and process limit; None where it is unknown."""
     known = [left for left in (_of_machine(), _of_container(), _of_process()) if left is not None]
     return max(min(known), 0) if known else None
 
@@ -67,18 +67,18 @@ def _of_process() -> int | None:
 
 
 def rows_that_fit(left: int, n_columns: int) -> int:
-    """Rows of a log for which ``left`` bytes are enough."""
+    """Rows of a log that fit into ``left`` bytes of memory."""
     return max(left - KEPT_FREE, 0) // (n_columns * BYTES_PER_CELL_AT_PEAK)
 
 
 def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None = None, n_held: int = 0) -> None:
-    """Refuse a log that would not fit.
+    """Refuse a log that does not fit into memory.
 
     Raises
     ------
     ReadError
-        When ``n_rows * n_columns * 16`` bytes, less 8 for every cell of the ``n_held`` rows already read, exceed what
-        is left; it says how many rows would fit.
+        When ``n_rows * n_columns * 16`` bytes, less 8 for every cell of the ``n_held`` rows already read, exceed the
+        available memory; the message says how many rows fit.
     """
     left = available_memory_bytes() if available is None else available
     if left is None:
@@ -95,12 +95,12 @@ def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None 
 
 
 def check_ratio(path: Path, packed: int, unpacked: int, what: str = "the file") -> None:
-    """Refuse what was packed to do harm.
+    """Refuse a malicious archive.
 
     Raises
     ------
     ReadError
-        When ``unpacked`` bytes come from a ``packed`` five hundred times smaller.
+        When ``unpacked`` is more than 500 times ``packed`` (both in bytes), and more than 100 MB.
     """
     if unpacked > RATIO_MATTERS_FROM and unpacked > MOST_RATIO * max(packed, 1):
         raise ReadError(
@@ -110,12 +110,12 @@ def check_ratio(path: Path, packed: int, unpacked: int, what: str = "the file") 
 
 
 def check_unpacked(path: Path, packed: int, unpacked: int, what: str = "the file") -> None:
-    """Refuse what was packed to do harm, and what would be held whole and does not fit into memory.
+    """Refuse a malicious archive, or one whose content does not fit into memory.
 
     Raises
     ------
     ReadError
-        As :func:`check_ratio`, or when ``unpacked`` bytes are more than there is room for.
+        As :func:`check_ratio`, or when ``unpacked`` bytes exceed the available memory.
     """
     check_ratio(path, packed, unpacked, what)
     left = available_memory_bytes()
@@ -130,10 +130,10 @@ _ACCEPTED = "a file name, an array (n, columns), a dictionary of arrays, or a da
 
 
 def table_of(data: object) -> Table:
-    """A table from what a program holds; masked cells, NaT and nulls are missing readings (NaN).
+    """A table from data in memory; masked cells, NaT and nulls are missing readings (NaN).
 
     ``data`` is an array (n, k) or (n,) structured, anything with the array interface, a mapping of names to arrays (n,)
-    or (n, 3), or a data frame (pandas, polars, Arrow, or whatever speaks the data frame interchange).
+    or (n, 3), or a data frame (pandas, polars, Arrow, or any that supports the data frame interchange protocol).
 
     Raises
     ------
@@ -146,7 +146,7 @@ def table_of(data: object) -> Table:
         names = list(dict.fromkeys(name for row in data for name in row))
         return columns_table("list", [(name, [row.get(name) for row in data]) for name in names])
     if hasattr(data, "collect") and hasattr(data, "collect_schema"):
-        # A lazy frame is a question; its answer has the rows.
+        # A lazy frame must be evaluated.
         data = data.collect()
     if _is_frame(data):
         return columns_table(type(data).__name__, frame_columns(data))
@@ -165,7 +165,7 @@ def table_of(data: object) -> Table:
 
 
 def _flat(data: Mapping[Any, Any], prefix: str = "") -> list[tuple[str, Any]]:
-    """Items of a dictionary, those of dictionaries inside it by both names: ``acc.x``."""
+    """Items of a dictionary; those of nested dictionaries have both names: ``acc.x``."""
     items: list[tuple[str, Any]] = []
     for key, value in data.items():
         items += _flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else [(f"{prefix}{key}", value)]
@@ -173,7 +173,7 @@ def _flat(data: Mapping[Any, Any], prefix: str = "") -> list[tuple[str, Any]]:
 
 
 def _name(label: object) -> str:
-    """A column's name; of several levels all that say something."""
+    """A column's name; for several levels, all that are not empty, joined by points."""
     return ".".join(str(part) for part in label if str(part)) if isinstance(label, tuple) else str(label)
 
 
@@ -199,7 +199,7 @@ def _is_frame(data: object) -> bool:
 
 
 def frame_columns(frame: Any) -> list[tuple[str, Any]]:
-    """Names and columns; a level of a pandas index that holds times, or has a name, is a column too."""
+    """Names and columns; a level of a pandas index that contains times, or is named and numeric, is a column too."""
     columns: list[tuple[str, Any]] = []
     index: Any = getattr(frame, "index", None)
     levels = [index.get_level_values(k) for k in range(index.nlevels)] if hasattr(index, "get_level_values") else []
@@ -257,7 +257,7 @@ def columns_table(kind: str, items: list[tuple[Any, Any]]) -> Table:
                 )
             parts = [_floats(kind, name, array[:, k]) for k in range(array.shape[1])]
             has_clock = len(parts) == 4 and len(parts[0]) > 2 and bool(np.all(np.diff(parts[0]) > 0.0))
-            # A clock beside three readings in one array, as RoNIN's raw readings have it.
+            # A clock and three readings in one array, as in RoNIN's raw readings.
             names += [f"{name} time"] * has_clock + [f"{name}[{k}]" for k in range(len(parts) - has_clock)]
             columns += parts
         else:
@@ -278,7 +278,7 @@ def _is_numeric_object(array: npt.NDArray[Any]) -> bool:
 
 
 def _floats(kind: str, name: str, array: npt.NDArray[Any]) -> FloatArray:
-    """A column as float64: what is masked, NaT or None is NaN; dates are seconds since 1970."""
+    """A column as float64: masked cells, NaT and None are NaN; dates are seconds since 1970."""
     mask = np.ma.getmaskarray(array) if isinstance(array, np.ma.MaskedArray) else None
     plain = np.asarray(np.ma.getdata(array))
     try:

@@ -1,4 +1,4 @@
-"""Two clocks, one time base: which sensor keeps its samples, and what interpolation does to the other."""
+"""Merges two sensors with separate clocks: one keeps its samples, the other is interpolated to its timestamps."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from trihedron.records import Finding, FindingCode, Severity
 
 
 def _unit_before(named: str, readings: FloatArray) -> str:
-    """Interpolation hides that readings were whole numbers, which tells their unit."""
+    """The unit of readings before interpolation, after which it is not visible that they were whole numbers."""
     return WHOLE if named in {"", "raw"} and is_integer(readings) else named
 
 
@@ -81,18 +81,18 @@ def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
 
 
 SAME_TICK = 0.02
-"""Timestamps closer than this part of a step are the same tick: the reading is taken as it is."""
+"""Timestamps closer than this fraction of a step are equal: the reading is used without interpolation."""
 NEIGHBOUR_STEPS = 1.5
-"""Two readings further apart than this have a gap between them, and nothing is made up inside a gap."""
+"""Largest distance of two readings, in steps, between which to interpolate; a larger one is a gap."""
 FASTER = 1.2
 QUIETER, FAITHFUL = 0.9, 0.99
-"""Interpolation that leaves less of the white noise's variance shows in uncertainties (a tenth), or at least in an
-Allan curve (a hundredth)."""
+"""White-noise variance factors of interpolation below which it affects uncertainties (by a tenth), or at least an Allan
+curve (by a hundredth)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Merged:
-    """Common time (n,) and both sensors (n, 3), NaN where one has no near neighbours; ``start_s`` of the base."""
+    """Common time (n,) [s] and both sensors (n, 3), NaN where one has no near neighbours; ``start_s`` of the base."""
 
     time_s: FloatArray
     start_s: float
@@ -108,10 +108,10 @@ class Merged:
 def resample(
     time_s: FloatArray, base_s: FloatArray, values: FloatArray, step_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Readings (m, 3) at times ``time_s`` brought to ``base_s`` (n,), and the white-noise variance factor (n,).
+    """Readings (m, 3) at times ``time_s`` interpolated to ``base_s`` (n,), and the white-noise variance factor (n,).
 
-    Linear interpolation with fraction α turns white variance σ² into ``(α² + (1 - α)²) σ²``; the same tick keeps it.
-    Rows without two neighbours within 1.5 steps become NaN.
+    Linear interpolation with fraction α changes the variance σ² of white noise to ``(α² + (1 - α)²) σ²``; at equal
+    timestamps it stays σ². Rows without two neighbours within 1.5 steps become NaN.
     """
     right = np.clip(np.searchsorted(time_s, base_s), 1, len(time_s) - 1)
     left = right - 1
@@ -124,12 +124,12 @@ def resample(
     near = (width > 0) & (width <= NEIGHBOUR_STEPS * step_s)
     usable = (alpha >= 0) & (alpha <= 1) & (same_left | same_right | near)
     weight = alpha[:, None]
-    # Written as a selection at the ends, so that a NaN in the unused neighbour does not spread.
+    # At α = 0 and 1 one reading is selected, so that a NaN in the unused neighbour has no effect.
     out = np.where(weight == 0, values[left], np.where(weight == 1, values[right], 0.0))
     between = (alpha > 0) & (alpha < 1)
     out[between] = (1 - weight[between]) * values[left[between]] + weight[between] * values[right[between]]
     out[~usable] = np.nan
-    inside = np.clip(alpha, 0.0, 1.0)  # far outside two nearly equal timestamps alpha has no square
+    inside = np.clip(alpha, 0.0, 1.0)  # alpha² overflows far outside two nearly equal timestamps
     factor = inside**2 + (1 - inside) ** 2
     return out, factor
 
@@ -143,10 +143,10 @@ def merge(
     gyroscope_start_s: float,
     where: str,
 ) -> Merged:
-    """Both sensors on the clock of one of them, over the time both run.
+    """Both sensors on the clock of one of them, over their common time.
 
-    The accelerometer's clock is the base and its samples stay untouched, unless the gyro is more than 1.2 times faster:
-    then throwing gyro samples away would hurt the integration of turns, and the accelerometer is interpolated.
+    The accelerometer's clock is the base and its samples are unchanged, unless the gyro is more than 1.2 times faster:
+    then the accelerometer is interpolated, because fewer gyro samples would impair the integration of rotations.
 
     Raises
     ------

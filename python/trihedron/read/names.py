@@ -1,4 +1,4 @@
-"""The meaning of one column name, over the habits of all common loggers."""
+"""The meaning of a column name, as common loggers write it."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ _GLUED = re.compile(
     r"^(acc|accel|accelero?|accelerometer|acceleration|gyr|gyro|gyroscope|omega|linacc|[agwft])_?([xyz])(raw|adc|out)?$"
 )
 _AXIS_FIRST = re.compile(r"^([xyz])(acc|accel|accelerometer|acceleration|gyr|gyro|gyroscope|rate)$")
-"""As MAVLink writes them: xacc, ygyro."""
+"""Axis before the sensor, as MAVLink writes it: xacc, ygyro."""
 _NUMBERED = re.compile(r"^(acc|accel|gyr|gyro|omega)([0123])$")
 _DEVICE_WORD = re.compile(r"(imu|dev|device|sensor|node|unit|port|ch|mpu|bmi|icm|lsm)\d*$")
 _LOOKS_LIKE_A_UNIT = re.compile(r"[/^²°]|\bper\b|^(ft|hz|rev|gon|grad|ips|rps|kdps|ug|µg)$|^(micro|nano|kilo|mega)")
-"""A unit that a bracket states, known or not: one that is not known is asked for."""
+"""Text in a bracket that is a unit, known or not; for an unknown unit the user is asked."""
 _UNIT_BEHIND = re.compile(r"[xyz][ _]([a-zµ°]+/[a-z]+[0-9²]?)$")
-"""The same behind the axis: gyro_x_rev/s."""
+"""A unit after the axis: gyro_x_rev/s."""
 _TICK_BEHIND = re.compile(r"(?:\s+in\s+|[\s_/]+)((?:1/)?\d[\d.]*\s*(?:k?hz|[mnuµ]?s))$", re.IGNORECASE)
-"""The size of a tick behind a name: ticks_25 us, ticks_1/32768 s."""
+"""The size of a tick after a name: ticks_25 us, ticks_1/32768 s."""
 _OTHER_TIMES = frozenset({"min", "minute", "h", "hr", "hour"})
-"""Behind what would be a unit of the second: rad/min begins as rad does."""
+"""Words after which a unit is not one per second: rad/min begins as rad does."""
 _OF_READINGS = frozenset({"unit", "units", "raw", "data", "reading", "readings", "value", "values"})
 _COUNTS = frozenset({"lsb", "digit", "digits", "count", "counts"})
-"""mg/LSB is the size of a count."""
+"""Words for counts; mg/LSB is the LSB, not a unit of the readings."""
 _RATES = {"p": "x", "q": "y", "r": "z"}
-"""An aircraft's names of its angular rates."""
+"""Names of angular rates in aeronautics, and their axes."""
 _TIME_WORDS = {
     "t",
     "time",
@@ -62,13 +62,13 @@ _TIME_WORDS = {
     "itow",
 }
 _TICK_WORDS = {"ticks", "tick", "clk", "sensortime"}
-"""What counts, and does not say how fast."""
+"""Words for a counter of ticks whose frequency is not stated."""
 _TIME_WORDS |= _TICK_WORDS | {"millis", "micros", "seconds", "secs", "unix"}
 _STEP_WORDS = {"dt", "deltat", "deltatime", "timedelta"}
-"""The time since the row before."""
+"""Words for the time since the previous row."""
 _RATE_WORDS = {"rate", "frequency", "freq", "odr", "fs"}
 _OF_RATES = {"sampling", "sample", "sensor", "output", "data", "update", "log", "logging", "imu", "nominal", "hz"}
-"""What may stand beside the word for a rate: a baud rate or an i2c frequency is another."""
+"""Words that may accompany the word for a rate; others mean another rate, such as a baud rate or an i2c frequency."""
 _OF_CLOCKS = {"1", "unit", "units", "resolution", "size", "period", "frequency"}
 _COUNTER_WORDS = {"index", "counter", "seq", "packet", "frame", "idx", "no", "number", "row", "samplenumber", "nr"}
 _TEMPERATURE = re.compile(r"temp|temperature|tempc|temperature\w*|temp_?\w{0,4}")
@@ -108,8 +108,8 @@ _UNIT_OF = {
 
 @dataclass(frozen=True)
 class ColumnName:
-    """``unit`` as stated, known or not; ``role`` is accelerometer, gyroscope, translation, bare, time,
-    step, temperature, supply, counter, or empty."""
+    """The meaning of a column name: ``unit`` as stated, known or not; ``role`` is accelerometer, gyroscope,
+    translation, bare, time, step, temperature, supply, counter, or empty."""
 
     role: str = ""
     axis: str = ""
@@ -120,12 +120,12 @@ class ColumnName:
     words: tuple[str, ...] = ()
 
     def unit_for(self, sensor: str) -> str:
-        """Unit stated by the name, read as that sensor's."""
+        """The unit in the name, if the column is that sensor's."""
         return _unit(sensor, list(self.words))
 
 
 def _unit(sensor: str, words: list[str]) -> str:
-    """A unit spelled by the words that are left of a name: joined, or word by word."""
+    """The unit that the remaining words of a name spell, joined or one by one."""
     table = _UNIT_OF[sensor]
     if not _COUNTS.isdisjoint(words):
         return "counts"
@@ -135,19 +135,19 @@ def _unit(sensor: str, words: list[str]) -> str:
             joined = "".join(words[start : start + length]).replace("milli", "m")
             if joined in table and not set(words[start + length : start + length + 1]) & _OTHER_TIMES:
                 found.append(table[joined])
-    # gyroADC [dps]: what a converter gave is in a unit where the name says which.
+    # gyroADC [dps]: where a name contains "ADC" and another unit, the latter is the unit.
     return next((unit for unit in found[1:] if unit not in ("counts", "raw")), found[min(len(found) - 1, 1)])
 
 
 def _of_unit(text: str) -> list[str]:
-    """Words of a unit, with its exponents as digits: ``rad.s^-1`` is rad, s; ``m s^-2`` is m, s2."""
+    """Words of a unit, with exponents as digits: ``rad.s^-1`` is rad, s; ``m s^-2`` is m, s2."""
     for mark, digits in (("²", "2"), ("^", ""), ("-1", ""), ("-2", "2")):
         text = text.replace(mark, digits)
     return english(_WORD.findall(text))
 
 
 def sensor_said(text: str) -> str:
-    """The sensor whose readings a remark speaks of, and of nothing else of it; "" where it does not."""
+    """The sensor that a remark names, with no other property of it; "" where it does not."""
     words = [w for w in english(_WORD.findall(plain(text).lower())) if w not in _OF_READINGS]
     sensor = _sensor(words)
     is_alone = all(_SENSOR_WORDS[sensor].fullmatch(w) or w == "rate" for w in words) if sensor in _UNIT_OF else False
@@ -155,18 +155,18 @@ def sensor_said(text: str) -> str:
 
 
 def unit_said(sensor: str, text: str) -> str:
-    """The unit that is all a remark says, known or not; "" where it says anything else."""
+    """The unit, known or not, that a remark consists of; "" where it contains anything else."""
     is_unit = _LOOKS_LIKE_A_UNIT.search(text) and not text[:1].isdecimal()
     return known_unit(sensor, text) or (text if is_unit else "")
 
 
 def known_unit(sensor: str, text: str) -> str:
-    """The unit of that sensor that a text spells, as the records call it; ``raw`` for no unit; "" where unknown."""
+    """The sensor's unit that a text spells, as named in the records; ``raw`` for raw readings; "" where unknown."""
     return _UNIT_OF[sensor].get("".join(_of_unit(plain(text).strip().lower())).replace("milli", "m"), "")
 
 
 def clock_said(what: str, unit: str) -> str:
-    """The time unit or the size of a tick that a remark states: ``time in ms``, ``1 tick = 25 us``; else ""."""
+    """The time unit or tick size that a remark states: ``time in ms``, ``1 tick = 25 us``; else ""."""
     words = english(_WORD.findall(plain(what).lower()))
     sized = re.sub(r"^ticks?\s+of\s+", "", unit)
     is_tick = sized != unit or not _TICK_WORDS.isdisjoint(words)
@@ -176,21 +176,21 @@ def clock_said(what: str, unit: str) -> str:
 
 
 def is_rate(text: str) -> bool:
-    """Whether a remark's key names the sampling rate, and nothing else: ``Sample rate``, ``ODR``, ``fs [Hz]``."""
+    """Whether a remark's key names the sampling rate and nothing else: ``Sample rate``, ``ODR``, ``fs [Hz]``."""
     words = _WORD.findall(text.lower())
     return not _RATE_WORDS.isdisjoint(words) and all(w in _RATE_WORDS or w in _OF_RATES for w in words)
 
 
 @lru_cache(maxsize=4096)
 def parse_name(name: str) -> ColumnName:
-    """What a column called ``name`` holds."""
+    """The meaning of a column called ``name``."""
     text = plain(name.strip().strip('"').strip()).replace("m/(s^2)", "m/s^2").replace("m/(sec^2)", "m/s^2")
     if re.fullmatch(r"gF[xyz]", text):
-        # Physics Toolbox: force in g along an axis, not a gyro's x.
+        # Physics Toolbox: force in g along an axis; the g does not mean gyro.
         return ColumnName("accelerometer", text[-1], "gf", "g", rank=1)
-    # An aircraft's load factors, beside p q r.
+    # Load factors in aeronautics, logged with p q r.
     text = re.sub(r"^N(?=[xyz](?![A-Za-z]))", "acc ", text)
-    # The sketch that most MPU-6050 boards run: AcX, GyX.
+    # The common Arduino sketch for MPU-6050 boards: AcX, GyX.
     text = re.sub(r"^(Ac|Gy)(?=[XYZ](?![A-Za-z]))", lambda m: {"Ac": "acc", "Gy": "gyr"}[m[1]], text)
     # GnssLogger joins axis and unit: UncalAccelXMps2, UncalGyroZRadPerSec.
     text = re.sub(r"([XYZ])(Mps2|RadPerSec|MicroT)\b", lambda m: f" {m[1]} {m[2].lower()}", text)
@@ -214,7 +214,7 @@ def parse_name(name: str) -> ColumnName:
         index, text = inner.group(1).lower(), text[: inner.start()]
     text = text.replace("m/s^2", "m_s2").replace("m/s²", "m_s2")
     words = english(_WORD.findall(re.sub(r"([a-z])([A-Z])", r"\1 \2", text).lower()))
-    # The size of a count, or a range: no unit of the readings.
+    # The LSB or a range is not a unit of the readings.
     stated = "" if re.match(r"[±+x*×-]*\s*\d[\d.]*(\s*/\s*[\d.]+)?\s*[a-zµ°]", bracket) else bracket
     unit_words = _of_unit(stated)
     said = _classify(words, unit_words, index)
@@ -299,13 +299,13 @@ def _sensor(words: list[str]) -> str:
     if len(hits) == 1:
         return hits.pop()
     if len(hits) == 2:
-        # "accelerometer rate x": the first word names the sensor.
+        # "accelerometer rate x": the first of the words names the sensor.
         for word in words:
             for sensor, pattern in _SENSOR_WORDS.items():
                 if pattern.fullmatch(word) and word != "rate":
                     return sensor
     if words and words[0] == "alpha":
-        return "translation"  # Kalibr's name for acceleration, beside omega; alone it is an angular acceleration
+        return "translation"  # Kalibr's name for acceleration if omega is there too; else an angular acceleration
     while len(words) > 1 and _DEVICE_WORD.match(words[0]):
         words = words[1:]
     return _LETTER.get(words[0], "") if words else ""

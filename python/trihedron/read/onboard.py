@@ -1,4 +1,4 @@
-"""Parameters of a flight controller, gathered while its log is read."""
+"""Parameters of a flight controller, collected while its log is read."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from trihedron.records.onboard import Autopilot, Stage
 
 
 class Parameters:
-    """Values of the parameters whose names begin with a pattern: as they were when the first reading was logged."""
+    """Values of the parameters whose names match a pattern, at the time of the first reading."""
 
     def __init__(self, wanted: re.Pattern[str]) -> None:
         self._wanted = wanted
@@ -18,7 +18,7 @@ class Parameters:
         self._changed: dict[str, None] = {}
 
     def note(self, name: str, value: float, *, has_readings: bool) -> None:
-        """Take a parameter as the log states it; ``has_readings`` once a reading was logged."""
+        """Add a parameter from the log; ``has_readings`` is True once a reading has been logged."""
         if not self._wanted.match(name):
             return
         if has_readings and self.values.get(name, value) != value:
@@ -28,14 +28,14 @@ class Parameters:
             self.values[name] = float(value)
 
     def onboard(self, autopilot: Autopilot, sensors: tuple[int, int], stage: Stage) -> Onboard | None:
-        """What the log states; ``None`` where it holds no parameters."""
+        """The corrections that the parameters describe; ``None`` where the log contains none."""
         if not self.values:
             return None
         return Onboard(autopilot, *sensors, stage, MappingProxyType(dict(self.values)), tuple(self._changed))
 
 
 def said_of(onboard: Onboard | None) -> tuple[Finding, ...]:
-    """That readings were corrected before they were logged, and that the parameters changed meanwhile."""
+    """The finding that readings were corrected on board, and whether the parameters changed during the log."""
     if onboard is None or onboard.stage == "raw":
         return ()
     return (

@@ -16,7 +16,7 @@ from trihedron.records import Finding, FindingCode
 
 
 def read_parquet(path: Path) -> Table:
-    """Numeric and time columns of a Parquet file; anything else is excluded and said so."""
+    """Numeric and time columns of a Parquet file; other columns are excluded with a finding."""
     refuse_after_fork(path)
     try:
         with panics_unprinted():

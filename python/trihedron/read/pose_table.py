@@ -27,23 +27,23 @@ _NAMES: dict[str, tuple[str, ...]] = {
 
 
 def read_pose_table(path: str | os.PathLike[str], *, gravity_m_s2: float, sigma_angle_deg: float = 0.0) -> PoseTable:
-    """Read a pose table (CSV, TSV, blanks) with a header.
+    """Read a pose table (separated by commas, tabs or blanks) with a header.
 
     Columns, in any order, units in brackets or after an underscore ignored: ``pitch`` and/or ``roll`` in degrees
-    (``pitch_rad`` in radians), or ``fx, fy, fz``, the direction that points up in the body, of any length. Optional:
-    ``pose``, the number (from 1) of the pose in the log; ``start`` and ``stop`` [s], when it was held.
+    (``pitch_rad`` in radians), or ``fx, fy, fz``, the body direction that points up, of any length. Optional:
+    ``pose``, the number (from 1) of the pose in the log; ``start`` and ``stop`` [s] of its interval.
 
     Parameters
     ----------
     gravity_m_s2 : float
-        Local gravity: directions get this length.
+        Local gravity, to which directions are scaled.
     sigma_angle_deg : float
-        Standard error of an angle setting.
+        Standard uncertainty of an angle setting.
 
     Raises
     ------
     ReadError
-        (a ``ValueError``) when the file cannot be read, has no header or neither angles nor directions.
+        (a ``ValueError``) when the file cannot be read, or has no header, or neither angles nor directions.
     """
     file = Path(path)
     table = read_table(file)

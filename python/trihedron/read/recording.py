@@ -1,4 +1,4 @@
-"""From files to one audited recording: the composition of the room."""
+"""Reads one or two files to one audited recording; composes the other modules of this package."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
 
 TIMESTAMPS = "logged time after the first [s]"
-"""Name under which timestamps that gave way to an even clock are kept."""
+"""Auxiliary column with the logged timestamps, where an even clock replaces them."""
 
 
-# Absurd readings (1e300) overflow squares; they then fail every test of plausibility, which is what they should.
+# Squares of absurd readings (1e300) overflow; such readings then fail every plausibility test, as they should.
 @np.errstate(over="ignore", invalid="ignore")
 def read_recording(
     path: Any = None,
@@ -63,7 +63,7 @@ def read_recording(
     Raises
     ------
     ReadError
-        (a ``ValueError``) one sentence naming file, line and remedy.
+        (a ``ValueError``) the message names file, line and remedy in one sentence.
     """
     if rate_hz is not None and not (np.isfinite(rate_hz) and 0 < rate_hz < 1e7):
         raise ReadError(f"the rate must be a positive number of samples per second, got {rate_hz}.")
@@ -99,13 +99,13 @@ def _of_file(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
     try:
         tables = read_tables(path, options.choice, options.progress)
     except OSError as error:
-        # A name too long, a folder that may not be entered: what the readers of formats did not meet.
+        # Errors before a format's reader is called: a name that is too long, a folder without permission.
         raise from_os_error(path, error) from None
     return of_tables(tables, sensor, options)
 
 
 def of_tables(tables: tuple[Table, ...], sensor: Sensor | None, options: Options) -> Sensors:
-    """The sensors of one table, of two (accelerometer, gyro) merged, or of the one of two that is wanted."""
+    """The sensors of one table, of two tables (accelerometer, gyro) merged, or of that of two for ``sensor``."""
     if len(tables) == 1 and options.columns is None and not tables[0].is_chosen:
         tables = (one_beside(tables[0], options.choice.instance),)
     if len(tables) == 1:
@@ -119,7 +119,7 @@ def of_tables(tables: tuple[Table, ...], sensor: Sensor | None, options: Options
 
 
 def _accounted(sensors: Sensors, findings: list[Finding]) -> None:
-    """Every row of the file is a reading or in a finding; where it is not, the answer is not to be trusted."""
+    """Add a finding if some rows of the file are neither readings nor counted in a finding as excluded."""
     reported = round(sum(finding.numbers.get("rows_left_out", 0.0) for finding in findings))
     missing = sensors.rows_in_file - sensors.rows_read - reported
     if missing:
@@ -142,7 +142,7 @@ def audited(
     gyroscope_unit: str | RateUnit | None,
     progress: Progress | None,
 ) -> Recording:
-    """Units settled, clock and readings audited, rows accounted for: a record."""
+    """The recording, with units determined, clock and readings audited, and all rows accounted for."""
     sensors = settled(sensors)
     findings = list(sensors.findings)
     _accounted(sensors, findings)
@@ -211,7 +211,7 @@ def audited(
 def _judged_gyro(
     sensors: Sensors, rate_hz: float, windows: Windows | None, given: str | RateUnit | None, extremes: Extremes
 ) -> Judged:
-    """The gyro's unit, and what gravity's turning says of it and of its axes."""
+    """The gyro's unit, with findings from the rotation of gravity about the unit and the axes."""
     assert sensors.gyroscope is not None
     acc = sensors.accelerometer
     turning = None if acc is None else turning_of(acc, sensors.gyroscope, rate_hz)
@@ -239,7 +239,7 @@ def _judged_gyro(
 
 
 def _finite_extremes(triad: FloatArray) -> Extremes:
-    """Extremes of a triad (n, 3), in which infinite readings become missing ones."""
+    """Extremes of a triad (n, 3); infinite readings are set to NaN in it."""
     extremes = _core.triad_extremes(triad)
     if any(np.isinf(value) for low, _, high, _ in extremes for value in (low, high)):
         triad[np.isinf(triad)] = np.nan
@@ -248,7 +248,7 @@ def _finite_extremes(triad: FloatArray) -> Extremes:
 
 
 def _rate_hz(sensors: Sensors) -> float:
-    """Samples per second: of the clock behind the timestamps where losses can be told on it, else of the rows."""
+    """Samples per second: from the even clock's period where losses are counted on it or it is used, else from rows."""
     sampling = sensors.sampling
     if sampling.period_s > 0.0 and (sampling.counts_losses or sampling.is_even):
         return 1.0 / sampling.period_s

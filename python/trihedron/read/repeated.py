@@ -1,4 +1,4 @@
-"""What repeats: a channel that reads the same throughout, rows that a log holds twice."""
+"""Repeated readings: channels that are constant throughout, and rows that a log contains twice."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from trihedron.read.errors import ReadError
 from trihedron.read.table import Table
 
 TOO_FEW_TO_JUDGE = 20
-"""Rows in which a live channel may well read the same throughout."""
+"""Number of rows below which a working channel may be constant."""
 
 
 def refuse_constant(table: Table, name: str, triad: FloatArray, where: tuple[int, int, int]) -> None:
-    """Readings (n, 3) of which an axis never changes, from columns ``where``.
+    """Refuse readings (n, 3), from columns ``where``, of which an axis is constant.
 
     Raises
     ------
     ReadError
-        Naming the first such column.
+        When an axis is constant or has no finite reading; the message names the first such column.
     """
     for k, column in enumerate(where):
         head = triad[:1000, k]
         if np.isfinite(head[0]) and np.any(np.isfinite(head) & (head != head[0])):
-            continue  # it changes: no need to go through millions of rows
+            continue  # not constant: the other rows need no check
         finite = triad[np.isfinite(triad[:, k]), k]
         if len(finite) == 0:
             raise ReadError(f"{table.path}: column {table.label(column)} of the {name} holds no finite number.")
@@ -44,25 +44,25 @@ def refuse_constant(table: Table, name: str, triad: FloatArray, where: tuple[int
 
 
 MOST_LOOKED_AT = 100_000
-"""Rows at which readings are compared with those farther back: chance as low as one in ten thousand is seen."""
+"""Rows compared with earlier ones, enough to measure a chance of equal readings of one in ten thousand."""
 LAGS = (2, 3, 4, 5)
-"""How far back: past the row that may be a copy, near enough for the same pose."""
+"""Rows back at which equality by chance is measured: beyond the possible copy, but near enough for the same pose."""
 BEYOND_CHANCE = 1e-6
-"""p-value below which equal readings under equal timestamps are copies."""
+"""p-value below which equal readings with equal timestamps are copies."""
 BEYOND_COUNT = 2.0
-"""And as many times what chance makes: neighbours are a little more alike than rows farther apart."""
+"""Smallest ratio to the number expected by chance: neighbours are slightly more alike than rows farther apart."""
 USUALLY = 0.5
-"""Share of rows with the timestamp before that repeat its readings too, from which such rows are copies in this log."""
+"""If this share of the rows that repeat a timestamp also repeat its readings, all of the latter are copies."""
 
 
 def copied_rows(
     columns: Sequence[FloatArray], time_s: FloatArray, rows: npt.NDArray[np.signedinteger]
 ) -> npt.NDArray[np.signedinteger]:
-    """Samples (k,) whose timestamp and readings are both those of the sample before, where that is no chance.
+    """Samples (k,) that repeat timestamp and readings of the previous sample more often than by chance.
 
-    ``columns`` hold the readings (rows of the table), ``rows`` (n,) where each sample stands. Samples timestamped on
-    arrival share timestamps, and coarse codes of a sensor at rest share readings: both at once are two samples still.
-    How often readings agree by chance is seen where nothing can be a copy: two to five samples back.
+    ``columns`` are the readings (rows of the table), ``rows`` (n,) the table row of each sample. Samples timestamped on
+    arrival share timestamps, and coarse codes in a pose share readings, so two samples may share both. The probability
+    that readings are equal by chance is measured two to five samples back, where none can be a copy.
     """
     again = np.flatnonzero(np.diff(time_s) == 0) + 1
     is_alike = _alike(columns, rows, again, 1)
@@ -82,7 +82,7 @@ def copied_rows(
 def _alike(
     columns: Sequence[FloatArray], rows: npt.NDArray[np.signedinteger], samples: npt.NDArray[np.signedinteger], lag: int
 ) -> npt.NDArray[np.bool_]:
-    """Whether every reading of these samples is that of the sample ``lag`` before."""
+    """Whether every reading of these samples equals that of the sample ``lag`` earlier."""
     out = np.ones(len(samples), dtype=bool)
     for values in columns:
         if len(values):

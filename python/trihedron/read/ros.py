@@ -23,7 +23,7 @@ SECONDS = StatedClock(unit="s")
 
 @dataclass(frozen=True)
 class Stream:
-    """``count`` messages or rows of ``topic``; ``instance`` "" where there is one only."""
+    """``count`` messages or rows of ``topic``; ``instance`` is "" where there is only one."""
 
     topic: str
     count: int
@@ -31,16 +31,16 @@ class Stream:
 
     @property
     def name(self) -> str:
-        """Topic and instance."""
+        """Topic and instance as text."""
         return f"{self.topic} {self.instance}".strip()
 
 
 MOST_LISTED = 24
-"""Streams that are named."""
+"""Largest number of streams that are listed by name."""
 
 
 def listed(streams: list[Stream]) -> Words:
-    """Every stream with its count."""
+    """The streams with their counts, at most ``MOST_LISTED``."""
     named = [(stream.name, stream.count) for stream in streams[:MOST_LISTED]]
     return words("streams", streams=named, has_more=len(streams) > MOST_LISTED)
 
@@ -51,7 +51,7 @@ def pick(path: Path, streams: list[Stream], choice: Choice, what: str) -> Stream
     Raises
     ------
     ReadError
-        When there is none, none fits the choice, several do, or the one that does is empty.
+        When there is no stream, none or several match the choice, or the matching one is empty.
     """
     if not streams:
         raise ReadError(f"{path}: {what} without readings of an accelerometer or a gyro that are known here.")
@@ -77,7 +77,7 @@ def pick(path: Path, streams: list[Stream], choice: Choice, what: str) -> Stream
 
 
 def choice_note(kind: str, taken: Stream, streams: list[Stream]) -> tuple[Finding, ...]:
-    """Which of several streams was read; nothing where there was one."""
+    """The finding that names which of several streams is read; empty where there is one."""
     if len(streams) < 2:
         return ()
     from trihedron.read.devices import chosen
@@ -86,12 +86,12 @@ def choice_note(kind: str, taken: Stream, streams: list[Stream]) -> tuple[Findin
 
 
 def missing_extra(path: Path, what: str, package: str, extra: str) -> ReadError:
-    """The sentence for a library that is not installed."""
+    """The error for a library that is not installed."""
     return ReadError(f"{path}: {what} is read by {package}, which is not installed: pip install 'trihedron[{extra}]'.")
 
 
 def first_line(error: BaseException) -> str:
-    """What a library complains about, in one line."""
+    """The first line of a library's error message, at most 160 characters."""
     return (str(error).strip().split("\n")[0] or type(error).__name__)[:160]
 
 
@@ -101,18 +101,18 @@ _ALL_NAMES = (*_NAMES, *(f"angular_velocity.{x} [rad/s]" for x in "xyz"), "recei
 
 
 def read_bag(path: Path, suffix: str, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
-    """The messages of one topic, or of an accelerometer's and a gyro's topic, on the clock of their headers.
+    """The messages of one topic, or of an accelerometer's and a gyro's topic, with the timestamps of their headers.
 
     Raises
     ------
     ReadError
-        When rosbags is not installed, the bag is damaged, or does not tell which topic to read.
+        When rosbags is not installed, the bag is damaged, or it is ambiguous which topic to read.
     """
     try:
         from rosbags.highlevel import AnyReader
     except ImportError:
         raise missing_extra(path, "a ROS bag or MCAP file", "rosbags", "ros") from None
-    # rosbags goes by the ending of the name, and a file may have another one.
+    # rosbags recognises the format by the ending of the name, which may be another one.
     with tempfile.TemporaryDirectory() as folder:
         named = path
         if suffix and path.suffix != suffix:
@@ -123,7 +123,7 @@ def read_bag(path: Path, suffix: str, choice: Choice, progress: Progress | None 
                 return _tables(path, reader, choice, progress)
         except ReadError:
             raise
-        # rosbags answers damage with errors of every layer below it: struct, zlib, sqlite, assertions.
+        # For damaged bags rosbags raises errors of every layer below it: struct, zlib, sqlite, assertions.
         except Exception as error:
             raise ReadError(
                 f"{path}: rosbags cannot read this bag ({first_line(error)}); reindex or copy it again."
@@ -158,7 +158,7 @@ def _tables(path: Path, reader: Any, choice: Choice, progress: Progress | None) 
 
 
 def _pair(streams: list[Stream]) -> tuple[Stream, Stream] | None:
-    """Two topics of a camera that logs each sensor by itself, as RealSense does: /camera/accel and /camera/gyro."""
+    """Two topics of a camera that logs each sensor separately, such as RealSense's /camera/accel and /camera/gyro."""
     acc = [s for s in streams if "acc" in s.topic.lower() and "gyr" not in s.topic.lower() and s.count]
     gyr = [s for s in streams if "gyr" in s.topic.lower() and "acc" not in s.topic.lower() and s.count]
     return (acc[0], gyr[0]) if len(acc) == len(gyr) == 1 and len([s for s in streams if s.count]) == 2 else None
@@ -199,6 +199,6 @@ def _table(
     rows = rows[:n]
     names, columns = list(_ALL_NAMES), [np.ascontiguousarray(rows[:, k]) for k in range(len(_ALL_NAMES))]
     if not np.any(rows[:, 0] != 0) and not np.any(rows[:, 1] != 0):
-        # No clock in the headers: the one of whoever recorded is all there is.
+        # No timestamps in the headers: those of the recording program are used.
         names, columns = ["time [s]", *names[2:8]], [columns[8], *columns[2:8]]
     return Table(path, tuple(names), tuple(columns), sha256, findings=choice_note("bag", stream, streams))

@@ -1,4 +1,4 @@
-"""Which unit, which triad: decided by names, by what the user says, and by what the readings can only be."""
+"""Units, and the order of unnamed triads: from names, from the user's options, and from the readings."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from trihedron.records import Finding, FindingCode
 from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si
 
 NEAR_GRAVITY = 0.2
-"""An uncalibrated accelerometer at rest may be this far off: scale a few per cent, bias a tenth of g."""
+"""Largest relative error of |a| of a static uncalibrated accelerometer: scale a few per cent, bias a tenth of g."""
 MG_OR_GAL = 0.015
-"""Share of a length by which a thousand mg must stand off 980.665 cm/s^2; the two differ by 0.02."""
+"""Relative difference from 980.665 cm/s^2 below which a norm near 1000 mg is ambiguous; the two differ by 0.02."""
 WHOLE = "whole numbers"
-"""Stands for the unit of readings that were whole numbers before they were interpolated."""
+"""Unit given to readings that were whole numbers before interpolation."""
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A unit and what to say about it; whether gravity turns as the gyro's stated unit and the clock say."""
+    """A unit and findings about it; ``confirms_clock``: gravity rotates as the gyro's stated unit and clock imply."""
 
     unit: AccelerationUnit | RateUnit
     findings: tuple[Finding, ...]
@@ -35,7 +35,7 @@ class Judged:
 
 
 def parse_acceleration_unit(text: str | AccelerationUnit) -> AccelerationUnit:
-    """A user's unit word."""
+    """The acceleration unit that a user's text names."""
     key = text.value if isinstance(text, AccelerationUnit) else known_unit("accelerometer", text)
     try:
         return AccelerationUnit(key.replace("raw", "counts"))
@@ -47,7 +47,7 @@ def parse_acceleration_unit(text: str | AccelerationUnit) -> AccelerationUnit:
 
 
 def parse_rate_unit(text: str | RateUnit) -> RateUnit:
-    """A user's unit word."""
+    """The rate unit that a user's text names."""
     key = text.value if isinstance(text, RateUnit) else known_unit("gyroscope", text)
     try:
         return RateUnit(key.replace("raw", "counts"))
@@ -59,9 +59,9 @@ def parse_rate_unit(text: str | RateUnit) -> RateUnit:
 
 
 def rest_norm(readings: FloatArray, windows: Windows | None) -> float:
-    """Median length of single accelerometer readings in quiet windows, raw unit.
+    """Median norm of single accelerometer readings in quiet windows, raw unit.
 
-    Of single readings, so that a table of pose means, where every row is another pose, gives the same.
+    Single readings are used so that a table of pose means, with one pose per row, gives the same result.
     """
     if windows is None:
         return math.nan
@@ -71,7 +71,7 @@ def rest_norm(readings: FloatArray, windows: Windows | None) -> float:
 def judge_accelerometer(
     readings: FloatArray, windows: Windows | None, named: str, given: str | AccelerationUnit | None
 ) -> Judged:
-    """Unit of the accelerometer: as given, else as named, else from |a| at rest."""
+    """Unit of the accelerometer: as given, else as named, else from |a| in quiet windows."""
     norm = rest_norm(readings, windows)
     whole = is_integer(readings) or named == WHOLE
     named = "" if named == WHOLE else named
@@ -90,7 +90,7 @@ def judge_accelerometer(
     lengths = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si := acceleration_to_si(unit))}
     nearest = min(lengths, key=lambda unit: abs(norm - lengths[unit]) if math.isfinite(norm) else 0.0)
     if _is_near(norm, lengths[nearest]):
-        # Nearer to cm/s^2 than a usual scale error takes mg.
+        # A usual scale error makes mg and cm/s^2 indistinguishable.
         is_alike = nearest is AccelerationUnit.CM_S2 or abs(norm / lengths[AccelerationUnit.CM_S2] - 1.0) < MG_OR_GAL
         if is_alike:
             return Judged(
@@ -143,7 +143,7 @@ def judge_gyroscope(
     given: str | RateUnit | None,
     extremes: Extremes,
 ) -> Judged:
-    """Unit of the gyro: as given, else as named, else by ``turning`` gravity, else by magnitude (a warning)."""
+    """Unit of the gyro: as given, named, by the rotation of gravity (``turning``), or by magnitude (a warning)."""
     whole = is_integer(readings) or named == WHOLE
     named = "" if named == WHOLE else named
     if given is not None or named not in {"", "raw"}:
@@ -192,7 +192,7 @@ def _gyroscope_by_magnitude(extremes: Extremes, windows: Windows | None) -> Judg
     rest = largest
     if windows is not None:
         rest = float(np.median(np.abs(windows.quiet_mean("gyroscope")).max(axis=1)))
-    # A gyro at rest reads its bias: MEMS stay below about 10 deg/s (0.2 rad/s, 200 mrad/s); none measures 40 rad/s.
+    # A static gyro reads its bias, for MEMS below about 10 deg/s (0.2 rad/s, 200 mrad/s); none measures 40 rad/s.
     if largest > 40.0:
         unit = RateUnit.MRAD_S if rest > 20.0 else RateUnit.DEG_S
     else:
@@ -204,10 +204,10 @@ def _gyroscope_by_magnitude(extremes: Extremes, windows: Windows | None) -> Judg
 
 
 def order_of_triads(first: FloatArray, second: FloatArray, rate_hz: float) -> tuple[bool | None, str]:
-    """Whether the first of two unnamed triads is the accelerometer (None: cannot tell), and the catalogue's word why.
+    """Whether the first of two unnamed triads is the accelerometer (None: undecided), and the catalogue's reason.
 
-    At rest in different poses a gyro repeats its bias while an accelerometer points elsewhere; in one pose gravity
-    still stands far higher above the accelerometer's noise than a bias does above the gyro's.
+    From pose to pose the means of an accelerometer change and those of a gyro do not; in a single pose the ratio of
+    gravity to the accelerometer's noise is far higher than that of the gyro's bias to its noise.
     """
     windows = look_at_pair(first, second, rate_hz)
     if windows is None:
@@ -227,5 +227,5 @@ def order_of_triads(first: FloatArray, second: FloatArray, rate_hz: float) -> tu
 
 
 def look_at_pair(first: FloatArray, second: FloatArray, rate_hz: float) -> Windows | None:
-    """Windows of two triads not yet named."""
+    """Windows of two triads whose sensors are not known yet."""
     return look({"first": first, "second": second}, rate_hz)

@@ -1,4 +1,4 @@
-"""One file's sensors on its clock; two files' sensors on one clock."""
+"""The sensors of one table on the table's clock, with units and order of samples."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ from trihedron.records.words import Words, words
 
 ASSUMED_RATE_HZ = 100.0
 FEWEST_ROWS = 2
-"""What makes a recording: copies that would leave less are none."""
+"""Smallest number of rows of a recording; rows are not removed as copies if fewer would remain."""
 WITNESS_ROWS = 200_000
 LONGEST_MTI_STEP = 5000.0
-"""Counts of 100 µs between samples at 2 Hz, below an MTi's usual rates; a DOT's are 8333 µs apart at least."""
+"""Steps of 100 µs between samples at 2 Hz, below an MTi's usual rates; a DOT's samples are at least 8333 µs apart."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,9 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Sensors:
-    """Both triads on one time base, and where each sample stood in the file.
+    """Both triads on one time base, and the row of each sample in the file.
 
-    ``sampling``, ``lost_behind`` (n - 1,) once the clock is settled, and ``timestamps_s`` (n,), what it replaced.
+    After the clock is settled: ``sampling``, ``lost_behind`` (n - 1,), and ``timestamps_s`` (n,) if they were replaced.
     """
 
     time_s: FloatArray
@@ -72,12 +72,12 @@ class Sensors:
     rows_read: int = 0
 
     def row(self, sample: int) -> int:
-        """Row of the base table that holds a sample."""
+        """Row of the base table that contains a sample."""
         at = sample + self.offset
         return int(self.rows[at]) if self.rows is not None else at
 
     def place(self, sample: int) -> Words:
-        """A sample's number, file line and time, for people."""
+        """A sample's number, file line and time, for messages."""
         return words("sample", sample=sample, row=self.table.place(self.row(sample)), time_s=self.time_s[sample])
 
 
@@ -90,7 +90,7 @@ def _triad(
     if together is not None and rows is None:
         return together
     if together is not None and rows is not None and table.is_private:
-        # A long log has no room for all columns twice: one after the other, where they lie.
+        # To save memory for a long log the columns are reordered in place, one after the other.
         for k in range(3):
             in_order(together[:, k].copy(), rows, together[: len(rows), k])
         return together[: len(rows)]
@@ -106,7 +106,7 @@ def _triad(
 
 
 def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors:
-    """One table's sensors (only ``sensor``, where it is said) on the table's clock.
+    """One table's sensors (only ``sensor``, if given) on the table's clock.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
 
 
 def _without_used(table: Table, chosen: Columns) -> Table:
-    """The table without the columns that are on the time base now: a long log has no room for both."""
+    """The table without the columns that were copied to the time base, to save memory for a long log."""
     kept = {chosen.temperature, chosen.supply, chosen.counter}
     done = {chosen.time, *(chosen.accelerometer or ()), *(chosen.gyroscope or ())} - kept
     columns = tuple(np.empty(0) if i in done else column for i, column in enumerate(table.columns))
@@ -191,7 +191,7 @@ def _without_used(table: Table, chosen: Columns) -> Table:
 
 
 def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[Finding]) -> Clock:
-    """Rows written twice (same timestamp, same readings) once; they are no samples."""
+    """The clock without rows that repeat timestamp and readings of the previous row, which are not samples."""
     if chosen.time is None or not steps_of(clock.time_s).same:
         return clock
     rows = np.arange(table.n_rows) if clock.rows is None else clock.rows
@@ -213,7 +213,7 @@ def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[
 
 
 def _witness(table: Table, chosen: Columns) -> Witness:
-    """Readings that limit how long a row can have lasted, in the order of the file (a first part of a long one)."""
+    """Readings that limit the time between rows, in file order (the first part of a long log)."""
     triad, temperature = chosen.accelerometer, chosen.temperature
     if triad is None or any(len(table.columns[c]) == 0 for c in triad):
         readings = None
@@ -223,7 +223,7 @@ def _witness(table: Table, chosen: Columns) -> Witness:
 
 
 def settled(sensors: Sensors) -> Sensors:
-    """The same on the clock that its timestamps, its counter and the motion speak for; as it is where that was done."""
+    """The sensors on the clock that timestamps, counter and motion determine; unchanged if that is done already."""
     if not sensors.has_clock or sensors.sampling is not UNJUDGED:
         return sensors
     triads = [x for x in (sensors.accelerometer, sensors.gyroscope) if x is not None]
@@ -249,7 +249,7 @@ def _stated_rate(table: Table) -> float | None:
     if table.clock.rate_hz is not None:
         return table.clock.rate_hz
     for key, text in table.metadata.items():
-        # A number and no other unit: fs is a full scale too.
+        # Only a number, or one in Hz: fs may also mean full scale.
         value = re.fullmatch(r"(\d+\.?\d*(?:e\d+)?)\s*(?:(k?)hz\b.*)?", text.strip().lower()) if is_rate(key) else None
         if value and 0.0 < (rate := float(value[1]) * (1e3 if value[2] else 1.0)) < 1e7:
             return rate
@@ -261,7 +261,7 @@ def _time_base(table: Table, chosen: Columns, options: Options, findings: list[F
         named, given = chosen.time_unit, options.time_unit
         told = options.rate_hz if options.rate_hz is not None else _stated_rate(table)
         if told is not None and given is None and named in {"", TICKS} and counts_rows(table.columns[chosen.time]):
-            # A counter of samples under a name of time: as a clock whose tick is a sample, it tells losses too.
+            # A counter of samples named as time: as a clock with one tick per sample it also shows losses.
             given = f"{told!r} Hz"
             findings.append(_rate_stated(told, is_given=options.rate_hz is not None))
         if named == "100us" and not table.clock.unit:
@@ -296,7 +296,7 @@ def _time_base(table: Table, chosen: Columns, options: Options, findings: list[F
 
 
 def _with_rows_left_out(clock: Clock, n_rows: int) -> tuple[Finding, ...]:
-    """The clock's findings; the one about rows without a time says how many there are."""
+    """The clock's findings; the one about rows without a time states how many are excluded."""
     left = n_rows - len(clock.time_s)
     out = []
     for finding in clock.findings:
@@ -307,10 +307,10 @@ def _with_rows_left_out(clock: Clock, n_rows: int) -> tuple[Finding, ...]:
 
 
 def _sample_time_fine(table: Table, column: int, findings: list[Finding]) -> str:
-    """``SampleTimeFine`` counts 100 µs in Xsens MTi and MTw logs, and microseconds in those of Xsens (Movella) DOT.
+    """Unit of ``SampleTimeFine``: 100 µs in Xsens MTi and MTw logs, 1 µs in those of Xsens (Movella) DOT.
 
-    A DOT sends 120 samples a second at most (8333 µs apart), an MTi no fewer than one (10 000 steps of 100 µs); its
-    usual rates lie far above 2 Hz (5000 steps), so the step tells them apart and the finding says what was taken.
+    A DOT sends at most 120 samples a second (8333 µs apart), an MTi at least one (10 000 steps of 100 µs); its usual
+    rates are far above 2 Hz (5000 steps), so the step identifies the unit, which a finding states.
     """
     step = np.diff(table.columns[column])
     positive = step[step > 0]

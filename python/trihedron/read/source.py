@@ -1,4 +1,4 @@
-"""Any supported file as tables of numbers: the format is told by the first bytes, never by the name."""
+"""Any supported file as tables of numbers; the format is recognised by the first bytes, never by the name."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
 
 
 def refuse_foreign(path: Path, magic: bytes) -> None:
-    """Name a format that is not read.
+    """Refuse a file of a known format that is not supported.
 
     Raises
     ------
     ReadError
-        What the file is, and what to do to get at its numbers.
+        When the format is known; the message names it and says how to get its numbers.
     """
     for start, kind, remedy in _FOREIGN:
         if magic.startswith(start):
@@ -66,12 +66,12 @@ def refuse_foreign(path: Path, magic: bytes) -> None:
 
 
 def read_table(path: Path) -> Table:
-    """The one table of a file.
+    """The table of a file that contains one table.
 
     Raises
     ------
     ReadError
-        When the file cannot be read, is no log, or holds one table per sensor.
+        When the file cannot be read, is not a log, or contains one table per sensor.
     """
     tables = read_tables(path, Choice())
     if len(tables) > 1:
@@ -85,7 +85,7 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
     Raises
     ------
     ReadError
-        When the file cannot be read or is no log, or offers several devices of which none was chosen.
+        When the file cannot be read or is not a log, or contains several devices and none is chosen.
     """
     if path.is_dir() and (path / "metadata.yaml").is_file():
         from trihedron.read.ros import read_bag
@@ -105,7 +105,7 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
         return read_zip(path, choice, progress)
     if choice.device is not None:
         raise ReadError(f"{path}: a device was given, but this is not an .npz archive; leave --device out.")
-    # Tables bring a large library with them, which arrays do not need.
+    # The library for tables is large, and arrays do not need it.
     if magic.startswith(b"PAR1"):
         from trihedron.read.parquet import read_parquet
 
@@ -122,7 +122,7 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
 
 
 def _ecosystem(path: Path, magic: bytes, choice: Choice, progress: Progress | None) -> tuple[Table, ...] | None:
-    """Formats that libraries of their own ecosystem read, each fetched only when such a file is met."""
+    """Tables of formats that other libraries read, each imported only for such a file; None for other formats."""
     suffix = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite ": ".db3"}.get(
         magic[: 5 if magic[:1] == b"\x89" else 7]
     )
@@ -138,7 +138,7 @@ def _ecosystem(path: Path, magic: bytes, choice: Choice, progress: Progress | No
         from trihedron.read.ardupilot import read_dataflash
 
         return read_dataflash(path, choice)
-    # A MATLAB file says in its 125th byte that HDF5 follows, whatever words its writer put before.
+    # Bytes 125 and 126 of a MATLAB file state whether HDF5 follows, whatever text precedes them.
     is_hdf5_inside = magic.startswith(b"MATLAB") and magic[124:126] in (b"\x00\x02", b"\x02\x00")
     if magic.startswith(b"\x89HDF") or is_hdf5_inside or magic.startswith(b"MATLAB 7.3"):
         from trihedron.read.tree import read_hdf5

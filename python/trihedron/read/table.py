@@ -1,4 +1,4 @@
-"""A table of numbers as a file holds it, before anybody decides what its columns mean."""
+"""A table of numbers from a file, before its columns have roles."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from trihedron.records.words import Words, words
 
 @dataclass(frozen=True)
 class StatedClock:
-    """What a format itself says of its clock; what it leaves open is found from the numbers.
+    """What a format specifies about its clock; unspecified fields are determined from the numbers.
 
-    ``time``: column of the timestamps; ``unit``: theirs (``s``, ``ms``, ``us``, ``ns`` or ``100us``); ``counter``:
+    ``time``: column of the timestamps; ``unit``: their unit (``s``, ``ms``, ``us``, ``ns`` or ``100us``); ``counter``:
     column that counts samples, lost ones included; ``rate_hz``: the nominal rate, used where there are no timestamps.
     """
 
@@ -31,15 +31,14 @@ class StatedClock:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Columns (n,) float64 in file order, empty where a column holds words; ``names`` is None without a header.
+    """Columns (n,) float64 in file order, empty for columns of words; ``names`` is None without a header.
 
-    ``line_of_row`` (n,) gives the line of each row, or ``first_line`` alone when rows follow each other without a
-    break; both are zero/None for binary formats, where places are counted in rows. ``metadata`` holds key and value of
-    preamble lines. ``words`` gives an example cell of each column of words, ``labels`` its different words and the word
-    (n,) of each row where these are few. What a format knows of itself: ``sensor`` says whose ``x y z`` the columns
-    are, ``clock`` what it states of its timestamps. ``onboard`` what a
-    flight controller did to the readings. ``rows_in_file`` counts what the file holds, left-out rows
-    included (0: as many as there are here); every row that is not here is in a finding's ``rows_left_out``.
+    ``line_of_row`` (n,) is the line of each row; where rows are on consecutive lines it is None and ``first_line`` is
+    the first one; for binary formats, where places are given as rows, they are None and 0. ``metadata`` contains keys
+    and values of preamble lines. ``words`` is an example cell of each column of words; ``labels`` its distinct words
+    and the index (n,) of each row's word, where they are few. From the format: ``sensor`` of columns ``x y z``,
+    ``clock`` of the timestamps, ``onboard`` corrections of a flight controller. ``rows_in_file`` counts all rows of the
+    file, excluded ones too (0: none is excluded); every excluded row is in a finding's ``rows_left_out``.
     """
 
     path: Path
@@ -57,17 +56,17 @@ class Table:
     onboard: Onboard | None = None
     rows_in_file: int = 0
     is_private: bool = False
-    """Its arrays were made by the reader and belong to nobody else: rows may be put in order where they lie."""
+    """The reader created the arrays and nothing else uses them, so that rows may be reordered in place."""
     is_chosen: bool = False
-    """The user's choice of topic and instance was spent on reading this table."""
+    """The user's choice of topic and instance was already applied when this table was read."""
 
     @property
     def n_in_file(self) -> int:
-        """Rows that the file holds, those included that are not in this table."""
+        """Number of rows in the file, including rows excluded from this table."""
         return self.rows_in_file or self.n_rows
 
     def take(self, rows: npt.NDArray[np.int64], n_in_file: int, *findings: Finding) -> Table:
-        """Some of the rows, in order, as a table of which the file holds ``n_in_file`` rows."""
+        """The table of the given rows, in this order; ``n_in_file`` is its number of rows in the file."""
         lines = None
         if self.line_of_row is not None:
             lines = self.line_of_row[rows]
@@ -89,7 +88,7 @@ class Table:
         return max((*(len(column) for column in self.columns), *labelled), default=0)
 
     def line(self, row: int) -> int:
-        """Line of the file that holds a row; 0 where the format has no lines."""
+        """Line of a row in the file; 0 where the format has no lines."""
         if self.line_of_row is not None:
             return int(self.line_of_row[row])
         return self.first_line + int(row) if self.first_line else 0

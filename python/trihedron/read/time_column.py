@@ -1,4 +1,4 @@
-"""The time of a log: a column, the sum of its steps, paced by arrivals; or there and not understood, and refused."""
+"""The time of a log: summed time steps, times from arrivals, and refusal of a time column that is not understood."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from trihedron.records import Finding, FindingCode
 
 
 def summed_steps(table: Table, chosen: Columns) -> tuple[Table, Columns]:
-    """The table with the sum of its column of steps in place of them, as its time; both as they are without one."""
+    """The table with its column of time steps replaced by their sum, which is the time; unchanged without one."""
     for i, name in enumerate(table.names or ()):
         step, parsed = table.columns[i], parse_name(name)
         if parsed.role != "step" or not len(step) or not (np.all(step >= 0.0) and np.median(step) > 0.0):
@@ -30,9 +30,9 @@ def summed_steps(table: Table, chosen: Columns) -> tuple[Table, Columns]:
 
 
 def with_arrivals(table: Table, time: int) -> Table:
-    """A log of ``trihedron capture`` from a board without a clock, its times paced anew by all of its arrivals.
+    """A log of ``trihedron capture`` from a board without a clock, with its times recomputed from all arrivals.
 
-    While it is recorded the first seconds can only guess the rate; the log keeps counter and arrivals for this.
+    During the capture the rate is uncertain in the first seconds; the log contains counter and arrivals for this.
     """
     names = table.names or ()
     if table.metadata.get("device clock") != "none" or not {"frame", "host_s"} <= set(names):
@@ -46,22 +46,22 @@ def with_arrivals(table: Table, time: int) -> Table:
 
 
 _CLOCK = re.compile(r"\d[:.h]\d\d[:.m]\d\d")
-"""Hours, minutes and seconds in some order of marks."""
+"""Hours, minutes and seconds with any usual separators."""
 FEWEST_ROWS = 20
-"""Rows below which readings may well grow from row to row."""
+"""Number of rows below which readings may increase in every row by chance."""
 NEARLY_ALL = 0.99
-"""Steps of a clock that go forward; a timestamp written twice now and then is still a clock's."""
+"""Smallest share of increasing steps of a clock; a few timestamps may be equal."""
 
 
 def refuse_unread_time(table: Table, chosen: Columns, mapping: str | None, rate_hz: float | None) -> None:
-    """Nothing, where no column without a known name can be a time, or the user's ``mapping`` says what is.
+    """Refuse a table with a column that looks like a time but is not understood, unless ``mapping`` names the time.
 
     ``rate_hz`` is the rate that is known without a clock, if any.
 
     Raises
     ------
     ReadError
-        Naming the column and what to say of it.
+        When there is such a column; the message names it and the options to give.
     """
     if table.names is None or (mapping is not None and re.search(r"(?:t|time)\s*=", mapping)):
         return
@@ -84,7 +84,7 @@ def refuse_unread_time(table: Table, chosen: Columns, mapping: str | None, rate_
 
 
 def _runs_like_a_clock(values: FloatArray) -> bool:
-    """Whether numbers (n,) grow at nearly every row, but not by one each, which a counter does too."""
+    """Whether numbers (n,) increase in nearly every row, but not by 1, as a counter does."""
     if len(values) < FEWEST_ROWS:
         return False
     step = np.diff(values)

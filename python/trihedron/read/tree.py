@@ -1,4 +1,4 @@
-"""HDF5 and MATLAB files: groups of arrays, of which the one with an accelerometer or a gyro is the log."""
+"""HDF5 and MATLAB files: groups of arrays; the group with an accelerometer or a gyro is the log."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ MIN_ROWS = 8
 
 
 def read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
-    """The log of an HDF5 or MATLAB 7.3 file; of MATLAB's tables one for each sensor where they are apart.
+    """The log of an HDF5 or MATLAB 7.3 file; two tables where MATLAB saved one for each sensor.
 
     Raises
     ------
     ReadError
-        When h5py is not installed, the file is damaged, or does not tell which group to read.
+        When h5py is not installed, the file is damaged, or it is ambiguous which group to read.
     """
     try:
         import h5py
@@ -41,7 +41,7 @@ def read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
     def visit(name: str, node: Any) -> None:
         if isinstance(node, h5py.Dataset) and (node.dtype.kind in "iufb" or node.dtype.names) and node.size:
             if name.startswith("#"):
-                return  # MATLAB's own bookkeeping
+                return  # internal data of MATLAB
             parent, _, leaf = name.rpartition("/")
             groups.setdefault(parent, {})[leaf] = node[()]
 
@@ -49,7 +49,7 @@ def read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
         with h5py.File(path, "r") as file:
             has_objects = "#subsystem#" in file
             file.visititems(visit)
-    # h5py answers damage with errors of several kinds.
+    # For damaged files h5py raises errors of several kinds.
     except Exception as error:
         raise ReadError(f"{path}: h5py cannot read this file ({first_line(error)}); copy it again.") from None
     if has_objects and not _hold_a_log(path, groups):
@@ -63,7 +63,7 @@ def read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
     Raises
     ------
     ReadError
-        When the file is damaged, holds objects of MATLAB only, or does not tell which structure to read.
+        When the file is damaged, contains only MATLAB objects, or it is ambiguous which structure to read.
     """
     from scipy.io import loadmat
 
@@ -75,10 +75,10 @@ def read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
         raise from_os_error(path, error) from None
     try:
         with warnings.catch_warnings():
-            # Of objects SciPy finds the bookkeeping only, and says so.
+            # SciPy warns that it finds only internal data of objects.
             warnings.simplefilter("ignore")
             content = loadmat(str(path), simplify_cells=True)
-    # SciPy answers damage with errors of several kinds.
+    # For damaged files SciPy raises errors of several kinds.
     except Exception as error:
         raise ReadError(f"{path}: SciPy cannot read this MATLAB file ({first_line(error)}); save it again.") from None
     groups: Groups = {}
@@ -101,12 +101,12 @@ def _walk(name: str, node: Mapping[str, Any], groups: Groups) -> None:
 
 
 def _hold_a_log(path: Path, groups: Groups) -> bool:
-    """Whether arrays outside the objects are named as a sensor's."""
+    """Whether arrays outside the MATLAB objects have names of a sensor."""
     return bool(_tables(path, groups))
 
 
 def _tables(path: Path, groups: Groups) -> dict[str, Table]:
-    """Groups that hold an accelerometer or a gyro, by name."""
+    """Groups with an accelerometer or a gyro, by name."""
     tables: dict[str, Table] = {}
     for name, arrays in groups.items():
         table = _table(path, arrays)
@@ -126,7 +126,7 @@ def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
         a for arrays in groups.values() for a in map(_upright, arrays.values()) if a.ndim == 2 and min(a.shape) >= 3
     ]
     if not tables and len(single) == 1 and len(single[0]) >= MIN_ROWS:
-        # One matrix: what its columns are is told by their number, or by --columns.
+        # One matrix: the roles of its columns follow from their number, or from --columns.
         columns = tuple(np.ascontiguousarray(column, dtype=np.float64) for column in single[0].T)
         return Table(path, None, columns, file_sha256(path))
     if not tables:
@@ -144,13 +144,13 @@ def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
 
 
 def _upright(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """MATLAB's 1 x n and 3 x n turned round."""
+    """The array with MATLAB's 1 x n squeezed and 3 x n transposed."""
     plain = np.squeeze(array)
     return plain.T if plain.ndim == 2 and plain.shape[0] <= 12 < plain.shape[1] else plain
 
 
 def _table(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> Table | None:
-    """Arrays of the group's usual length as columns, those of MATLAB's 1 x n and 3 x n turned round."""
+    """Arrays of the group's most frequent length as columns, after :func:`_upright`; None where there is no table."""
     shaped: dict[str, npt.NDArray[Any]] = {}
     for name, array in arrays.items():
         if array.dtype.names:

@@ -1,10 +1,8 @@
-"""The gyro's scale by physics: whatever turns the body turns gravity in the accelerometer's frame, ``ȧ = -ω × a``.
+"""The gyro's scale from the rotation of gravity in the accelerometer's frame, ``ȧ = -ω × a``.
 
-Least squares of gravity's change over blocks of 0.1 s on what a gyro of scale s predicts, for every order and sign of
-its axes
-(and the rotation that fits best): turns about the vertical, which leave gravity alone, predict no change and say
-nothing.
-Needs no calibration; the body's own acceleration averages out.
+Least squares of gravity's change over blocks of 0.1 s on the change that a gyro of scale s predicts, for every order
+and sign of its axes, and for the best-fitting rotation. Rotations about the vertical do not change gravity and do not
+contribute. No calibration is needed; the body's own acceleration averages out.
 """
 
 from __future__ import annotations
@@ -22,21 +20,21 @@ from trihedron.units import RateUnit, rate_to_si
 
 USUAL = (RateUnit.RAD_S, RateUnit.DEG_S)
 RARE = (RateUnit.MRAD_S, RateUnit.MDEG_S)
-"""Seldom written without being named: beside a clock whose unit was weighed, ticks of another size are as likely."""
+"""Units seldom logged without being named; if the clock's unit is itself inferred, another tick is as likely."""
 TOLERANCE = 1.25
-"""Factor by which the scale of an uncalibrated sensor and its clock may be off; candidates lie a factor 17 or 57
+"""Factor by which the scale of an uncalibrated sensor and its clock may be wrong; candidates are a factor 17 or 57
 apart."""
 _MIN_CORRELATION = 0.5
-"""Hands that also accelerate reach 0.7 and more, other motion and other quantities stay below 0.4."""
+"""Rotation by hand with acceleration gives 0.7 and more; other motion and other quantities give less than 0.4."""
 PARTS, _FEWEST = 4, 50
-"""Of the log, each of which must fit with the same axes, and the blocks that tell."""
+"""Parts of the log, each of which must fit with the same axes, and the smallest number of blocks to test one."""
 _AXES_FIT, _MORE_UNEXPLAINED = 0.75, 4.0
-"""A part speaks against the axes of the whole log where its own fit so well, and leave a quarter unexplained."""
+"""A part has other axes if they correlate so well, and the axes of the whole log leave 4 times the unexplained part."""
 _BLOCK_S = 0.1
 _MAX_BLOCKS = 20_000
 _MOST_TURN_RAD = 0.7
 _NEAR_GRAVITY = 0.2
-"""Blocks whose |a| leaves the usual one by more are the body's own acceleration."""
+"""Blocks whose |a| differs from the median by more than this fraction contain acceleration and are excluded."""
 _SIGNED_AXES = tuple(
     np.eye(3)[list(order)] * np.array(signs)
     for order in itertools.permutations(range(3))
@@ -46,11 +44,10 @@ _SIGNED_AXES = tuple(
 
 @dataclass(frozen=True)
 class Turning:
-    """The gyro's ``scale`` [rad/s per unit] by which gravity turns, its standard uncertainty, the correlation of
-    gravity's change with
-    the gyro's prediction, and the number of blocks behind them. ``odd_part`` (from 1; 0: none) of ``PARTS`` fits
-    with other axes only, with the correlation so and
-    with those of the whole. ``clock_is_weighed``: nothing said the unit of whole-numbered timestamps."""
+    """The gyro's ``scale`` [rad/s per unit] from the rotation of gravity, its standard uncertainty, the correlation of
+    gravity's change with the gyro's prediction, and the number of blocks. ``odd_part`` (from 1; 0: none) of ``PARTS``
+    fits only with other axes; ``odd_correlation`` is that with its own axes and that with those of the whole log.
+    ``clock_is_weighed``: the unit of whole-numbered timestamps was inferred, not stated."""
 
     scale: float
     sigma: float
@@ -62,33 +59,32 @@ class Turning:
 
     @property
     def candidates(self) -> tuple[RateUnit, ...]:
-        """Units among which the scale may choose; a wrong clock and a wrong unit must not cancel."""
+        """Units that the scale may select; errors of clock unit and gyro unit must not cancel."""
         return USUAL if self.clock_is_weighed else USUAL + RARE
 
     @property
     def is_clear(self) -> bool:
-        """Whether it is a rotation that both sensors saw: five deviations, and a share of the motion worth
-        that name."""
+        """Whether both sensors measured the same rotation: correlation above 0.5 and above five standard errors."""
         return self.correlation > max(_MIN_CORRELATION, 5.0 / math.sqrt(max(self.n, 1)))
 
     @property
     def percent(self) -> float:
-        """Standard uncertainty of the scale in per cent."""
+        """Relative standard uncertainty of the scale in per cent."""
         return 100.0 * self.sigma / self.scale
 
     def factor(self, unit: RateUnit) -> float:
-        """Scale over that of a unit."""
+        """Ratio of the scale to that of a unit."""
         return self.scale / (rate_to_si(unit) or math.nan)
 
     def fits(self, unit: RateUnit) -> bool:
-        """Whether it is the unit's, within what uncalibrated sensors and four deviations allow."""
+        """Whether the scale is that of a unit, within ``TOLERANCE`` and four standard uncertainties."""
         allowed = math.log(TOLERANCE) + 4.0 * self.sigma / self.scale
         return abs(math.log(self.factor(unit))) <= allowed
 
 
 def turning_of(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float) -> Turning | None:
-    """The scale at which readings (n, 3) of a gyro turn gravity in those of the accelerometer; None where nothing
-    turns."""
+    """The scale of gyro readings (n, 3) from the rotation of gravity in accelerometer readings (n, 3); None where
+    there is no rotation."""
     length = max(1, round(_BLOCK_S * rate_hz))
     n = min(len(accelerometer) // length, _MAX_BLOCKS)
     if n < 3:
@@ -100,7 +96,7 @@ def turning_of(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float)
     if not finite.any():
         return None
     usual = float(np.median(norm[finite]))
-    # Raw biases may be large (a gyro of 10 bits reads 512 at rest): the median is the bias, or near it.
+    # Raw biases may be large (a static 10-bit gyro reads 512): the median is close to the bias.
     w = w - np.median(w[finite], axis=0)
     good = finite & (np.abs(norm - usual) < _NEAR_GRAVITY * usual)
     a = a / np.where(finite, norm, 1.0)[:, None]
@@ -115,8 +111,7 @@ def turning_of(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float)
 
 @dataclass(frozen=True)
 class _Sums:
-    """Normal matrix (9, 9), right side (9,) and sum of squares of gravity's change on rates, and the number of
-    blocks."""
+    """Normal matrix (9, 9), right side (9,) and sum of squares for gravity's change on rates; number of blocks."""
 
     normal: FloatArray
     right: FloatArray
@@ -124,7 +119,7 @@ class _Sums:
     n: int
 
     def on(self, axes: FloatArray) -> Turning | None:
-        """Scale and correlation where the gyro's axes lie so (3, 3) in the accelerometer's."""
+        """Scale and correlation for the orientation ``axes`` (3, 3) of the gyro in the accelerometer's frame."""
         c = axes.ravel()
         predicted, shared = float(c @ self.normal @ c), float(c @ self.right)
         if not (predicted > 0.0 and shared > 0.0 and self.total > 0.0):
@@ -134,13 +129,13 @@ class _Sums:
         return Turning(scale, scale * spread, correlation, self.n)
 
     def best(self, orientations: Sequence[FloatArray]) -> tuple[Turning, FloatArray] | None:
-        """The orientation that explains gravity's change best."""
+        """The orientation with the highest correlation, and its scale."""
         tried = [(found, axes) for axes in orientations if (found := self.on(axes)) is not None]
         return max(tried, key=lambda pair: pair[0].correlation) if tried else None
 
 
 def _sums(a: FloatArray, w: FloatArray, seen: FloatArray, step_s: float) -> _Sums:
-    """Of directions a (n, 3), rates w (n, 3) [unit] and changes (n, 3) over blocks of ``step_s``."""
+    """Sums of directions a (n, 3), rates w (n, 3) [unit] and changes (n, 3) over blocks of ``step_s`` [s]."""
     cross = np.zeros((len(a), 3, 3))
     cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -a[:, 2], a[:, 1], -a[:, 0]
     cross -= cross.transpose(0, 2, 1)

@@ -1,9 +1,9 @@
 """PX4 ULog, read by pyulog: raw sensor_accel and sensor_gyro of one instance, or sensor_combined.
 
-PX4's batches of raw samples (sensor_accel_fifo, sensor_gyro_fifo), one row per sample.
+PX4's batches of raw samples (sensor_accel_fifo, sensor_gyro_fifo) become one row per sample.
 
-A message holds up to 32 samples of each axis as counts, the size of a count, the step between samples and the timestamp
-of its last one: sample s of n was taken at t - (n - 1 - s) dt.
+Such a message contains up to 32 samples of each axis in counts, the LSB, the interval dt between samples and the
+timestamp t of its last one: sample s of n was taken at t - (n - 1 - s) dt.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SUFFIX = "_fifo"
 
 
 def expanded(data: dict[str, Any]) -> dict[str, npt.NDArray[np.float64]] | None:
-    """Samples of every message in order: ``timestamp_sample`` [µs] and x, y, z in SI; None where fields are missing."""
+    """All samples in order: ``timestamp_sample`` [µs] and x, y, z in SI, each (n,); None where fields are missing."""
     present = {"timestamp_sample", "dt", "scale", "samples"} <= set(data)
     width = sum(f"x[{k}]" in data for k in range(256))
     if not present or not width or any(f"{axis}[{width - 1}]" not in data for axis in AXES):
@@ -62,13 +62,13 @@ _SKIP = {"timestamp", "timestamp_sample"}
 def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
     """The accelerometer's and the gyro's table of one instance, or the one table of ``sensor_combined``.
 
-    Raw topics are taken where they were logged at full rate (at least half as many rows as ``sensor_combined`` has),
-    else batches of raw samples (``sensor_accel_fifo``) where there are, unrolled.
+    Raw topics are read if they were logged at full rate (at least half as many rows as ``sensor_combined``), else
+    batches of raw samples (``sensor_accel_fifo``) if there are any.
 
     Raises
     ------
     ReadError
-        When pyulog is not installed, the log is damaged, or holds several IMUs of which none was chosen.
+        When pyulog is not installed, the log is damaged, or contains several IMUs and none is chosen.
     """
     try:
         from pyulog import ULog
@@ -76,11 +76,11 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
         raise missing_extra(path, "a PX4 ULog", "pyulog", "px4") from None
     _check_definitions(path)
     try:
-        # pyulog prints what it meets; stdout belongs to results.
-        # The stream is ours, because pyulog leaves its own open when it gives up.
+        # pyulog prints messages on stdout, which is reserved for results.
+        # The stream is opened here, because pyulog leaves its own open when it fails.
         with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as stream:
             log = ULog(stream, _TOPICS)
-    # pyulog answers damage with whatever its unpacking met.
+    # For damaged logs pyulog raises errors of any kind.
     except Exception as error:
         raise ReadError(f"{path}: pyulog cannot read this log ({first_line(error)}); copy it again.") from None
     data = _unrolled(log)
@@ -118,7 +118,7 @@ def _unrolled(log: Any) -> dict[tuple[str, int], dict[str, Any]]:
 
 
 def _pairs(counts: dict[tuple[str, int], int], suffix: str) -> list[Stream]:
-    """Accelerometers whose gyro of the same number was logged as well."""
+    """Streams of accelerometers for which the gyro of the same number was logged too."""
     return [
         Stream(_RAW + suffix, n, str(i))
         for (name, i), n in sorted(counts.items())
@@ -127,9 +127,9 @@ def _pairs(counts: dict[tuple[str, int], int], suffix: str) -> list[Stream]:
 
 
 def _check_definitions(path: Path) -> None:
-    """Walk the messages before the data: where they are damaged near the end of a file, pyulog never comes back.
+    """Check the messages before the data: if they are damaged near the end of a file, pyulog never returns.
 
-    Each is its size (16 bits), its type and so many bytes, from byte 16 to the first subscription or log message.
+    Each has a size (16 bits), a type and that many bytes, from byte 16 on to the first subscription or log message.
     """
     with path.open("rb") as stream:
         size = stream.seek(0, io.SEEK_END)
@@ -153,7 +153,7 @@ def _table(
     onboard: Onboard | None,
     findings: tuple[Finding, ...],
 ) -> Table:
-    # The sample's own timestamp, where the log has it; `timestamp` is when the message was published.
+    # The timestamp of the sample if the log has it; `timestamp` is that of publishing the message.
     timestamp = _timestamp(data)
     names, columns = ["timestamp [us]"], [np.asarray(data[timestamp], dtype=np.float64)]
     for name, values in data.items():
@@ -170,10 +170,10 @@ def _table(
 
 
 def _onboard(log: Any, topic: str, instance: int) -> Onboard | None:
-    """What the readings of a topic have been through, by the parameters and the identity of the sensor.
+    """The on-board corrections of a topic's readings, from the parameters and the device id of the sensor.
 
-    Drivers corrected ``sensor_accel`` themselves while it also held counts (``x_raw``, before firmware 1.11);
-    ``sensor_combined`` holds what was corrected and turned into the axes of the board.
+    Before firmware 1.11 drivers corrected ``sensor_accel`` themselves; such logs also contain counts (``x_raw``).
+    ``sensor_combined`` contains readings that are corrected and rotated to the board's axes.
     """
     columns = {(d.name, d.multi_id): d.data for d in log.data_list}
     own = columns.get((topic, instance), {})

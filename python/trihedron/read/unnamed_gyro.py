@@ -1,4 +1,4 @@
-"""Columns left aside that turn as gravity does: a gyro under a name that says nothing."""
+"""Columns without a role whose readings rotate as gravity does: a gyro with an unknown name."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from trihedron.read.turning import turning_of
 from trihedron.records import Finding, FindingCode
 
 CLEAR_CORRELATION = 0.5
-"""Of gravity's change with that predicted from three columns as rates: a gyro's lies above (0.74 in a hand that also
-accelerates), that of angles, fields and velocities below 0.1 (tests/test_read_unusual.py)."""
+"""Correlation of gravity's change with that predicted from three columns as rates: a gyro's is higher (0.74 for a hand
+that also accelerates), that of angles, fields and velocities below 0.1 (tests/test_read_unusual.py)."""
 FEWEST_PAIRS = 50
-"""Blocks in motion, below which chance may correlate; 0.5 is then three and a half standard errors of a correlation."""
+"""Smallest number of blocks in motion, for which 0.5 is three and a half standard errors of a correlation."""
 
 
 def unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
-    """A warning for each triad of columns without a known name that turns with the accelerometer's gravity.
+    """A warning for each triad of columns with unknown names whose readings rotate as the accelerometer's gravity does.
 
-    Only where no gyro was recognised; gravity's change in blocks against ``-ω × a`` (``turning_of``).
+    Only where no gyro is recognised; gravity's change in blocks is compared with ``-ω × a`` (``turning_of``).
     """
     accelerometer, table, columns = sensors.accelerometer, sensors.table, sensors.columns
     if accelerometer is None or sensors.gyroscope is not None or columns.accelerometer is None or table.names is None:
@@ -46,7 +46,7 @@ def _kept(sensors: Sensors, column: int, n: int) -> FloatArray:
 
 
 def _triads(names: tuple[str, ...], taken: set[int]) -> list[Triad]:
-    """Columns whose names differ in one letter only: x, y, z."""
+    """Triads of columns whose names differ only in one letter: x, y, z."""
     left = {name.strip().lower(): i for i, name in enumerate(names) if i not in taken}
     out: list[Triad] = []
     for name, i in left.items():

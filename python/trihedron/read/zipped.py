@@ -1,4 +1,4 @@
-"""Zip archives as phone apps export them: one text file per sensor inside, joined on their common clock."""
+"""Zip archives from phone apps: one text file per sensor, on a common clock."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tu
     Raises
     ------
     ReadError
-        When the archive is damaged, is another program's container, or does not tell which members to read.
+        When the archive is damaged, is another program's container, or it is ambiguous which members to read.
     """
     try:
         with zipfile.ZipFile(path) as archive:
@@ -89,7 +89,7 @@ def _chosen(path: Path, members: list[str], topic: str | None) -> list[str]:
 
 
 def _by_name(members: list[str]) -> list[str]:
-    """The members of both sensors, else the only text; readings with gravity and without corrections before others."""
+    """The only text, or the members of both sensors; readings with gravity and uncorrected ones are preferred."""
     if len(members) == 1:
         return members
     picked: list[str] = []
@@ -98,7 +98,7 @@ def _by_name(members: list[str]) -> list[str]:
         for name in members:
             plain = re.sub(r"[^a-z]", "", PurePosixPath(name).stem.lower())
             if pattern.fullmatch(plain) and not _WITHOUT_GRAVITY.search(plain):
-                # Sensor Logger's Accelerometer is without gravity where a TotalAcceleration stands beside it.
+                # Sensor Logger's Accelerometer excludes gravity where there is also a TotalAcceleration.
                 ranked.append((plain.endswith("uncalibrated") + 2 * plain.startswith("total"), name))
         if ranked:
             picked.append(max(ranked, key=lambda r: r[0])[1])
@@ -111,14 +111,14 @@ def _by_name(members: list[str]) -> list[str]:
 def _member(
     path: Path, archive: zipfile.ZipFile, name: str, sha256: str, progress: Progress | None, is_of_several: bool
 ) -> tuple[Table, ...]:
-    # Parsing brings a large library with it, which a NumPy archive does not need.
+    # Parsing needs a large library, which a NumPy archive does not.
     from trihedron.read.columns import sensor_of_file_name
     from trihedron.read.text.open import read_text
 
     info = archive.getinfo(name)
     check_unpacked(path, info.compress_size, info.file_size, f"its member {name}")
     with archive.open(name) as member:
-        # Not more than was said: a header that lies is found out here.
+        # At most one byte more than stated, so that a wrong header is detected.
         content = member.read(info.file_size + 1)
     if len(content) != info.file_size:
         raise ReadError(f"{path}: its member {name} is not as long as the archive says; export it again.")

@@ -1,4 +1,4 @@
-"""Simulation of the instrument: motion, mechanism, noise, ADC. Produces the same records as reading a file."""
+"""Simulation of an IMU: motion, sensor mechanism, noise, ADC. It produces the same records as reading a log."""
 
 from trihedron.simulate.accelerometer import Accelerometer, Hysteresis, ProofMass
 from trihedron.simulate.diagnosed import diagnosed_sizes, with_diagnosed_effects

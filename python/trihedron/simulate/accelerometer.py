@@ -1,4 +1,4 @@
-"""The accelerometer: three proof masses, each at its own place, on springs between capacitor plates."""
+"""Accelerometer model: three proof masses, each at its own position, on springs between capacitor plates."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class ProofMass:
     """A mass on a spring in the gap of a differential capacitor, per channel.
 
     ``resonance_hz`` f0 and ``gap_m`` x0 give the displacement over gap per acceleration, ξ = a/((2πf0)² x0).
-    ``moves`` lets the mass follow the second-order equation with ``quality`` Q; otherwise it follows at once.
-    ``reads_bridge`` reads the displacement through V/V_in = c0/(c1+c0) - c0/(c2+c0) (= 2ξ/(4-ξ²) for equal plates)
-    instead of a linear readout, with plates that differ by ``mismatch`` and a suspension of restoring force
+    With ``moves`` the mass obeys the second-order equation with quality factor ``quality`` Q; without, it has no lag.
+    With ``reads_bridge`` the displacement is read through V/V_in = c0/(c1+c0) - c0/(c2+c0) (= 2ξ/(4-ξ²) for equal
+    plates) instead of linearly; the plates differ by the fraction ``mismatch``, the restoring force is
     k x0 (ξ + ``second`` ξ² + ``third`` ξ³). ``spring_per_k`` and ``gap_per_k``: relative change of k and x0 per kelvin.
     """
 
@@ -43,7 +43,7 @@ class ProofMass:
 
     @property
     def deflection(self) -> FloatArray:
-        """(3,) ξ per m/s²."""
+        """(3,) displacement over gap ξ per m/s²."""
         omega = 2.0 * np.pi * np.asarray(self.resonance_hz)
         out: FloatArray = 1.0 / (omega**2 * np.asarray(self.gap_m))
         return out
@@ -51,10 +51,10 @@ class ProofMass:
 
 @dataclass(frozen=True)
 class Hysteresis:
-    """Memory of earlier orientations, per channel.
+    """Dependence of a reading on earlier orientations, per channel.
 
-    Play: the reading differs by up to ``offset_m_s2``, with the sign of the way the input came, once the input has
-    turned back by more than ``width_m_s2``. Creep: ``creep_fraction`` of every change arrives with ``creep_tau_s``.
+    Play (backlash): an offset of up to ``offset_m_s2`` that changes sign when the input has reversed by more than
+    ``width_m_s2``. Creep: the fraction ``creep_fraction`` of every change lags with time constant ``creep_tau_s``.
     """
 
     offset_m_s2: Triple = NONE
@@ -67,9 +67,9 @@ class Hysteresis:
 class Accelerometer:
     """``raw = S^-1 (f - b)`` for the linear instrument, direct form S [m/s² per raw unit], b [m/s²].
 
-    ``places_m`` (row per channel) are the places of the three proof masses from the body's reference point [m].
-    ``rectification`` [1/(m/s²)]: offset per mean square of the acceleration faster than ``rectification_corner_hz``.
-    ``noise_filter``: the part's own digital low-pass, which colours the noise.
+    ``places_m`` (row per channel) are the positions of the three proof masses from the body's reference point [m].
+    ``rectification`` [1/(m/s²)]: bias per mean square of the acceleration above ``rectification_corner_hz``.
+    ``noise_filter``: the part's own digital low-pass, applied to the noise.
     """
 
     S: Matrix = IDENTITY

@@ -1,4 +1,4 @@
-"""Effects that a diagnosis accepted, switched on in a simulation: ids and parameters become sizes of mechanisms."""
+"""Effects that a diagnosis accepted, added to a simulation: ids and parameters become sizes of mechanisms."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Size = dict[str, Any]
 
 
 class _NotSimulated(Exception):
-    """Why an accepted effect cannot be switched on."""
+    """An accepted effect cannot be simulated; the message says why."""
 
 
 def with_diagnosed_effects(
@@ -23,7 +23,7 @@ def with_diagnosed_effects(
 ) -> tuple[Scenario, tuple[str, ...], dict[str, str]]:
     """The scenario with the accepted effects of a diagnosis (``effects`` of its JSON).
 
-    Returns the scenario, the ids switched on, and for every other id why it was excluded.
+    Returns the scenario, the ids of the effects added, and the reason of exclusion for every other id.
     """
     sizes, left_out = diagnosed_sizes(effects)
     done: list[str] = []
@@ -34,15 +34,15 @@ def with_diagnosed_effects(
 
 
 LENGTH = "length of the session"
-"""Beside an effect's parameters: what a straight drift went on for, s."""
+"""Key, beside an effect's parameters, of the time over which a linear drift lasts, s."""
 
 
 def diagnosed_sizes(
     effects: Sequence[Mapping[str, Any]], length_s: float | None = None
 ) -> tuple[list[tuple[str, Size]], dict[str, str]]:
-    """Accepted effects as ids and sizes of mechanisms (keys of :func:`with_effect`), and why others were excluded.
+    """Accepted effects as ids and sizes of mechanisms (keys of :func:`with_effect`), and why others are excluded.
 
-    ``length_s`` is that of the recording they were found in.
+    ``length_s`` is the duration of the recording in which the effects were found.
     """
     out: list[tuple[str, Size]] = []
     left_out: dict[str, str] = {}
@@ -168,7 +168,7 @@ _SIZES: dict[str, Callable[[Parameters, str], Size | list[Size]]] = {
     "accel-saturation": _limit,
     "lever-arm": lambda v, _: {"arm_m": _axis(v, "r")},
     "accel-size-effect": _places,
-    # A gyro that samples later under the same timestamp is an accelerometer that reads an earlier instant.
+    # The gyro sampling later under the same timestamp is equivalent to the accelerometer being delayed.
     "accel-gyro-time-offset": lambda v, _: {"offset_s": v["accelerometer_delay"]},
     "sensor-lag": _lag,
     "dropped-samples": _losses,

@@ -1,4 +1,4 @@
-"""The gyro: a driven mass whose Coriolis force moves a sense mass between capacitor plates."""
+"""Gyro model: a driven mass whose Coriolis force moves a sense mass between capacitor plates."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from trihedron.units import RateUnit
 class SenseMode:
     """Drive and sense motion of the vibrating mass, per channel.
 
-    ``deflection_s_rad``: displacement of the sense mass over its gap per rad/s (0: linear readout); ``second``,
-    ``third``: its suspension, ``mismatch``: its plates, as in a proof mass. ``bandwidth_hz`` (0: unlimited) and
-    ``quality`` describe how the demodulated sense motion follows the rate.
+    ``deflection_s_rad``: displacement of the sense mass over its gap per rad/s (0: linear readout); ``second`` and
+    ``third`` describe its suspension, ``mismatch`` its plates, as in ``ProofMass``. ``bandwidth_hz`` (0: unlimited) and
+    ``quality`` are those of the second-order response of the demodulated signal to the rate.
     """
 
     deflection_s_rad: Triple = NONE
@@ -35,9 +35,9 @@ class SenseMode:
 class Gyroscope:
     """``raw = S^-1 (ω - b)`` for the linear instrument, direct form S [rad/s per raw unit], b [rad/s].
 
-    ``g_sensitivity`` (row per channel) [(rad/s)/(m/s²)]: rate seen per specific force; ``rectification``
-    [(rad/s)/(m/s²)²]: rate seen per mean square of the acceleration faster than ``rectification_corner_hz``.
-    ``noise_filter``: the part's own digital low-pass, which colours the noise.
+    ``g_sensitivity`` (row per channel) [(rad/s)/(m/s²)]: rate error per specific force; ``rectification``
+    [(rad/s)/(m/s²)²]: rate error per mean square of the acceleration above ``rectification_corner_hz``.
+    ``noise_filter``: the part's own digital low-pass, applied to the noise.
     """
 
     S: Matrix = IDENTITY

@@ -35,7 +35,7 @@ SESSIONS: dict[str, Callable[..., Motion]] = {
     "rate-table": rate_table,
     "rest": long_rest,
 }
-"""What a scenario file may call a session."""
+"""Sessions that a scenario file can name, and the functions that make them."""
 
 
 def _of(profile: Profile, motion: Motion, name: str = "", unit: int = 1) -> Scenario:
@@ -78,7 +78,7 @@ def _rest_manual() -> Scenario:
 
 def _dividing_head() -> Scenario:
     scenario = _of(ADIS, dividing_head())
-    step = 0.11 * math.sqrt(12.0)  # the published ADC's own noise of 0.11 m/s² as the rms of its rounding
+    step = 0.11 * math.sqrt(12.0)  # the rms of the rounding equals the published ADC noise of 0.11 m/s²
     accel = scenario.accelerometer
     lsb = step / float(np.abs(np.diag(np.asarray(accel.S))).mean())
     return replace(scenario, accelerometer=replace(accel, adc=replace(accel.adc, lsb=lsb)))
@@ -142,7 +142,7 @@ def scenario_by_name(name: str) -> Scenario:
     Raises
     ------
     ValueError
-        When there is none of that name.
+        When no scenario has that name.
     """
     if name not in _SCENARIOS:
         raise RefusedError(f"no scenario is called {name!r}; there are {', '.join(_SCENARIOS)}")

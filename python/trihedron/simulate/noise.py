@@ -1,4 +1,4 @@
-"""Sensor noise with exact discrete statistics: Q, N, B, K, R per axis, each from its own stream of random numbers."""
+"""Sensor noise with exact discrete statistics: Q, N, B, K, R per axis, each from its own random stream."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _NONE: Triple = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class NoiseTerms:
-    """Coefficients of the five terms per axis, SI, by their Allan variance.
+    """Coefficients of the five noise terms per axis, SI, each defined by its Allan variance.
 
     With u the unit of the signal (rad/s or m/s²): ``Q`` quantisation [u·s], 3Q²/τ²; ``N`` white [u·√s = u/√Hz], N²/τ;
     ``B`` bias instability [u], (2 ln 2/π) B²; ``K`` rate random walk [u/√s], K²τ/3; ``R`` ramp [u/s], R²τ²/2.
@@ -47,35 +47,35 @@ def _sequence(seed: int, stage: str) -> np.random.SeedSequence:
 
 
 def stream(seed: int, stage: str) -> np.random.Generator:
-    """Random numbers of one stage: they depend on the seed and the stage's name only."""
+    """Random generator of one stage, which depends only on the seed and the stage's name."""
     return np.random.default_rng(_sequence(seed, stage))
 
 
 def key(seed: int, stage: str) -> int:
-    """Key of one stage's stream in the kernel."""
+    """Key of one stage's random stream in the Rust kernel."""
     return int(_sequence(seed, stage).generate_state(1, np.uint64)[0])
 
 
 def make_noise(terms: NoiseTerms, n: int, dt: float, seed: int, sensor: str) -> FloatArray:
     """(n, 3) noise at step ``dt`` [s], unit of the signal.
 
-    Per step: Q/dt the first difference of white; N/√dt white; B a sum of Gauss-Markov processes of spectrum 1/f; K√dt
-    the increments of a walk that starts at zero; R a ramp.
+    Per step: Q/dt times the first difference of white noise; white noise N/√dt; B as a sum of Gauss-Markov processes
+    with spectrum 1/f; a random walk from 0 with increments K√dt; R as a ramp.
     """
     table = [[terms.Q[k], terms.N[k], terms.B[k], terms.K[k], terms.R[k]] for k in range(3)]
     keys = [[key(seed, f"{sensor}/{name}/{k}") for name in "QNBK"] for k in range(3)]
     return _core.simulate_noise(n, dt, table, keys)
 
 
-# A bias that is another in every pose: repeatability after a turn, stress of the mounting.
+# Bias repeatability: the bias differs from pose to pose, for example because the mounting is stressed.
 RESTS = frozenset({"pose", "disturbance", "vibration"})
-"""Kinds of steps that leave the attitude: a knocked pose is the same pose."""
+"""Kinds of steps that keep the attitude: a disturbed pose remains the same pose."""
 
 
 def bias_of_poses(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, rng: np.random.Generator) -> FloatArray:
-    """(n, 3) biases at ``time_s`` (n,): one normal draw a pose with deviations ``sigma`` (3,), a straight line between.
+    """(n, 3) biases at ``time_s`` (n,): N(0, ``sigma``²) drawn once per pose, ``sigma`` (3,), linear during moves.
 
-    Poses are stretches of rest between which anything moved. Unit: that of ``sigma``.
+    Consecutive static steps are one pose. Unit: that of ``sigma``.
     """
     stretches = _stretches(labels)
     if not stretches:
@@ -86,9 +86,9 @@ def bias_of_poses(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, 
 
 
 def bias_in_moves(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, rng: np.random.Generator) -> FloatArray:
-    """(n, 3) by how much the bias leaves, during moves only, the line between its poses (eq. 11.8b).
+    """(n, 3) departure of the bias, during moves only, from the straight line between its poses (eq. 11.8b).
 
-    N(0, ``sigma``²) at the first and at the last instant of a move, independently, linear between; nothing at rest.
+    N(0, ``sigma``²) at the first and at the last instant of a move, independently, linear between; 0 in poses.
     """
     out = np.zeros((len(time_s), 3))
     for (_, start_s), (stop_s, _) in pairwise(_stretches(labels)):

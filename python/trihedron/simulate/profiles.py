@@ -1,6 +1,6 @@
-"""Instruments by class, with the typical figures of their data sheets, and units drawn within their tolerances.
+"""Classes of IMUs with typical data sheet figures, and units drawn within their tolerances.
 
-What a data sheet says in its own units is written so here and converted at once.
+Figures are written in the units of the data sheet and converted to SI here.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, r
 
 _MG = STANDARD_GRAVITY_M_S2 / 1000.0
 _DEG = radians_from_degrees(1.0)
-# m/s/√h and °/√h to per-√s, °/h to rad/s.
+# m/s/√h and °/√h to values per √s; °/h to rad/s.
 _PER_ROOT_HOUR = 1.0 / 60.0
 _DEG_PER_HOUR = _DEG / 3600.0
 
 
 @dataclass(frozen=True)
 class Profile:
-    """A class of instrument: a nominal one, and how far one unit may differ.
+    """A class of IMU: its nominal sensors and the tolerances of a unit.
 
-    ``scale`` and ``misalignment`` are fractions (3σ), ``bias`` SI (3σ), accelerometer then gyro.
+    ``scale`` and ``misalignment`` are fractions (3σ), ``bias`` is in SI (3σ); each for accelerometer, then gyro.
     """
 
     name: str
@@ -42,9 +42,9 @@ class Profile:
     bias: tuple[float, float] = (0.0, 0.0)
 
     def unit(self, number: int) -> tuple[Accelerometer, Gyroscope]:
-        """One unit off the line: S and b drawn within the tolerances, reproducibly by ``number``.
+        """One produced unit: S and b drawn within the tolerances from the random stream of ``number``.
 
-        The accelerometer defines Mz in its *lower* form; the gyro's triad is turned against it as a whole too.
+        The accelerometer's S is lower-triangular and defines the body frame; the gyro has all six cross-axis errors.
         """
         rng = stream(number, f"unit/{self.name}")
         out: list[tuple[Matrix, Triple]] = []
@@ -72,7 +72,7 @@ def _all(value: float) -> Triple:
 
 # SparkFun 6DOF with a 10-bit ADC at 3.3 V: Freescale MMA7260Q (800 mV/g at ±1.5 g, 350 µg/√Hz, one pole at
 # 350 Hz) and InvenSense IDG-300 (2 mV/(°/s), ±500 °/s, 0.014 °/s/√Hz, 140 Hz); ratiometric to the board's supply.
-# Matrices: the published example of the laboratory manual. Its S_ω [rad/s per count] goes with offsets in counts
+# Matrices: the published example of the laboratory manual. It gives S_ω in rad/s per count and offsets in counts
 # (457.68 counts are 1.48 V, the IDG-300's zero-rate level is 1.5 V), so b_ω = -S_ω·offset here.
 _MANUAL_S_F: Matrix = ((-0.0393, 0.0, 0.0), (0.0001, 0.0390, 0.0), (0.0001, 0.0002, 0.0385))
 _MANUAL_B_F: Triple = (19.5696, -22.4746, -20.3088)
@@ -105,7 +105,7 @@ ANALOG_6DOF = Profile(
 )
 
 # InvenSense MPU-6050/9150: accelerometer 16384 LSB/g ±3 %, cross-axis ±2 %, ±50/80 mg, 400 µg/√Hz; gyro
-# 131 LSB/(°/s) ±3 %, cross-axis ±2 %, ±20 °/s, 0.005 °/s/√Hz. Bias instability and walk: as measured on such parts.
+# 131 LSB/(°/s) ±3 %, cross-axis ±2 %, ±20 °/s, 0.005 °/s/√Hz. Bias instability and random walk: measured on such parts.
 MPU = Profile(
     name="mpu",
     about="consumer 16-bit part (MPU-6050/9150), 100 Hz",
@@ -171,19 +171,19 @@ TACTICAL = Profile(
     bias=(0.75 * _MG, 250.0 * _DEG_PER_HOUR),
 )
 
-# A perfect instrument, to which effects can be added one at a time.
+# A perfect IMU, to which effects can be added one at a time.
 IDEAL = Profile("ideal", "no noise, no quantisation, SI output, 100 Hz", Accelerometer(), Gyroscope(), Clock(100.0))
 
 PROFILES: dict[str, Profile] = {p.name: p for p in (ANALOG_6DOF, MPU, ADIS, TACTICAL, IDEAL)}
 
 
 def profile_by_name(name: str) -> Profile:
-    """A class of instrument.
+    """A class of IMU.
 
     Raises
     ------
     ValueError
-        When there is none of that name.
+        When no profile has that name.
     """
     if name not in PROFILES:
         raise RefusedError(f"no profile is called {name!r}{meant(name, PROFILES)}; there are {', '.join(PROFILES)}")

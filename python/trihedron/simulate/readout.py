@@ -1,4 +1,4 @@
-"""What both sensors share behind the moving part: electronics, filter, ADC. Zero means: not there."""
+"""Signal chain that both sensors share after the moving mass: electronics, filter, ADC. A value of 0 disables it."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ NO_MATRIX: Matrix = (NONE, NONE, NONE)
 
 @dataclass(frozen=True)
 class Adc:
-    """ADC, raw units: step ``lsb`` (0: none), range ``[low, high]``.
+    """ADC, raw units: resolution ``lsb`` (0: no rounding), range limits ``[low, high]``.
 
-    ``dead_band`` is the half-width around the bias inside which nothing moves; of every ``missing_every`` codes
-    one is never given (0: none is missing).
+    Readings within ``dead_band`` of the bias come out as the bias; of every ``missing_every`` codes one never occurs
+    (0: no missing codes).
     """
 
     lsb: float = 0.0
@@ -37,19 +37,19 @@ class Adc:
 
     @property
     def is_there(self) -> bool:
-        """Whether it changes anything."""
+        """Whether the ADC changes readings."""
         return self != Adc()
 
     def convert(self, raw: FloatArray, bias: Triple = NONE) -> FloatArray:
-        """(n, 3) raw → (n, 3) codes times ``lsb``; ``zero`` is the reading at zero input."""
+        """(n, 3) raw → (n, 3) codes times ``lsb``; ``bias`` (3,) is the raw reading at zero input."""
         return _core.simulate_convert(raw, self.lsb, self.low, self.high, self.dead_band, bias, self.missing_every)
 
 
 @dataclass(frozen=True)
 class Thermal:
-    """Electronics against die temperature, relative to the reference: offset [SI/K, SI/K²], gain [1/K, 1/K²].
+    """Bias [SI/K, SI/K²] and gain [1/K, 1/K²] of the electronics over die temperature, relative to the reference.
 
-    The die follows the environment with the lag ``lag_s``.
+    The die temperature follows the environment with the time constant ``lag_s``.
     """
 
     bias_per_k: Triple = NONE
@@ -61,10 +61,10 @@ class Thermal:
 
 @dataclass(frozen=True)
 class Drift:
-    """Offset that dies away after power-on, and one that goes on.
+    """Bias drift: a warm-up that decays after power-on, and a linear drift.
 
-    ``amplitude exp(-t/tau_s) + change (t/length_s - 1/2)``, SI: a session of ``length_s`` sees the second about its
-    own mean.
+    ``amplitude exp(-t/tau_s) + change (t/length_s - 1/2)``, SI: over a session of ``length_s`` the linear part has
+    mean 0.
     """
 
     amplitude: Triple = NONE
@@ -73,7 +73,7 @@ class Drift:
     length_s: float = 300.0
 
     def at(self, time_s: FloatArray) -> FloatArray:
-        """(n, 3) offsets at times (n,) from power-on."""
+        """(n, 3) bias, SI, at times (n,) after power-on [s]."""
         dies = np.exp(-np.maximum(time_s, 0.0) / self.tau_s)[:, None] * np.asarray(self.amplitude)
         out: FloatArray = dies + (time_s / self.length_s - 0.5)[:, None] * np.asarray(self.change)
         return out
@@ -81,7 +81,7 @@ class Drift:
 
 @dataclass(frozen=True)
 class Interference:
-    """A line picked up electrically, in front of the filter: amplitude [SI] per channel, frequency, phase."""
+    """A sinusoid of electrical pick-up, before the filter: amplitude [SI] per channel, frequency, phase."""
 
     frequency_hz: float = 50.0
     amplitude: Triple = NONE
@@ -90,7 +90,7 @@ class Interference:
 
 @dataclass(frozen=True)
 class Filter:
-    """Butterworth low-pass in front of the sampler: ``cutoff_hz`` (0: none), ``order`` 1 to 8."""
+    """Butterworth low-pass before the sampler: ``cutoff_hz`` (0: none), ``order`` 1 to 8."""
 
     cutoff_hz: float = 0.0
     order: int = 2
@@ -100,11 +100,11 @@ class Filter:
             raise RefusedError(f"a filter needs cutoff_hz >= 0 and order 1..8, got {self.cutoff_hz} Hz, {self.order}")
 
     def apply(self, signal: FloatArray, dt: float) -> FloatArray:
-        """(n, 3) → (n, 3), settled at the start."""
+        """(n, 3) → (n, 3); the filter starts in its steady state."""
         if self.cutoff_hz == 0.0:
             return signal
         for k in range(self.order // 2):
-            # Pole pairs stand at π(2k+1)/2n from the negative real axis for even n, at π(k+1)/n for odd n.
+            # Pole pairs lie at π(2k+1)/2n from the negative real axis for even n, at π(k+1)/n for odd n.
             angle = math.pi * (2 * k + 1 + self.order % 2) / (2 * self.order)
             quality = 0.5 / math.cos(angle)
             signal = _core.simulate_second_order(signal, dt, [self.cutoff_hz] * 3, [quality] * 3)
@@ -115,10 +115,9 @@ class Filter:
 
 @dataclass(frozen=True)
 class Smoother:
-    """Digital low-pass of the part as its noise meets it, at the output rate.
+    """The part's digital low-pass as applied to its noise, at the output rate.
 
-    Butterworth poles of ``corner_hz`` (0: none) and ``order`` 1 to 6, carried over by ``z = exp(s dt)``; gain one at
-    rest.
+    Butterworth poles of ``corner_hz`` (0: none) and ``order`` 1 to 6, mapped by ``z = exp(s dt)``; unit gain at 0 Hz.
     """
 
     corner_hz: float = 0.0
@@ -136,7 +135,7 @@ class Smoother:
         return np.real(np.poly(poles))
 
     def apply(self, signal: FloatArray, dt: float) -> FloatArray:
-        """(n, 3) → (n, 3), settled on the first sample."""
+        """(n, 3) → (n, 3); the filter starts in its steady state for the first sample."""
         if self.corner_hz == 0.0:
             return signal
         a = self.feedback(dt)
@@ -149,10 +148,10 @@ class Smoother:
 class Electronics:
     """Demodulator, amplifier, supply, filter.
 
-    ``asymmetry`` δ: gain 1+δ for positive and 1-δ for negative signals. ``ratiometric`` 1: the reading follows the
-    supply; 0: not at all. ``saturation`` [SI] clips in front of the filter. ``lag_s`` first-order lag per channel.
-    ``bias_repeatability`` [SI] σ of a bias that is drawn anew in every pose, and changes during the move.
-    ``bias_in_moves`` [SI] how far a bias leaves, at the beginning and at the end of a move, the line between its poses.
+    ``asymmetry`` δ: gain 1+δ for positive and 1-δ for negative signals. ``ratiometric`` 1: readings are proportional
+    to the supply voltage; 0: independent of it. ``saturation`` [SI]: clipping before the filter. ``lag_s``:
+    first-order lag per channel. ``bias_repeatability`` [SI]: σ of a bias drawn in every pose, linear during moves.
+    ``bias_in_moves`` [SI]: σ of its departure from that line at the beginning and at the end of a move.
     """
 
     asymmetry: Triple = NONE
@@ -172,9 +171,9 @@ class Electronics:
         return any(self.lag_s) or self.filter.cutoff_hz > 0.0
 
     def amplify(self, signal: FloatArray, time_s: FloatArray, die_k: FloatArray | None) -> FloatArray:
-        """(n, 3) input-referred signal through asymmetry, temperature, drift, interference and saturation.
+        """(n, 3) input-referred signal after asymmetry, temperature, drift, interference and saturation.
 
-        ``die_k`` (n,) is the die's temperature above the reference, None where it is at the reference.
+        ``die_k`` (n,) is the die temperature above the reference [K], None where it always equals the reference.
         """
         if any(self.asymmetry):
             signal = signal * (1.0 + np.asarray(self.asymmetry) * np.sign(signal))
@@ -194,7 +193,7 @@ class Electronics:
         return np.clip(signal, -limit, limit) if np.isfinite(limit).any() else signal
 
     def smooth(self, signal: FloatArray, dt: float) -> FloatArray:
-        """Lag, then filter, at the fine step ``dt``."""
+        """Apply the lag, then the filter, at the oversampled step ``dt`` [s]."""
         if any(self.lag_s):
             signal = _core.simulate_first_order(signal, dt, self.lag_s)
         return self.filter.apply(signal, dt)

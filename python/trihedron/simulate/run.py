@@ -1,4 +1,4 @@
-"""From a scenario to a recording and its truth."""
+"""Simulate a scenario: a recording and its truth."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ _MARGIN = 4
 
 
 def simulate(scenario: Scenario, seed: int = 0) -> tuple[Recording, Truth]:
-    """Move the instrument, sample it, and keep the truth apart.
+    """Simulate the motion and the readings of both sensors; return the recording and, separately, the truth.
 
-    Every stage draws from its own stream keyed by ``seed`` and the stage's name: switching one stage on or off, or
-    changing its size, leaves all others as they were, sample by sample.
+    Every stage draws from its own random stream keyed by ``seed`` and the stage's name: switching one stage on or off,
+    or changing its size, does not change any sample of the others.
 
     Raises
     ------
     ValueError
-        When the scenario asks for something that cannot be, in one sentence.
+        When the scenario is impossible; the message names the value in one sentence.
     """
     plan = plan_motion(scenario.motion, stream(seed, "motion"))
     clock, place = scenario.clock, scenario.environment
@@ -107,7 +107,7 @@ def _read(
     scenario: Scenario,
     seed: int,
 ) -> FloatArray:
-    """(n, 3) raw readings of one sensor at its instants."""
+    """(n, 3) raw readings of one sensor at its sampling instants ``time_s`` (n,)."""
     clock, place = scenario.clock, scenario.environment
     dt = 1.0 / clock.true_rate_hz
     if sensor.is_dynamic:
@@ -133,7 +133,7 @@ def _read(
         signal = signal + bias_in_moves(plan.labels, time_s, sensor.electronics.bias_in_moves, rng)
     _, gain = sense_axes(sensor.S, name)
     offset = -np.linalg.solve(np.asarray(sensor.S), np.asarray(sensor.b))
-    raw = signal  # in place: ten million samples are 240 MB
+    raw = signal  # modified in place: ten million samples take 240 MB
     raw *= gain
     raw += offset
     if sensor.electronics.ratiometric:
@@ -145,7 +145,7 @@ def _read(
 
 
 def _die(sensor: Sensor, place: Environment, time_s: FloatArray, dt: float) -> FloatArray | None:
-    """(n,) die temperature above the reference, None where it is there all the time."""
+    """(n,) die temperature above the reference [K], None where it always equals the reference."""
     if place.temperature.is_constant_reference:
         return None
     above = place.temperature.at(time_s) - place.temperature.reference_degc
@@ -160,7 +160,7 @@ def _sample_instants(clock: Clock, n: int, seed: int) -> FloatArray:
     grid = np.array(clock.instants_s) if clock.instants_s else np.arange(n) / clock.true_rate_hz
     if clock.jitter_s == 0.0:
         return grid
-    # Neighbours must not overtake each other: the tail beyond 0.45 steps is folded to it.
+    # Samples must stay in order: jitter is clipped at 0.45 of the sampling interval.
     limit = 0.45 / clock.true_rate_hz
     jitter = np.clip(clock.jitter_s * stream(seed, "clock/jitter").standard_normal(n), -limit, limit)
     return grid + jitter
@@ -194,7 +194,7 @@ def _timestamps(clock: Clock, true_s: FloatArray, kept: npt.NDArray[np.bool_], s
 
 
 def _pick(values: FloatArray, kept: npt.NDArray[np.bool_]) -> FloatArray:
-    """Rows that were not lost; without a copy where none was."""
+    """Rows of the samples that were not lost; no copy where none was lost."""
     return values if kept.all() else values[kept]
 
 
@@ -217,7 +217,7 @@ def _segments(plan: Plan, time_s: FloatArray) -> tuple[TrueSegment, ...]:
     labels = plan.labels
     starts = np.searchsorted(time_s, [label.start_s for label in labels])
     starts[0] = 0
-    # A step may last shorter than a sample: its range is then empty.
+    # A step can be shorter than the sampling interval: its range is then empty.
     stops = [*(int(k) for k in starts[1:]), len(time_s)]
     return tuple(
         TrueSegment(label.kind, label.name, int(a), b, label.start_s, label.stop_s, label.axis, label.turn_rad)

@@ -1,4 +1,4 @@
-"""A scenario: who moves what instrument where, sampled how."""
+"""A scenario: motion, sensors, clock and environment of a simulated recording."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from trihedron.units import STANDARD_GRAVITY_M_S2, radians_from_degrees
 
 @dataclass(frozen=True)
 class Temperature:
-    """Temperature around the instrument: a start, a warm-up that saturates, a ramp, a swing.
+    """Temperature around the IMU: a start value, an exponential warm-up, a ramp, a sinusoid.
 
     ``start_degc + warm_up_k (1 - exp(-t/warm_up_tau_s)) + ramp_k_s t + swing_k sin(2π t/swing_period_s)``.
-    ``logged``: the recording has the channel, in steps of ``step_k``. Sensors refer to ``reference_degc``.
+    ``logged``: the recording has this channel, rounded to ``step_k``. S and b are those at ``reference_degc``.
     """
 
     start_degc: float = 25.0
@@ -35,7 +35,7 @@ class Temperature:
     step_k: float = 0.01
 
     def at(self, time_s: FloatArray) -> FloatArray:
-        """(n,) °C."""
+        """(n,) temperature [°C] at ``time_s`` (n,)."""
         if self.warm_up_k == self.ramp_k_s == self.swing_k == 0.0:
             return np.full(len(time_s), self.start_degc)
         t = np.maximum(time_s, 0.0)
@@ -48,14 +48,14 @@ class Temperature:
 
     @property
     def is_constant_reference(self) -> bool:
-        """Whether the die stays at its reference."""
+        """Whether the temperature always equals the reference."""
         still = self.warm_up_k == self.ramp_k_s == self.swing_k == 0.0
         return still and self.start_degc == self.reference_degc
 
 
 @dataclass(frozen=True)
 class Supply:
-    """Supply voltage: nominal, a slow sag ``sag_v (1 - exp(-t/sag_tau_s))``, a ripple."""
+    """Supply voltage: the nominal value, less a slow sag ``sag_v (1 - exp(-t/sag_tau_s))``, and a sinusoidal ripple."""
 
     nominal_v: float = 3.3
     sag_v: float = 0.0
@@ -66,7 +66,7 @@ class Supply:
     step_v: float = 0.001
 
     def at(self, time_s: FloatArray) -> FloatArray:
-        """(n,) volts."""
+        """(n,) supply voltage [V] at ``time_s`` (n,)."""
         if self.sag_v == self.ripple_v == 0.0:
             return np.full(len(time_s), self.nominal_v)
         t = np.maximum(time_s, 0.0)
@@ -76,10 +76,10 @@ class Supply:
 
 @dataclass(frozen=True)
 class Environment:
-    """Where it happens.
+    """Gravity, Earth rate, temperature and supply voltage at the site.
 
-    Gravity is ``gravity_m_s2``, or WGS84's at ``latitude_deg`` and ``height_m`` when that is 0. ``earth_rate`` lets
-    the Earth turn; the level frame's x axis points ``heading_deg`` from north, clockwise seen from above.
+    Gravity is ``gravity_m_s2``, or WGS84's at ``latitude_deg`` and ``height_m`` when that is 0. ``earth_rate`` includes
+    the Earth's rotation; the level frame's x axis points ``heading_deg`` from north, clockwise seen from above.
     """
 
     gravity_m_s2: float = STANDARD_GRAVITY_M_S2
@@ -117,14 +117,14 @@ class Loss:
 
 @dataclass(frozen=True)
 class Clock:
-    """When samples are taken and what the timestamps say.
+    """Sampling instants and timestamps.
 
-    ``rate_error``: the true rate is ``rate_hz (1 + rate_error)`` while the timestamps believe in ``rate_hz``.
-    ``jitter_s``: rms of the true instants about the grid; ``timestamps_show_jitter`` writes it into the timestamps.
+    ``rate_error``: the true rate is ``rate_hz (1 + rate_error)``, while the timestamps are spaced by 1/``rate_hz``.
+    ``jitter_s``: rms of the true instants about the grid; ``timestamps_show_jitter`` includes it in the timestamps.
     ``timestamp_jitter_s``: rms error of the timestamps alone. ``gyroscope_offset_s``: the gyro samples that much later
-    under the same stamp. Samples are lost as listed in ``losses`` and at random with ``loss_probability``;
-    ``restamped`` then counts on as if nothing were missing. ``instants_s`` gives every true instant, from 0, instead of
-    a grid: timestamps and gaps of a real log. ``oversample`` fine steps per sample where a sensor has dynamics (0: 8).
+    under the same timestamp. Samples are lost as listed in ``losses`` and at random with ``loss_probability``; with
+    ``restamped`` the timestamps have no gaps at losses. ``instants_s`` gives every true instant, from 0, instead of
+    a grid: timestamps and gaps of a real log. ``oversample``: steps per sample where a sensor has dynamics (0: 8).
     """
 
     rate_hz: float = 100.0
@@ -159,7 +159,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class Scenario:
-    """Everything that decides a simulated recording, apart from the seed."""
+    """Everything that determines a simulated recording, apart from the seed."""
 
     motion: Motion
     name: str = "scenario"

@@ -1,4 +1,4 @@
-"""Scenario files (TOML): a profile, a session or steps, overrides of any parameter, and effects by their id."""
+"""Scenario files (TOML): a profile, a session or steps, overrides of any parameter, and effects by id."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def read_scenario(path: str | Path) -> Scenario:
     Raises
     ------
     ValueError
-        When the file is not TOML or asks for something that does not exist, naming the table and the key.
+        When the file is not TOML or a table, key or name in it does not exist; the message names table and key.
     """
     path = Path(path)
     try:
@@ -60,7 +60,7 @@ def read_scenario(path: str | Path) -> Scenario:
 _TABLES = {"clock": Clock, "environment": Environment, "accelerometer": Accelerometer, "gyroscope": Gyroscope}
 
 _MOST_POSES = 100_000
-"""Poses of a session: three days of poses of two seconds."""
+"""Largest number of poses of a session; poses of 2 s then take more than two days."""
 
 
 def scenario_from_table(table: Mapping[str, Any], name: str = "scenario") -> Scenario:
@@ -90,7 +90,7 @@ def scenario_from_table(table: Mapping[str, Any], name: str = "scenario") -> Sce
 
 
 def _environment(table: Any) -> Environment:
-    """Who states a latitude or a height and no gravity means the gravity there."""
+    """The environment; gravity is WGS84's where the table gives a latitude or a height and no gravity."""
     given = _changed(Environment(), table, "environment")
     if {"latitude_deg", "height_m"} & set(table) and "gravity_m_s2" not in table:
         given = dataclasses.replace(given, gravity_m_s2=0.0)
@@ -147,7 +147,7 @@ def _refuse_unknown(values: Mapping[str, Any], known: tuple[str, ...], where: st
 
 
 def _changed(base: Any, values: Mapping[str, Any], where: str) -> Any:
-    """A dataclass with some fields replaced by values of a table."""
+    """The dataclass ``base`` with some fields replaced by values of a table."""
     if not isinstance(values, Mapping):
         raise RefusedError(f"{where} must be a table, got {values!r}")
     cls = type(base)
@@ -159,7 +159,7 @@ def _changed(base: Any, values: Mapping[str, Any], where: str) -> Any:
 
 
 def _made(cls: type[Any], values: Mapping[str, Any], where: str) -> Any:
-    """A dataclass from a table, other fields at their defaults."""
+    """A dataclass from a table; other fields have their defaults."""
     names = tuple(f.name for f in dataclasses.fields(cls))
     _refuse_unknown(values, names, where)
     hints = typing.get_type_hints(cls)

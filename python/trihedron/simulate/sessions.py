@@ -1,4 +1,4 @@
-"""Calibration sessions as people perform them, as motions."""
+"""Motions of typical calibration sessions."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ def hand_session(
     arm_m: float = 0.0,
     layout: int = 0,
 ) -> Motion:
-    """Faces, edges, then arbitrary tilts held by turns, moved by hand with wobble, travel and a change of heading.
+    """Poses on faces, on edges, then at random tilts; moves by hand with wobble, travel and a change of heading.
 
-    ``layout`` seeds the order, the tilts, durations and headings: the protocol, apart from the noise. ``arm_m`` puts
-    the wrist that far behind the case.
+    ``layout`` seeds the order, tilts, durations and headings, separately from the noise. The wrist, which is the pivot
+    of the moves, lies ``arm_m`` behind the case (along -X).
     """
     if not (isinstance(n_poses, int) and n_poses >= 1):
         raise RefusedError(f"n_poses must be a whole number of at least 1 pose, got {n_poses!r}")
@@ -80,7 +80,7 @@ def poses_in_order(
     wobble_deg: float = 3.0,
     arrive: bool = False,
 ) -> Motion:
-    """Hold each of the directions up in turn; ``arrive`` puts a move in front of the first as well."""
+    """One pose for each body direction in ``ups``, pointing up; ``arrive`` adds a move before the first pose."""
     if len(ups) == 0:
         raise RefusedError("a session of poses needs at least one direction that is held up")
     steps: list[Step] = []
@@ -92,7 +92,7 @@ def poses_in_order(
 
 
 def six_faces(repeats: int = 1, pose_s: float = 5.0, move_s: float = 3.0) -> Motion:
-    """The cube on each of its faces in turn, ``repeats`` times round."""
+    """The cube on each of its six faces in turn, ``repeats`` times."""
     if not (isinstance(repeats, int) and repeats >= 1):
         raise RefusedError(f"repeats must be a whole number of at least 1 round, got {repeats!r}")
     return poses_in_order(FACES * repeats, pose_s, move_s)
@@ -106,9 +106,9 @@ def table_turns(
     error_deg: float = 0.0,
     layout: int = 0,
 ) -> Motion:
-    """Turns on a table against a wall about the vertical, the cube on each of ``faces`` in turn.
+    """Turns about the vertical on a table, aligned with a wall, with each body direction in ``faces`` up in turn.
 
-    ``error_deg`` is the standard deviation of the true angle about the stated one, drawn by ``layout``.
+    ``error_deg`` is the standard deviation of the true angle from the stated one, seeded by ``layout``.
     """
     if len(faces) == 0:
         raise RefusedError("turns on a table need at least one face that the case stands on")
@@ -130,7 +130,7 @@ def table_turns(
 def dividing_head(pose_s: float = 2.0, move_s: float = 1.0) -> Motion:
     """The 324 poses of an optical dividing head: pitch 0..350 deg by 10, roll 0..80 deg by 10.
 
-    Hold ``pitch P roll R``: up in the body is ``(-sin P, cos P sin R, cos P cos R)``.
+    In the pose ``pitch P roll R`` the body direction ``(-sin P, cos P sin R, cos P cos R)`` points up.
     """
     steps: list[Step] = []
     start = (0.0, 0.0, 1.0)
@@ -151,7 +151,7 @@ def rate_table(
     axes: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
     arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Motion:
-    """Constant rates of both signs about each body axis, reached and left by smooth ramps; the axis stands upright."""
+    """Constant rates of both signs about each body axis, which points up, with smooth ramps before and after."""
     steps: list[Step] = [Pose(5.0, name="rest")]
     for axis in axes:
         steps += [MoveTo(axis, 3.0), Pose(3.0, name="rest")]
@@ -168,5 +168,5 @@ def rate_table(
 
 
 def long_rest(duration_s: float = 3600.0, up: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Motion:
-    """Stand still, for Allan variance."""
+    """One static pose, for Allan variance."""
     return Motion((Pose(duration_s, name="rest"),), start=attitude_with_up(up))

@@ -1,8 +1,8 @@
-"""The twin: a real recording repeated as a simulation, from its poses, moves, instants, noise and ADC.
+"""Digital twin of a recording: a scenario with its poses, moves, timestamps, noise and ADC.
 
-Poses are the directions of gravity that the calibrated poses show; moves are replayed from the calibrated rates and
-accelerations, turned by a slow level rotation so that each ends in the pose that follows. What the calibration does not
-explain is therefore what differs between the recording and its twin.
+Poses have the directions of gravity measured in the calibrated poses. Moves replay the calibrated rates and
+accelerations, with a slow rotation about a level axis added so that each ends in the next pose. The recording and its
+digital twin therefore differ by what the calibration does not explain.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from trihedron.simulate.readout import Adc, Matrix, Triple, sense_axes
 from trihedron.simulate.scenario import Clock, Environment, Scenario
 from trihedron.simulate.twin_noise import noise_of_poses
 
-# Knots of a replayed move: wider ones would blunt the jolt of setting the case down. The price is that the recording's
-# noise inside moves is replayed as motion and the simulation's own comes on top.
+# Knot spacing of a replayed move: a wider one would smooth the jolt of setting the case down. At this spacing the
+# recording's noise in moves is replayed as motion, and the simulated noise is added to it.
 _KNOT_S = 0.01
 
 
@@ -38,7 +38,7 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
     Raises
     ------
     ValueError
-        When the recording lacks a sensor, was never still, or the calibration has no gyro.
+        When the recording lacks a sensor or has no pose, or the calibration has no gyro.
     """
     if recording.accelerometer is None or recording.gyroscope is None or calibration.gyroscope is None:
         raise RefusedError("a digital twin needs both sensors in the recording and in the calibration")
@@ -48,7 +48,7 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
     time_s = recording.time_s
     readings = (_filled(recording.accelerometer), _filled(recording.gyroscope))
     facts = recording.facts
-    # A motion that left a sensor's range leaves it again.
+    # Motion that exceeded a sensor's range must exceed it again.
     beyond = (unclipped(readings[0], facts.of("accelerometer")), unclipped(readings[1], facts.of("gyroscope")))
     motion = _motion(time_s, beyond, segments, calibration)
     poses = [(pose.start, pose.stop) for pose in segments.poses]
@@ -85,7 +85,7 @@ def _motion(
     time_s: FloatArray, readings: tuple[FloatArray, FloatArray], segments: Segments, calibration: Calibration
 ) -> Motion:
     gyro = calibration.gyroscope
-    assert gyro is not None  # twin_scenario has looked
+    assert gyro is not None  # twin_scenario checks it
     force = correct(readings[0], calibration.accelerometer.S, calibration.accelerometer.b)
     rate = correct(readings[1], gyro.S, gyro.b)
     poses = segments.poses
@@ -128,7 +128,7 @@ def _knots(time_s: FloatArray, start_s: float, stop_s: float) -> FloatArray:
 
 
 def _averaged(time_s: FloatArray, values: FloatArray, knots: FloatArray) -> FloatArray:
-    """(m, 3) values at the knots: least squares of straight lines between them, so that no knot holds one sample."""
+    """(m, 3) values at the knots (m,): least-squares linear spline, so that a knot is not one sample's noise."""
     a, b = np.searchsorted(time_s, [knots[0] - 1e-9, knots[-1] + 1e-9])
     t, y = time_s[a:b], values[a:b]
     place = np.clip((t - knots[0]) / (knots[1] - knots[0]), 0.0, len(knots) - 1.0)
@@ -141,7 +141,7 @@ def _averaged(time_s: FloatArray, values: FloatArray, knots: FloatArray) -> Floa
     np.add.at(off, k, x * (1.0 - x))
     np.add.at(right, k, (1.0 - x)[:, None] * y)
     np.add.at(right, k + 1, x[:, None] * y)
-    # A weak pull towards evenness decides knots in a gap of the log.
+    # A weak regularisation towards the interpolated readings determines knots in a gap of the log.
     diagonal += 1e-3
     nearest = np.column_stack([np.interp(knots, t, y[:, j]) for j in range(3)])
     right += 1e-3 * nearest
@@ -149,7 +149,7 @@ def _averaged(time_s: FloatArray, values: FloatArray, knots: FloatArray) -> Floa
 
 
 def _attitudes(rate: FloatArray, start: Quaternion, duration_s: float) -> FloatArray:
-    """(m, 4) attitude at every knot of a replay."""
+    """(m, 4) attitude quaternion at every knot of a replay; ``rate`` (m, 3) [rad/s]."""
     row = np.array([[0.0, duration_s, *start, 1.0, 0.0, 0.0, 0.0, 0.5, *[0.0] * 6, 0.5]])
     knots = np.column_stack([np.zeros(len(rate)), rate, np.zeros_like(rate)])
     empty = np.zeros((0, 6))
@@ -159,9 +159,9 @@ def _attitudes(rate: FloatArray, start: Quaternion, duration_s: float) -> FloatA
 
 
 def _ending_in(rate: FloatArray, start: Quaternion, duration_s: float, up: FloatArray) -> FloatArray:
-    """The rate with a constant level rotation added, so that the move ends with ``up`` at the zenith.
+    """(m, 3) rate with a constant rotation about a level axis added, so that the move ends with ``up`` vertical.
 
-    If R(t) belongs to ω then exp(c t) R(t) belongs to ω + R(t)ᵀ c, exactly; c is level and small.
+    If ω makes the attitude R(t), then ω + R(t)ᵀ c makes exp(c t) R(t), exactly; c [rad/s] is level and small.
     """
     for _ in range(3):
         R = _matrices(_attitudes(rate, start, duration_s))
@@ -171,9 +171,9 @@ def _ending_in(rate: FloatArray, start: Quaternion, duration_s: float, up: Float
 
 
 def _coming_to_rest(acceleration: FloatArray) -> FloatArray:
-    """(m, 3) the acceleration less a smooth hump, so that what stood still before the move stands still after it.
+    """(m, 3) acceleration less a sin² pulse, so that the velocity after the move is 0, as before it.
 
-    What is left of a velocity is a flaw of the recording (a late sensor, a scale), not a motion: replayed, every
+    A remaining velocity is an error of the recording (a delayed sensor, a scale error), not motion: if replayed, every
     simulation would inherit it.
     """
     m = len(acceleration)
@@ -183,7 +183,7 @@ def _coming_to_rest(acceleration: FloatArray) -> FloatArray:
 
 
 def _matrices(q: FloatArray) -> FloatArray:
-    """(m, 3, 3) body to level."""
+    """(m, 3, 3) body-to-level rotation matrices of quaternions (m, 4)."""
     w, x, y, z = q.T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -194,7 +194,7 @@ def _matrices(q: FloatArray) -> FloatArray:
 
 
 def _filled(raw: FloatArray) -> FloatArray:
-    """Lost rows by straight lines: only the motion under them is guessed."""
+    """(n, 3) readings with missing values interpolated linearly."""
     if np.isfinite(raw).all():
         return raw
     out = raw.copy()
@@ -217,18 +217,18 @@ def _matrix(S: FloatArray) -> Matrix:
     return (_triple(S[0]), _triple(S[1]), _triple(S[2]))
 
 
-# Motion beyond a sensor's range, as far as the readings before and after it tell.
+# Motion beyond a sensor's range, extrapolated from the readings before and after it.
 
 SLOPE_OVER = 2
-"""Samples on either side over which the slope into a cut peak is taken: fewer are noise, more the next bend."""
+"""Samples over which the slope beside a clipped peak is taken: fewer add noise, more include other motion."""
 
 
 def unclipped(readings: FloatArray, facts: ChannelFacts) -> FloatArray:
-    """(n, 3) readings with the peaks that a limit cut off drawn again, raw units.
+    """(n, 3) readings with the peaks clipped at a range limit restored, raw units.
 
-    A cubic through the last reading before and the first after a run at the limit, with their slopes; never inside the
-    limit, never further beyond it than the limit is from the middle of the log. What was cut is a guess; that the
-    motion went beyond is not.
+    Each clipped run is replaced by a cubic through the last reading before and the first after it, with their slopes;
+    never inside the limit, and never further beyond it than the limit is from the channel's median. The height of the
+    peak is a guess; that the motion exceeded the range is certain.
     """
     if not facts.limits:
         return readings
@@ -246,7 +246,7 @@ def unclipped(readings: FloatArray, facts: ChannelFacts) -> FloatArray:
                 continue
             rise = _slope(column, at_limit, a, -1)
             fall = _slope(column, at_limit, b, 1)
-            # Seen from the limit outward: a peak is entered upwards and left downwards, or there was none.
+            # Towards the limit before the run and away from it after; a slope of the wrong sign is set to 0.
             slopes = [max(sign * rise, 0.0) * sign, min(sign * fall, 0.0) * sign]
             curve = CubicHermiteSpline([a, b], [column[a], column[b]], slopes)
             beyond = sign * (curve(np.arange(first, stop)) - limit.value)
@@ -255,7 +255,7 @@ def unclipped(readings: FloatArray, facts: ChannelFacts) -> FloatArray:
 
 
 def _slope(column: FloatArray, at_limit: BoolArray, place: int, step: int) -> float:
-    """Slope [raw/sample] at ``place``, from readings on its side that lie at no limit."""
+    """Slope [raw/sample] at ``place``, from readings in direction ``step`` that are not at a limit."""
     other = place
     for _ in range(SLOPE_OVER):
         if not 0 <= other + step < len(column) or at_limit[other + step]:

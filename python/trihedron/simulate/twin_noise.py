@@ -1,6 +1,6 @@
-"""Noise of a recording's poses for its twin: N, B and the low-pass that coloured them.
+"""Noise in the poses of a recording, for its digital twin: N, B and the low-pass that filters them.
 
-A non-negative fit to the pooled Allan variance of the poses, for each of a list of filters; the best is kept.
+For each of a list of filters N² and B² are fitted, non-negative, to the pooled Allan variance; the best filter is kept.
 """
 
 from __future__ import annotations
@@ -15,30 +15,30 @@ from trihedron.simulate.noise import NoiseTerms, Triple
 from trihedron.simulate.readout import Smoother
 
 _FREQUENCIES = np.pi * (np.arange(1 << 13) + 0.5) / (1 << 13)
-# Corners in parts of the sampling rate, and orders, that are tried.
+# Corner frequencies, as fractions of the sampling rate, and orders that are tried.
 _CORNERS = (0.03, 0.045, 0.06, 0.08, 0.1, 0.12, 0.15, 0.19, 0.24, 0.3, 0.37, 0.45)
 _ORDERS = (1, 2, 3, 4, 6)
 
 FILTER_EARNS = 16.0
-"""Twice the log-likelihood that a low-pass must win over none, as where its corner is measured."""
+"""Smallest gain in twice the log-likelihood for a low-pass over none; the same as where a corner is measured."""
 FLICKER_EARNS = 6.63
-"""Twice the log-likelihood that flicker must win over none: χ² of one degree of freedom passes it in 1 %."""
+"""Smallest gain in twice the log-likelihood for flicker over none: the 1 % point of χ² with one degree of freedom."""
 NEAR = 0.3
-"""In the logarithm: neighbours of the corners that are tried differ by about as much."""
+"""Largest difference of ln(corner) from a known corner; neighbouring corners tried differ by about as much."""
 HIDDEN = 1e-2
-"""Power gain below which an ADC's rounding and what leaks hide the shape of a filter."""
+"""Power gain below which the ADC's rounding and spectral leakage hide the shape of a filter."""
 LOWEST, HIGHEST = 5e-3, 2.0
-"""Of the rate: corners that are seen at all (a 64th of Nyquist, four times Nyquist)."""
+"""Corner frequencies searched, as fractions of the sampling rate: 1/100 to 4 times the Nyquist frequency."""
 SHAPES = 0.1
-"""Relative error of a density that two terms and a low-pass do not follow: lines, sharper filters."""
+"""Relative model error of a density: lines and sharper filters are not represented by two terms and a low-pass."""
 
 
 def noise_of_poses(
     signal: FloatArray, poses: Sequence[tuple[int, int]], dt: float, step: FloatArray | float = 0.0
 ) -> tuple[NoiseTerms, Smoother]:
-    """Terms per axis of (n, 3) readings inside the poses ``[start, stop)``, and the low-pass all axes share.
+    """Terms per axis of (n, 3) readings inside the poses ``[start, stop)``, and the low-pass that all axes share.
 
-    ``step`` of the ADC is taken off. What is longer than a third of a pose cannot be told and is excluded.
+    The rounding noise ``step``²/12 of the ADC is subtracted. A pose contributes cluster times up to a third of its own.
     """
     steps = np.broadcast_to(np.asarray(step, dtype=np.float64), (3,))
     measured = [_pooled(signal[:, k], poses, float(steps[k])) for k in range(3)]
@@ -58,7 +58,7 @@ def noise_of_poses(
 
 
 FEWEST_BELOW = 4
-"""Octaves that begin below a corner from which on they alone tell white noise from flicker."""
+"""Number of octaves starting below the corner from which on only these are fitted for N and B."""
 
 
 def noise_of_octaves(
@@ -72,16 +72,16 @@ def noise_of_octaves(
     """Terms per axis and the low-pass that all axes share, from mean densities in frequency bands.
 
     ``bands_hz`` (m, 2), ``density`` (m, 3) two-sided, unit²/Hz (that of white noise is N²), ``relative`` (m, 3) their
-    relative standard errors. ``low_pass`` where it is known, or roughly its corner [Hz]: then one of a list near there;
-    else one that earns ``FILTER_EARNS``, or all colour would become one. ``white``: N of each axis with its relative
-    error, where it was measured below a low-pass: one more density, of white noise alone.
+    relative standard errors. ``low_pass``: the filter if known; or its approximate corner [Hz], and the best of those
+    tried near it is taken; or None, and a filter must gain ``FILTER_EARNS`` over none, because one fits any coloured
+    noise. ``white``: N of each axis and its relative error where measured below a low-pass; it adds a density of N.
     """
     frequency_hz = _FREQUENCIES / (2.0 * np.pi * dt)
     inside = [(low <= frequency_hz) & (frequency_hz < high) for low, high in bands_hz]
 
     def fitted(low_pass: Smoother, bands: slice = slice(None)) -> tuple[list[FloatArray], float]:
         power = _power(low_pass, dt)
-        # Both pass the low-pass, as they do in the simulated sensor.
+        # Both terms pass through the low-pass, as in the simulated sensor.
         flicker = power / (2.0 * np.pi * frequency_hz)
         design = np.array([[float(column[one].mean()) for column in (power, flicker)] for one in inside])
         terms, misfit = [], 0.0
@@ -102,7 +102,7 @@ def noise_of_octaves(
         near = [k for k in range(1, len(filters)) if corner_hz and abs(np.log(filters[k].corner_hz / corner_hz)) < NEAR]
         best = min(near or range(len(filters)), key=lambda k: misfits[k])
         low_pass = filters[best if near or misfits[0] - misfits[best] > FILTER_EARNS else 0]
-    # Above a corner rounding and the filter's own shape are left: no octave there tells white noise from flicker.
+    # Above the corner rounding and the filter's shape dominate: no octave there separates white noise from flicker.
     n_below = int(np.count_nonzero(bands_hz[:, 0] < low_pass.corner_hz))
     below = slice(n_below if low_pass.corner_hz > 0.0 and n_below >= FEWEST_BELOW else None)
     N, B = ((float(x), float(y), float(z)) for x, y, z in np.array(fitted(low_pass, below)[0]).T)
@@ -110,9 +110,9 @@ def noise_of_octaves(
 
 
 def low_pass_like(frequency_hz: FloatArray, gain: FloatArray, dt: float) -> Smoother:
-    """The low-pass whose power gain is nearest to ``gain`` (m,) at ``frequency_hz`` (m,), in the logarithm.
+    """The low-pass whose power gain is nearest to ``gain`` (m,) at ``frequency_hz`` (m,) in mean square of ln(gain).
 
-    A gain below ``HIDDEN`` counts no further.
+    Gains below ``HIDDEN`` are set to ``HIDDEN``.
     """
     turns = np.exp(-2j * np.pi * frequency_hz * dt)
     wanted = np.log(np.maximum(gain, HIDDEN))
@@ -134,7 +134,7 @@ def low_pass_like(frequency_hz: FloatArray, gain: FloatArray, dt: float) -> Smoo
 
 
 def _earned(design: FloatArray, density: FloatArray, relative: FloatArray) -> tuple[FloatArray, float]:
-    """White noise (first column), and flicker (second) where it earns ``FLICKER_EARNS``."""
+    """Variances of white noise and of flicker (0 where it gains less than ``FLICKER_EARNS``), and -2 log-likelihood."""
     white, alone = _non_negative(design[:, :1], density, relative)
     both, misfit = _non_negative(design, density, relative)
     return (both, misfit) if alone - misfit > FLICKER_EARNS else (np.append(white, 0.0), alone)
@@ -156,7 +156,7 @@ def _non_negative(design: FloatArray, density: FloatArray, relative: FloatArray)
 
 
 def _pooled(x: FloatArray, poses: Sequence[tuple[int, int]], step: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Cluster sizes, Allan variances over all poses, and their degrees of freedom."""
+    """Cluster sizes [samples], Allan variances pooled over all poses, and their degrees of freedom, each (k,)."""
     longest = max(stop - start for start, stop in poses)
     clusters, variances, freedom = [], [], []
     m = 1
@@ -186,16 +186,16 @@ def _pooled(x: FloatArray, poses: Sequence[tuple[int, int]], step: float) -> tup
 def _fit(
     pooled: tuple[FloatArray, FloatArray, FloatArray], dt: float, passed: FloatArray
 ) -> tuple[tuple[float, ...], float]:
-    """(N, B) and how badly they fit, as -2 log-likelihood; ``passed`` is what a low-pass leaves of unit white."""
+    """(N, B) and -2 log-likelihood; ``passed`` (k,) is the Allan variance of unit white noise after the low-pass."""
     size, measured, freedom = pooled
     if not np.any(measured > 0.0):
         return (0.0, 0.0), 0.0
-    # The filter colours what is fast; flicker is slow enough to pass it whole. A walk is not offered: holds of seconds
-    # would let it grow over the minutes between them without a trace of evidence.
+    # Flicker is slow enough to pass the filter unchanged. No random walk is fitted: poses of seconds do not constrain
+    # how far it grows over the minutes between them.
     flat = np.full(len(size), 2.0 * np.log(2.0) / np.pi)
     design = np.column_stack([passed / dt, flat])
-    # Relative errors of a variance with so many degrees of freedom; at least 3 %, which the shapes do not keep. They
-    # are relative to the model: a variance that came out small by accident must not weigh the most.
+    # Relative standard error of a variance with these degrees of freedom, with 3 % of model error in quadrature. It is
+    # relative to the model, so that a variance that is small by chance does not get the largest weight.
     relative = np.hypot(np.sqrt(2.0 / freedom), 0.03)
     model = np.maximum(measured, 0.1 * measured.max() / size)
     for _ in range(5):
@@ -208,13 +208,13 @@ def _fit(
 
 
 def _windows(size: FloatArray) -> FloatArray:
-    """(k, 8192) what the Allan variance at each cluster size sees of a spectrum over (0, π)."""
+    """(k, 8192) weight of a spectrum over (0, π) in the Allan variance at each cluster size (k,)."""
     half = 0.5 * _FREQUENCIES
     return np.array([2.0 / m**2 * np.sin(half * m) ** 4 / np.sin(half) ** 2 / len(half) for m in size])
 
 
 def _power(low_pass: Smoother, dt: float) -> FloatArray:
-    """(8192,) power transfer of the low-pass."""
+    """(8192,) power gain of the low-pass."""
     if low_pass.corner_hz == 0.0:
         return np.ones(len(_FREQUENCIES))
     a = low_pass.feedback(dt)

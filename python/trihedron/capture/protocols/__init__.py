@@ -1,4 +1,4 @@
-"""Protocols by name, one maker's per file, found by themselves; a decoder turns bytes into frames."""
+"""Protocols by name, one manufacturer per file, found automatically; a decoder converts bytes to frames."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ __all__ = ["PROTOCOLS", "Decoder", "Frame", "LineColumns", "NameColumns", "decod
 _SPOKEN = [one for module in modules_of(__name__, __path__) for one in getattr(module, "SPOKEN", {}).items()]
 _DECODERS: dict[str, Any] = {kind.name: kind for kind, _ in _SPOKEN}
 PROTOCOLS: dict[str, str] = {kind.name: sentence for kind, sentence in _SPOKEN}
-"""Name and one sentence; a .toml file declares any other binary frame."""
+"""Name and description of each protocol; a .toml file declares any other binary frame."""
 
 
 def decoder_factory(
     protocol: str | FrameDeclaration, name_columns: NameColumns = name_by_position
 ) -> Callable[[], Decoder]:
-    """Makes decoders of one protocol.
+    """A function that makes decoders of one protocol.
 
     Raises
     ------
     CaptureError
-        When there is no protocol of that name.
+        When no protocol has that name.
     """
     if isinstance(protocol, FrameDeclaration):
         return lambda: DeclaredDecoder(protocol)

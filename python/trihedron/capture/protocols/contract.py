@@ -1,4 +1,4 @@
-"""What a protocol is: bytes in, frames out, remains counted."""
+"""Interface of a protocol decoder: bytes in, frames out, corrupt and skipped bytes counted."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import NamedTuple, Protocol
 
 
 class Frame(NamedTuple):
-    """One frame as it was sent.
+    """One frame as sent.
 
     ``counter`` counts frames and ``ticks`` is the device's clock, where the protocol has them (raw, wrapping);
-    ``values`` the numbers of its columns; ``text`` the same for the log, digit for digit.
+    ``values`` are the numbers of its columns, ``text`` the same numbers as written to the log, digit for digit.
     """
 
     counter: int | None
@@ -20,11 +20,11 @@ class Frame(NamedTuple):
 
 
 class Decoder(Protocol):
-    """Takes bytes as they come, in pieces of any size, and gives whole frames.
+    """Converts bytes, in pieces of any size, to complete frames.
 
-    ``columns`` names the values; it is empty until the protocol knows them. ``counter_modulus`` and
-    ``clock_modulus`` say where counter and clock wrap (0: they do not), ``tick_s`` is one tick of the clock in seconds
-    (0: no clock). ``corrupt`` counts pieces that began or looked like a frame and were none; ``skipped_bytes`` the
+    ``columns`` names the values; it is empty until they are known. ``counter_modulus`` and ``clock_modulus`` are the
+    values at which counter and clock wrap (0: they do not), ``tick_s`` is one tick of the clock in seconds (0: no
+    clock). ``corrupt`` counts pieces that look like the beginning of a frame but are none; ``skipped_bytes`` counts
     bytes outside frames.
     """
 
@@ -41,7 +41,7 @@ class Decoder(Protocol):
         ...
 
     def finish(self) -> list[Frame]:
-        """Frames that stand in the remaining bytes, when no more will come."""
+        """Frames in the remaining bytes, at the end of the stream."""
         ...
 
 
@@ -49,8 +49,8 @@ _PRINTED = frozenset("0123456789+-.eE \tnaNinfINF")
 
 
 def printed_numbers(texts: Sequence[str]) -> list[float] | None:
-    """Numbers as a board prints them; ``None`` where one is none, or holds what Python alone reads past: a bit that
-    flips makes form feeds and underscores.
+    """Numbers as a board prints them; ``None`` where one is not a number, or contains characters that only Python
+    accepts in a number, such as form feeds and underscores from flipped bits.
     """
     if not all(map(_PRINTED.issuperset, texts)):
         return None

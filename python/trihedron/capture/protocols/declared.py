@@ -1,4 +1,4 @@
-"""A binary frame that the user declared in TOML."""
+"""Decoder of a binary frame that the user declares in TOML."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class DeclaredDecoder(FramedDecoder):
         self.columns = tuple(f"{field.name} [{field.unit}]" if field.unit else field.name for field in values)
         self._scales = tuple(field.scale for field in values)
         self._is_plain = all(scale == 1.0 for scale in self._scales)
-        # One struct for all fields in the order of their places; gaps are skipped.
+        # One struct for all fields in order of position; gaps are skipped.
         ordered = sorted(declaration.fields, key=lambda field: field.at)
         layout, at = order, 0
         for field in ordered:
@@ -50,7 +50,7 @@ class DeclaredDecoder(FramedDecoder):
         self._checksum_end = declaration.checksum_at + CHECKSUM_SIZES[declaration.checksum]
 
     def is_sound(self, data: bytearray, at: int, length: int) -> bool:  # noqa: ARG002 -- one length
-        """By the checksum; without one every sync begins a frame."""
+        """Whether the checksum is right; without a checksum every sync begins a frame."""
         if self._checksum is None:
             return True
         frame = self._declaration
@@ -59,7 +59,7 @@ class DeclaredDecoder(FramedDecoder):
         return self._checksum(covered) == int.from_bytes(said, "little" if frame.little_endian else "big")
 
     def decode(self, frame: bytes) -> Frame:
-        """The fields, scaled."""
+        """The frame's fields, scaled."""
         numbers = self._struct.unpack_from(frame)
         values = tuple(numbers[i] for i in self._pick)
         if not self._is_plain:

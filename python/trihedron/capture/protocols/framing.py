@@ -1,4 +1,4 @@
-"""Frames with a sync and a length, found in a stream that loses, doubles and garbles bytes."""
+"""Frames with a sync and a length, found in a stream with lost, doubled and corrupt bytes."""
 
 from __future__ import annotations
 
@@ -59,22 +59,22 @@ CHECKSUM_OF: dict[str, Checksum] = {
     "crc16-kermit": lambda data: _reflected(data, _KERMIT, 0),
     "crc32": zlib.crc32,
 }
-"""Value of each kind over the covered bytes."""
+"""Functions that compute each kind of checksum over the covered bytes."""
 
 
 MORE = -1
-"""The bytes so far begin a frame; how long it is, or whether it is one, needs more of them."""
+"""Returned when more bytes are needed to determine a frame's length or whether it is a frame."""
 
 LONGEST_LINE = 4096
-"""Bytes without a line feed, after which they are no line."""
+"""Bytes without a line feed after which they are discarded."""
 
 
 class FramedDecoder(ABC):
-    """Looks for ``sync``, asks the protocol for length and content, and starts again one byte later where it is none.
+    """Finds ``sync``, checks length and content of the frame, and continues one byte later if there is no frame.
 
-    A short checksum passes by chance (once in 256 for a sum of bytes) over a frame that lost a byte and borrowed the
-    next one's first. So a frame that is not followed by a sync, or by the end of what has come, is taken only if no
-    whole frame begins inside it.
+    A short checksum matches by chance (once in 256 for a sum of bytes) for a frame that lost a byte and took the first
+    one of the next frame. A frame that is not followed by a sync, or by the end of the received bytes, is therefore
+    accepted only if no complete frame begins inside it.
     """
 
     name = ""
@@ -83,7 +83,7 @@ class FramedDecoder(ABC):
     clock_modulus = 0
     tick_s = 0.0
     length = 0
-    """Of every frame, where all have one."""
+    """Length of every frame in bytes, where it is constant."""
 
     def __init__(self, sync: bytes) -> None:
         self._sync = sync
@@ -92,16 +92,16 @@ class FramedDecoder(ABC):
         self.skipped_bytes = 0
 
     def length_at(self, data: bytearray, at: int) -> int:
-        """Length of the frame whose sync is ``at``; ``MORE``; or 0 where its head cannot be one."""
+        """Length of the frame whose sync is at ``at``; ``MORE``; or 0 where its header is invalid."""
         return self.length if len(data) - at >= self.length else MORE
 
     @abstractmethod
     def is_sound(self, data: bytearray, at: int, length: int) -> bool:
-        """Whether the bytes are a frame: checksum, tail, structure."""
+        """Whether the bytes are a frame, by checksum, tail and structure."""
 
     @abstractmethod
     def decode(self, frame: bytes) -> Frame | None:
-        """The content of a sound frame, or None where it holds no readings."""
+        """The content of a valid frame, or None where it has no readings."""
 
     def feed(self, data: bytes) -> list[Frame]:
         """Frames that are complete with these bytes."""
@@ -109,7 +109,7 @@ class FramedDecoder(ABC):
         return self._take(is_last=False)
 
     def finish(self) -> list[Frame]:
-        """Frames that stand in the remaining bytes."""
+        """Frames in the remaining bytes, at the end of the stream."""
         frames = self._take(is_last=True)
         if self._buffer:
             self.skipped_bytes += len(self._buffer)
@@ -124,7 +124,7 @@ class FramedDecoder(ABC):
         while True:
             found = buffer.find(sync, at)
             if found < 0:
-                # The end may hold the beginning of a sync.
+                # The last bytes may be the beginning of a sync.
                 kept = _begun(buffer, sync, at)
                 self.skipped_bytes += size - kept - at
                 at = size - kept
@@ -155,13 +155,13 @@ class FramedDecoder(ABC):
         return out
 
     def _looks_begun(self, at: int) -> int:
-        """A sync of one byte also occurs inside garbage: only longer ones are counted as frames that broke."""
+        """1 where a corrupt frame begins; a sync of one byte also occurs at random, so only longer ones count."""
         return 1 if len(self._sync) > 1 and self._buffer.startswith(self._sync, at) else 0
 
     def _stands_alone(self, at: int, length: int, *, is_last: bool) -> bool | None:
-        """Whether no whole frame begins inside this one; None while that needs more bytes.
+        """Whether no complete frame begins inside this one; None while more bytes are needed.
 
-        The answer depends on the bytes alone, never on the pieces in which they came.
+        The result depends on the bytes alone, not on the pieces in which they arrive.
         """
         buffer, sync = self._buffer, self._sync
         end = at + length
@@ -182,7 +182,7 @@ class FramedDecoder(ABC):
 
 
 def _begun(buffer: bytearray, sync: bytes, at: int) -> int:
-    """How many bytes at the end of the buffer are the beginning of a sync."""
+    """Number of bytes at the end of the buffer that are the beginning of a sync."""
     for length in range(min(len(sync) - 1, len(buffer) - at), 0, -1):
         if buffer.endswith(sync[:length]):
             return length
@@ -190,7 +190,7 @@ def _begun(buffer: bytearray, sync: bytes, at: int) -> int:
 
 
 class LineFedDecoder(ABC):
-    """One message per line feed, at most one frame from each; what a subclass makes of a line is its protocol."""
+    """One message per line, with at most one frame in each; a subclass decodes the line."""
 
     clock_modulus = 0
     counter_modulus = 0
@@ -202,7 +202,7 @@ class LineFedDecoder(ABC):
 
     @abstractmethod
     def frame_of(self, line: bytes) -> Frame | None:
-        """The frame that a line without its end completes, if it does."""
+        """The frame that a line (without its line feed) completes, or None."""
 
     def feed(self, data: bytes) -> list[Frame]:
         """Frames of the lines that are complete with these bytes."""
@@ -215,7 +215,7 @@ class LineFedDecoder(ABC):
         return [frame for line in lines if (frame := self.frame_of(bytes(line))) is not None]
 
     def finish(self) -> list[Frame]:
-        """A line without its end is none."""
+        """No frames: an incomplete last line is discarded."""
         self.skipped_bytes += len(self._buffer)
         self._buffer.clear()
         return []

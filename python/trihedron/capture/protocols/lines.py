@@ -1,4 +1,4 @@
-"""Lines of text: numbers between commas, semicolons, tabs or blanks, or with a label each."""
+"""Lines of text: numbers separated by commas, semicolons, tabs or blanks, or each with a label."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ LEARN_LINES = 12
 
 _LONGEST = 4096
 _LONGEST_LINE = 600
-"""Characters: thirty numbers with their labels; longer lines are binary."""
+"""Characters, enough for thirty labelled numbers; longer lines are binary."""
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|NaN"
 _LABELLED = re.compile(rf"([A-Za-zµ°_][^:=,;|\t]*?)\s*[:=]\s*({_NUMBER})(?=[\s,;|]|$)")
-# The Arduino monitor's own clock in front of a line, or a terminal program's in brackets.
+# The timestamp that the Arduino serial monitor writes before a line, or a terminal program writes in brackets.
 _MONITOR = re.compile(r"^\s*\[?(\d{1,2}):(\d{2}):(\d{2})[.,](\d{1,6})\]?\s*(?:->)?\s*")
 _DAY_MS = 86_400_000
 
 
 @dataclass(frozen=True)
 class LineColumns:
-    """What the fields of a line are: names of all, and which is the device's clock (seconds per unit of it) and which
-    its frame counter, where there are such."""
+    """Names of the fields of a line, and the indices of the device's clock (``time_unit_s`` seconds per unit) and of
+    its frame counter, where there are any."""
 
     names: tuple[str, ...]
     time: int | None = None
@@ -35,11 +35,11 @@ class LineColumns:
 
 
 NameColumns = Callable[[tuple[str, ...] | None, list[list[str]]], LineColumns]
-"""From the names that the device sent (or None) and some lines of numbers."""
+"""Function from the names that the device sent (or None) and some rows of numbers to the columns."""
 
 
 def name_by_position(names: tuple[str, ...] | None, rows: list[list[str]]) -> LineColumns:
-    """Without a reader's knowledge: names as they are; 3 = x y z, 6 = two triads, one more in front is ms."""
+    """The names as sent; without names 3 fields are x y z, 6 are two triads, and one more before them is time in ms."""
     n = len(rows[0])
     triads = ("ax", "ay", "az", "gx", "gy", "gz")
     if names is None:
@@ -52,10 +52,10 @@ def name_by_position(names: tuple[str, ...] | None, rows: list[list[str]]) -> Li
 
 
 class LinesDecoder:
-    """Learns the layout from the first lines, then takes every line of that layout.
+    """Learns the layout from the first lines, then decodes every line of that layout.
 
-    A line of another number of fields, or with a field that is no number, is counted as corrupt; lines of words only
-    are what the device says (``said``). The first line of a stream is expected to be cut and counts as nothing.
+    A line with another number of fields, or with a field that is not a number, is counted as corrupt; lines without
+    digits are the device's messages (``said``). Lines before the first frame are not counted as corrupt.
     """
 
     name = "lines"
@@ -98,13 +98,13 @@ class LinesDecoder:
         return self._take(lines)
 
     def finish(self) -> list[Frame]:
-        """What was learned until now must do; a line without its end is none."""
+        """Frames of the first lines if the layout is not learned yet; an incomplete last line is discarded."""
         self.skipped_bytes += len(self._buffer)
         self._buffer.clear()
         return self._learn() if self._n == 0 and self._first else []
 
     def adopt(self, other: LinesDecoder) -> None:
-        """Go on with what another one learned: the same device, connected again."""
+        """Take over the layout of another decoder, of the same device before it reconnected."""
         for name in (
             *("columns", "clock_modulus", "tick_s", "_labels", "_separator", "_n", "_time", "_counter", "_keep"),
             *("_per_unit", "_monitor", "_pattern"),
@@ -124,7 +124,7 @@ class LinesDecoder:
                 continue
             if self._n == 0:
                 if self._is_first:
-                    # A stream is joined in the middle of a line; the start of a file is not known from that.
+                    # A live stream usually starts in the middle of a line; a file does not.
                     self._is_first = False
                 if line:
                     self._first.append(line)
@@ -186,7 +186,7 @@ class LinesDecoder:
             elif out:
                 self._reject(line)
             else:
-                # Before the first frame: a line that was joined in its middle, a greeting, the names.
+                # Before the first frame: an incomplete first line, a start-up message, or the names.
                 self.skipped_bytes += len(line) + 1
                 self.said += [line[:200]] if len(self.said) < 20 else []
         return out
@@ -200,7 +200,7 @@ class LinesDecoder:
         if self._time is not None:
             at, unit = self._time, columns.time_unit_s
             digits = max((len(row[at].partition(".")[2]) for row in rows if len(row) == n), default=0)
-            # Decimals are ticks: 12.345 s is 12345 of a millisecond.
+            # One tick is the last decimal: 12.345 s is 12345 ticks of 1 ms.
             self._per_unit = 10 ** min(digits, 9)
             self.tick_s = unit / self._per_unit
             self.clock_modulus = 1 << 32 if digits == 0 and unit < 1.0 else 0
@@ -269,7 +269,7 @@ def _separator(lines: list[str]) -> str | None:
 
 
 def _fields_of_numbers(line: str) -> int:
-    """How many fields a line of numbers has; 0 where some field is none."""
+    """Number of fields of a line of numbers; 0 where a field is not a number."""
     labelled = _LABELLED.findall(line)
     if labelled:
         return len(labelled)

@@ -1,6 +1,6 @@
-"""Xsens MTData2: 0xFA, bus 0xFF, message 0x36, length, packets of (identifier, size, data), sum of bytes zero.
+"""Xsens MTData2: 0xFA, bus 0xFF, message 0x36, length, packets of (identifier, size, data), checksum.
 
-Layout after the maker's "MT Low Level Communication Protocol" (MT0101P); numbers are big-endian.
+Layout by the manufacturer's "MT Low Level Communication Protocol" (MT0101P); numbers are big-endian.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from trihedron.capture.protocols.framing import MORE, FramedDecoder
 _SYNC = b"\xfa\xff\x36"
 _EXTENDED = 0xFF
 
-# Identifier without its lowest nibble (number format and frame of axes) → names.
+# Identifier without its lowest nibble (number format and coordinate system) → column names.
 _TRIADS = {
     0x4020: ("acc_x [m/s^2]", "acc_y [m/s^2]", "acc_z [m/s^2]"),
     0x4040: ("acc_x [m/s^2]", "acc_y [m/s^2]", "acc_z [m/s^2]"),
@@ -35,7 +35,7 @@ Packets = list[tuple[int, int, int]]
 
 
 def _numbers(identifier: int, data: bytes) -> tuple[float, ...] | None:
-    """Numbers of one packet by the format in its identifier: 0 float, 1 fixed 12.20, 2 fixed 16.32, 3 double."""
+    """Numbers of one packet in the format of its identifier: 0 float, 1 fixed 12.20, 2 fixed 16.32, 3 double."""
     form = identifier & 0x3
     if form in (0, 3):
         size, code = (4, "f") if form == 0 else (8, "d")
@@ -44,13 +44,13 @@ def _numbers(identifier: int, data: bytes) -> tuple[float, ...] | None:
         return tuple(v / 2**20 for v in struct.unpack(f">{len(data) // 4}i", data)) if len(data) % 4 == 0 else None
     if len(data) % 6:
         return None
-    # 32 bits of fraction come first, then 16 of the whole part.
+    # 32 bits of fraction come first, then 16 bits of the integer part.
     parts = struct.iter_unpack(">Ih", data)
     return tuple(whole + fraction / 2**32 for fraction, whole in parts)
 
 
 class Mtdata2Decoder(FramedDecoder):
-    """Whatever inertial packets the device was set to send; those of the first messages become the columns."""
+    """Decodes the inertial packets that the device is configured to send; the first message sets the columns."""
 
     name = "xsens-mtdata2"
 
@@ -59,11 +59,11 @@ class Mtdata2Decoder(FramedDecoder):
         self._wanted: dict[int, int] = {}
 
     def adopt(self, other: Mtdata2Decoder) -> None:
-        """Go on with the columns of the connection before."""
+        """Take over the columns of the previous connection."""
         self.columns, self._wanted = other.columns, other._wanted
 
     def length_at(self, data: bytearray, at: int) -> int:
-        """By the length byte, or by two more where it says 255."""
+        """Length from the length byte, or from the two bytes after it where it is 255."""
         if len(data) - at < 4:
             return MORE
         if data[at + 3] != _EXTENDED:
@@ -73,7 +73,7 @@ class Mtdata2Decoder(FramedDecoder):
         return int.from_bytes(data[at + 4 : at + 6], "big") + 7 if data[at + 4] < 0x08 else 0
 
     def is_sound(self, data: bytearray, at: int, length: int) -> bool:
-        """Bytes after the preamble add up to zero, and packets fill the message to its end."""
+        """Whether the bytes after the preamble add up to 0 modulo 256, and packets fill the message exactly."""
         return sum(data[at + 1 : at + length]) & 0xFF == 0 and _packets(data, at, length) is not None
 
     def decode(self, frame: bytes) -> Frame | None:

@@ -1,7 +1,7 @@
 """SBG Systems' sbgECom: 0xFF 0x5A, message, class, length, content, CRC-16, 0x33; numbers low byte first.
 
-Layout after the maker's firmware manual: message 3 (IMU data, floats in m/s^2 and rad/s) and 44 (IMU short, whole
-numbers), each with a clock of microseconds and the temperature.
+Layout by the manufacturer's firmware manual: message 3 (IMU data, floats in m/s^2 and rad/s) and 44 (IMU short,
+integers), each with a clock in microseconds and the temperature.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from trihedron.capture.protocols.framing import CHECKSUM_OF, MORE, FramedDecoder
 _HEAD, _TAIL, _END = 6, 3, 0x33
 _LONGEST = 4086
 _LOGS = 0
-"""The class of messages that the device sends by itself."""
+"""Class of the log messages, which the device sends unprompted."""
 _DATA, _SHORT = 3, 44
 _LAYOUTS = {_DATA: struct.Struct("<IH7f"), _SHORT: struct.Struct("<IH6ih")}
 _PER_M_S2, _PER_DEGREE_C = 1048576.0, 256.0
 _PER_RAD_S, _PER_RAD_S_WIDE, _IS_WIDE = 67108864.0, 12304174.0, 1 << 10
-"""Counts of message 44; a bit of its status says that the gyro's are the larger ones."""
+"""Counts of message 44 per unit; ``_IS_WIDE`` in its status means the wider gyro range, with fewer counts per rad/s."""
 
 _COLUMNS = (
     *(f"acc_{axis} [m/s^2]" for axis in "xyz"),
@@ -29,7 +29,7 @@ _COLUMNS = (
 
 
 class SbgDecoder(FramedDecoder):
-    """Messages of the first kind that holds both sensors; the others pass by."""
+    """Decodes messages of the first kind that contains both sensors; others are ignored."""
 
     name = "sbg"
     columns: tuple[str, ...] = _COLUMNS
@@ -41,24 +41,24 @@ class SbgDecoder(FramedDecoder):
         self._kind: int | None = None
 
     def adopt(self, other: SbgDecoder) -> None:
-        """Go on with the kind of message of the connection before."""
+        """Take over the kind of message of the previous connection."""
         self._kind = other._kind
 
     def length_at(self, data: bytearray, at: int) -> int:
-        """By the length of the content."""
+        """Length from the length field of the content."""
         if len(data) - at < _HEAD:
             return MORE
         size = data[at + 4] | data[at + 5] << 8
         return _HEAD + size + _TAIL if size <= _LONGEST else 0
 
     def is_sound(self, data: bytearray, at: int, length: int) -> bool:
-        """The byte at the end, and the checksum from the message's number on."""
+        """Whether the end byte and the checksum, which covers the bytes from the message number on, are right."""
         end = at + length
         told = data[end - 3] | data[end - 2] << 8
         return data[end - 1] == _END and CHECKSUM_OF["crc16-kermit"](bytes(data[at + 2 : end - 3])) == told
 
     def decode(self, frame: bytes) -> Frame | None:
-        """Readings in SI."""
+        """The readings in SI, or None for another message."""
         kind, layout = frame[2], _LAYOUTS.get(frame[2])
         if layout is None or frame[3] != _LOGS or len(frame) < _HEAD + layout.size + _TAIL:
             return None

@@ -1,4 +1,4 @@
-"""SparkFun boards: the 6DOF v4's binary frame and its text, and the Razor's tagged text lines.
+"""SparkFun boards: binary frame and text of the 6DOF v4, and tagged text lines of the Razor.
 
 6DOF v4: the letter A, a sample count, three accelerometers, pitch, roll and yaw rate, the letter Z; two bytes each,
 high byte first, readings of a ten-bit ADC. There is no checksum. Razor: one line per sensor, ``#A-R=x,y,z``.
@@ -14,9 +14,9 @@ from trihedron.capture.protocols.lines import LineColumns, LinesDecoder
 
 _FRAME = struct.Struct(">x7Hx")
 _HIGHEST = 1023
-"""Of a ten-bit ADC: what exceeds it is no frame."""
+"""Highest code of a ten-bit ADC; bytes with a higher one are not a frame."""
 
-# The count wraps at 2^15 in some firmware and at 2^16 in other: modulo 2^15 it is right for both.
+# The count wraps at 2^15 in some firmware and at 2^16 in others: modulo 2^15 is right for both.
 _COUNT_MODULUS = 1 << 15
 
 SIX_DOF_COLUMNS = (
@@ -26,7 +26,7 @@ SIX_DOF_COLUMNS = (
 
 
 class SixDofDecoder(FramedDecoder):
-    """Binary frames ``A … Z`` of 16 bytes."""
+    """Decodes binary frames ``A … Z`` of 16 bytes."""
 
     name = "sparkfun-6dof"
     length = 16
@@ -37,17 +37,17 @@ class SixDofDecoder(FramedDecoder):
         super().__init__(b"A")
 
     def is_sound(self, data: bytearray, at: int, length: int) -> bool:
-        """Z at its place and nothing above the ADC's range."""
+        """Whether the frame ends in Z and no reading exceeds the ADC's range."""
         return data[at + length - 1] == 0x5A and max(data[at + 3 : at + length - 1 : 2]) <= _HIGHEST >> 8
 
     def decode(self, frame: bytes) -> Frame:
-        """Counts."""
+        """The readings in counts."""
         numbers = _FRAME.unpack(frame)
         return Frame(numbers[0] % _COUNT_MODULUS, None, numbers[1:], ",".join(map(str, numbers[1:])))
 
 
 class SixDofTextDecoder(LinesDecoder):
-    """The 6DOF v4's text: ``A``, count, six readings, ``Z`` between tabs."""
+    """Decodes the text of the 6DOF v4: ``A``, count, six readings, ``Z``, separated by tabs."""
 
     name = "sparkfun-6dof-text"
 
@@ -69,7 +69,7 @@ class SixDofTextDecoder(LinesDecoder):
 
 
 class RazorDecoder(LineFedDecoder):
-    """Tagged lines of one sample: A (acceleration), M (magnetometer, optional), G (rates); R raw or C corrected."""
+    """Decodes tagged lines of a sample: A (acceleration), M (magnetometer, optional), G (rates); R raw, C corrected."""
 
     name = "razor"
     tick_s = 0.0
@@ -81,18 +81,18 @@ class RazorDecoder(LineFedDecoder):
         self._order: tuple[str, ...] = ()
 
     def adopt(self, other: RazorDecoder) -> None:
-        """Go on with the columns of the connection before."""
+        """Take over the columns of the previous connection."""
         self.columns, self._order = other.columns, other._order
 
     def frame_of(self, line: bytes) -> Frame | None:
-        """A sample whose last line this is."""
+        """The sample that this line completes, or None."""
         line = line.strip(b"\r\x00 ")
         tag = line[:5]
         fields = line[5:].split(b",")
         if tag[:1] != b"#" or tag[2:3] != b"-" or tag[4:5] != b"=" or tag[1:2] not in b"AMG" or len(fields) != 3:
             if line:
                 self.skipped_bytes += len(line)
-                # The rest of this sample is not whole any more.
+                # This sample is incomplete.
                 self.corrupt += bool(self._parts)
                 self._parts = {}
             return None

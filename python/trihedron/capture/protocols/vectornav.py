@@ -1,7 +1,7 @@
 """VectorNav ASCII: lines ``$VNIMU,...*66`` with magnetometer, acceleration in m/s^2 and rate in rad/s.
 
-Layout after the maker's manuals; the checksum is the XOR of the bytes between ``$`` and ``*``, or a CRC-16 of four
-digits. What comes behind the readings (pressure, a count that the user asked for) is left.
+Layout by the manufacturer's manuals; the checksum is the XOR of the bytes between ``$`` and ``*``, or a CRC-16 of four
+digits. Fields after the readings (pressure, a count that the user configured) are ignored.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from trihedron.capture.protocols.contract import Frame, printed_numbers
 from trihedron.capture.protocols.framing import LineFedDecoder
 
 _BEFORE = {b"VNIMU": 0, b"VNMAR": 0, b"VNCMV": 0, b"VNYMR": 3, b"VNQMR": 4}
-"""Numbers of the attitude before the magnetometer's."""
+"""Kinds of lines, and the number of attitude fields before the magnetometer's."""
 _COLUMNS = (
     *(f"mag_{axis}" for axis in "xyz"),
     *(f"acc_{axis} [m/s^2]" for axis in "xyz"),
@@ -23,7 +23,7 @@ _COLUMNS = (
 
 
 class VectorNavDecoder(LineFedDecoder):
-    """Lines of the first kind that holds both sensors; other lines pass by."""
+    """Decodes lines of the first kind that contains both sensors; other lines are ignored."""
 
     name = "vectornav"
     columns: tuple[str, ...] = _COLUMNS
@@ -34,11 +34,11 @@ class VectorNavDecoder(LineFedDecoder):
         self._kind = b""
 
     def adopt(self, other: VectorNavDecoder) -> None:
-        """Go on with the kind of line of the connection before."""
+        """Take over the kind of line of the previous connection."""
         self._kind = other._kind
 
     def frame_of(self, line: bytes) -> Frame | None:
-        """The readings of a whole line."""
+        """The readings of a complete line."""
         start, mark, check = line.rstrip(b"\r").partition(b"*")
         kind, *fields = start[1:].split(b",")
         if not (start.startswith(b"$VN") and mark and _checks(start[1:], check)):

@@ -1,8 +1,8 @@
-"""WitMotion: packets of eleven bytes, 0x55, kind, eight bytes of content, sum of the ten before.
+"""WitMotion: packets of eleven bytes: 0x55, kind, eight bytes of content, sum of the ten bytes before.
 
-Layout after the maker's data sheets (WT901): 0x50 is the clock, 0x51 acceleration (16 g at 32768) and temperature, 0x52
-rate (2000 deg/s at 32768); 16 bits, low byte first. A sample is the packets from one 0x51 to the next; the clock, where
-the sensor sends it, comes before.
+Layout by the manufacturer's data sheets (WT901): 0x50 is the clock, 0x51 acceleration (16 g at 32768) and temperature,
+0x52 rate (2000 deg/s at 32768); 16 bits, low byte first. A sample is the packets from one 0x51 to the next; the clock,
+if the sensor sends it, precedes them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _COLUMNS = (
 
 
 class WitMotionDecoder(FramedDecoder):
-    """Samples of acceleration and rate; angles, magnetometer and the rest pass by."""
+    """Decodes samples of acceleration and rate; other packets are ignored."""
 
     name = "witmotion"
     length = 11
@@ -38,19 +38,19 @@ class WitMotionDecoder(FramedDecoder):
         self._has_clock: bool | None = None
 
     def adopt(self, other: WitMotionDecoder) -> None:
-        """Go on with the clock of the connection before."""
+        """Take over the clock of the previous connection."""
         self._has_clock, self.tick_s, self.clock_modulus = other._has_clock, other.tick_s, other.clock_modulus
 
     def is_sound(self, data: bytearray, at: int, length: int) -> bool:
-        """A kind that there is, and the sum of bytes."""
+        """Whether the kind exists and the checksum is right."""
         end = at + length - 1
         return _CLOCK <= data[at + 1] <= _LAST_KIND and sum(data[at:end]) & 0xFF == data[end]
 
     def decode(self, frame: bytes) -> Frame | None:
         """The sample that a packet of rates completes.
 
-        Whether there is a clock is told by what comes before the second sample; a first one that was held back for it
-        goes out with the next packet, or was not whole.
+        The packet before the second sample shows whether there is a clock. Until then the first sample is kept; it is
+        returned with that packet if there is no clock, and discarded if there is one.
         """
         kind, parts = frame[1], self._parts
         if kind == _CLOCK:
@@ -73,13 +73,13 @@ class WitMotionDecoder(FramedDecoder):
         return None
 
     def finish(self) -> list[Frame]:
-        """Frames that stand in the remaining bytes, and one that was held back."""
+        """Frames in the remaining bytes, and a first sample that is still kept."""
         frames = super().finish()
         held, self._held = self._held, None
         return frames if held is None else [*frames, held]
 
     def _drop(self) -> None:
-        """Parts of a sample that ended before it was whole."""
+        """Discard the parts of an incomplete sample."""
         self.corrupt += bool(self._parts)
         self._parts.clear()
 
@@ -100,7 +100,7 @@ class WitMotionDecoder(FramedDecoder):
 
 
 def _milliseconds(frame: bytes) -> int:
-    """Of the day, of a packet of the clock: year, month, day, hour, minute, second, milliseconds."""
+    """Milliseconds of the day from a clock packet: year, month, day, hour, minute, second, milliseconds."""
     hour, minute, second, milliseconds = frame[5], frame[6], frame[7], frame[8] | frame[9] << 8
     return (3_600_000 * hour + 60_000 * minute + 1000 * second + milliseconds) % _DAY_MS
 

@@ -1,6 +1,6 @@
 """xio x-IMU3: messages that end in a line feed, text or binary, with a timestamp in microseconds.
 
-Layout after the maker's user manual: text ``I,time,gx,gy,gz,ax,ay,az``; binary 0x80 + "I", 64-bit time, six floats,
+Layout by the manufacturer's manual: text ``I,time,gx,gy,gz,ax,ay,az``; binary 0x80 + "I", 64-bit time, six floats,
 little-endian, line feeds and escapes inside replaced as in SLIP (0xDB 0xDC, 0xDB 0xDD). There is no checksum.
 """
 
@@ -21,11 +21,11 @@ _COLUMNS = (
     *("acc_x [g]", "acc_y [g]", "acc_z [g]"),
 )
 _LARGEST = 1e5
-"""deg/s or g: no such sensor goes there, but a bit that flipped in the exponent of a float does."""
+"""Limit in deg/s or g: no sensor has that range, but a flipped bit in the exponent of a float exceeds it."""
 
 
 class XioDecoder(LineFedDecoder):
-    """Inertial messages; all other kinds pass by."""
+    """Decodes inertial messages; other kinds are ignored."""
 
     name = "xio"
     columns: tuple[str, ...] = _COLUMNS
@@ -41,7 +41,7 @@ class XioDecoder(LineFedDecoder):
         elif first == 0x49 and line[1:2] == b",":
             frame = self._text(line)
         else:
-            # Another kind is a letter (or 0x80 and a letter); anything else is what is left of a message.
+            # Other kinds begin with a letter (or 0x80 plus a letter); anything else is a damaged message.
             if not 0x41 <= first & 0x7F <= 0x5A:
                 self.corrupt += 1
                 self.skipped_bytes += len(line) + 1

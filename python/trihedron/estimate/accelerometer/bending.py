@@ -1,8 +1,8 @@
-"""Axes that bend, as parameters with a prior beside S and b (docs/model-session.md, 11.12c).
+"""Nonlinearity of the axes as parameters with a prior beside S and b (docs/model-session.md, 11.12c).
 
-Poses that miss |g| beyond their noise do so by a bias that scatters, or by axes that are not linear (``shapes``).
-Scatter is drawn anew in every pose; a bent axis is the same function of direction in all of them, and S and b take up
-most of it. What the poses leave open of its strength, data sheets bound.
+Gravity errors in static poses beyond noise have two causes: bias repeatability, or nonlinear axes (``shapes``). The
+bias differs at random from pose to pose; a nonlinearity is one function of direction in all poses, and S and b absorb
+most of it. Where the poses do not determine its strength, data sheets bound it.
 """
 
 from __future__ import annotations
@@ -21,32 +21,32 @@ from trihedron.records.segments import Segments
 from trihedron.sensor_model import in_frame
 
 NONLINEARITY = 2e-3
-"""Of the range: data sheets of consumer accelerometers state 0.1 to 0.5 %."""
+"""Fraction of the range: data sheets of consumer accelerometers state 0.1 to 0.5 %."""
 TAIL_DOF = 4.0
-"""Degrees of freedom of the half-t prior of a strength: of finite variance, and residuals may demand many times it."""
+"""Degrees of freedom of the half-t prior of a strength: finite variance, and tails that allow many times the scale."""
 STRENGTHS = np.geomspace(1e-5, 0.1, 17)
 SCATTERS = np.concatenate([[0.0], np.geomspace(0.25, 64.0, 17)])
-"""Strengths tried, of |g|, and scatters, in standard errors of a pose."""
+"""Strengths tried, in |g|, and bias scatters, in standard errors of a pose."""
 UNSEEN = 1e-6
-"""Relative size of the smallest diagonal of R from which on nine parameters are determined."""
+"""Smallest diagonal of R, relative to the largest, below which the nine parameters are not determined."""
 SAID = 2.0
-"""Factor on a standard error from which on its cause is said."""
+"""Factor on a standard uncertainty above which the nonlinearity is reported as its cause."""
 
 
 def covariance_by_bends(up: FloatArray, residual: FloatArray, sigma: FloatArray, gravity_m_s2: float) -> FloatArray:
-    """Covariance (9, 9) that bends of unknown strength add to the relative errors of S, row by row of its lower
-    triangle, and of b in units of |g|.
+    """Covariance (9, 9) that nonlinearity of unknown strength adds to the relative errors of S, row by row of its
+    lower triangle, and of b in units of |g|.
 
-    With r = X θ + B c + ε, B of one shape, c ~ N(0, τ²) and ε ~ N(0, σ² + s²), the θ that was fitted without bends is
-    off by T c beside its noise, T what the nine columns X take up of B. The second moment T (C_c + ĉ ĉᵀ) Tᵀ is averaged
-    over shapes, τ and s by their restricted likelihood and priors (τ half-t about the data sheet, s even in its log).
+    With r = X θ + B c + ε, B of one shape, c ~ N(0, τ²) and ε ~ N(0, σ² + s²), θ fitted without B has the error T c
+    beside its noise, T the part of B that the nine columns X absorb. The second moment T (C_c + ĉ ĉᵀ) Tᵀ is averaged
+    over shapes, τ and s by restricted likelihood and priors (τ half-t about the data sheet, s uniform in its log).
 
     Parameters
     ----------
     up : (n, 3)
         Unit verticals.
     residual, sigma : (n,)
-        What the poses miss of |g|, and their noise, m/s².
+        Gravity errors in static poses, and their noise, m/s².
     gravity_m_s2 : float
     """
     design, bends = design_rows(up) * gravity_m_s2, [of(up) * gravity_m_s2 for of in SHAPES.values()]
@@ -78,9 +78,9 @@ def covariance_by_bends(up: FloatArray, residual: FloatArray, sigma: FloatArray,
 
 
 def with_bending(calibration: Calibration, segments: Segments) -> Calibration:
-    """A calibration whose covariance holds bends of its axes, where poses miss beyond noise (11.12c).
+    """The calibration with nonlinearity added to its covariance, where gravity errors in poses exceed noise (11.12c).
 
-    The nine numbers that norms determine are those of the lower frame. The case's own frame is left as it is.
+    The norms determine nine parameters in the lower-triangular frame. A calibration in frame ``case`` is unchanged.
     """
     reading, seen = segments.accelerometer_mean, calibration.accelerometer.quality
     if calibration.frame == "case" or seen is None or reading is None or len(seen.residual) != len(reading):
@@ -92,7 +92,7 @@ def with_bending(calibration: Calibration, segments: Segments) -> Calibration:
     added = covariance_by_bends(verticals(fitted, reading), seen.residual, seen.sigma, calibration.gravity_m_s2)
     wrt = wrt_relative_errors(fitted.S, fitted.b, calibration.gravity_m_s2)
     if calibration.gyroscope is not None:
-        # The gyro's frame is the accelerometer's: it follows as far as the fit ties it to S and b.
+        # The gyro shares the accelerometer's frame: its parameters follow by their covariance with S and b.
         to_relative = np.linalg.pinv(wrt)
         own = to_relative @ calibration.covariance[:12, :12] @ to_relative.T
         tied = np.linalg.lstsq(own, to_relative @ calibration.covariance[:12, 12:], rcond=None)[0].T

@@ -21,10 +21,10 @@ from trihedron.units import AccelerationUnit, acceleration_to_si
 
 @dataclass(frozen=True, eq=False)
 class Placements:
-    """One mean (n, 3) of covariance ``noise`` (n, 3, 3) and face (n,) for each time that the case was set down.
+    """One mean (n, 3), covariance ``noise`` (n, 3, 3) and face (n,) for each time that the case was set down.
 
-    ``scatter`` is the variance [raw²] per level component by which headings on one face differ beyond noise, ``None``
-    where they do not; it is not in ``noise`` and averages over ``n_headings`` (n,).
+    ``scatter`` is the variance [raw²] per horizontal component of the headings on one face, ``None`` where noise
+    explains it; it is not in ``noise`` and averages over ``n_headings`` (n,).
     """
 
     means: FloatArray
@@ -35,9 +35,9 @@ class Placements:
 
 
 def shared_rounding(segments: Segments, step: FloatArray) -> FloatArray | None:
-    """Variance (3,) [raw²] of pose means that readings at one place inside an LSB share.
+    """Variance (3,) [raw²] of the rounding error that pose means at one place inside an LSB share.
 
-    Where noise does not dither the ``step`` (3,), what the best of the means keeps is the rounding.
+    It is that of the most accurate mean on axes whose noise does not dither the LSB ``step`` (3,), 0 on the others.
     """
     sigma, sigma_mean = segments.accelerometer_sigma, segments.accelerometer_sigma_mean
     if sigma is None or sigma_mean is None:
@@ -49,12 +49,12 @@ def shared_rounding(segments: Segments, step: FloatArray) -> FloatArray | None:
 def placements(values: FloatArray, noise: FloatArray, faces: IntArray, shared: FloatArray | None = None) -> Placements:
     """Merge the poses of every placement.
 
-    ``shared`` (3,) raw² is the part of the noise that equal readings share (rounding): an axis that is up reads alike
-    at every heading, one that lies level at every return to a heading.
+    ``shared`` (3,) raw² is the part of the noise that equal readings share (rounding): the vertical axis reads the same
+    at every heading, a horizontal axis at every return to a heading.
 
-    Taken as independent they would seem to show, by agreeing with each other, that nothing is tilted. What they scatter
-    beyond noise is a tilt that turns with the case, and goes into the error of their mean; a heading that the case came
-    back to shows the same tilt once more and counts once.
+    Poses of one placement share its tilt: as independent poses, their agreement would suggest a level table. Their
+    scatter beyond noise is a tilt that rotates with the case and is added to the error of their mean. A repeated
+    heading repeats the same tilt and counts once.
     """
     start = np.flatnonzero(np.concatenate([[True], faces[1:] != faces[:-1]]))
     stop = np.concatenate([start[1:], [len(faces)]])
@@ -90,7 +90,7 @@ def placements(values: FloatArray, noise: FloatArray, faces: IntArray, shared: F
 
 
 def _headings(values: FloatArray, noise: FloatArray) -> npt.NDArray[np.intp]:
-    """(n,) number of the heading of each pose (n, 2): that of the first one before it which it repeats within noise."""
+    """Heading number (n,) of each pose (n, 2): that of the first earlier pose with the same reading within noise."""
     limit = float(probability.chdtri(2, verdict.SIGNIFICANCE))
     out = np.zeros(len(values), dtype=np.intp)
     first: list[int] = []
@@ -107,10 +107,10 @@ def _headings(values: FloatArray, noise: FloatArray) -> npt.NDArray[np.intp]:
 
 
 LARGEST_TILT_DEG = 20.0
-"""A pose further than this from every face is no face: between misplaced by hand (a few degrees) and an edge (45°)."""
+"""A pose further than this from every face is not a face: above placement errors (a few degrees), below edges (45°)."""
 
 FACES: tuple[int, ...] = (1, -1, 2, -2, 3, -3)
-"""``+i``: axis i up, ``f = +|g| e_i``. (The manual numbers poses by the face that is *down*: its pose i is -i here.)"""
+"""``+i``: axis i (1 X, 2 Y, 3 Z) up, ``f = +|g| e_i``. (The manual's pose i has that face *down*: it is -i here.)"""
 
 
 def face_in_words(face: int) -> Words:
@@ -119,7 +119,7 @@ def face_in_words(face: int) -> Words:
 
 
 def direction_of(faces: IntArray) -> FloatArray:
-    """(n, 3) unit vectors of faces (n,)."""
+    """Unit vectors (n, 3), upward in the body frame, of faces (n,)."""
     unit = np.zeros((len(faces), 3))
     unit[np.arange(len(faces)), np.abs(faces) - 1] = np.sign(faces)
     return unit
@@ -128,13 +128,13 @@ def direction_of(faces: IntArray) -> FloatArray:
 def identify(means: FloatArray, raw_unit: AccelerationUnit) -> IntArray:
     """Face (n,) of each mean reading (n, 3): the axis with the largest reading about the common centre; 0 for none.
 
-    The centre is that of the sphere through the readings, so that nothing need be known of zero and scale. In a
-    physical unit with too few poses for a sphere it is the nominal zero.
+    The centre is that of the sphere through the readings, so that bias and scale need not be known. With too few poses
+    for a sphere, readings in a physical unit are taken about 0.
 
     Raises
     ------
     ValueError
-        When the readings hold no sphere and their unit has no nominal zero.
+        When the readings determine no sphere and are in counts.
     """
     centred = _about_centre(means)
     if centred is not None:
@@ -148,13 +148,13 @@ def identify(means: FloatArray, raw_unit: AccelerationUnit) -> IntArray:
 
 
 def are_six_faces(means: FloatArray) -> bool:
-    """Whether poses of mean readings (n, 3) are the faces of a case, each at least once, and nothing else."""
+    """Whether the mean readings (n, 3) are those of the six faces, each at least once, and of no other pose."""
     centred = _about_centre(means)
     return centred is not None and set(_nearest(centred).tolist()) == set(FACES)
 
 
 def _about_centre(means: FloatArray) -> FloatArray | None:
-    """(n, 3) readings about the centre of the sphere through them, none where they hold no sphere."""
+    """Readings (n, 3) about the centre of the sphere through them; ``None`` where they determine no sphere."""
     spread = np.abs(means - means.mean(axis=0)).max()
     unit = (means - means.mean(axis=0)) / (spread if spread > 0 else 1.0)
     design = np.column_stack([2.0 * unit, np.ones(len(unit))])
@@ -164,7 +164,7 @@ def _about_centre(means: FloatArray) -> FloatArray | None:
 
 
 def _nearest(centred: FloatArray) -> IntArray:
-    """Face (n,) of directions (n, 3): that of the largest component; 0 where it is no face."""
+    """Face (n,) of directions (n, 3): that of the largest component; 0 beyond ``LARGEST_TILT_DEG`` from it."""
     norm = np.linalg.norm(centred, axis=1)
     axis = np.argmax(np.abs(centred), axis=1)
     largest = centred[np.arange(len(centred)), axis]
@@ -174,7 +174,7 @@ def _nearest(centred: FloatArray) -> IntArray:
 
 
 def faces_up(means: FloatArray, raw_unit: AccelerationUnit, up: Sequence[int] | None) -> IntArray:
-    """Face (n,) of each mean reading (n, 3): as stated, or as they show it.
+    """Face (n,) of each mean reading (n, 3): ``up`` where given, else identified from the readings.
 
     Raises
     ------
@@ -187,12 +187,12 @@ def faces_up(means: FloatArray, raw_unit: AccelerationUnit, up: Sequence[int] | 
 
 
 def given(up: Sequence[int], n: int) -> IntArray:
-    """Faces as the user states them: ±1, ±2, ±3, or 0 for a pose to leave out.
+    """Faces as the user states them: ±1, ±2, ±3, or 0 for a pose to exclude.
 
     Raises
     ------
     ValueError
-        When they are not n such numbers.
+        When ``up`` is not n such numbers.
     """
     faces = np.asarray(up)
     if faces.shape != (n,) or not np.all(np.isin(faces, (0, *FACES))):
@@ -203,7 +203,7 @@ def given(up: Sequence[int], n: int) -> IntArray:
 
 
 def check_sufficient(faces: IntArray) -> None:
-    """Twelve parameters need four faces that are not in one plane.
+    """Check for four faces of all three axes, which the twelve parameters need.
 
     Raises
     ------
@@ -221,7 +221,7 @@ def check_sufficient(faces: IntArray) -> None:
 
 
 def left_out(faces: IntArray, values: FloatArray) -> list[Finding]:
-    """Poses that are no faces, said."""
+    """Finding that names the poses which are not faces."""
     left = np.flatnonzero(faces == 0)
     if len(left) == 0:
         return []

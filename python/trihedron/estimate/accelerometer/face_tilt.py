@@ -1,4 +1,4 @@
-"""What a table that is not level, or a case that does not lie flat, does to the faces' readings (docs/model.md, 2)."""
+"""Effect on the faces' readings of a table that is not level, or a case that does not lie flat (docs/model.md, 2)."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.accelerometer import face_poses
 
 FREE_HEADINGS = 3
-"""Headings that remain free where faces on one leaning table do not contradict each other at all: each opposite face
-turned so as to lean the other way."""
+"""Number of headings that stay free when faces on one tilted table do not contradict each other at all: the heading of
+each opposite face is such that its tilt cancels."""
 
 
 def tilted(noise: FloatArray, faces: IntArray, S_a: FloatArray, g: float, tilt_rad: float | FloatArray) -> FloatArray:
-    """Covariances (n, 3, 3) of raw means with a horizontal error of ``g tilt`` rms per component on top (eq. 9).
+    """Covariances (n, 3, 3) of raw means plus a horizontal error of ``g tilt`` rms per component (eq. 9).
 
-    ``tilt_rad`` is one number or (n,).
+    ``tilt_rad`` [rad] is a number or (n,).
     """
     unit = face_poses.direction_of(faces)
     horizontal = np.eye(3) - unit[:, :, None] * unit[:, None, :]
@@ -26,11 +26,11 @@ def tilted(noise: FloatArray, faces: IntArray, S_a: FloatArray, g: float, tilt_r
 
 
 def widened(dof: int, n_placements: int) -> float:
-    """Factor on standard errors of a tilt that is known from few contradictions: 1.96 of them shall hold in 95 %.
+    """Factor on standard uncertainties from a tilt with few degrees of freedom, so that 1.96 of them cover 95 %.
 
-    Where every placement leans by itself the contradictions have ``dof`` degrees of freedom. One table that leans, with
-    the case put on it at any heading, hides its tilt more easily: leans of one size cancel where headings happen to
-    fit. The share of headings whose contradictions stay below a part s of the tilt falls as s^(n - 3) only.
+    Where the tilts of placements are independent, their contradictions have ``dof`` degrees of freedom. One tilted
+    table with the case at arbitrary headings is harder to detect: equal tilts cancel at some headings. The probability
+    that the contradictions are below a fraction s of the tilt falls only as s^(n - 3).
     """
     free = max(min(dof, n_placements - FREE_HEADINGS), 1)
     return float(probability.stdtrit(free, 0.025) / probability.ndtri(0.025))

@@ -26,7 +26,7 @@ METHOD = "faces of the case on a level table"
 
 @dataclass(frozen=True, eq=False)
 class _Estimate:
-    """Inverse form ``a' = S_a f + b_a`` of some face poses; ``tilt_rad`` is the rms tilt charged to each pose."""
+    """Fit of the distort direction ``a' = S_a f + b_a``; ``tilt_rad`` is the rms tilt added to each variance."""
 
     S_a: FloatArray
     b_a: FloatArray
@@ -49,12 +49,12 @@ def calibrate_faces(
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Accelerometer triad from poses with one axis of the case along the vertical.
 
-    ``a'[i] = S_a (±|g| e) + b_a + δa[i]`` by weighted least squares over all poses, repeats and missing faces welcome
-    (eq. 7; of six faces it is eq. 8).
+    ``a'[i] = S_a (±|g| e) + b_a + δa[i]`` by weighted least squares over all poses; faces may repeat or be missing
+    (eq. 7; for six faces it is eq. 8).
 
-    Faces that contradict each other beyond their noise were not level: the tilt per pose that makes them consistent is
-    estimated, reported (TABLE_TILT) and carried into weights and uncertainties as a horizontal error per pose. A tilt
-    that is common to all poses in the case's own axes cannot be seen by this method; it turns Mz against the case.
+    Faces that contradict each other beyond their noise were not level: the rms tilt per pose that makes them consistent
+    is estimated, reported (TABLE_TILT) and added to the variance of each pose as a horizontal error. A tilt common to
+    all poses in the axes of the case is not observable; it rotates the body frame against the case.
 
     Parameters
     ----------
@@ -65,19 +65,19 @@ def calibrate_faces(
     gravity_m_s2 : float
         |g| where the recording was made.
     up : (n,) of ±1, ±2, ±3, optional
-        Axis of the case that points up in each pose (0: leave the pose out). Without it the axis with the largest
-        reading is taken, which also decides that a positive reading is up: handedness is then not tested.
+        Axis of the case that points up in each pose (0: the pose is excluded). Without it the axis with the largest
+        reading is taken, and a positive reading is taken as up: handedness is then not tested.
     raw_unit : AccelerationUnit
         Unit of ``means``.
     shared : (3,), optional
         Part of the means' variance, raw², that equal readings share (rounding).
     opposite : OppositeHeadings, optional
-        What whole turns show of the readings at half a turn.
+        Readings at the opposite headings, determined from whole turns.
 
     Raises
     ------
     ValueError
-        When arrays do not fit or faces are missing; names them.
+        When shapes do not fit, or naming the faces that are missing.
     """
     values, noise = inputs.pose_means(means, sigma_means)
     g, unit = inputs.gravity(gravity_m_s2), AccelerationUnit(raw_unit)
@@ -116,19 +116,19 @@ def _estimate_placements(
     shared: FloatArray | None,
     opposite: OppositeHeadings | None,
 ) -> _Estimate:
-    """Fit with one mean for each time that the case was set down: holds between turns on one face share their tilt."""
+    """Fit with one mean for each placement of the case: poses between turns on one face share their tilt."""
     used = np.flatnonzero(faces)
     seen = with_opposite(values, noise, faces, opposite)
     placed = placements(*seen, shared)
     if len(placed.means) == len(used):
         return _estimate(values[used], noise[used], faces[used], g)
     spread = placed.noise
-    # Readings half a turn apart have opposite tilts: none is in their mean.
+    # Readings half a turn apart have opposite tilts, which cancel in their mean.
     is_cancelled = opposite is not None and len(opposite.pose) == len(placed.means)
     if placed.scatter is not None:
         S_a, _, _ = _least_squares(placed.means, placed.noise, placed.faces, g)
         tilt2 = placed.scatter / (g**2 * float(np.mean(np.sum(S_a**2, axis=0))))
-        # Through the misalignments a tilt reaches the reading of the axis that is up as well.
+        # Misalignments couple the tilt into the reading of the vertical axis.
         if not is_cancelled:
             spread = face_tilt.tilted(placed.noise, placed.faces, S_a, g, np.sqrt(tilt2 / placed.n_headings))
     estimate = _estimate(placed.means, spread, placed.faces, g)
@@ -139,11 +139,11 @@ def _estimate_placements(
 
 
 def _with_doubt(estimate: _Estimate, tilt2: float, g: float) -> _Estimate:
-    """A tilted face reads ``g cos t``: the scale may be short by the mean square tilt per component, to second order,
-    and the bias off by as much of g: misalignments by which the tilt reaches an axis that is up are known to it only.
+    """Add second-order errors of a tilt to the covariance; ``tilt2`` [rad²] is the mean square tilt per component.
 
-    It is not corrected, for what scatters need not be a tilt; the uncertainties contain it.
-    """
+    A tilted face reads ``g cos t``: the scale may be too small by ``tilt2``. Misalignments are uncertain by the tilt:
+    coupled into the vertical axis it changes the bias by up to ``g tilt2``. Neither is corrected: scatter may have
+    other causes."""
     scale = np.concatenate([estimate.S_a.ravel(), np.zeros(3)])
     covariance = estimate.covariance + np.outer(scale, scale) * tilt2**2
     covariance[9:, 9:] += (g * tilt2) ** 2 * estimate.S_a @ estimate.S_a.T
@@ -151,7 +151,7 @@ def _with_doubt(estimate: _Estimate, tilt2: float, g: float) -> _Estimate:
 
 
 def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float) -> _Estimate:
-    """Fit with the noise alone; if that is contradicted, with the rms tilt per pose that makes χ² equal its dof."""
+    """Fit with the noise alone; if χ² rejects it, with the rms tilt per pose that makes χ² equal its dof."""
     S_a, b_a, covariance = _least_squares(values, noise, faces, g)
     dof = 3 * len(values) - 12
     residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
@@ -168,13 +168,13 @@ def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float) 
     widened = face_tilt.tilted(noise, faces, S_a, g, high)
     S_a, b_a, covariance = _least_squares(values, widened, faces, g)
     residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
-    # A tilt estimated from few degrees of freedom has Student's tails: 1.96 standard errors shall hold in 95 %.
+    # A tilt estimated with few degrees of freedom has Student's tails: 1.96 standard uncertainties shall cover 95 %.
     covariance = covariance * face_tilt.widened(dof, len(values)) ** 2
     return _with_doubt(_Estimate(S_a, b_a, covariance, residual, 0.0, chi2_noise, dof), high**2, g)
 
 
 def _inverses(noise: FloatArray) -> FloatArray:
-    """Weights; an axis without noise (stuck) gets a millionth of the others' instead of an infinite one."""
+    """Inverse covariances (n, 3, 3); the variance of a stuck axis is a millionth of the trace instead of zero."""
     variance, axes = np.linalg.eigh(noise)
     variance = np.maximum(variance, 1e-6 * variance.sum(axis=1, keepdims=True))
     out: FloatArray = np.einsum("nij,nj,nkj->nik", axes, 1.0 / variance, axes)
@@ -196,10 +196,10 @@ def _least_squares(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     design = _design(faces, g)
     weighted = np.einsum("nij,njk->nik", _inverses(noise), design)
-    # Columns of S_a carry |g|, those of b_a one: scaled for a well conditioned inverse.
+    # Columns of S_a have size |g|, those of b_a 1: both are scaled for a well-conditioned inverse.
     scale = np.concatenate([np.full(9, g), np.ones(3)])
     normal = np.einsum("nij,nik->jk", design, weighted) / np.outer(scale, scale)
-    # Readings are taken from their mean: counts near 32768 would otherwise cost digits.
+    # The mean is subtracted: counts near 32768 would otherwise lose digits.
     centre = values.mean(axis=0)
     right = np.einsum("nij,ni->j", weighted, values - centre) / scale
     covariance = np.linalg.inv(normal) / np.outer(scale, scale)
@@ -217,7 +217,7 @@ def _chi2(values: FloatArray, noise: FloatArray, faces: IntArray, g: float) -> f
 def _quality(
     values: FloatArray, noise: FloatArray, faces: IntArray, g: float, estimate: _Estimate
 ) -> tuple[FitQuality, FloatArray]:
-    """Norm residual per pose in sample and left out (NaN for poses that are no faces), and the vector residual's χ²."""
+    """``FitQuality``: norm residuals (NaN where no face), χ² of the vectors; (n, 2) held-out norm residuals and σ."""
     used = np.flatnonzero(faces)
     S, b = other_form(estimate.S_a, estimate.b_a)
     residual, sigma = (np.full(len(values), np.nan) for _ in range(2))
@@ -259,7 +259,7 @@ def _left_out_pose(
     others: IntArray,
     tilt_rad: float,
 ) -> tuple[float, float]:
-    """Norm error of one pose by the model of the others, and its standard error."""
+    """Held-out norm residual of one pose, from a fit to the other poses, and its standard error, m/s²."""
     S_a, _, _ = _least_squares(values[others], noise[others], faces[others], g)
     widened = face_tilt.tilted(noise[others], faces[others], S_a, g, tilt_rad)
     S_a, b_a, covariance = _least_squares(values[others], widened, faces[others], g)
@@ -272,7 +272,7 @@ def _left_out_pose(
 
 
 def _tilt_findings(estimate: _Estimate, S: FloatArray, faces: IntArray, used: IntArray) -> list[Finding]:
-    """Faces that contradict each other."""
+    """Finding where faces contradict each other beyond noise, with the tilt and the worst pose."""
     if estimate.tilt_rad == 0.0:
         return []
     horizontal = estimate.residual @ S.T
@@ -292,7 +292,7 @@ def _tilt_findings(estimate: _Estimate, S: FloatArray, faces: IntArray, used: In
 
 
 def _observability(noise: FloatArray, faces: IntArray, estimate: _Estimate, g: float) -> Observability:
-    """Of the twelve parameters, from the whitened design."""
+    """Observability of the twelve parameters, from the whitened and column-scaled design matrix."""
     roots = np.linalg.cholesky(_inverses(face_tilt.tilted(noise, faces, estimate.S_a, g, estimate.tilt_rad)))
     rows = np.einsum("nji,njk->nik", roots, _design(faces, g)).reshape(-1, 12)
     rows = rows / np.linalg.norm(rows, axis=0)

@@ -1,4 +1,4 @@
-"""An accelerometer of which too few faces were recorded: what gravity's length says, in a case it is not tied to."""
+"""An accelerometer with too few faces: the norm fit, with the angle between triad and case as an uncertainty."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from trihedron.records.finding import Finding
 from trihedron.units import AccelerationUnit
 
 TO_CASE_RAD = 0.1
-"""Standard error of each angle between the triad and the case: that of a perfect triad's own angles."""
+"""Standard uncertainty of each angle between triad and case: that of the angles between the axes in the norm fit."""
 
 
 def calibrate_few_faces(
     means: FloatArray, sigma: FloatArray, gravity_m_s2: float, raw_unit: AccelerationUnit
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
-    """The norm's fit, its unseen directions held near a perfect triad and named in a serious finding.
+    """The norm fit; undetermined directions are constrained to an ideal triad and named in a serious finding.
 
     Raises
     ------
     ValueError
-        When not even that can be said.
+        As :func:`calibrate_norm`.
     """
     sensor, findings = calibrate_norm(means, sigma, gravity_m_s2, raw_unit=raw_unit)
     turned = []

@@ -1,4 +1,4 @@
-"""Checks on what is asked, in the user's words."""
+"""Checks of the arguments; errors name them in the user's words."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from trihedron.errors import RefusedError
 
 
 def pose_means(means: npt.ArrayLike, sigma_means: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Means (n, 3) and their noise (n, 3, 3), from standard errors (), (3,), (n, 3) or covariances
-    (n, 3, 3).
+    """Means (n, 3) and their covariances (n, 3, 3), from standard errors (), (3,), (n, 3) or covariances (n, 3, 3).
 
     Raises
     ------
@@ -47,7 +46,7 @@ def gravity(gravity_m_s2: float) -> float:
     Raises
     ------
     ValueError
-        When it is no plausible gravity (it would go into every scale).
+        When it is not between 1 and 100 m/s²: its relative error would be that of every scale.
     """
     value = float(gravity_m_s2)
     if not 1.0 < value < 100.0:
@@ -56,12 +55,12 @@ def gravity(gravity_m_s2: float) -> float:
 
 
 def axis_signs(signs: npt.ArrayLike | None) -> FloatArray:
-    """(3,) of ±1: the sign with which each raw axis follows its axis of Mz; +1 when nothing is said.
+    """(3,) of ±1: sign of each raw axis against the body frame's axis; +1 where ``signs`` is ``None``.
 
     Raises
     ------
     ValueError
-        When they are not three signs.
+        When ``signs`` is not three numbers ±1.
     """
     if signs is None:
         return np.ones(3)

@@ -1,4 +1,4 @@
-"""Method 2: ``|S a' + b| = |g|`` in every pose, free of case and table (docs/model.md, section 3)."""
+"""Method 2: ``|S a' + b| = |g|`` in every pose, independent of case and table (docs/model.md, section 3)."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from trihedron.units import AccelerationUnit
 def ellipsoid(
     means: npt.ArrayLike, gravity_m_s2: float, frame: Literal["lower", "symmetric"] = "lower"
 ) -> tuple[FloatArray, FloatArray]:
-    """S and b of the ellipsoid through the readings (eq. 18, 19): every pose weighs alike, no uncertainty.
+    """S and b of the ellipsoid through the readings (eq. 18, 19): poses have equal weights, no uncertainty.
 
-    ``trihedron.calibrate`` starts from it and goes on to the least squares of ``|S a' + b| - |g|``, weighted by the
-    noise of every pose.
+    ``trihedron.calibrate`` starts from it and minimises ``|S a' + b| - |g|`` by least squares, weighted by the noise of
+    every pose.
 
     Parameters
     ----------
@@ -35,8 +35,8 @@ def ellipsoid(
     gravity_m_s2 : float
         |g| [m/s²].
     frame : "lower" or "symmetric"
-        Which S of those that a rotation turns into one another: lower-triangular (X along accelerometer X), or the
-        symmetric root.
+        Body frame, which poses leave free up to a rotation: S lower-triangular (X along accelerometer X), or S
+        symmetric.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def ellipsoid(
     Raises
     ------
     ValueError
-        Too few poses, or poses that lie on no ellipsoid; the sentence names the directions that are missing.
+        Too few poses, or poses that lie on no ellipsoid; the message names the directions that are missing.
 
     Examples
     --------
@@ -65,7 +65,7 @@ def ellipsoid(
 
 Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
 
-# Number across the seam, and the scale (in standard errors) that keeps 95 % efficiency on Gaussian noise.
+# Number of the loss in the Rust core, and its scale (in standard errors) for 95 % efficiency on Gaussian noise.
 _LOSSES: dict[str, tuple[int, float]] = {
     "linear": (0, 1.0),
     "huber": (1, 1.345),
@@ -104,24 +104,24 @@ def calibrate_norm(
     raw_unit : AccelerationUnit
         Unit of ``means``; only kept in the result and used to question implausible scales.
     frame : "lower" or "symmetric"
-        Body frame. (``case`` needs method 1: poses do not know the case.)
+        Body frame. (``case`` needs method 1: norms do not depend on the orientation of the case.)
     loss : "linear", "huber", "soft_l1" or "cauchy"
         Robust losses keep 95 % efficiency on Gaussian noise.
     axis_signs : (3,) of ±1, optional
-        Sign with which each raw axis follows its axis of Mz, from the board's documentation or method 1: the signs of
-        the diagonal of S. Gravity's magnitude cannot tell them; +1 without a statement. An odd number of minus signs
+        Sign of each raw axis against the body frame's axis, from the board's documentation or method 1: the signs of
+        the diagonal of S. Gravity's magnitude does not determine them; the default is +1. An odd number of minus signs
         is reported as a left-handed triad.
 
     Returns
     -------
     (SensorCalibration, findings)
-        When the poses do not determine nine parameters, these are held to 10 % of the sphere through the readings, the
-        covariance of what was not seen is that wide, and a SERIOUS finding names the poses to add.
+        When the poses do not determine nine parameters, these have a prior of 10 % about the sphere through the
+        readings, which is the uncertainty of undetermined directions, and a SERIOUS finding names the poses to add.
 
     Raises
     ------
     ValueError
-        When arrays do not fit, hold NaN, there are fewer than three poses, or all poses read the same.
+        When shapes do not fit, values are NaN, there are fewer than three poses, or all poses read the same.
     """
     values, noise = inputs.pose_means(means, sigma_means)
     g = inputs.gravity(gravity_m_s2)
@@ -176,7 +176,7 @@ def _assemble(
     *,
     signs_are_known: bool,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
-    """Residuals, certainty and findings of a fitted triad, back in the raw axes as they are."""
+    """Residuals, covariance and findings of a fitted triad, for the raw axes with their own signs."""
     # f = S₊ (D a') + b: flipping a raw axis flips a column of S.
     S = fit.S * signs
     f = values @ S.T + fit.b
@@ -184,7 +184,7 @@ def _assemble(
     residual, sigma = norm_residual(f, S, noise, g)
     dof = len(values) - 9
     z2 = (residual / sigma) ** 2
-    # A robust loss also judges the noise without the poses it rejected.
+    # With a robust loss χ² excludes the rejected poses.
     chi2 = fit.robust_chi2
     scale = verdict.covariance_scale(chi2, dof)
     design = PoseDesign.of(up, sigma / g)
@@ -245,9 +245,9 @@ def _assemble(
 
 
 def norm_residual(f: FloatArray, S: FloatArray, noise: FloatArray, g: float) -> tuple[FloatArray, FloatArray]:
-    """``|f| - |g|`` (n,) less the inflation by noise across gravity, and its standard error (n,), in m/s² (eq. 12).
+    """``|f| - |g|`` (n,) less its mean inflation by noise across gravity, and its standard error (n,), m/s² (eq. 12).
 
-    ``f`` (n, 3) corrected means in m/s², ``noise`` (n, 3, 3) covariances of the raw means.
+    ``f`` (n, 3) are corrected means in m/s², ``noise`` (n, 3, 3) covariances of the raw means.
     """
     norm = np.linalg.norm(f, axis=1)
     up = f / norm[:, None]
@@ -259,7 +259,7 @@ def norm_residual(f: FloatArray, S: FloatArray, noise: FloatArray, g: float) -> 
 
 
 def _anchored_covariance(information: FloatArray, S: FloatArray, b: FloatArray, g: float, frame: Frame) -> FloatArray:
-    """(12, 12) of a fit held to ``ANCHOR`` of |g|: what was not seen is as wide as that (model.md, 3)."""
+    """Covariance (12, 12) of S, b with the prior σ ``ANCHOR``, in |g|, on the nine relative errors (model.md, 3)."""
     physical = np.linalg.inv(information + np.eye(9) / _core.ANCHOR**2)
     to_lower = reframing(S, b, "lower")
     L, low = to_lower.rotation @ S, to_lower.rotation @ b

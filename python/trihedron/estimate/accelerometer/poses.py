@@ -1,8 +1,8 @@
-"""What poses in given directions determine, in words, and which pose to add next.
+"""Which parameters poses in given directions determine, in words, and which pose to add next.
 
-In the truth's own coordinates a small error of the model is ``δf = M f + z`` with M lower triangular; a pose with
-gravity reaction along the unit vector u sees ``uᵀδf = g Σ_{j≥k} M_jk u_j u_k + zᵀu``. These nine functions of direction
-depend on nothing but u, so that the sufficiency of a set of poses can be told before the first sample is taken.
+In the lower-triangular body frame a small error of the model is ``δf = M f + z`` with M lower-triangular; in a pose
+with specific force along the unit vector u the norm error is ``uᵀδf = g Σ_{j≥k} M_jk u_j u_k + zᵀu``. These nine
+functions depend only on u, so that a set of poses can be assessed before a sample is recorded.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from trihedron.records.calibration import Observability
 from trihedron.records.words import Words, words
 
 ENTRIES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
-"""Rows and columns of M's six entries."""
+"""Row and column of each of the six entries of M."""
 
 RANK_TOLERANCE = 1e-6
-"""Singular value, relative to the largest, below which a direction counts as unseen: only the same pose repeats to a
-part in a million."""
+"""Singular value, relative to the largest, below which a combination of parameters is undetermined: only repeated
+readings of one pose agree to 1 ppm."""
 
 
 @cache
 def parameter_names() -> tuple[Words, ...]:
-    """The nine parameters as a user would name them."""
+    """Names of the nine parameters in the user's words: scales and angles in the order of ``ENTRIES``, then biases."""
     entries = [
         words("scale-of-axis", axis=j + 1) if j == k else words("angle-between-axes", one=k + 1, other=j + 1)
         for j, k in ENTRIES
@@ -41,17 +41,17 @@ def _unit(directions: FloatArray) -> FloatArray:
 
 
 CANDIDATES: FloatArray = _unit(np.array([c for c in product((-1.0, 0.0, 1.0), repeat=3) if any(c)]))
-"""(26, 3) faces, edges and corners of a cube: the poses that a hand can find on a table."""
+"""(26, 3) upward unit vectors: faces, edges and corners of a cube, the poses that are easy to set by hand."""
 
 
 def design_rows(directions: FloatArray) -> FloatArray:
-    """(n, 9) sensitivity of the norm, in units of |g|, of poses with unit upward vectors (n, 3)."""
+    """(n, 9) derivative of |f|/|g| with respect to (M, z/|g|) in poses with upward unit vectors (n, 3)."""
     u = np.asarray(directions, dtype=np.float64)
     return np.column_stack([u[:, j] * u[:, k] for j, k in ENTRIES] + [u[:, j] for j in range(3)])
 
 
 def wrt_relative_errors(S: FloatArray, b: FloatArray, gravity_m_s2: float) -> FloatArray:
-    """(12, 9) of S, row by row, and b by the relative errors of ``f``: δf = M f + z gives δS = M S, δb = M b + z."""
+    """(12, 9) derivative of S, row by row, and b with respect to (M, z/|g|): δf = M f + z, δS = M S, δb = M b + z."""
     out = np.zeros((12, 9))
     for i, (j, k) in enumerate(ENTRIES):
         out[3 * j : 3 * j + 3, i] = S[k]
@@ -61,7 +61,7 @@ def wrt_relative_errors(S: FloatArray, b: FloatArray, gravity_m_s2: float) -> Fl
 
 
 def pose_in_words(direction: FloatArray) -> Words:
-    """How to hold the sensor so that a unit vector (3,) of it points up.
+    """Orientation of the sensor, in words, in which a unit vector (3,) of the body frame points up.
 
     Examples
     --------
@@ -81,10 +81,10 @@ def pose_in_words(direction: FloatArray) -> Words:
 
 @dataclass(frozen=True, eq=False)
 class PoseDesign:
-    """The information of a set of poses.
+    """Fisher information of a set of poses about the nine parameters, relative to |g|.
 
-    ``information`` (9, 9) in units of (|g|/σ)²; ``covariance`` its inverse over the ``rank`` determined directions;
-    ``singular_values`` (9,) of the column-scaled design.
+    ``rows`` (n, 9) are whitened; ``covariance`` is the inverse of ``information`` over ``rank`` determined directions;
+    ``singular_values`` (9,) and ``directions`` (9, 9) are the SVD of ``rows`` divided by the column norms ``scale``.
     """
 
     rows: FloatArray
@@ -97,7 +97,7 @@ class PoseDesign:
 
     @classmethod
     def of(cls, up: FloatArray, relative_sigma: FloatArray) -> PoseDesign:
-        """Of poses with unit upward vectors (n, 3) and standard errors σ/|g| (n,)."""
+        """Design of poses with upward unit vectors (n, 3) and standard errors σ/|g| (n,)."""
         rows = design_rows(up) / np.asarray(relative_sigma)[:, None]
         scale = np.linalg.norm(rows, axis=0)
         scale = np.where(scale > 0, scale, 1.0)
@@ -109,17 +109,17 @@ class PoseDesign:
         return cls(rows, rows.T @ rows, half @ half.T, rank, s, scale, vt)
 
     def weakest(self) -> Words:
-        """The worst determined combination, in words."""
+        """The least determined combination of parameters, in words."""
         direction = self.directions[-1] / self.scale
         share = np.abs(direction) / np.abs(direction).max()
-        # Zero and scale are compared in the effect each has on a reading near |g|, which both rows already are in.
+        # Scale and bias are comparable: both are relative to |g|.
         names = [parameter_names()[k] for k in np.argsort(-share, kind="stable") if share[k] > 0.5]
         if self.rank < 9:
             return words("poses-unseen", names=names, rank=self.rank)
         return words("poses-weakest", names=names, times=self.singular_values[0] / self.singular_values[-1])
 
     def worst_prediction(self) -> float:
-        """Largest standard error, over the candidate directions, of the norm that the model predicts, in |g|."""
+        """Largest standard uncertainty, in |g|, of the predicted norm over the candidate directions."""
         if self.rank < 9:
             return float("inf")
         rows = design_rows(CANDIDATES)
@@ -128,7 +128,7 @@ class PoseDesign:
     def advice(self, relative_sigma: float, n_poses: int) -> tuple[Words, ...]:
         """The poses that most reduce the largest variance among the nine parameters, one after another (greedy)."""
         information = self.information.copy()
-        # A prior of one (100 % of scale, |g| of zero) makes the unseen comparable with the badly seen.
+        # A prior of one (100 % of scale, |g| of bias) makes undetermined and weakly determined parameters comparable.
         information += np.eye(9)
         rows = design_rows(CANDIDATES) / relative_sigma
         advised = []
@@ -137,7 +137,7 @@ class PoseDesign:
             seen = rows @ covariance
             gain = seen**2 / (1.0 + np.einsum("ij,ij->i", seen, rows))[:, None]
             left = np.diag(covariance) - gain
-            # The worst first; among equals the smaller sum, so that a pose also helps the second worst.
+            # The largest variance decides; the sum breaks ties, so that a pose also helps the second largest.
             score = left.max(axis=1) + 1e-3 * left.sum(axis=1)
             best = int(np.argmin(score))
             advised.append(pose_in_words(CANDIDATES[best]))
@@ -159,7 +159,7 @@ class PoseDesign:
         return tuple(sorted(pairs, key=lambda pair: -abs(pair[2])))
 
     def observability(self, relative_sigma: float, n_advised: int = 3) -> Observability:
-        """As a record, with advice where something is weak."""
+        """The design as an ``Observability`` record, with at least ``n_advised`` poses to add."""
         missing = max(9 - self.rank, 0)
         n_advised = max(missing, n_advised)
         return Observability(

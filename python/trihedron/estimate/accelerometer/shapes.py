@@ -1,8 +1,8 @@
-"""Whether what poses miss of |g| has the shape of a nonlinear axis, which S and b then take up in part.
+"""Test whether gravity errors in static poses have the shape of a nonlinear axis, part of which S and b absorb.
 
-A reading that is not linear along its axis moves |f| by the force along that axis times a curve of it: f³ of a reading
-quadratic in force, f⁴ of a cubic one, |f|³ where both directions have unlike scales. The nine parameters hold f², and
-imitate a part of these: S is then wrong by far more than the residual says, whose χ² alone widens its uncertainties.
+A nonlinear axis changes |f| by the force f along it times the error of its reading: f³ for a quadratic error, f⁴ for a
+cubic one, |f|³ for unequal scales of both directions. The nine parameters have the terms f and f² and absorb part of
+these shapes: the error of S is then far larger than the residual, by whose χ² alone its uncertainty is widened.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from trihedron.records.segments import Segments
 SHAPES: Mapping[str, Callable[[FloatArray], FloatArray]] = MappingProxyType(
     {"quadratic": lambda u: u**3, "cubic": lambda u: u**4, "unlike-scales": lambda u: np.abs(u) ** 3}
 )
-"""What an axis whose reading bends so does to |f|, of the components (n, 3) of the unit vertical."""
+"""Relative change (n, 3) of |f| by each nonlinear axis, as a function of the unit vertical (n, 3)."""
 CHANCE = 1e-3
-"""That one of the shapes fits the scatter of a sound sensor's poses as well."""
+"""p-value below which a shape is detected: false alarms of a linear sensor, over all shapes."""
 LEAST_REST = 3
-"""Degrees of freedom that the poses must leave beside a shape: with fewer its F is ruled by one pose."""
+"""Fewest residual degrees of freedom beside a shape: with fewer, one pose dominates the F statistic."""
 MATTERS = 2.0
-"""Standard errors by which the shape shifts a parameter: less is within the 95 % interval that is stated."""
+"""Smallest reported shift of a parameter, in standard uncertainties: less is within the stated 95 % interval."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape that the poses show: its ``p``, paid for the search; how far it shifts the parameters at most, in m/s²
-    where an axis bears |g|, and in their standard errors."""
+    """A detected shape: ``p`` corrected for multiple testing; the largest shift of a parameter that it causes, in m/s²
+    at a force of |g| and in standard uncertainties."""
 
     name: str
     p: float
@@ -46,14 +46,14 @@ class Shape:
 def shape_of(
     up: FloatArray, residual: FloatArray, sigma: FloatArray, gravity_m_s2: float, scale: float
 ) -> Shape | None:
-    """The shape that poses show most clearly and that shifts a parameter by more than is said of it, or ``None``.
+    """The shape with the smallest p below ``CHANCE`` that shifts a parameter by more than ``MATTERS`` σ, or ``None``.
 
     Parameters
     ----------
     up : (n, 3)
         Unit verticals.
     residual, sigma : (n,)
-        What the poses miss of |g| after the fit, and their noise, m/s².
+        Gravity errors in static poses after the fit, and their noise, m/s².
     gravity_m_s2 : float
     scale : float
         χ² per degree of freedom by which the covariance of S and b is widened.
@@ -81,7 +81,7 @@ def shape_of(
         drop = float(gained @ gained)
         p = min(len(SHAPES) * fdtrc(k, dof, (drop / k) / max((float(left @ left) - drop) / dof, 1e-300)), 1.0)
         strength = axes[seen].T @ (gained / size[seen])
-        # What the fit has taken up of the shape instead of leaving it in the residual.
+        # The part of the shape that the nine parameters absorb: their shift.
         taken = np.linalg.solve(r, q.T @ (columns @ strength))
         shift = np.abs(taken)
         shape = Shape(name, float(p), float(shift.max()) * gravity_m_s2, float((shift / known).max()))
@@ -91,18 +91,18 @@ def shape_of(
 
 
 def verticals(fitted: SensorCalibration, reading: FloatArray) -> FloatArray:
-    """Unit verticals (n, 3) of poses by their mean readings (n, 3)."""
+    """Unit verticals (n, 3) of poses from their mean readings (n, 3)."""
     up: FloatArray = reading @ fitted.S.T + fitted.b
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     return up
 
 
 def shape_findings(calibration: Calibration, segments: Segments) -> tuple[Finding, ...]:
-    """The shape in a calibration's residual of poses, as a finding that says what it does to S and b."""
+    """Finding for a nonlinear shape in the gravity errors of static poses, with the shift of S and b that it causes."""
     fitted, reading = calibration.accelerometer, segments.accelerometer_mean
     if fitted.quality is None or reading is None or len(fitted.quality.residual) != len(reading):
         return ()
-    seen, is_known = fitted.quality, np.isfinite(fitted.quality.residual)  # a pose that was excluded misses nothing
+    seen, is_known = fitted.quality, np.isfinite(fitted.quality.residual)  # excluded poses have no residual
     up = verticals(fitted, reading)[is_known]
     scale = max(seen.covariance_scale, seen.chi2 / seen.dof if seen.dof > 0 else 1.0, 1.0)
     shape = shape_of(up, seen.residual[is_known], seen.sigma[is_known], calibration.gravity_m_s2, scale)
@@ -122,7 +122,7 @@ def shape_findings(calibration: Calibration, segments: Segments) -> tuple[Findin
 
 
 def with_shapes(calibration: Calibration, segments: Segments) -> tuple[Finding, ...]:
-    """A calibration's findings and a shape's: one that is told is no longer one that is not excluded."""
+    """A calibration's findings and a shape's; a detected shape replaces an earlier NONLINEAR_RESIDUAL finding."""
     shapes = shape_findings(calibration, segments)
     kept = (one for one in calibration.findings if not shapes or one.code is not FindingCode.NONLINEAR_RESIDUAL)
     return (*kept, *shapes)

@@ -1,4 +1,4 @@
-"""What a fitted triad must say about itself: residual against noise, unseen poses, outliers, handedness, scale."""
+"""Findings of a fitted triad: residual against noise, undetermined parameters, outliers, handedness, scale."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from trihedron.records.finding import Finding, FindingCode
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 SIGNIFICANCE = 0.01
-"""Rate at which a healthy recording raises one of the statistical findings here."""
+"""False alarm rate of each statistical finding here."""
 
 WEAK_PREDICTION = 3.0
-"""A set of n well spread poses predicts any new one to √(9/n) of a pose's noise; at three times the noise of a pose the
-set hardly constrains some direction."""
+"""Largest prediction error of a norm, in the noise of a pose, that is not reported. n well-spread poses predict any
+other to √(9/n) of the noise of a pose; three times that noise means that some direction is hardly determined."""
 
 
 def covariance_scale(chi2: float, dof: int) -> float:
-    """χ²/dof where it exceeds the 99 % quantile of noise alone, else 1: errors never shrink below the noise."""
+    """χ²/dof where χ² exceeds the 99 % quantile of noise alone, else 1: uncertainties are never reduced."""
     if dof <= 0 or chi2 <= probability.chdtri(dof, SIGNIFICANCE):
         return 1.0
     return chi2 / dof
 
 
 def residual_findings(chi2: float, dof: int, rms: float, floor: float) -> list[Finding]:
-    """Residuals that the stated noise does not explain."""
+    """Finding where the stated noise does not explain the residuals."""
     scale = covariance_scale(chi2, dof)
     if scale == 1.0:
         return []
@@ -52,7 +52,7 @@ def observability_findings(
     anchor: float,
     are_faces: bool,
 ) -> list[Finding]:
-    """Nothing, a warning, or a refusal, with the poses to add; faces of a case have a method of their own."""
+    """No finding, WEAKLY_OBSERVABLE or NOT_OBSERVABLE, with the poses to add; ``are_faces``: method 1 would apply."""
     if design.rank < 9:
         return [
             Finding.of(
@@ -105,7 +105,7 @@ def _unseen(design: PoseDesign) -> list[str]:
 
 
 def held_out_findings(held_out: FloatArray, sigma: FloatArray, chi2_per_dof: FloatArray, dof: int) -> list[Finding]:
-    """Poses that the others do not predict (externally studentised, Bonferroni), and a fit that does not generalise."""
+    """Findings for outlier poses (externally studentised, Bonferroni), or for held-out residuals above uncertainty."""
     seen = np.isfinite(held_out)
     n = int(seen.sum())
     if n == 0 or dof < 2:
@@ -119,14 +119,14 @@ def held_out_findings(held_out: FloatArray, sigma: FloatArray, chi2_per_dof: Flo
         for i in np.flatnonzero(np.abs(z) > limit)
     ]
     mean_square = float(np.mean(z[seen] ** 2))
-    # Held-out z share one training set and heavy tails of t: twice the variance of noise alone is beyond both.
+    # Held-out z are correlated (shared training poses) and heavy-tailed (Student's t): the factor 2 covers both.
     if not found and n >= 12 and mean_square > 2.0 * probability.chdtri(n, SIGNIFICANCE) / n:
         found.append(Finding.of(FindingCode.HELD_OUT_WORSE, "poses", held_out_z_rms=np.sqrt(mean_square)))
     return found
 
 
 def model_findings(S: FloatArray, raw_unit: AccelerationUnit, *, signs_are_known: bool) -> list[Finding]:
-    """A left-handed triad, and scales that contradict the unit of the log."""
+    """Findings for a left-handed triad, and for scales that contradict the unit of the log."""
     found = []
     if np.linalg.det(S) < 0:
         signs = "".join("+" if s > 0 else "-" for s in np.diag(S))
@@ -157,7 +157,7 @@ def model_findings(S: FloatArray, raw_unit: AccelerationUnit, *, signs_are_known
 
 
 def convergence_findings(is_converged: bool, stopped_because: str) -> list[Finding]:
-    """The solver did not reach its convergence inequality."""
+    """Finding where the solver stopped without convergence."""
     if is_converged:
         return []
     return [Finding.of(FindingCode.NOT_CONVERGED, "accelerometer", stopped_because=stopped_because)]

@@ -1,4 +1,4 @@
-"""What a whole turn on a table shows of its tilt: gravity goes once round the case while it turns."""
+"""Tilt of the table from whole turns on it: horizontal gravity rotates once through the case during a turn."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
 
 HARMONICS = (2, 3, 4, 5)
-"""Of the turn: a tilt has none of them, and vibration, shocks and an uneven table have them as they have the first."""
+"""Harmonics of the turn without a tilt signal: vibration, shocks and an uneven table excite them like the first."""
 FEWEST = 60
-"""Readings of a turn: ten for each cosine and sine."""
+"""Fewest samples of a turn: six for each of the ten cosines and sines."""
 
 
 @dataclass(frozen=True, eq=False)
 class OppositeHeadings:
-    """Readings (k, 3), raw, that a case would show half a turn from pose ``pose`` (k,), and their covariances."""
+    """Raw readings (k, 3) predicted for the case half a turn from pose ``pose`` (k,), and covariances (k, 3, 3)."""
 
     values: FloatArray
     noise: FloatArray
@@ -28,10 +28,10 @@ class OppositeHeadings:
 def opposite_headings(
     recording: Recording, segments: Segments, moves: list[Move], turns_deg: list[float]
 ) -> OppositeHeadings | None:
-    """Of every placement that was turned by whole turns, from the first harmonic of its level axes over them.
+    """Opposite headings of placements rotated by whole turns, from the first harmonic of the readings over the turns.
 
-    With a the reading, φ the angle turned and ā that at rest, ``a - ā = c + A (cos φ - 1) + B sin φ + P ω² + Q ω'``:
-    P and Q are what a sensor beside the axis feels. Half a turn on the case would read ā - 2A.
+    With reading a, its mean ā at rest and angle φ, ``a - ā = c + A (cos φ - 1) + B sin φ + P ω² + Q ω'``: P and Q are
+    due to the sensor's distance from the axis. Half a turn further the case would read ā - 2A (``None`` without turns).
     """
     force, gyro = recording.accelerometer, recording.gyroscope
     mean, sigma = segments.accelerometer_mean, segments.accelerometer_sigma_mean
@@ -40,7 +40,7 @@ def opposite_headings(
     found: dict[int, list[tuple[FloatArray, FloatArray]]] = {}
     last, placed = -1, -1
     for move, angle in zip(moves, turns_deg, strict=True):
-        # Turns that follow each other without the case being set down anew are of one placement.
+        # Consecutive turns, without the case set down anew between them, belong to one placement.
         placed = placed if move.pose_before == last else move.pose_before
         last = move.pose_after
         if angle == 0.0 or angle % 360.0 != 0.0 or move.stop - move.start < FEWEST:
@@ -55,10 +55,10 @@ def opposite_headings(
         return None
     poses = np.array(list(found), dtype=np.int64)
     lean = np.array([np.mean([a for a, _ in found[k]], axis=0) for k in poses.tolist()])
-    # Turns of one placement hear one uneven table: their errors are not averaged.
+    # The unevenness of the table is common to the turns of one placement: their errors do not average out.
     variance = np.array([np.mean([v for _, v in found[k]], axis=0) for k in poses.tolist()])
     at_rest = np.asarray(sigma)[poses] ** 2
-    # The mean of both headings is as uncertain as the pose and A: it stands in both.
+    # ā enters both headings: with this noise their mean, ā - A, has variance σ_ā² + σ_A².
     noise = 3.0 * at_rest + 4.0 * variance
     return OppositeHeadings(mean[poses] - 2.0 * lean, np.einsum("ni,ij->nij", noise, np.eye(3)), poses)
 
@@ -66,7 +66,7 @@ def opposite_headings(
 def _first_harmonic(
     time_s: FloatArray, force: FloatArray, rate: FloatArray, angle_rad: float
 ) -> tuple[FloatArray, FloatArray] | None:
-    """A (3,) and its variance (3,), from readings (n, 3) of a turn without those at rest; ``None`` where they fail."""
+    """A (3,), raw, and its variance (3,), from readings (n, 3) of a turn less those at rest; ``None`` if singular."""
     if not (np.isfinite(force).all() and np.isfinite(rate).all()):
         return None
     step = np.diff(time_s)
@@ -86,7 +86,7 @@ def _first_harmonic(
     if rank < design.shape[1]:
         return None
     inverse = np.linalg.inv(design.T @ design)
-    # Columns of one length: what stands in the other harmonics, in units of their own leverage, is what A hears.
+    # Disturbance power in harmonics 2 to 5, per unit variance of each coefficient, estimates the disturbance of A.
     others = np.arange(design.shape[1] - 2 * len(HARMONICS), design.shape[1])
     heard = np.mean(solution[others] ** 2 / np.diag(inverse)[others, None], axis=0)
     left = force - design @ solution
@@ -98,7 +98,7 @@ def _first_harmonic(
 def with_opposite(
     values: FloatArray, noise: FloatArray, faces: IntArray, opposite: OppositeHeadings | None
 ) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Poses that are faces (``faces`` not 0), each followed by the opposite heading that its turns show."""
+    """Poses that are faces (``faces`` not 0), each followed by the opposite heading from its turns."""
     used = np.flatnonzero(faces)
     if opposite is None:
         return values[used], noise[used], faces[used]

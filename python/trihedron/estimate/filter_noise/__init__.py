@@ -1,1 +1,1 @@
-"""Which N and K make a filter's predicted errors right, and what those errors are made of (docs/filter-noise.md)."""
+"""N and K with which the covariance that a filter predicts is true, and shares of its errors (docs/filter-noise.md)."""

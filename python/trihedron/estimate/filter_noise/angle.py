@@ -14,13 +14,13 @@ from trihedron.estimate.reference.motion import MotionFit
 Mask = npt.NDArray[np.bool_]
 
 START_RAD = 0.3
-"""Prior σ of the attitude at the beginning of a stretch: the fit has it within some degrees."""
+"""Prior σ of the attitude error at the start of a stretch: the fit leaves some degrees."""
 LONGEST, SHORTEST = 300, 12
-"""Blocks of a stretch: beyond five minutes its parameters are its own (temperature), and matrices stay small."""
+"""Most and fewest blocks of a stretch: over five minutes parameters drift (temperature), and matrices stay small."""
 
 
 def runs(is_good: Mask) -> list[tuple[int, int]]:
-    """Stretches of good blocks, none longer than ``LONGEST``."""
+    """Stretches ``(first, last)`` of good blocks, from ``SHORTEST`` to ``LONGEST`` blocks long."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_good, [False]]).astype(int))).reshape(-1, 2)
     out = []
     for first, last in edges:
@@ -31,7 +31,7 @@ def runs(is_good: Mask) -> list[tuple[int, int]]:
 
 
 def band_power(signal: FloatArray, step_s: float, band_hz: float, n: int) -> FloatArray:
-    """(m,) mean square over blocks of ``n`` samples of a signal (k, 3) above ``band_hz``, one axis' mean [SI²]."""
+    """(m,) mean square [SI²] of a signal (k, 3) above ``band_hz``, over blocks of ``n`` samples and the three axes."""
     spectrum = np.fft.rfft(signal - signal.mean(axis=0), axis=0)
     spectrum[np.fft.rfftfreq(len(signal), step_s) < band_hz] = 0.0
     fast = np.fft.irfft(spectrum, len(signal), axis=0)
@@ -40,19 +40,19 @@ def band_power(signal: FloatArray, step_s: float, band_hz: float, n: int) -> Flo
 
 
 def relative(power: FloatArray, density: float, width_hz: float) -> FloatArray:
-    """Band power (m,) beyond the noise at rest of that density, its mean one; zeros where there is none of it.
+    """Band power (m,) above the static noise, scaled to mean 1; zeros where it is within the noise.
 
-    N √rate is the deviation of a sample, so that a band has 2 N² times its width of it; the quietest tenth bounds it
-    where N is not known.
+    Static noise has the power 2 N² ``width_hz``, because N √rate is the σ of a sample; where N is not known
+    (``density`` 0) it is the 10 % quantile of the power.
     """
     floor = 2.0 * density**2 * width_hz if density > 0.0 else float(np.quantile(power, 0.1))
     beyond = np.maximum(power - floor, 0.0)
-    # Half the floor is what its own scatter and a wrong N leave.
+    # Half of the noise power covers its scatter and an error of N.
     return np.asarray(beyond / beyond.mean()) if beyond.mean() > 0.5 * floor else np.zeros(len(power))
 
 
 def angle_stretches(found: MotionFit, band_hz: float, static_N: float) -> list[Stretch]:
-    """Stretches of recording 0 between its gaps; ``static_N`` [rad/s/√Hz] or zero where it is not known."""
+    """Stretches of recording 0 between its gaps; ``static_N`` [rad/s/√Hz], 0 where it is not known."""
     side, problem, point = found.sides[0], found.problems[0], found.points[0]
     blocks = problem.blocks
     n = max(2, round(1.0 / side.grid.step_s))
@@ -94,7 +94,7 @@ def _stretch(table: dict[str, FloatArray], at: slice, h: float, centre: FloatArr
 
 
 def bias_steps(upto: FloatArray) -> FloatArray:
-    """(3 m, 3 m) what a bias during each block does, from what one from the start on does to each block (m, 3, 3)."""
+    """(3 m, 3 m) derivative of the observations by the bias in each block, from that by a constant bias (m, 3, 3)."""
     m = len(upto)
     edge = np.concatenate([upto[:1], 0.5 * (upto[1:] + upto[:-1]), upto[-1:]])
     out = np.zeros((m, 3, m, 3))

@@ -1,4 +1,4 @@
-"""White noise of X, Y and Z apart, in motion: what each turns into along the reference's axes differs."""
+"""White noise of X, Y and Z separately, in motion: rotation distributes them differently over the world axes."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
 from trihedron.records.filter_noise import Bounded
 
 STEP = 0.05
-"""Step in the logarithm of an axis' density."""
+"""Step in the logarithm of an axis' density, for the curvature."""
 AXES_SIGMA = float(np.log(3.0))
-"""Prior σ of that logarithm about the mean of the axes: of one chip they differ by less than a factor of three."""
+"""Prior σ of that logarithm about the axes' mean: axes of one chip differ by less than a factor of three."""
 
 
 def unlike_axes_beside(stretches: Sequence[Stretch], found: Fitted, N: Bounded) -> tuple[Bounded, ...]:
-    """N of each axis, noise at rest and vibration together, where the evidence prefers three to one; else nothing.
+    """N of each axis, static noise and vibration together, where the evidence prefers three densities to one; else ().
 
-    The other strengths stay as they are; the interval of N itself is in every axis'.
+    The other strengths are fixed; every axis' interval includes that of the common N.
     """
     if N.is_limit:
         return ()
@@ -50,12 +50,12 @@ def unlike_axes_beside(stretches: Sequence[Stretch], found: Fitted, N: Bounded) 
 
 
 def _without_noise(stretch: Stretch, strengths: FloatArray) -> FloatArray:
-    """Covariance (3 m, 3 m) of everything but noise and vibration."""
+    """Covariance (3 m, 3 m) of all random errors except noise and vibration."""
     return stretch.covariance(np.where(np.isin(NAMES, ("noise", "vibration")), 0.0, strengths))
 
 
 def _of_axes(stretch: Stretch, strengths: FloatArray) -> FloatArray:
-    """(3, 3 m, 3 m) covariance of the noise and vibration of each axis, in the reference's world."""
+    """(3, 3 m, 3 m) covariance of noise and vibration of each body axis, in the reference's world frame."""
     m = len(stretch.time_s)
     h = float(np.median(np.diff(stretch.time_s)))
     per_block = h * (strengths[0] ** 2 + strengths[1] ** 2 * stretch.power)

@@ -1,4 +1,4 @@
-"""A log beside its reference: noise of both sensors for a filter, tested on the half that the fit did not see."""
+"""Noise of both sensors for a filter from a log with a reference, validated on the held-out half of the log."""
 
 from __future__ import annotations
 
@@ -47,26 +47,26 @@ ANGLE = Prior(
     np.append(np.log([30.0, 30.0, 30.0, 30.0, 30.0, 4.0]), 1.0),
     np.ones(7),
 )
-"""Consumer gyros and optical trackers, a factor of 30 either way and of 4 for the time constant (as `--reference`)."""
+"""Prior for consumer gyros and optical trackers: factor 30 either way, 4 for the time constant (as `--reference`)."""
 VELOCITY = Prior(
     np.append(np.log([2e-3, 2e-3, 3e-4, 1e-3, 1e-3, 8.0]), 0.0),
     ANGLE.sigma,
     np.ones(7),
 )
-"""The same of accelerometers beside a path: a millimetre of white error; the slow one is that of the attitude, whose
-fit knows more of it (`Learnt.told`)."""
+"""Prior for accelerometers with a reference position: 1 mm of white error; the slow error is that of the attitude and
+gets its prior from the gyro's fit (`Learnt.told`)."""
 LEAST_S = 40.0
-"""Shared motion below which two halves say nothing of ten seconds."""
+"""Shortest shared motion: in less, the halves do not validate predictions over 10 s."""
 UNTURNED = np.ones(2)
-"""A body that keeps its attitude."""
+"""``turned_alike`` of a body that does not rotate."""
 PREDICTING = 20
-"""Draws of the strengths for a prediction."""
+"""Number of draws of the strengths per prediction."""
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What is wanted: ``horizons_s``, ``band_hz`` above which vibration is looked for, ``gravity_m_s2``, and what is
-    known of each sensor at rest."""
+    """Options: ``horizons_s``, ``band_hz`` above which power is vibration, ``gravity_m_s2``, and the static noise of
+    each sensor, where known."""
 
     horizons_s: tuple[float, ...]
     band_hz: float
@@ -76,12 +76,12 @@ class Asked:
 
 
 def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Asked) -> tuple[SensorFilterNoise, ...]:
-    """Gyro, and with a position the accelerometer, of a log beside attitudes.
+    """Filter noise of the gyro, and with a reference position of the accelerometer, beside a reference attitude.
 
     Raises
     ------
     ValueError
-        When the reference has no attitude, or the two share too little motion.
+        When the reference has no attitude, or log and reference share less than ``LEAST_S``.
     """
     if motion.attitude is None:
         raise RefusedError(f"{motion.source}: the reference holds rates; give attitudes, whose errors do not add up.")
@@ -106,8 +106,8 @@ def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Asked
 
 @dataclass(frozen=True, eq=False)
 class Learnt:
-    """Fits of a sensor's stretches: ``taught`` on the half before ``held``, ``found`` on all, each with whether the
-    reference follows the sensor; the prior of all."""
+    """Fits of a sensor: ``taught`` on the first half, ``found`` on all stretches, each with whether the reference
+    follows the sensor; ``held`` as `halves` returns it; ``prior`` of the fit on all."""
 
     stretches: Sequence[Stretch]
     held: list[tuple[Stretch, int]]
@@ -116,9 +116,9 @@ class Learnt:
     prior: Prior
 
     def told(self, usual: Prior) -> tuple[Prior, Prior]:
-        """Priors of the half and of all for another sensor beside this reference, with what this one tells of it.
+        """Priors, of the half and of all, for another sensor: its slow error of the reference from this sensor's fit.
 
-        A reference computed from this sensor shares errors with it that the difference does not show.
+        ``usual`` is kept where the reference was computed from this sensor: common errors cancel in the difference.
         """
         half, whole = (
             usual if follows else with_slow_error_of(usual, fitted.draws)
@@ -128,7 +128,7 @@ class Learnt:
 
 
 def learnt(stretches: Sequence[Stretch], usual: tuple[Prior, Prior], static: StaticNoise | None) -> Learnt:
-    """Both fits, under the usual priors of the half and of all."""
+    """Fits on the first half and on all stretches, under their ``usual`` priors and the static noise."""
     half, held = halves(stretches)
     of_half, of_all = (informed(one, stretches, static) for one in usual)
     return Learnt(
@@ -158,7 +158,7 @@ def _sensor(
     draws = found.draws
     N, K = bounded(np.hypot(draws[:, 0], draws[:, 1])), bounded(draws[:, 2])
     if follows:
-        # What is left beside it is the reference's as much as the sensor's.
+        # The difference contains the reference's error as much as the sensor's: N is the static one.
         assert static is not None
         N, K = static.N, replace(K, lower=0.0, is_limit=True)
     tilt = None if is_gyro else asked.gravity_m_s2 * np.array([1.0, white_rad * np.sqrt(BLOCK_S)])
@@ -189,24 +189,24 @@ def _sensor(
 
 
 def informed(usual: Prior, stretches: Sequence[Stretch], static: StaticNoise | None) -> Prior:
-    """The usual prior with the noise at rest as a datum; without vibration where no band power stands out."""
+    """The usual prior with the static N as a datum; without vibration where the band power does not exceed noise."""
     mean, sigma, is_there = usual.mean.copy(), usual.sigma.copy(), usual.is_there.copy()
     if static is not None and not static.N.is_limit and static.N.value > 0.0:
         mean[0] = np.log(static.N.value)
-        # Ends of its interval, and no closer than one unit of a kind repeats from day to day (5 %).
+        # σ from the 95 % interval of N, at least 5 %: the repeatability of a unit from day to day.
         sigma[0] = max(0.25 * np.log(static.N.upper / max(static.N.lower, 1e-12)), 0.05)
         mean[1] = mean[0]
     power = np.concatenate([one.power for one in stretches])
-    # Without a datum of the noise at rest only changes of the power tell vibration from it.
+    # Without a static N only a change of power separates vibration from noise.
     shows = np.any(power > 0.0) and (static is not None or np.std(power) > 0.2 * np.mean(power))
     is_there[1] = float(shows)
     return replace(usual, mean=mean, sigma=sigma, is_there=is_there)
 
 
 def independent_or_not(stretches: Sequence[Stretch], prior: Prior, usual: Prior) -> tuple[Fitted, bool]:
-    """The fit with noise at rest as a datum, or, where the evidence prefers it, of a reference that follows the sensor.
+    """The fit with the static N as a datum, or the fit without it where the evidence prefers that; and which it is.
 
-    A smoother over this sensor repeats part of its noise, and what is left of it beside the reference may be any less.
+    A reference smoothed from this sensor repeats part of its noise: N of the difference is then below the static N.
     """
     apart = fit(stretches, prior)
     if prior.sigma[0] == usual.sigma[0] or np.log(np.median(apart.draws[:, 0])) > prior.mean[0] - prior.sigma[0]:
@@ -219,7 +219,7 @@ def independent_or_not(stretches: Sequence[Stretch], prior: Prior, usual: Prior)
 
 
 def halves(stretches: Sequence[Stretch]) -> tuple[list[Stretch], list[tuple[Stretch, int]]]:
-    """The first half of the time to learn from, and stretches with the block from which on they are held out."""
+    """Stretches of the first half of the time, for the fit, and stretches with their first held-out block."""
     total = sum(len(one.time_s) for one in stretches)
     learnt: list[Stretch] = []
     held, so_far = [], 0
@@ -237,7 +237,7 @@ def halves(stretches: Sequence[Stretch]) -> tuple[list[Stretch], list[tuple[Stre
 def consistency(
     held: Sequence[tuple[Stretch, int]], taught: Fitted, static: StaticNoise | None, horizon_s: float
 ) -> Consistency | None:
-    """Errors over one horizon under what was taught, and under the static values with the reference taken for exact."""
+    """Held-out NEES and rms over one horizon under ``taught``, and under static N and K with an exact reference."""
     some = taught.draws[:: max(1, len(taught.draws) // PREDICTING)]
     found = errors_over(held, some, horizon_s)
     if found is None:
@@ -246,7 +246,7 @@ def consistency(
     if static is not None:
         plain = np.zeros(len(NAMES))
         plain[[0, 2]] = static.N.filter_value, static.K.filter_value
-        # Of a path only means are compared: its white error cannot be none, and is what it is.
+        # The white error of a position is never 0: the fitted one is kept.
         plain[3] = 0.0 if held[0][0].tilts is None else taught.mode[3]
         exact = [(replace(one, given=None), first) for one, first in held]
         beside = errors_over(exact, plain[None], horizon_s)
@@ -268,18 +268,18 @@ def _worth(draws: FloatArray, follows: bool) -> ReferenceWorth:
     return ReferenceWorth(bounded(draws[:, 3]), bounded(slow), float(np.median(draws[:, 6])), follows)
 
 
-# What the error over a horizon is made of (docs/filter-noise.md).
+# Shares of the error over a horizon (docs/filter-noise.md).
 
 
 def parts_of(
     draws: FloatArray, horizon_s: float, tilt: FloatArray | None = None, alike: FloatArray = UNTURNED
 ) -> dict[Cause, FloatArray]:
-    """Mean squares (k,) of all three axes together by cause, under strengths (k, 7), without the correction's.
+    """Mean squares (k,), summed over the axes, by cause, under strengths (k, 7); without calibration and temperature.
 
-    Of an angle over h: 3 N² h, 3 V² h, K² h³, and of a reference the difference of two of its errors,
-    2 σ² (1 - k(h)) and white; one of the body turns with it, so that only ``alike`` (n,) of it, at times from 0 to h,
-    is still the same (`turned_alike`). ``tilt`` (2,) makes it a velocity: what a radian of slow error [m/s²], and the
-    white error of the attitude [m/s/√s], add over h, of two axes.
+    For an angle over h: 3 N² h, 3 V² h, K² h³; for the reference 2 σ² (1 - k(h)) per axis and white error, because two
+    of its errors are subtracted. A body-frame error rotates with the body: the fraction ``alike`` (n,), at times from 0
+    to h, stays common (`turned_alike`). For a velocity, ``tilt`` (2,) is the acceleration per radian of slow error
+    [m/s²] and the effect of the attitude's white error [m/s/√s]; two axes are affected.
     """
     s = dict(zip(NAMES, draws.T, strict=True))
     h = horizon_s
@@ -297,14 +297,14 @@ def parts_of(
 
 
 def shares_over(parts: dict[Cause, FloatArray], horizon_s: float) -> tuple[Share, ...]:
-    """Shares with 95 % intervals of causes' mean squares (k,); a cause without a part has no share."""
+    """Shares of the mean squares (k,) by cause, with 95 % intervals; a cause that is not in ``parts`` has no share."""
     total = np.sum(list(parts.values()), axis=0)
     return tuple(Share(name, horizon_s, bounded(parts[name] / total)) for name in CAUSES if name in parts)
 
 
 def turned_alike(stretches: Sequence[Stretch], horizon_s: float) -> FloatArray:
-    """(n,) how much of a vector of the body is still the same in the world, at times from 0 to ``horizon_s``: a third
-    of the trace of the turn, its mean over all starts."""
+    """(n,) mean correlation, in the world frame, of a body-fixed vector after times from 0 to ``horizon_s``: trace/3 of
+    the rotation, averaged over all starts."""
     step_s = float(np.median(np.diff(stretches[0].time_s)))
     alike = []
     for ahead in range(max(1, round(horizon_s / step_s)) + 1):
@@ -315,7 +315,7 @@ def turned_alike(stretches: Sequence[Stretch], horizon_s: float) -> FloatArray:
 
 
 def _twice_summed(h: float, tau_s: FloatArray, alike: FloatArray) -> FloatArray:
-    """Variance of the integral over h of a Matérn-3/2 process of variance one, of which ``alike`` stays the same."""
+    """Variance (k,) of the integral over h of a unit Matérn-3/2 process, its correlation multiplied by ``alike``."""
     lag = np.linspace(0.0, h, 101)
     kernel = matern(lag[None, :], tau_s[:, None]) * np.interp(lag, np.linspace(0.0, h, len(alike)), alike)
     return np.asarray(2.0 * trapezoid((h - lag) * kernel, lag, axis=1))

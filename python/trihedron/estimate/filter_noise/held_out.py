@@ -1,4 +1,4 @@
-"""Errors of a filter that carries on alone for some time, against what its covariance predicts."""
+"""Errors of a filter without updates over a horizon, against the covariance that it predicts."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from trihedron.estimate.filter_noise.stretch import Stretch
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """NEES of every start (n,) of one horizon, mean squares of error and prediction [SI²], starts apart."""
+    """NEES (n,) of all starts, mean squares of actual and predicted error [SI²], number of starts without overlap."""
 
     nees: FloatArray
     actual: float
@@ -22,11 +22,11 @@ class Errors:
 
 
 def errors_over(stretches: Sequence[tuple[Stretch, int]], draws: FloatArray, horizon_s: float) -> Errors | None:
-    """What lies ``horizon_s`` ahead, predicted from all before; of each stretch from block number ``first`` on.
+    """Prediction errors ``horizon_s`` ahead from all earlier observations; of each stretch from block ``first`` on.
 
-    With V = L Lᵀ and w = L⁻¹y an observation j given those up to k is L[j, :k] w[:k], and its covariance is
-    L[j, k:j] L[j, k:j]ᵀ: one factor holds the filter over every horizon. Strengths are known by ``draws`` (d, 7): means
-    and covariances are those of the mixture. None where no start has room.
+    With V = L Lᵀ and w = L⁻¹y the prediction of observation j from those up to k is L[j, :k] w[:k], its covariance
+    L[j, k:j] L[j, k:j]ᵀ: one factor gives the filter over every horizon. Means and covariances are those of the mixture
+    over ``draws`` (d, 7) of the strengths. None where no stretch is long enough.
     """
     nees, actual, predicted, apart = [], [], [], 0
     for stretch, first in stretches:
@@ -52,7 +52,7 @@ def errors_over(stretches: Sequence[tuple[Stretch, int]], draws: FloatArray, hor
 
 
 def _ahead(stretch: Stretch, strengths: FloatArray, ahead: int, targets: np.ndarray) -> tuple[FloatArray, FloatArray]:
-    """Errors (n, 3) and their covariances (n, 3, 3) under one set of strengths."""
+    """Errors (n, 3) of the blocks ``targets`` (n,) and their covariances (n, 3, 3) under one set of strengths."""
     L, w = stretch.factor(strengths)
     errors, covariances = np.empty((len(targets), 3)), np.empty((len(targets), 3, 3))
     for k, j in enumerate(targets):

@@ -1,4 +1,4 @@
-"""What S and g-sensitivity would leave over a horizon in a filter that does not know them, drawn from the fit."""
+"""Error over a horizon of a filter that does not correct S and g-sensitivity, drawn from their posterior."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from trihedron.records.filter_noise import Cause
 Left = dict[float, dict[Cause, FloatArray]]
 """Mean squares (k,) [rad²] by horizon and cause."""
 SIZES = np.geomspace(1e-5, 0.1, 33)
-"""Of the elements of a scale matrix."""
+"""Sizes tried for the error of the elements of S."""
 G_SENSITIVITY = "gyro-g-sensitivity"
 PARTS = np.geomspace(1e-2, 10.0, 33)
-"""Of g-sensitivities, in the size that data sheets give."""
+"""Sizes tried for the g-sensitivity, in units of the data sheets' typical value."""
 FLAT = 1e-2
-"""Information, in units of a prior that is taken out, that keeps what no motion shows invertible."""
+"""Fraction of the prior's information that stays when a prior is removed, so that the covariance is invertible."""
 
 
 def left_over(found: MotionFit, horizons_s: Sequence[float]) -> Left:
-    """Mean squares, over all starts of every horizon, of what one scale, square axes and no g-sensitivity leave.
+    """Mean square errors over all starts of every horizon of a gyro with one scale, orthogonal axes, no g-sensitivity.
 
-    The mounting is nobody's fault, and a filter finds the bias: neither counts.
+    The mounting is no calibration error, and a filter estimates the bias: neither is included.
     """
     side, point = found.sides[0], found.points[0]
     grid = side.grid
     C = side.reference.attitude(grid.time_s * (1.0 + point.rate) + point.offset_s) @ point.mounting
 
     def carried(signal: FloatArray) -> FloatArray:
-        """(n, 3, 9) angle so far by each element of a matrix that multiplies a signal (n, 3)."""
+        """(n, 3, 9) derivative of the angle by the elements of a matrix times a signal (n, 3) less its mean."""
         apart = np.where(side.seen[:, None], signal - signal[side.seen].mean(axis=0), 0.0)
         return np.cumsum(np.einsum("nij,nk->nijk", C, apart).reshape(len(C), 3, 9), axis=0) * grid.step_s
 
     S, cov = found.value(0, "S"), found.covariance(0, ("S",))
     across = _across(S)
-    # A matrix has six numbers beside a rotation: in the other three nothing is ever seen, of any size.
+    # Without its rotation a matrix has six degrees of freedom: the other three directions are excluded.
     u, gains, _ = np.linalg.svd(across)
     kept = u[:, gains > 0.5]
     elements = drawn_errors(kept.T @ left_of(S), kept.T @ across @ cov @ across.T @ kept, SIZES) @ kept.T
@@ -55,7 +55,7 @@ def left_over(found: MotionFit, horizons_s: Sequence[float]) -> Left:
 
 
 def _g_sensitivities(found: MotionFit) -> FloatArray:
-    """(k, 9) drawn from what the log says of them, without the fit's prior: all of one size, small ones as likely."""
+    """(k, 9) draws of the g-sensitivity: its likelihood without the fit's prior, with one size for all elements."""
     name = G_SENSITIVITY
     size = float(np.mean(found.wider.get(name, 1.0) * found.sides[0].sigma(name)))
     inverse = np.linalg.inv(found.covariance(0, (name,)))
@@ -68,15 +68,15 @@ def _steps(angle: FloatArray, ahead: int) -> FloatArray:
 
 
 def mean_square(steps: FloatArray, errors: FloatArray) -> FloatArray:
-    """(k,) of errors (k, f) over many starts, by what each number does from each start on (n, 3, f)."""
+    """(k,) mean square error of parameter errors (k, f), from their derivatives (n, 3, f) at n starts."""
     square = np.einsum("nai,naj->ij", steps, steps) / max(1, len(steps))
     return np.asarray(np.einsum("ki,ij,kj->k", errors, square, errors))
 
 
 def drawn_errors(seen: FloatArray, cov: FloatArray, sizes: FloatArray, n: int = DRAWN, seed: int = 0) -> FloatArray:
-    """(n, f) errors of numbers seen as ``seen`` (f,) with covariance (f, f), all of one unknown size among ``sizes``.
+    """(n, f) posterior draws of errors with estimate ``seen`` (f,), covariance (f, f) and one prior σ among ``sizes``.
 
-    What noise alone makes of a perfect matrix is no error: without a common size its square would be twice counted.
+    Without the prior the variance of the estimate would count twice: noise makes a perfect matrix seem imperfect.
     """
     width = [cov + size**2 * np.eye(len(seen)) for size in sizes]
     log_p = np.array([-0.5 * (np.linalg.slogdet(V)[1] + seen @ np.linalg.solve(V, seen)) for V in width])
@@ -92,14 +92,14 @@ def drawn_errors(seen: FloatArray, cov: FloatArray, sizes: FloatArray, n: int = 
 
 
 def _across(S: FloatArray) -> FloatArray:
-    """(9, 9) derivative of what is left of S."""
+    """(9, 9) derivative of :func:`left_of` with respect to S."""
     step = 1e-6 * float(np.linalg.norm(S))
     return np.array([(left_of(S + step * e) - left_of(S - step * e)) / (2.0 * step) for e in np.eye(9)]).T
 
 
 def left_of(S: FloatArray) -> FloatArray:
-    """(9,) S less the square, equal one that comes nearest to it; of readings in SI its scale is one."""
+    """(9,) S less the nearest orthogonal matrix times one scale; the scale is 1 for readings in SI."""
     u, s, vt = np.linalg.svd(S.reshape(3, 3))
-    # Of counts the scale is a data sheet's, and no error.
+    # For counts the mean scale is nominal and no error.
     scale = 1.0 if 0.5 < float(np.mean(s)) < 2.0 else float(np.mean(s))
     return np.asarray(S - scale * (u @ vt).ravel())

@@ -1,4 +1,4 @@
-"""Without a reference: noise at rest as identified, and what changes between static intervals."""
+"""Without a reference: static noise as identified, and changes of bias and gravity between static intervals."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from trihedron.records import NoiseAxis, Segments, TermName
 from trihedron.records.filter_noise import Bounded, IntervalCheck, StaticNoise, TiltCheck
 
 LONGEST_MOVE_S = 60.0
-"""Beyond a minute between two poses the bias may have gone anywhere."""
+"""Longest move that is used: over more than a minute the bias may drift arbitrarily."""
 
 
 def at_rest(axes: Sequence[NoiseAxis], unit: str) -> StaticNoise | None:
-    """N and K, root mean squares over a sensor's axes in ``unit``, with their intervals; None without a sensor."""
+    """Static N and K, rms over the axes with this unit, with 95 % intervals; None where no axis has the unit."""
     own = [axis for axis in axes if axis.unit == unit]
     return StaticNoise(_pooled(own, TermName.WHITE), _pooled(own, TermName.RATE_RANDOM_WALK)) if own else None
 
 
 def unlike_axes(axes: Sequence[NoiseAxis], unit: str) -> tuple[Bounded, ...]:
-    """N of each axis of a sensor, where two of their intervals do not meet; else nothing."""
+    """N of each axis of a sensor where two of the 95 % intervals do not overlap, else ``()``."""
     each = [axis.terms[TermName.WHITE] for axis in axes if axis.unit == unit]
     if len(each) < 2 or max(t.lower for t in each) <= min(t.upper for t in each):
         return ()
@@ -36,7 +36,7 @@ def _pooled(axes: Sequence[NoiseAxis], term: TermName) -> Bounded:
         limit = _rms([max(one.limit, one.value) for one in terms])
         return Bounded(0.0, 0.0, limit, True)
     value = _rms([one.value for one in terms])
-    # Axes are estimated independently: their relative errors add in squares.
+    # Errors of the axes are independent: variances add.
     spread = math.sqrt(sum(one.sigma**2 * one.value**2 for one in terms)) / (len(terms) * max(value, 1e-300))
     factor = math.exp(1.96 * spread / max(value, 1e-300))
     return Bounded(value, value / factor, value * factor)
@@ -47,10 +47,10 @@ def _rms(values: Sequence[float]) -> float:
 
 
 def tilt_over_moves(time_s: FloatArray, rate: FloatArray, segments: Segments, static: StaticNoise) -> TiltCheck | None:
-    """Gravity carried by the gyro (n, 3) [rad/s] over every move against gravity measured after it.
+    """Tilt errors after rotations, from gyro rates (n, 3) [rad/s], with their prediction from the static N.
 
-    The bias is the mean of the poses on both sides; turns about the vertical stay unseen. None without a move.
-    """
+    The bias is the mean rate of the poses on both sides; rotation about the vertical is not observable. None without a
+    move."""
     means = segments.accelerometer_mean
     if means is None:
         return None
@@ -79,9 +79,9 @@ def tilt_over_moves(time_s: FloatArray, rate: FloatArray, segments: Segments, st
 def between_intervals(
     time_s: FloatArray, rate: FloatArray, segments: Segments, static: StaticNoise
 ) -> IntervalCheck | None:
-    """The gyro's mean (n, 3) [rad/s] and gravity's length from one static interval to the next; None of fewer than two.
+    """Changes of the mean of ``rate`` (n, 3) [rad/s] and of |g| between static intervals; None with fewer than two.
 
-    A limit of K is taken for K: a change beyond it is no walk that the longest stretch allows.
+    Where K is an upper limit, the limit predicts: a larger change exceeds any random walk that the noise allows.
     """
     means, poses = segments.accelerometer_mean, segments.poses
     if means is None or len(poses) < 2:

@@ -1,4 +1,4 @@
-"""Strengths of noise by evidence: draws of their posterior, and a bias that forgets."""
+"""Noise strengths by evidence: draws of their posterior, and a comparison with a Gauss-Markov bias."""
 
 from __future__ import annotations
 
@@ -17,47 +17,47 @@ from trihedron.records.filter_noise import Bounded
 Mask = npt.NDArray[np.bool_]
 
 COORDINATES = ("noise", "vibration", "bias_walk", "white", "slow", "slow_s", "body")
-"""Logarithms of strengths, ``slow`` that of the reference's whole slow error, and last a standard normal number whose
-quantile is the angle, in right angles, between it and its part in the world: two strengths of which either may be
-nothing would have a posterior with a corner. The ratio of the two is then half-Cauchy; with the quantile as the part of
-the *square* that turns with the body, none of it was so unlikely that the whole came out too small."""
+"""Coordinates of the search: logarithms of strengths; ``slow`` is the reference's total slow error; ``body`` is a
+standard normal number whose quantile Φ(x), in right angles, is the angle with world part ``slow`` cos, body part
+``slow`` sin. Two strengths that may both be zero would have a posterior with a corner. The ratio of the parts is then
+half-Cauchy; Φ(x) as the share of the *square* makes a zero body part so unlikely that ``slow`` comes out too small."""
 MAY_BE_NOTHING = np.isin(COORDINATES, ("vibration", "bias_walk", "white", "slow"))
 NU = 3.0
-"""Degrees of freedom of its prior, the fewest with a mean square: a predicted covariance is one."""
+"""Degrees of freedom of the half-Student prior: the fewest with a mean square, which a predicted covariance needs."""
 MEDIAN = float(np.log(stdtrit(NU, 0.75)))
-"""Logarithm of its median for scale one: that is where the usual size stands."""
+"""Log of the median of a half-Student distribution of scale one: the prior's median is the usual size."""
 HALF = float(np.log(2.0) + gammaln(0.5 * NU + 0.5) - gammaln(0.5 * NU) - 0.5 * np.log(np.pi * NU))
 FARTHEST = 4.0
-"""Coordinates beyond four prior σ are those of nothing."""
+"""Limit of the search in prior σ: beyond it a strength is negligible."""
 STEP = 1e-3
 """Step in a coordinate for derivatives of the covariance."""
 SEARCHES, LONGEST_STEP, ENOUGH = 80, 2.0, 0.01
-"""Steps of the search, the longest of them, and the gain of the log posterior at which it ends."""
+"""Most steps of the search, longest step in a coordinate, and gain of the log posterior below which it ends."""
 ROUNDS, MOST_ROUNDS, PROPOSED, DRAWN = 3, 15, 100, 400
-"""Rounds of proposals at least and at most, proposals of each, and draws that are made of them."""
+"""Fewest and most rounds of proposals, proposals per round, and number of draws returned."""
 LEAST_DRAWS, ENOUGH_DRAWS = 3, 15
-"""Independent draws for each strength below which their covariance is too narrow, or singular, to propose from, and
-with which sampling may end."""
+"""Effective draws per strength: below the first their covariance is too narrow, or singular, for proposals; above the
+second sampling may end."""
 TAILS = 5.0
-"""Degrees of freedom of a proposal: heavier tails than a posterior's."""
+"""Degrees of freedom of a proposal: heavier tails than the posterior's."""
 TIMES_S = (10.0, 30.0, 100.0)
-"""Time constants of a Gauss-Markov bias that are tried beside the walk."""
+"""Correlation times of a Gauss-Markov bias that are compared with the random walk."""
 PREFERRED = 6.0
-"""2 ln of the evidence by which the bias has to be Gauss-Markov: three time constants are tried (2 ln 3) and 4 more."""
+"""Gain in 2 ln evidence that a Gauss-Markov bias needs: 2 ln 3 for three time constants, and 4."""
 WIDER_BY, LEAST_SIGMA = 2.0, 0.2
-"""Prior σ of what another sensor's draws tell, in theirs: both see the same course of the reference's error, and what
-that course tells of its strength counts once. No less than the number of draws tells."""
+"""Prior σ from another sensor's draws, in their σ, and its minimum (finite number of draws): both sensors observe one
+realisation of the reference's error, whose information about the strength counts once."""
 ABSENT = 30.0
-"""An interval that reaches over more than this factor says how large the strength can be, and no more."""
+"""Ratio of the ends of a 95 % interval above which only the upper limit is stated."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Of the coordinates: ``mean`` (7,), ``sigma`` (7,); ``is_there`` (7,) those that there are.
+    """Prior of the coordinates: ``mean`` (7,), ``sigma`` (7,); ``is_there`` (7,) is 1 for those in the model.
 
-    A strength that ``may_be_nothing`` (7,) has half a Student's distribution of that median (Gelman 2006): flat towards
-    nothing, so that what a log does not show has an upper limit of the log and not of the prior. ``sigma`` then bounds
-    the search. The others are normal.
+    A strength that ``may_be_nothing`` (7,) has a half-Student prior with median exp(mean) (Gelman 2006): flat towards
+    zero, so that the log and not the prior sets the upper limit of a strength that is not detected. ``sigma`` then
+    bounds the search. The other coordinates are normal.
     """
 
     mean: FloatArray
@@ -68,8 +68,8 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Likeliest strengths (7,) in SI, log evidence of the model, draws (k, 7) of the strengths' posterior, and of how
-    many independent ones those are worth."""
+    """Strengths (7,) in SI at the posterior maximum, log evidence of the model, posterior draws (k, 7) of the
+    strengths, and their effective number."""
 
     mode: FloatArray
     evidence: float
@@ -78,15 +78,14 @@ class Fitted:
 
     @property
     def is_settled(self) -> bool:
-        """Whether enough draws count for moments of the strengths."""
+        """Whether the effective number of draws exceeds ``LEAST_DRAWS`` per free strength."""
         return bool(self.n_effective > LEAST_DRAWS * np.count_nonzero(np.ptp(self.draws, axis=0)))
 
 
 def most_likely(stretches: Sequence[Stretch], prior: Prior) -> tuple[FloatArray, FloatArray]:
-    """Coordinates (f,) that the model has at their greatest posterior, and its information (f, f) there.
+    """Free coordinates (f,) at the posterior maximum, and the information (f, f) there.
 
-    Steps of Levenberg and Marquardt with the average information: the posterior has ridges along which a search that
-    knows only slopes stops early.
+    Levenberg-Marquardt steps with the average information: along the posterior's ridges a gradient search stops early.
     """
     free = prior.is_there > 0.0
     reach = (FARTHEST - 0.1) * prior.sigma[free]
@@ -112,10 +111,10 @@ def most_likely(stretches: Sequence[Stretch], prior: Prior) -> tuple[FloatArray,
 
 
 def _slope(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Derivatives (f,) of the log posterior, and its average information (f, f; Gilmour et al. 1995)."""
+    """Gradient (f,) of the log posterior, and its average information (f, f; Gilmour et al. 1995)."""
     free = prior.is_there > 0.0
     far, sigma = x - prior.mean[free], prior.sigma[free]
-    # Of the logarithm, on average over the prior.
+    # Second derivative by the logarithm, averaged over the prior.
     slope = np.where(prior.may_be_nothing[free], _half_slope(far), -far / sigma**2)
     information = np.diag(np.where(prior.may_be_nothing[free], 2.0 * NU / (NU + 3.0), 1.0 / sigma**2))
     at = whole(prior, x)
@@ -135,12 +134,12 @@ def _slope(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> tuple[F
 
 
 def _half_slope(far: FloatArray) -> FloatArray:
-    """Derivative of the logarithm of half a Student's density."""
+    """Derivative of the log half-Student density by the logarithm of the strength."""
     return np.asarray(1.0 - (NU + 1.0) / (1.0 + NU * np.exp(-2.0 * (far + MEDIAN))))
 
 
 def height(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> float:
-    """Log evidence and prior of coordinates (f,) that the model has."""
+    """Log posterior (evidence times prior) at free coordinates (f,); -inf outside ``FARTHEST``."""
     free = prior.is_there > 0.0
     far, sigma = x - prior.mean[free], prior.sigma[free]
     if np.any(np.abs(far) > (FARTHEST + STEP) * sigma):
@@ -153,7 +152,7 @@ def height(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> float:
 
 
 def whole(prior: Prior, x: FloatArray) -> FloatArray:
-    """(7,) strengths in SI of coordinates (f,); those that the model does not have are none."""
+    """Strengths (7,) in SI from free coordinates (f,); strengths that are not in the model are 0."""
     every = np.full(len(COORDINATES), -np.inf)
     every[prior.is_there > 0.0] = x
     angle = 0.5 * np.pi * float(ndtr(every[-1]))
@@ -162,14 +161,14 @@ def whole(prior: Prior, x: FloatArray) -> FloatArray:
 
 
 def with_slow_error_of(prior: Prior, draws: FloatArray) -> Prior:
-    """The prior of another sensor beside the same reference, whose slow error is as ``draws`` (k, 7) of this one have
-    it: one error turns the angles of the one and tilts gravity for the other."""
+    """``prior`` of another sensor with the reference's slow error from ``draws`` (k, 7) of this sensor: it is one
+    attitude error, in the angle of the gyro and in the tilt of gravity for the accelerometer."""
     s = dict(zip(NAMES, draws.T, strict=True))
     right_angles = np.arctan2(s["body"], s["world"]) / (0.5 * np.pi)
     told = {
         "slow": np.log(np.hypot(s["world"], s["body"])),
         "slow_s": np.log(s["slow_s"]),
-        # Within five sigma: rounding makes a part of the one or of the other exactly nothing.
+        # Clipped at 5 σ: rounding makes some parts exactly zero.
         "body": np.clip(ndtri(right_angles), -5.0, 5.0),
     }
     mean, sigma, may_be_nothing = prior.mean.copy(), prior.sigma.copy(), prior.may_be_nothing.copy()
@@ -180,8 +179,8 @@ def with_slow_error_of(prior: Prior, draws: FloatArray) -> Prior:
 
 
 def fit(stretches: Sequence[Stretch], prior: Prior) -> Fitted:
-    """Posterior of the strengths by importance: each round's proposals are Student's with the moments of all before,
-    and every proposal counts against the mixture of all rounds (Cornuet et al. 2012).
+    """Posterior of the strengths by adaptive importance sampling (Cornuet et al. 2012): each round proposes from
+    Student's distribution with the moments of all earlier draws; weights are against the mixture of all rounds.
     """
     middle, information = most_likely(stretches, prior)
     first = np.linalg.inv(information)
@@ -200,7 +199,7 @@ def fit(stretches: Sequence[Stretch], prior: Prior) -> Fitted:
         weights /= weights.sum()
         if drawn >= ROUNDS and _effective(weights) > ENOUGH_DRAWS * len(middle):
             break
-        # Few that count would make the next proposal too narrow: flatter weights until there are enough.
+        # Too few effective draws make the next proposal too narrow: the weights are flattened until there are enough.
         flat = weights if _effective(weights) > LEAST_DRAWS * len(middle) else np.sqrt(weights) / np.sqrt(weights).sum()
         middle = flat @ x
         spread = ((x - middle).T * flat) @ (x - middle) + 0.02 * first
@@ -215,7 +214,7 @@ def _effective(weights: FloatArray) -> float:
 
 
 def _mixture(x: FloatArray, proposals: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
-    """(k,) log density of points (k, f) under the mean of Student's distributions, by middle and root."""
+    """(k,) log density of points (k, f) under the equal mixture of Student's distributions (mean, Cholesky root)."""
     n = x.shape[1]
     norm = gammaln(0.5 * (TAILS + n)) - gammaln(0.5 * TAILS) - 0.5 * n * np.log(TAILS * np.pi)
     each = []
@@ -226,14 +225,15 @@ def _mixture(x: FloatArray, proposals: Sequence[tuple[FloatArray, FloatArray]]) 
 
 
 def bounded(values: Sequence[float] | FloatArray) -> Bounded:
-    """Median and 95 % interval of draws; only a limit where the interval reaches over a factor of ``ABSENT``."""
+    """Median and 95 % interval of draws; an upper limit where the interval spans more than a factor of ``ABSENT``."""
     low, middle, high = (float(v) for v in np.quantile(values, [0.025, 0.5, 0.975]))
     is_limit = high > 0.0 and low < high / ABSENT
     return Bounded(middle, 0.0 if is_limit else low, high, is_limit)
 
 
 def forgetting(stretches: Sequence[Stretch], walk: Fitted) -> tuple[float, float, float]:
-    """(2 ln gain, σ, time constant) of the best Gauss-Markov bias over the walk, the other strengths as they are."""
+    """Gain in 2 ln evidence, σ [SI] and correlation time [s] of the best Gauss-Markov bias over the random walk, with
+    the other strengths fixed."""
     at = NAMES.index("bias_walk")
     best = (-np.inf, 0.0, 0.0)
     for tau in TIMES_S:

@@ -1,7 +1,7 @@
-"""A stretch of a log beside its reference: observations, columns of what is constant, covariances of what is random.
+"""A stretch of a log beside its reference: observations, columns of constant parameters, covariances of random errors.
 
-Everything is linear (docs/reference.md, eq. 1) and Gaussian, so the covariance of a whole stretch is a sum of fixed
-matrices, each with one strength; those of slow errors change with a time constant (docs/filter-noise.md).
+The model is linear (docs/reference.md, eq. 1) and Gaussian: the covariance of a stretch is a sum of fixed matrices,
+each with one strength; the matrices of slow errors depend on a time constant (docs/filter-noise.md).
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from trihedron.arrays import FloatArray
 AnyFloats = np.ndarray[Any, np.dtype[Any]]
 
 NAMES = ("noise", "vibration", "bias_walk", "white", "world", "body", "slow_s")
-"""Strengths of a stretch, in this order."""
+"""Order of the seven strengths of a stretch."""
 ALIKE = ("noise", "vibration", "white")
-"""Those whose errors have the same size along every axis."""
+"""Strengths whose errors are equal and independent on the three axes."""
 BLOCK_ENDS, TRIANGLE_ENDS = (1.0 / 6.0, 0.0), (7.0 / 30.0, 1.0 / 120.0)
-"""A mean over a block has a third of the block's variance, and not half; a triangular one over two blocks 4/15."""
+"""Corrections (diagonal, neighbour) to min(t, t') at the middles, in the variance that a random walk gains per block:
+a block mean contains 1/3 of it instead of 1/2, a triangular mean over two blocks 4/15."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Observations ``observed`` (3 m,) at ``time_s`` (m,), columns (3 m, p) in units of their prior, p standard normal.
+    """Observations ``observed`` (3 m,) at ``time_s`` (m,); ``columns`` (3 m, p) scaled to a prior σ of 1.
 
-    ``centre`` (p,) is where that prior stands; ``alike`` the covariances (m, m), the same along every axis, of noise,
-    vibration and white error of the reference for strength one, ``bias_walk`` (3 m, 3 m) that of a bias that walks;
-    ``tilts`` (m, 3, 3) what an attitude error of the world up to an observation adds to it and to all later ones, None
-    where it is the observation itself; ``given`` (3 m, 3 m) a covariance that is known, or None;
-    ``attitude`` (m, 3, 3) is the body's; ``bias_steps`` (3 m, 3 m) is what a bias of each block does to the
-    observations; ``power`` (m,) the vibration's, mean one; ``ends`` the parts of a block's variance by which a mean of
-    a walk, and two neighbouring ones, have less than min(t, t') of their middles; ``kelvin`` (m,) a logged
-    temperature about its mean, whose bias is the last three columns, in units of ``kelvin_size`` [SI/K].
+    ``centre`` (p,) is the prior mean; ``alike`` the covariances (m, m), equal on every axis, of noise, vibration and
+    white error of the reference for strength 1; ``bias_walk`` (3 m, 3 m) that of the bias random walk; ``tilts``
+    (m, 3, 3) the increment that an attitude error in the world frame adds to an observation and to all later ones, None
+    where the observation is the angle itself; ``given`` (3 m, 3 m) a known covariance, or None; ``attitude`` (m, 3, 3)
+    body to world; ``bias_steps`` (3 m, 3 m) the derivative of the observations with respect to the bias in each block;
+    ``power`` (m,) that of vibration, with mean 1; ``ends`` as ``BLOCK_ENDS``; ``kelvin`` (m,) the logged temperature
+    less its mean, ``kelvin_size`` [SI/K] the prior σ of the bias per kelvin, which is the last three columns.
     """
 
     time_s: FloatArray
@@ -56,7 +56,7 @@ class Stretch:
 
     @cached_property
     def tilted(self) -> tuple[FloatArray, FloatArray]:
-        """(m, 3, m, 3) covariances of what one attitude error of the world, and of the body, adds at all times."""
+        """(m, 3, m, 3) covariances of the increments for a unit attitude error, world-fixed and body-fixed."""
         assert self.tilts is not None
         own = self.tilts @ self.attitude
         world, body = (np.asarray(np.einsum("kij,lmj->kilm", by, by)) for by in (self.tilts, own))
@@ -64,16 +64,16 @@ class Stretch:
 
     @cached_property
     def turned(self) -> FloatArray:
-        """(m, 3, m, 3) the bodies' attitudes to one another."""
+        """(m, 3, m, 3) products C_k C_lᵀ of the body's attitudes at blocks k and l."""
         return np.asarray(np.einsum("kij,lmj->kilm", self.attitude, self.attitude))
 
     @cached_property
     def lag_s(self) -> FloatArray:
-        """(m, m) between the observations."""
+        """(m, m) time differences between the observations [s]."""
         return np.abs(np.subtract.outer(self.time_s, self.time_s))
 
     def covariance(self, strengths: FloatArray) -> FloatArray:
-        """(3 m, 3 m) of everything random, under strengths (7,) in SI, a zero being none."""
+        """Covariance (3 m, 3 m) of all random errors under ``strengths`` (7,) in SI; a strength may be 0."""
         s = dict(zip(NAMES, strengths, strict=True))
         m = len(self.time_s)
         correlation = matern(self.lag_s, s["slow_s"])
@@ -97,21 +97,21 @@ class Stretch:
         return self.evidence_under(self.covariance(strengths))
 
     def evidence_under(self, V: FloatArray) -> float:
-        """The same under any covariance (3 m, 3 m)."""
+        """Log evidence under a given covariance (3 m, 3 m); -inf where it is singular."""
         try:
             L = cholesky(V, lower=True, check_finite=False)
             half = solve_triangular(L, np.column_stack([self.columns, self.observed]), lower=True, check_finite=False)
             X, y = half[:, :-1], half[:, -1] - half[:, :-1] @ self.centre
             inner = cholesky(np.eye(X.shape[1]) + X.T @ X, lower=True, check_finite=False)
         except np.linalg.LinAlgError:
-            # Strengths so unlike that V is singular to working precision.
+            # The strengths differ so much that V is singular in double precision.
             return -np.inf
         gain = solve_triangular(inner, X.T @ y, lower=True)
         log_det = np.sum(np.log(np.diag(L))) + np.sum(np.log(np.diag(inner)))
         return float(-0.5 * (y @ y - gain @ gain) - log_det - 0.5 * len(y) * np.log(2.0 * np.pi))
 
     def coefficients(self, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Posterior mean (p,) and covariance (p, p) of the columns' coefficients, beside ``centre``."""
+        """Posterior mean (p,), relative to ``centre``, and covariance (p, p) of the columns' coefficients."""
         L = cholesky(self.covariance(strengths), lower=True, check_finite=False)
         y = self.observed - self.columns @ self.centre
         half = solve_triangular(L, np.column_stack([self.columns, y]), lower=True, check_finite=False)
@@ -119,13 +119,13 @@ class Stretch:
         return covariance @ (half[:, :-1].T @ half[:, -1]), covariance
 
     def factor(self, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Cholesky factor (3 m, 3 m) of the covariance with the columns' prior in it, and whitened observations."""
+        """Cholesky factor (3 m, 3 m) of the covariance plus the columns' prior, and whitened observations (3 m,)."""
         V = self.covariance(strengths) + self.columns @ self.columns.T
         L = cholesky(V, lower=True, check_finite=False)
         return L, solve_triangular(L, self.observed - self.columns @ self.centre, lower=True, check_finite=False)
 
     def part(self, first: int, last: int) -> Stretch:
-        """Blocks from ``first`` up to ``last``."""
+        """The stretch of blocks ``first`` to ``last`` (exclusive)."""
         rows = slice(3 * first, 3 * last)
         at = slice(first, last)
         return replace(
@@ -144,7 +144,7 @@ class Stretch:
         )
 
     def with_gauss_markov(self, correlation_time_s: float) -> Stretch:
-        """The bias as a Gauss-Markov process of that time constant, its strength the σ [SI]."""
+        """The stretch with a Gauss-Markov bias of this correlation time [s]; its strength is the stationary σ [SI]."""
         steps = self.bias_steps.shape[1] // 3
         h = float(np.median(np.diff(self.time_s)))
         lag = np.abs(np.subtract.outer(np.arange(steps), np.arange(steps))) * h
@@ -153,14 +153,14 @@ class Stretch:
 
 
 def matern(lag_s: FloatArray | float, tau_s: FloatArray | float) -> FloatArray:
-    """Matérn-3/2 correlation over some lags: a smoothed truth has a derivative."""
+    """Matérn-3/2 correlation at lags [s]: the error of a smoothed reference is differentiable."""
     x = np.sqrt(3.0) * lag_s / np.maximum(tau_s, 1e-9)
     return np.asarray((1.0 + x) * np.exp(-x))
 
 
 def accumulated(per_block: FloatArray, ends: tuple[float, float]) -> FloatArray:
-    """(m, m) covariance of means of a walk with a rate of its own in every block (m,): min(t, t') of their middles,
-    less what ``ends`` says."""
+    """(m, m) covariance of block means of a random walk whose variance grows by ``per_block`` (m,): min(t, t') at the
+    middles of the blocks, less the corrections ``ends``."""
     upto = np.cumsum(per_block) - 0.5 * per_block
     neighbours = np.eye(len(upto), k=1) + np.eye(len(upto), k=-1)
     less = np.diag(ends[0] * per_block) + ends[1] * per_block.mean() * neighbours
@@ -168,8 +168,8 @@ def accumulated(per_block: FloatArray, ends: tuple[float, float]) -> FloatArray:
 
 
 def walked(steps: FloatArray) -> FloatArray:
-    """Covariance (3 m, 3 m) of a bias that walks by one per block: ``steps`` (3 m, 3 m) is what each block's does."""
-    # From block j on all later ones carry the change: sums from behind.
+    """Covariance (3 m, 3 m) from a bias random walk with unit steps per block; ``steps`` as ``Stretch.bias_steps``."""
+    # A step at block j persists in all later blocks: cumulative sums from the end.
     m = steps.shape[1] // 3
     carried = np.cumsum(steps.reshape(len(steps), m, 3)[:, ::-1], axis=1)[:, ::-1].reshape(len(steps), -1)
     return np.asarray(carried @ carried.T)

@@ -1,4 +1,4 @@
-"""The part of the bias that follows a logged temperature: columns of a stretch, and its share of the error."""
+"""Bias proportional to a logged temperature: columns of a stretch, and its share of the error."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
 from trihedron.records import Recording
 
 PER_KELVIN = {"gyroscope": 4e-4, "accelerometer": 5e-3}
-"""How far biases of parts move [SI/K], one σ, as the session's effects of temperature have it."""
+"""Temperature coefficient of the bias [SI/K], 1 σ over parts, as in the session's temperature effects."""
 WIDE = 3.0
-"""The columns' prior in those: a part may be worse than most."""
+"""Prior σ of the columns in units of ``PER_KELVIN``: a part may be worse than most."""
 SIZES = np.geomspace(1e-3, 2.0, 33)
-"""Of the biases per kelvin that are tried, in those of the prior."""
+"""Sizes of the temperature coefficient that are tried, in units of the prior σ."""
 GROUPS = 40
-"""Of draws with like K; the biases per kelvin of a group are those under the strengths in its middle."""
+"""Groups of draws with similar K: the coefficients of a group use the strengths of its median draw."""
 LEAST_SWING_K = 0.3
-"""A sensor's own thermometer scatters by some hundredths."""
+"""Least temperature range [K] that is used: a sensor's own thermometer has noise of some 0.01 K."""
 
 
 def beside_temperature(stretches: Sequence[Stretch], recording: Recording, per_kelvin: float) -> list[Stretch]:
-    """Stretches with three columns for a bias along a logged temperature; as they are where none was logged or moved.
+    """Stretches with three columns for a bias proportional to the logged temperature, with prior σ ``WIDE per_kelvin``.
 
-    ``per_kelvin`` is the size of such a bias [SI/K].
+    Unchanged where no temperature was logged or its range is below ``LEAST_SWING_K``. ``per_kelvin`` is in SI/K.
     """
     degrees = recording.temperature_degc
     if degrees is None:
@@ -40,7 +40,7 @@ def beside_temperature(stretches: Sequence[Stretch], recording: Recording, per_k
     heated = np.append(0.0, np.cumsum(0.5 * (value[1:] + value[:-1]) * np.diff(time)))
 
     def mean_of_blocks(at: FloatArray) -> FloatArray:
-        # Means: a thermometer's scatter and its LSB are no temperature.
+        # Block means reduce the thermometer's noise and resolution.
         half = 0.5 * float(np.median(np.diff(at)))
         first, last = np.clip(at - half, time[0], time[-1]), np.clip(at + half, time[0], time[-1])
         covered = np.maximum(last - first, 1e-9)
@@ -68,8 +68,8 @@ def _with_columns(stretch: Stretch, kelvin: FloatArray, size: float) -> Stretch:
 
 
 def of_temperature(stretches: Sequence[Stretch], found: Fitted, horizons_s: Sequence[float]) -> Left:
-    """Mean squares, over all starts of every horizon, of what the temperature's change since the start makes of the
-    bias; nothing where none was logged."""
+    """Mean square errors, over all starts of every horizon, from the change of bias with temperature since the start;
+    empty where no temperature was logged."""
     told = [one for one in stretches if one.kelvin is not None]
     if not told:
         return {}
@@ -83,13 +83,13 @@ def of_temperature(stretches: Sequence[Stretch], found: Fitted, horizons_s: Sequ
 def _drawn(told: Sequence[Stretch], found: Fitted) -> FloatArray:
     """(k, 3) bias per kelvin [SI/K], one for each draw of the strengths.
 
-    What moves slowly is temperature or walk: each goes with a K near that of its own draw.
+    A slow bias change is due to temperature or to the random walk: each coefficient is drawn under a K near its draw's.
     """
     order = np.argsort(found.draws[:, NAMES.index("bias_walk")])
     errors = np.empty((len(order), 3))
     for seed, some in enumerate(np.array_split(order, GROUPS)):
         parts = [one.coefficients(found.draws[some[len(some) // 2]]) for one in told]
-        # One sensor in all stretches; each holds the prior, which counts once.
+        # All stretches are of one sensor; each posterior contains the prior, which counts once.
         inverses = [np.linalg.inv(cov[-3:, -3:]) for _, cov in parts]
         cov = np.linalg.inv(np.sum([one - np.eye(3) for one in inverses], axis=0) + FLAT * np.eye(3))
         seen = np.sum([inverse @ mean[-3:] for inverse, (mean, _) in zip(inverses, parts, strict=True)], axis=0)
@@ -98,7 +98,7 @@ def _drawn(told: Sequence[Stretch], found: Fitted) -> FloatArray:
 
 
 def _since_start(stretch: Stretch, horizon_s: float) -> FloatArray:
-    """(n, 3, 3) what a kelvin's bias makes of the error over a horizon, from every start on."""
+    """(n, 3, 3) derivative, by the bias per kelvin, of the error over a horizon from each of n starts."""
     assert stretch.kelvin is not None
     m = len(stretch.time_s)
     ahead = max(1, round(horizon_s / float(np.median(np.diff(stretch.time_s)))))

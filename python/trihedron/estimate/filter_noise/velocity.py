@@ -1,4 +1,4 @@
-"""Stretches of the velocity that accelerometer and reference attitude give, against the reference's position."""
+"""Stretches of the velocity from accelerometer and reference attitude, against the reference's position."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from trihedron.estimate.filter_noise.stretch import TRIANGLE_ENDS, Stretch, accu
 from trihedron.estimate.reference.beside import Beside, Point
 
 LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)[None])
-"""Of a cross product: [i, j, k] the k-th part of axis i with axis j."""
+"""Levi-Civita symbol: component k of e_i × e_j at [i, j, k]."""
 SIZES = {"S": 0.05, "b": 0.5, "up": 0.5, "start": 5.0, "arm": 0.3}
-"""Prior σ: 5 % of a scale beside the fit, 0.5 m/s² of bias and of gravity, 5 m/s at the start, 0.3 m of lever arm."""
+"""Prior σ: 5 % of scale, 0.5 m/s² of bias and of gravity, 5 m/s of velocity at the start, 0.3 m of lever arm."""
 
 
 def velocity_stretches(
@@ -22,7 +22,7 @@ def velocity_stretches(
 ) -> list[Stretch]:
     """Stretches of differences of the position's block means, each a triangular mean of the velocity.
 
-    ``white_rad`` is the white error of the reference's attitude, of a block's mean: the accelerometer does not make it.
+    ``white_rad`` is the white error of block means of the reference's attitude, added to the variance as known.
     """
     assert side.force is not None
     h_grid = side.grid.step_s
@@ -46,20 +46,20 @@ def velocity_stretches(
 def _stretch(
     local: tuple[FloatArray, FloatArray, FloatArray], time: FloatArray, n: int, vibration: FloatArray, gravity: float
 ) -> Stretch:
-    """``local``: attitude (k, 3, 3), specific force (k, 3), position (k, 3) of a stretch's samples."""
+    """One stretch from ``local``: attitude (k, 3, 3), specific force (k, 3) and position (k, 3) at its samples."""
     C, force, position = local
     step = float(np.median(np.diff(time)))
     h = n * step
 
     def between(samples: FloatArray) -> FloatArray:
-        """Mean velocities between neighbouring blocks of an acceleration (k, ...)."""
-        # Trapezoids both times: a sum that includes its last sample whole is a path half a sample ahead.
+        """Triangular means of velocity between neighbouring blocks, from an acceleration (k, ...)."""
+        # Both integrals by trapezoids: a plain cumulative sum is half a sample ahead.
         once = np.cumsum(samples, axis=0) - 0.5 * samples
         return _differences(np.cumsum(once, axis=0) - 0.5 * once, n) * step**2 / h
 
     world = np.einsum("kij,kj->ki", C, force)
     up = world.mean(axis=0) / np.linalg.norm(world.mean(axis=0))
-    # Gravity along the mean force is the point about which its vector is free.
+    # The gravity vector is free about |g| along the mean specific force.
     carried = between(world - gravity * up)
     observed = _differences(position, n) / h - carried
     m = len(observed)
@@ -73,7 +73,7 @@ def _stretch(
     quiet = np.full(m, h)
     shaken = 0.5 * h * (vibration[1:] + vibration[:-1])
     noise, shakes = (accumulated(q, TRIANGLE_ENDS) for q in (quiet, shaken))
-    # An attitude wrong by e turns the specific force by e x f, gravity and the motion's own; summed over time.
+    # An attitude error e changes the specific force by e x f; its integral is a velocity error.
     across = between(np.einsum("ijk,nk->nij", LEVI_CIVITA, world))
     return Stretch(
         time_s=time[: m * n].reshape(m, n).mean(axis=1) + 0.5 * h,
@@ -84,7 +84,7 @@ def _stretch(
         bias_walk=h * walked(steps),
         bias_steps=steps,
         tilts=np.diff(across, axis=0, prepend=0.0),
-        # At the edge that two blocks share.
+        # Attitude at the edge between two blocks.
         attitude=C[n - 1 : m * n : n],
         power=vibration[1:],
         ends=TRIANGLE_ENDS,
@@ -92,7 +92,7 @@ def _stretch(
 
 
 def _of_white_attitude(stretch: Stretch, white_rad: float) -> FloatArray:
-    """(3 m, 3 m) of an attitude with an error of its own in every block: white acceleration of |f| times it."""
+    """Covariance (3 m, 3 m) of the velocity from a white attitude error per block: white acceleration |f| times it."""
     assert stretch.tilts is not None
     m = len(stretch.tilts)
     per_block = np.einsum("kij,klj->il", stretch.tilts, stretch.tilts) / m * white_rad**2
@@ -100,7 +100,7 @@ def _of_white_attitude(stretch: Stretch, white_rad: float) -> FloatArray:
 
 
 def neighbours(m: int) -> FloatArray:
-    """(m, m) ones beside the diagonal."""
+    """(m, m) matrix with ones on the two secondary diagonals."""
     return np.eye(m, k=1) + np.eye(m, k=-1)
 
 

@@ -1,1 +1,1 @@
-"""Gyro calibration: known turns (method 1) and moves between poses (method 2)."""
+"""Gyro calibration: known turns (method 1) and rotations between poses (method 2)."""

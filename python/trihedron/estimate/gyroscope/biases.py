@@ -1,4 +1,4 @@
-"""Biases of the poses: their common value, how far the true bias changes, and what each pose then has."""
+"""Gyro biases of the poses: their mean, their variance between poses, and the combined estimate for each pose."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from trihedron.arrays import FloatArray
 from trihedron.probability import MEDIAN_CHI2, fdtrc
 
 FALSE_ALARM = 1e-4
-"""Chance that a sensor without it is treated for it: the price of removing nothing is small, but it is a decision."""
+"""Probability that g-sensitivity is removed from a sensor without it; the cost of removing a spurious one is small."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +18,7 @@ class AttitudeDependence:
     """``z(f) = z₀ + A f``: the raw bias (n, 3) of the poses against their specific force.
 
     ``A`` (3, 3) in raw unit per m/s²; ``var_bias`` (3,) variances of ``z₀``; ``p_value`` of ``A = 0``;
-    ``scatter_left`` the standard deviation of the pose biases with it, raw.
+    ``scatter_left`` the ratio of the scatter of the pose biases with ``A`` to that without.
     """
 
     A: FloatArray
@@ -28,14 +28,14 @@ class AttitudeDependence:
 
     @property
     def is_present(self) -> bool:
-        """The holds say so beyond chance."""
+        """Whether the dependence is significant at ``FALSE_ALARM``."""
         return self.p_value < FALSE_ALARM
 
 
 def attitude_dependence(zero: FloatArray, var_bias: FloatArray, force: FloatArray) -> AttitudeDependence | None:
     """Regress the pose biases on specific force (n, 3), m/s²; ``None`` with fewer than 9 poses or poses in one plane.
 
-    The three axes share one F test: 9 slopes against what is left of 3 n numbers.
+    One F test for the three axes: 9 slopes against 3 (n - 4) residual degrees of freedom.
     """
     n = len(zero)
     design = np.column_stack([np.ones(n), force])
@@ -55,7 +55,7 @@ def attitude_dependence(zero: FloatArray, var_bias: FloatArray, force: FloatArra
         chi2_mean += float(np.sum(weight * (zero[:, axis] - mean) ** 2))
         chi2_line += float(np.sum(weight * rest**2))
     ratio = ((chi2_mean - chi2_line) / 9.0) / max(chi2_line / (3.0 * (n - 4)), 1e-300)
-    # Where noise alone explains the poses, a significant ratio of two tiny numbers means nothing.
+    # Where noise alone explains the pose biases, the ratio of two small sums is not tested.
     p_value = float(fdtrc(9, 3 * (n - 4), ratio)) if chi2_mean > 3.0 * (n - 1) else 1.0
     left = float(np.sqrt(chi2_line / (n - 4) / max(chi2_mean / (n - 1), 1e-300)))
     return AttitudeDependence(A, var_z0, p_value, left)
@@ -65,7 +65,7 @@ def pool_biases(bias: FloatArray, var_bias: FloatArray) -> tuple[FloatArray, Flo
     """Random-effects mean of biases (n, 3) of variance (n, 3) (DerSimonian & Laird 1986).
 
     Returns the mean (3,), χ² against constancy (3,) with n − 1 degrees of freedom, and the variance (3,) of the true
-    bias between poses, nothing where χ² is within chance.
+    bias between poses, 0 where χ² is within chance.
     """
     floor = np.maximum(var_bias, 1e-30 + 1e-24 * bias**2)
     weight = 1.0 / floor
@@ -74,7 +74,7 @@ def pool_biases(bias: FloatArray, var_bias: FloatArray) -> tuple[FloatArray, Flo
     chi2 = (weight * (bias - mean) ** 2).sum(axis=0)
     dof = len(bias) - 1
     spread = np.maximum(chi2 - dof, 0.0) / np.maximum(total - (weight**2).sum(axis=0) / total, 1e-300)
-    # Only a change beyond chance counts: a spread fitted to pure noise would spoil the weights of long poses.
+    # Only a significant spread counts: one fitted to noise alone would reduce the weights of long poses.
     spread = np.where(chi2 > dof + 4.0 * np.sqrt(2.0 * max(dof, 1)), spread, 0.0)
     weight = 1.0 / (floor + spread)
     weight /= weight.sum(axis=0)
@@ -82,12 +82,12 @@ def pool_biases(bias: FloatArray, var_bias: FloatArray) -> tuple[FloatArray, Flo
 
 
 def shrink(bias: FloatArray, var_bias: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Biases of the poses drawn to the session's by their noise: ``(z/v + z̄/τ²)/(1/v + 1/τ²)`` and its variance.
+    """Biases of the poses combined with the session's mean: ``(z/v + z̄/τ²)/(1/v + 1/τ²)`` and its variance.
 
-    With a bias that changes (τ² ≫ v) each pose keeps its own; with a steady one a short pose borrows from the others.
+    Where the bias changes between poses (τ² ≫ v) each pose keeps its own; a constant bias is estimated from all poses.
     """
     n = len(bias)
-    # By medians, which single bad poses do not move.
+    # Medians are robust to single bad poses.
     square = np.median((bias - mean) ** 2, axis=0) * n / max(n - 1, 1) / MEDIAN_CHI2[1]
     tau2 = np.maximum(square - np.median(var_bias, axis=0), 0.0)
     gain = tau2 / np.maximum(tau2 + var_bias, 1e-300)

@@ -1,4 +1,4 @@
-"""Readings at the gyro's limit: bridged by a smooth peak, and made as uncertain as that is."""
+"""Clipped gyro readings: replaced by a smooth peak, with the variance of the replacement."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.records import Recording
 
 LONGEST_BRIDGE_S = 0.15
-"""A hand turns smoothly over this long; a peak cut for longer may have had any shape."""
+"""Longest clipped run that is bridged: rotation by hand is smooth over this time; a longer peak may have any shape."""
 
 DOUBT = 0.5
-"""Standard error of the bridged area above the limit, as a part of that area."""
+"""Standard uncertainty of the bridged area above the range limit, relative to that area."""
 
 
 @dataclass(frozen=True, eq=False)
 class Clipped:
-    """``is_clipped`` (n, 3), ``readings`` (n, 3) with the peaks bridged, ``variance`` (n, 3) of each bridged
-    reading."""
+    """``is_clipped`` (n, 3), raw ``readings`` (n, 3) with the peaks bridged, ``variance`` (n, 3) of each bridged
+    reading, raw²."""
 
     is_clipped: BoolArray
     readings: FloatArray
@@ -27,10 +27,10 @@ class Clipped:
 
 
 def bridge_clipping(recording: Recording) -> Clipped | None:
-    """Replace the gyro's runs at its limits by the cubic that continues the slopes on both sides; ``None`` without any.
+    """Replace the gyro's clipped runs by the cubic that continues the slopes on both sides; ``None`` without a limit.
 
     A cubic with slopes ``s₁, s₂`` at the ends of a run of length ``T`` has the area ``T² (s₁ − s₂)/12`` above the
-    chord; half of it is taken for its standard error.
+    chord; its standard uncertainty is ``DOUBT`` of it.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def bridge_clipping(recording: Recording) -> Clipped | None:
 
 
 def clipped_time(clipped: Clipped | None, edges: IntArray, step_s: float) -> FloatArray:
-    """Time (m,) that each move spent at the limit on any axis, s."""
+    """Time (m,) in each move with any axis at the range limit, s."""
     if clipped is None:
         return np.zeros(len(edges))
     any_axis = np.any(clipped.is_clipped, axis=1)
@@ -75,5 +75,5 @@ def _bridge(time_s: FloatArray, column: FloatArray, variance: FloatArray, first:
     )
     area = span**2 * abs(enter - leave) / 12.0
     count = last - first + 1
-    # Spread over the samples of the run so that their sum, taken as independent, has the variance of the area.
+    # Equal and independent variances of the run's samples, whose integral has the variance of the area.
     variance[first : last + 1] = (DOUBT * area) ** 2 / count / (span / (count + 1)) ** 2

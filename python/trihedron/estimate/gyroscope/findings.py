@@ -1,4 +1,4 @@
-"""What the moves showed, as findings."""
+"""Findings of the fit of moves."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.units import STANDARD_GRAVITY_M_S2, RateUnit, degrees_from_radians, rate_to_si
 
 MAX_SCALE_RATIO = 1.5
-"""Untrimmed MEMS gyros are within 10 % of their data sheet; half as much again is a wrong unit or rate."""
+"""Ratio to the nominal scale above which the unit or the rate is wrong: MEMS gyros are within 10 % of data sheets."""
 
 
 def findings_of(
@@ -26,7 +26,7 @@ def findings_of(
     gyroscope: SensorCalibration,
     seen: Carried,
 ) -> tuple[Finding, ...]:
-    """Everything that the moves showed."""
+    """All findings of the fit of moves; ``outliers`` are the moves that were excluded."""
     S, observability = gyroscope.S, gyroscope.observability
     assert observability is not None
     found = audit_moves(measured)
@@ -36,7 +36,7 @@ def findings_of(
         found.append(Finding.of(FindingCode.NOT_CONVERGED, "session", stopped_because=solution.stopped_because))
     found += _outlier_findings(outliers, measured, seen)
     if solution.inflation[0] > 1.0:
-        # Bars that are widened in proportion say nothing about a minimum elsewhere.
+        # Widened uncertainties do not cover convergence to a wrong minimum: large tilt errors are serious.
         is_astray = usual_deg(seen.angle_deg, measured, solution.S_a, solution.b_a) > ASTRAY_DEG
         found.append(
             Finding.of(
@@ -53,7 +53,7 @@ def findings_of(
 
 
 def scale_findings(S: FloatArray, raw_unit: RateUnit) -> list[Finding]:
-    """A scale that contradicts the unit of the log: the rate of the log, or the unit, is wrong by that factor."""
+    """Finding for a scale that contradicts the unit of the log: sample rate or unit is wrong by that factor."""
     nominal = rate_to_si(raw_unit)
     if nominal is None:
         return []
@@ -66,9 +66,9 @@ def scale_findings(S: FloatArray, raw_unit: RateUnit) -> list[Finding]:
 def handedness(S: FloatArray, S_accelerometer: FloatArray) -> list[Finding]:
     """LEFT_HANDED when the logged axes of a sensor form a left-handed triad, or those of both sensors disagree.
 
-    ``det S_ω < 0`` cannot come from the accelerometer's sign conventions: a reflection ``R`` of its frame makes
-    ``S_ω → −R S_ω``, whose determinant keeps its sign. Two gyro axes that run against the accelerometer's show the
-    accelerometer's reflection.
+    ``det S_ω < 0`` is not due to the accelerometer's sign conventions: a reflection ``R`` of its frame makes
+    ``S_ω → −R S_ω``, whose determinant keeps its sign. Two gyro axes opposite to the accelerometer's show a reflection
+    of the accelerometer.
     """
     found = []
     if np.linalg.det(S) < 0.0:
@@ -150,7 +150,7 @@ def _drift_findings(measured: MoveMeasurements, S: FloatArray) -> list[Finding]:
 
 
 def audit_moves(measured: MoveMeasurements) -> list[Finding]:
-    """Findings on clipped moves, gaps inside moves, and a bias that changes from pose to pose."""
+    """Findings on clipped moves and on gaps inside moves."""
     findings = []
     if np.any(measured.clipped_s > 0.0):
         which = [int(i) + 1 for i in np.flatnonzero(measured.clipped_s > 0.0)]

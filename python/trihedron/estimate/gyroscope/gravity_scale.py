@@ -1,4 +1,4 @@
-"""The gyro's scale as gravity shows it, rough but enough to tell turns of 90, 180 and 360 degrees apart."""
+"""The gyro's scale from gravity: rough, but sufficient to distinguish turns of 90, 180 and 360 degrees."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 
 LARGEST_DOUBT = 0.1
-"""Relative standard error above which a scale by gravity is not used: three of them still exclude half and twice."""
+"""Largest relative standard uncertainty of a scale that is used: three of them still exclude half and twice."""
 LEAST_TOLERANCE = 0.01
-"""What a fit without findings may still be off by (nonlinearity, a hand that pushes)."""
+"""Smallest tolerance: errors that the fit does not show (nonlinearity, accelerations of the hand)."""
 
 
 @dataclass(frozen=True, eq=False)
 class GravityScale:
-    """``S`` (3, 3) rad/s per raw unit, and ``tolerance``, three relative standard errors of its worst direction."""
+    """``S`` (3, 3) rad/s per raw unit; ``tolerance``: 3 relative standard uncertainties of its worst direction."""
 
     S: FloatArray
     tolerance: float
@@ -31,10 +31,10 @@ class GravityScale:
 def scale_by_gravity(
     recording: Recording, segments: Segments, accelerometer: SensorCalibration, gravity_m_s2: float
 ) -> GravityScale | None:
-    """Scale of the gyro from the moves that turn gravity (method 2), or ``None`` where they do not tell it.
+    """Scale of the gyro from moves that change gravity's direction (method 2), or ``None`` if they do not determine it.
 
-    Moves from face to face turn gravity by right angles, and turns on a table that is not level turn it a little: a
-    scale that is off by a factor of two would miss it by tens of degrees.
+    Moves from face to face rotate gravity by 90°, turns on a tilted table by a little: with a scale wrong by a factor
+    of two the tilt errors would be tens of degrees.
     """
     if recording.gyroscope is None or recording.accelerometer is None:
         return None

@@ -1,4 +1,4 @@
-"""Samples that a log lost unseen: what they take from every turn, as far as the moves' scatter leaves room for it."""
+"""Undetected lost samples: the rotation that they remove, bounded by the scatter of the tilt errors after moves."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ from trihedron.probability import fdtrc
 from trihedron.records.finding import Finding, FindingCode
 
 ACROSS_VERTICAL = 2.0 / 3.0
-"""Part of a turn's squared error that gravity shows, turns being about any axis."""
+"""Fraction of a rotation's squared error that gravity shows, averaged over rotation axes."""
 MOST_STEPS = 3.0
-"""What a move misses beyond so many of its usual steps is no sample or two that were lost."""
+"""Cap of a tilt error, in rms errors by one lost sample: a larger one is not due to one or two lost samples."""
 MANY = 0.3
-"""Losses a move from which on the moves without any no longer decide the fit: a move left out is then not the odd
-one. Below, what was excluded was excluded rightly."""
+"""Losses per move above which moves without a loss no longer dominate the fit, so that excluded moves are counted.
+Below it the excluded moves are true outliers."""
 EVEN = 1e-4
-"""Scatter of the timestamps, in steps, up to which they may have been made from the number of the row."""
+"""Scatter of the timestamps, in steps, up to which they may be computed from the row number."""
 NOISE_DOF = 100.0
-"""The predicted noise is itself measured in the recording: to about 7 %, as 100 degrees of freedom give."""
+"""Degrees of freedom of the predicted noise, which is measured in the recording to about 7 %."""
 CERTAIN, DOUBTFUL = 1e-3, 0.05
-"""Chance of the misses by noise alone below which losses are asked for: where all moves were fitted, and where some
-were excluded. A loss in each move is shared out among the nine numbers of a scale, the moves that lost more are left
-out, and what remains looks nearly sound (sessions wrong by 20 standard errors had χ² of 1.7 per degree of freedom)."""
+"""p-value of χ² of the tilt errors below which losses are tested: where all moves are fitted, and where some are
+excluded. The nine elements of S absorb part of a loss in each move, moves with more losses are excluded, and the rest
+seems nearly consistent (sessions wrong by 20 standard uncertainties had χ² of 1.7 per degree of freedom)."""
 POINTS = 100
-"""Instants of a move at which one of two samples may have been lost: a turn bends little from one to the next."""
+"""Instants of a move at which each of two lost samples is tried: the effect changes slowly between them."""
 STRONG = 20.0
-"""Odds that are strong evidence (Kass, Raftery 1995): a fall that ends between two samples misses by parts of one."""
+"""Odds that are strong evidence (Kass, Raftery 1995): a fall between two samples causes a fraction of a loss."""
 OWN_CLOCK = 1.5
-"""Distance of timestamps from a straight line, in spreads of their steps, from which on a clock made them: rounding a
-line leaves them within one spread of it."""
+"""Deviation of timestamps from a straight line, in ranges of their steps, above which a real clock made them: rounding
+of a straight line deviates by at most one range."""
 
 
 @dataclass(frozen=True, eq=False)
 class PossibleLosses:
-    """``carried``: share of the samples that the uncertainties carry; ``possible``: with every move that was excluded.
+    """``carried``: share of lost samples included in the uncertainties; ``possible``: that with all excluded moves.
 
-    ``scatter``: the variance of what moves miss, those left out with them where the share counts them, over that by
-    noise: a sample lost in some moves and none in others bends the scale's other elements by so much.
+    ``scatter``: variance of the tilt errors, with the excluded moves where ``carried`` counts them, over that by noise:
+    losses in some of the moves change the off-diagonal elements of S by so much.
     """
 
     carried: float = 0.0
@@ -51,30 +51,30 @@ class PossibleLosses:
     scatter: float = 1.0
 
     def widened(self, covariance: FloatArray, S: FloatArray, b: FloatArray, inflation: float) -> FloatArray:
-        """Covariance (12, 12) of ``S, b``, its variances widened by ``inflation`` before, with the losses in it.
+        """Covariance (12, 12) of ``S, b`` with the losses; its variances already contain the factor ``inflation``.
 
-        All turns short by one part look like a scale.
+        A share that is missing from all rotations is equivalent to a scale error.
         """
         along = self.carried * np.concatenate([S.ravel(), b])
         return covariance * max(self.scatter / inflation, 1.0) + np.outer(along, along)
 
     def findings(self, sigma_scale: float) -> tuple[Finding, ...]:
-        """Losses that could be more than all else that is known of the scale, by its relative standard error."""
+        """Finding where the possible share exceeds ``sigma_scale``, the scale's relative standard uncertainty."""
         if self.possible <= sigma_scale:
             return ()
         return (Finding.of(FindingCode.SAMPLES_LOST, "possible", lost_share=self.possible, sigma_scale=sigma_scale),)
 
 
 def relative_sigma(covariance: FloatArray, S: FloatArray) -> float:
-    """Relative standard error of a gyro's scale (the median axis), from the covariance of ``S, b`` (12, 12)."""
+    """Relative standard uncertainty of a gyro's scale (median of the axes) from the covariance (12, 12) of ``S, b``."""
     return float(np.median(np.sqrt(np.diag(covariance)[[0, 4, 8]]) / np.linalg.norm(S, axis=0)))
 
 
 def could_be_remade(time_s: FloatArray, nominal_step_s: float) -> bool:
-    """Whether timestamps may have been made from the number of the row, rounded or not: a loss then leaves no trace.
+    """Whether timestamps (n,) may be computed from the row number, rounded or not: they then do not show a loss.
 
-    A clock of its own, however rounded, leaves a straight line by more than one spread of its steps; a loss is a gap in
-    it.
+    A real clock, even rounded, deviates from a straight line by more than the range of its steps and shows a loss as a
+    gap.
     """
     steps = np.diff(time_s)
     if len(steps) < 2:
@@ -90,11 +90,11 @@ def could_be_remade(time_s: FloatArray, nominal_step_s: float) -> bool:
 def left_out_as_by_losses(
     time_s: FloatArray, measured: MoveMeasurements, outliers: tuple[int, ...], solution: SessionSolution, seen: Carried
 ) -> bool:
-    """Whether moves that were excluded miss gravity rather by a sample or two that are lost than by a knock.
+    """Whether the tilt errors of excluded moves are better explained by one or two lost samples than by a disturbance.
 
-    A sample lost at ``t`` leaves ``h ω(t)`` out of the turn, and gravity behind the move off by ``h R(t) (ω × f)(t)``,
-    carried from ``t`` to the end. The density of the miss, over all instants at which one sample or two may have been
-    lost, is held against that of a knock of unknown direction and just this size.
+    A sample lost at ``t`` removes the rotation ``h ω(t)`` and causes the error ``h R(t) (ω × f)(t)`` of gravity after
+    the move, R from ``t`` to its end. The likelihood of the error, averaged over all instants of one or two losses, is
+    compared with that of a disturbance of this size and unknown direction.
     """
     S, step_s = solution.S_w, measured.nominal_step_s
     if not outliers or not could_be_remade(time_s, step_s):
@@ -109,7 +109,7 @@ def left_out_as_by_losses(
         _, _, axes = np.linalg.svd(f[after][None])
         across = axes[1:]
         off, missed = off @ across.T, across @ seen.residual[move]
-        # What the other moves lost the scale has taken up, and hides as much here: a sample a move is allowed for.
+        # The scale absorbs the losses of the other moves: one sample per move is added to the variance.
         short = off.mean(axis=0)
         noise = across @ seen.covariance[move] @ across.T + np.outer(short, short)
         inverse, size = np.linalg.inv(noise), 2.0 * np.pi * np.sqrt(np.linalg.det(noise))
@@ -124,7 +124,7 @@ def left_out_as_by_losses(
 
 
 def _lost_at_each_instant(rate: FloatArray, force: FloatArray, step_s: float) -> FloatArray:
-    """What a sample lost at each instant of a move leaves gravity behind it off by, (n, 3) of rates (n, 3), m/s²."""
+    """(n, 3) error of gravity after the move [m/s²] by a sample lost at each instant, from rates (n, 3) [rad/s]."""
     onward = _core.rotation_from_vector(np.ascontiguousarray(-rate * step_s))
     carried = np.empty((len(rate), 3))
     for k, turn in enumerate(onward):
@@ -147,12 +147,12 @@ def losses_that_fit(
     dof: float,
     used: BoolArray,
 ) -> PossibleLosses:
-    """Part of the samples that could be missing though the timestamps are even, where moves miss beyond their noise.
+    """Share of samples that may be lost although the timestamps are even, from tilt errors beyond their noise.
 
-    A lost sample takes ``ω h`` from its turn. Samples lost at random with share ``p`` take ``p ∫ω dt`` in the mean,
-    which nothing tells from a scale, and scatter by the variance ``p h ∫ω² dt``, which the moves show: ``p`` follows
-    from how far gravity after the moves misses beyond its noise (docs/model-session.md, 11.17). That the excess has
-    another cause is the commoner case; the uncertainties must carry that it has this one.
+    A lost sample removes ``ω h`` from its rotation. Samples lost at random with share ``p`` remove ``p ∫ω dt`` on
+    average, which is confounded with the scale, with the variance ``p h ∫ω² dt``, which the moves show: ``p`` follows
+    from the tilt errors beyond noise (docs/model-session.md, 11.17). The excess mostly has another cause; the
+    uncertainties must include this one.
 
     Parameters
     ----------
@@ -161,9 +161,9 @@ def losses_that_fit(
     S, gravity_m_s2 : (3, 3), float
         The gyro's scale in rad/s per raw unit, |g|.
     missed : (m,), (m,)
-        Angle [deg] by which gravity is missed after every move, and its variance by noise [(m/s²)²].
+        Tilt error [deg] after every move, and its variance by noise [(m/s²)²].
     dof : float
-        Degrees of freedom of the misses of the moves in use.
+        Degrees of freedom of the tilt errors of the moves in use.
     used : (m,)
         The moves that were fitted.
     """
@@ -172,7 +172,7 @@ def losses_that_fit(
         return PossibleLosses()
     angle_deg, floor2 = missed
     speed2 = np.sum(((measured.rate - measured.bias_mean) @ S.T) ** 2, axis=1)
-    # ∫ω² dt times the step: the variance of a move's angle if one sample was lost in all, times the samples.
+    # h ∫ω² dt, the part that gravity shows: the variance of a move's angle per share of lost samples.
     room = ACROSS_VERTICAL * step_s**2 * np.array([float(np.nansum(speed2[a:b])) for a, b in measured.edges])
     length = np.maximum(measured.edges[:, 1] - measured.edges[:, 0], 1)
     missed2 = np.minimum(np.radians(angle_deg) ** 2, MOST_STEPS**2 * room / length)
@@ -181,7 +181,7 @@ def losses_that_fit(
         n = 2.0 * float(np.count_nonzero(which))
         excess = float(np.sum(missed2[which]) * n / max(dof, 1.0) - np.sum(floor2[which]) / gravity_m_s2**2)
         total = float(np.sum(room[which]))
-        # The scatter of few losses is known to about a part in the root of half the moves.
+        # The relative uncertainty of the excess is about √(4/n): it is added.
         return max(excess, 0.0) / total * (1.0 + np.sqrt(4.0 / max(n, 4.0))) if total > 0.0 else 0.0
 
     is_used, is_known = np.asarray(used, dtype=bool), ~measured.is_lost
@@ -199,8 +199,8 @@ def losses_that_fit(
 def is_asked_for_losses(
     time_s: FloatArray, measured: MoveMeasurements, outliers: tuple[int, ...], solution: SessionSolution, seen: Carried
 ) -> bool:
-    """Whether losses may be behind what moves miss: those in use beyond noise, a little being enough where others were
-    excluded, or those left out by whole samples."""
+    """Whether losses may cause the tilt errors: those of moves in use exceed noise (at a higher p where moves were
+    excluded), or those of excluded moves have the size of whole samples."""
     dof, chance = solution.moves_dof, DOUBTFUL if outliers else CERTAIN
     is_beyond_noise = dof >= 1.0 and fdtrc(dof, NOISE_DOF, solution.moves_chi2 / dof) < chance
     return is_beyond_noise or left_out_as_by_losses(time_s, measured, outliers, solution, seen)

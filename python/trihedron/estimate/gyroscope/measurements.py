@@ -1,4 +1,4 @@
-"""What a recording says about its moves: arrays for the fit of a session, and the noise behind each of them."""
+"""Measurements of a recording's moves: arrays for the fit of a session, with their noise."""
 
 from __future__ import annotations
 
@@ -34,29 +34,29 @@ from trihedron.session.rounding import (
 )
 
 GAP_STEPS = 5.0
-"""A step of time so much longer than the usual one is a gap: the rate in it is unknown."""
+"""A time step longer than this many usual ones is a gap, in which the rate is unknown."""
 BESIDE = 2
-"""Samples kept on either side of a move: one that brackets it, and that one's neighbour."""
+"""Samples kept on either side of a move: the one that brackets it, and its neighbour."""
 BLOCK_S = 0.5
-"""Length of the blocks whose scatter gives the angle random walk: moves last of this order, and it is long against
-the correlation that an anti-alias filter leaves between samples."""
+"""Block length for the angle random walk: of the order of a move's duration, and long against the correlation of
+samples by an anti-alias filter."""
 
 
 @dataclass(frozen=True, eq=False)
 class MoveMeasurements:
-    """Everything the fit of a session needs, in raw units of each sensor.
+    """Input of the fit of a session, in raw units of each sensor.
 
-    ``reading``, ``bias`` (n, 3) are the pose means of accelerometer and gyro, ``var_reading``, ``var_bias`` (n, 3) the
-    variances of these means; ``links`` (m, 2) the poses each move joins. ``rows`` (samples,) are the recording's rows
-    in and beside moves, move after move, ``time_s`` (samples,) their times, ``edges`` (m, 2) each move among them;
-    ``noise_density`` (3,) the angle random walk in raw unit · √s; ``clipped_s`` (m,) is the time in each move that the
-    gyro spent at its limit. ``attitude`` is the dependence of the bias on specific force where it was removed: ``rate``
-    (samples, 3) are the raw gyro readings without it, and so are the biases, whose mean over the session is
-    ``bias_mean`` (3,). ``is_undithered`` (3,) are the axes whose bias lies hidden inside an LSB, ``quantum``
-    (3,) the LSB, ``is_hidden`` (samples, 3) where a reading of such an axis stands in the LSB of its bias.
-    ``bias_read``, ``var_bias_read`` (n, 3) are the biases as each pose alone shows them, ``var_reading_noise`` (n, 3)
-    the variance of the pose means by noise alone, ``reading_variance`` (samples, 3) that of gyro readings which were
-    bridged or rounded, ``shared_errors`` (samples, 3, k) one standard error of each of k that all moves share.
+    ``reading``, ``bias`` (n, 3) are the pose means of accelerometer and gyro, ``var_reading``, ``var_bias`` (n, 3)
+    their variances; ``links`` (m, 2) the poses before and after each move. ``rows`` (samples,) are the recording's rows
+    in and beside moves, move after move, ``time_s`` (samples,) their times, ``edges`` (m, 2) each move's range in them;
+    ``noise_density`` (3,) is the angle random walk in raw unit · √s, ``clipped_s`` (m,) the time of each move in which
+    the gyro is at its range limit. ``attitude`` is the dependence of the bias on specific force where it is subtracted,
+    from the gyro readings ``rate`` (samples, 3) and from the biases, whose mean over the session is ``bias_mean`` (3,).
+    ``is_undithered`` (3,) are the axes whose noise does not dither the LSB ``quantum`` (3,), ``is_hidden`` (samples, 3)
+    is 1 where the reading of such an axis is in the LSB of its bias. ``bias_read``, ``var_bias_read`` (n, 3) are the
+    biases from each pose alone, ``var_reading_noise`` (n, 3) the variance of the accelerometer's pose means by noise
+    alone, ``reading_variance`` (samples, 3) that of gyro readings which are bridged or rounded, ``shared_errors``
+    (samples, 3, k) are k errors of one σ each that all moves share.
     """
 
     links: IntArray
@@ -88,7 +88,7 @@ class MoveMeasurements:
 
     @property
     def is_lost(self) -> BoolArray:
-        """Moves (m,) in which the gyro was at its limit too long to be bridged."""
+        """Moves (m,) with more time at the gyro's range limit than can be bridged."""
         return self.clipped_s > LONGEST_BRIDGE_S
 
     @property
@@ -101,8 +101,8 @@ def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
     """Angle random walk ``N`` of each raw axis in raw unit · √s, (3,), from block means inside the poses.
 
     ``N² = τ σ²(τ)`` with the Allan variance of blocks of τ = 0.5 s, pooled over the poses: unlike the scatter of single
-    samples it is right for filtered gyros, whose neighbouring samples are correlated. Never below the ADC's own
-    noise, ``LSB²/12`` per sample.
+    samples it is valid for filtered gyros, whose neighbouring samples are correlated. The lower limit is the rounding
+    of the ADC, ``LSB²/12`` per sample.
     """
     gyroscope = _required(recording.gyroscope, "gyroscope")
     step_s = 1.0 / recording.rate_hz
@@ -129,10 +129,10 @@ def measure_moves(
     *,
     is_bridged: bool = True,
 ) -> MoveMeasurements:
-    """Collect pose means, moves and noise; readings that look like the gyro's limit are bridged if ``is_bridged``.
+    """Collect pose means, moves and noise; clipped gyro readings are bridged if ``is_bridged``.
 
-    A bias that follows specific force beyond chance is subtracted sample by sample: interpolating it between two
-    attitudes would be wrong in the middle of a move.
+    A significant dependence of the bias on specific force is subtracted sample by sample: interpolation between two
+    poses would be wrong in the middle of a move.
 
     Raises
     ------
@@ -220,7 +220,7 @@ def _moves_of(recording: Recording, segments: Segments) -> list[Move]:
 def _bridged(
     rate: FloatArray, extra: FloatArray | None, clipped: Clipped, gyroscope: FloatArray, rows: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Rates at ``rows`` with the readings at the gyro's limit replaced, and the variance of what replaced them."""
+    """Rates at ``rows`` with clipped readings replaced, and their variance with that of the replacements."""
     is_clipped, variance = clipped.is_clipped[rows], clipped.variance[rows]
     rate = np.where(is_clipped, rate + clipped.readings[rows] - gyroscope[rows], rate)
     return rate, variance if extra is None else variance + np.where(is_clipped, 0.0, extra)
@@ -229,14 +229,14 @@ def _bridged(
 def _with_hidden_bias(
     bias: FloatArray, var_bias: FloatArray, segments: Segments, quantum: FloatArray, undithered: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
-    # Rounding hides the same part of every pose's bias: that part is fitted to the moves, as one offset.
+    # Rounding gives the bias of every pose the same error: it is fitted to the moves as one offset.
     hidden = np.where(undithered, quantum**2 / 12.0, 0.0)
     own = np.maximum(np.asarray(segments.gyroscope_sigma_mean, dtype=np.float64) ** 2 - hidden, 0.0)
     return common_bias(bias, np.where(undithered, own, var_bias), undithered)
 
 
 def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
-    """Steps between samples, the usual one, and the standard deviation of a timestamp, s."""
+    """Time steps (n - 1,), the median step, and the standard deviation of a timestamp, s."""
     steps = np.diff(recording.time_s)
     nominal = median(steps[steps > 0]) if np.any(steps > 0) else 1.0 / recording.rate_hz
     return steps, nominal, median(np.abs(steps - nominal)) * 1.4826 / np.sqrt(2.0)
@@ -250,7 +250,7 @@ def _edges_and_links(moves: Sequence[Move]) -> tuple[IntArray, IntArray]:
 
 def _undithered(quantum: FloatArray, sigma: FloatArray | None) -> BoolArray:
     """Axes (3,) whose noise does not reach the LSB ``quantum`` (3,)."""
-    # Of the noise of one reading, without what rounding adds to it; readings of one code alone show none.
+    # The noise of one reading is that without the variance of rounding; readings of a single code show none.
     white = (
         np.full(3, np.inf) if sigma is None else np.sqrt(np.maximum(np.asarray(sigma) ** 2 - quantum**2 / 12.0, 0.0))
     )
@@ -270,18 +270,18 @@ def _required(readings: FloatArray | None, name: str) -> FloatArray:
 
 
 def _mean_variance(sigma_mean: FloatArray | None) -> FloatArray:
-    """Variance of the pose means, (n, 3); what rounding leaves in them is in it (docs/segmentation.md)."""
+    """Variance (n, 3) of the pose means, including their rounding error (docs/segmentation.md)."""
     if sigma_mean is None:
         raise RefusedError("the segments do not say the uncertainty of their pose means")
     return np.ascontiguousarray(np.asarray(sigma_mean, dtype=np.float64) ** 2)
 
 
 def _unexplained_reading_variance(accelerometer: SensorCalibration) -> FloatArray:
-    """What the accelerometer's own residual says beyond noise, per raw axis, (3,): directions suffer as norms do."""
+    """Variance (3,) per raw axis of the accelerometer's residual beyond noise: directions have it as norms do."""
     quality = accelerometer.quality
     if quality is None or not np.isfinite(quality.rms_dof) or not np.isfinite(quality.floor):
         return np.zeros(3)
-    # Only beyond chance: half of all sound recordings scatter a little more than predicted.
+    # Only where significant: half of all sound recordings scatter slightly more than predicted.
     if quality.dof < 1 or chdtrc(quality.dof, quality.chi2) > 1e-3:
         return np.zeros(3)
     excess = max(quality.rms_dof**2 - quality.floor**2, 0.0)

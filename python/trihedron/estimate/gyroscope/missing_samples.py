@@ -1,4 +1,4 @@
-"""Samples lost without a trace in the timestamps: the turns they take away, as the motion on either side shows them."""
+"""Lost samples that the timestamps do not show, detected by the motion on either side of each step."""
 
 from __future__ import annotations
 
@@ -13,40 +13,40 @@ from trihedron.ranges import rows_beside
 from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
 
 HALF_WINDOW = 4
-"""Samples on either side through which one curve is laid: 80 ms of a 100 Hz log, less than a tremor's period."""
+"""Samples on either side of a step for the curve fit: 80 ms of a 100 Hz log, less than a tremor's period."""
 COEFFICIENTS = 6
-"""Of that curve, a quintic: two numbers a channel are left to contradict it."""
+"""Coefficients of the curve, a quintic: two degrees of freedom per channel remain for its misfit."""
 SHARP = 40.0
-"""What one lost sample would add to χ² of the joint, in that of an ordinary joint nearby, from where a step counts."""
+"""Misfit χ² that one lost sample would cause, in units of the median misfit nearby, above which a step is tested."""
 PART = (0.5, 2.0)
-"""Of that, what is gained by a sample put between: a jolt gains otherwise."""
+"""Range of the reduction of χ² by an inserted sample, relative to that expected of a loss: a jolt is outside."""
 WHOLE = (0.6, 1.5)
-"""Extra time, in steps, of a step that is one sample off; a step that is one too short is the measure of jolts."""
+"""Range of the time error, in steps, of a step that is too short by one sample; such steps are due to jolts."""
 STILL_ORDINARY = 3.0
-"""What may be left with the sample put between, in ordinary joints."""
+"""Largest χ² left with the sample inserted, in units of the median misfit nearby."""
 MIRRORED = 0.2
-"""And of a step that falls short, as a part of what there was."""
+"""For a step that is too short: largest χ² left, as a fraction of that before."""
 NEARBY = 65
-"""Steps over which an ordinary joint is the median: losses of 3 % touch a quarter of all windows of eight."""
+"""Steps over which the median misfit is taken: losses of 3 % affect a quarter of all windows of eight samples."""
 FEWEST = 4
 CHANCE = 1e-3
-"""Long steps, and chance of so many more of them than of short ones, below which nothing is said. 14 real sessions
-show 0 to 7 long steps, 0 to 4 short ones; healthy sessions of two generators 0 to 2 of up to 50 000. None is named."""
+"""A finding needs this many long steps, and at most this probability of so many more long than short steps. 14 real
+sessions have 0 to 7 long steps, 0 to 4 short ones; healthy sessions of two generators 0 to 2 of up to 50 000: none has
+a finding."""
 FALSE_SHARE = 5e-4
-"""Share of long steps that knocks upon brisk motion leave (18 in 38 000 of a filtered noise with knocks)."""
+"""Share of long steps that knocks during brisk motion cause (18 in 38 000 of filtered noise with knocks)."""
 SERIOUS_SHARE = 0.002
-"""Share of turning steps lost above which a scale factor, short by as much, exceeds an uncertainty of usual size."""
+"""Share of lost samples above which the scale factor, too small by that share, exceeds its usual uncertainty."""
 
 
 def missing_samples(recording: Recording, segments: Segments, sigma_scale: float = SERIOUS_SHARE) -> list[Finding]:
-    """A finding where steps of a move are longer than the motion around them by whole samples, far oftener than
-    shorter.
+    """Finding where far more steps of the moves are one sample too long for the motion around them than too short.
 
-    One quintic is laid through four samples on either side of a step, in all channels at once, as they stand and with
-    one sample put between (docs/diagnosis-method.md, 8.16 with one count): a step is long if that joins them, by as
-    much as the motion's slope says. Steps that are as much too short are jolts, and so are as many of the long ones;
-    the rest was lost: each takes the angle of one step from its turn. ``sigma_scale`` is the relative standard error
-    of the gyro's scale: a share beyond it is serious.
+    A quintic is fitted to four samples on either side of a step, in all channels, as logged and with one sample
+    inserted (docs/diagnosis-method.md, 8.16 with one count): a step is long if the insertion removes the misfit, by the
+    amount that the motion's slope predicts. Steps that are too short are jolts, and an equal number of the long ones
+    is; the others are losses, each of which removes the angle of one step from its rotation. A share of losses above
+    ``sigma_scale``, the relative standard uncertainty of the gyro's scale, is serious.
     """
     gyroscope = recording.gyroscope
     if gyroscope is None or segments.gyroscope_sigma is None or not segments.moves:
@@ -63,7 +63,7 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
     rows, inner = rows_beside(inner, HALF_WINDOW + 1, recording.n_samples)
     readings, time_s = np.concatenate([triad[rows] for triad in triads], axis=1), recording.time_s[rows]
     step_s = 1.0 / recording.rate_hz
-    # A step that the timestamps show to be long is a gap, known and reported; no curve is laid across it.
+    # A step that is long by the timestamps is a gap, reported elsewhere; no curve is fitted across it.
     is_gap = ~(np.abs(np.diff(time_s) - step_s) < 0.4 * step_s)
     is_missing: BoolArray = ~np.all(np.isfinite(readings), axis=1)
     is_gap |= is_missing[1:] | is_missing[:-1]
@@ -97,20 +97,20 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
 
 
 def unless_seen(of_fit: tuple[Finding, ...], seen: tuple[Finding, ...]) -> tuple[Finding, ...]:
-    """Findings of a fit; losses that were seen leave none to be guessed."""
+    """Findings of a fit, without its possible losses where losses were detected in the motion."""
     is_seen = any(finding.code is FindingCode.SAMPLES_LOST for finding in seen)
     return tuple(one for one in of_fit if not (is_seen and one.code is FindingCode.SAMPLES_LOST))
 
 
 def _positive(sigma: FloatArray) -> FloatArray:
-    """Noise (3,) without zeros: a channel whose codes hide its noise weighs as the noisiest other one."""
+    """Noise (3,) without zeros: a channel without visible noise (coarse LSB) gets that of the noisiest channel."""
     sigma = np.asarray(sigma, dtype=np.float64)
     return np.where(sigma > 0.0, sigma, max(float(sigma.max()), 1e-300))
 
 
 @dataclass(frozen=True, eq=False)
 class _Steps:
-    """Of the steps of moves: which would show a lost sample, which are one sample too long, which too short."""
+    """Flags (k,) of the steps of moves: a loss would be detectable, one sample too long, one sample too short."""
 
     is_sharp: BoolArray
     is_long: BoolArray
@@ -118,21 +118,21 @@ class _Steps:
 
 
 def _contrasts(missing: int) -> FloatArray:
-    """(2, 8) what no quintic through four samples on either side joins, those after it moved by ``missing`` steps."""
+    """(2, 8) contrasts that vanish for quintics through four samples on either side, ``missing`` more steps apart."""
     offsets = np.r_[np.arange(-HALF_WINDOW, 0) + 0.5, np.arange(HALF_WINDOW) + 0.5 + missing] / HALF_WINDOW
     q, _ = np.linalg.qr(np.vander(offsets - offsets.mean(), COEFFICIENTS), mode="complete")
     return q[:, COEFFICIENTS:].T
 
 
 CONTRASTS = np.array([_contrasts(missing) for missing in (0, 1, -1)])
-"""As the readings stand, with one sample put between, and with one taken out."""
+"""Contrasts (3, 2, 8): as logged, with one sample inserted, with one removed."""
 
 
 def _steps(readings: FloatArray, noise: FloatArray, moves: IntArray) -> _Steps:
-    """The steps behind the samples of ``moves``, one after the other; ``noise`` (c,) of the channels.
+    """Flags of the step after each sample of ``moves`` (m, 2), move after move; ``noise`` (c,) of the channels.
 
-    A short step is also one whose jump falls short of the slope beside it, the mirror image of a long one: a bend is as
-    often the one as the other.
+    A step whose change is smaller than the slope beside it, the mirror image of a long one, also counts as short:
+    curvature causes both equally often.
     """
     flags = _core.motion_joints(
         readings,

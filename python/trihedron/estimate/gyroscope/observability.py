@@ -1,4 +1,4 @@
-"""What the moves determine and what they leave open, in words, with the moves to add."""
+"""Which parameters the moves determine, in words, with the moves to add."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.words import Words, words
 
 WEAK = 0.03
-"""Relative standard error of a direction in ``S_ω`` above which it is called weak: data sheets promise this much."""
+"""Relative standard uncertainty of a direction in ``S_ω`` above which it is weak: the accuracy of data sheets."""
 HARDLY_SEEN = 10.0 * WEAK
-"""Beyond it the direction is known no better than its data sheet's nominal value."""
+"""Relative standard uncertainty above which a direction counts as not observable."""
 
 
 def describe(covariance: FloatArray, S: FloatArray) -> Observability:
-    """Turn the covariance (9, 9) of ``S_ω`` into words.
+    """``Observability`` of ``S_ω`` (row by row) from its covariance (9, 9).
 
-    A move shows ``δS_ω ∫w' dt`` across the vertical only, so the element ``S_ij`` needs a turn about body axis ``j``
-    during which axis ``i`` is not vertical, and, for ``i ≠ j``, by an angle that is not a whole turn.
+    A move shows ``δS_ω ∫w' dt`` only across the vertical: the element ``S_ij`` needs a rotation about body axis ``j``
+    during which axis ``i`` is not vertical, and, for ``i ≠ j``, by an angle that is not a multiple of 360°.
     """
     scale = np.maximum(np.linalg.norm(S, axis=0), np.finfo(float).tiny)
     share = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3) / scale
@@ -35,7 +35,7 @@ def describe(covariance: FloatArray, S: FloatArray) -> Observability:
     )
     size = max(float(np.linalg.norm(S, 2)), np.finfo(float).tiny)
     singular = size / np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), 1e-300))
-    # The fit itself begins from a scale that is as large as it looks: beyond that the moves say less than this.
+    # The fit has a prior as wide as the scale: below √2 the moves add less information than the prior.
     rank = int(np.count_nonzero(singular > np.sqrt(2.0)))
     condition = float(singular[0] / singular[-1]) if rank == 9 else float("inf")
     is_weak = rank < 9 or _worst(covariance, S) > WEAK
@@ -44,7 +44,7 @@ def describe(covariance: FloatArray, S: FloatArray) -> Observability:
 
 
 def _worst(covariance: FloatArray, S: FloatArray) -> float:
-    """Standard error of the worst direction in ``S_ω`` over its size."""
+    """Standard uncertainty of the least determined direction in ``S_ω``, relative to its norm."""
     size = float(np.linalg.norm(S, 2))
     return float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0))) / size if size > 0 else float("inf")
 
@@ -56,7 +56,7 @@ def _advice(covariance: FloatArray, size: float, rank: int) -> list[Words]:
         weak = [rate for rate in range(3) if sigma[rate, axis] > WEAK]
         if not weak:
             continue
-        # The element S_ij is seen while axis i is level: start with the third axis upright.
+        # The element S_ij is observable while axis i is horizontal: start with the third axis vertical.
         across = next((rate for rate in weak if rate != axis), axis)
         lines.append(
             words(
@@ -73,7 +73,7 @@ def _advice(covariance: FloatArray, size: float, rank: int) -> list[Words]:
 
 
 def observability_findings(observability: Observability, covariance: FloatArray, S: FloatArray) -> list[Finding]:
-    """NOT_OBSERVABLE or WEAKLY_OBSERVABLE with the moves to add, or nothing."""
+    """NOT_OBSERVABLE or WEAKLY_OBSERVABLE with the moves to add, or an empty list."""
     advice = observability.advice
     missing = observability.n_parameters - observability.rank
     if missing > 0:

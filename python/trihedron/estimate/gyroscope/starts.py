@@ -1,4 +1,4 @@
-"""Scales that the fit of a session is begun from: by the moves' own integrals, as given, or as the unit says."""
+"""Initial gyro scales for the fit of a session: from integrals over the moves, as given, or nominal of the unit."""
 
 from __future__ import annotations
 
@@ -16,18 +16,17 @@ from trihedron.records.recording import Recording
 from trihedron.units import rate_to_si
 
 FEWEST_MOVES = 3
-"""Nine numbers of a scale, three of each move at most."""
+"""Fewest moves: S has nine elements, and a move determines three at most."""
 LARGEST_TURN_RAD, STEP_RAD = 6.0 * np.pi, np.pi / 12.0
-"""Turn of the move that turns most, up to which scales are tried, and the distance of two of them there: a fit finds
-its way from half a right angle off."""
+"""Largest angle tried for the longest rotation, and the step between angles: a fit converges from 45° off."""
 MOST_TRIED = 6
-"""Scales from which fits are begun: neighbours of the best one, and its likes a turn further."""
+"""Number of initial scales: neighbours of the best one, and those that differ by a whole turn."""
 
 
 @dataclass(frozen=True)
 class MoveOptions:
-    """How moves are fitted: ``n_folds`` for held-out prediction, 0 for none; ``nominal_scale`` (3, 3) or a number,
-    rad/s per raw unit, where the moves cannot tell it."""
+    """Options of the fit of moves: ``n_folds`` of the cross-validation, 0 for none; ``nominal_scale`` (3, 3) or a
+    number, rad/s per raw unit, for moves that do not determine an initial scale."""
 
     n_folds: int = 5
     nominal_scale: FloatArray | float | None = None
@@ -50,8 +49,8 @@ def integral_start(
     """``S_ω`` (3, 3) from Poisson's equation in integral form, or ``None`` when the moves do not determine it.
 
     ``f_j − f_i = ∫ [f]× S_ω (w' − z) dt`` is linear in ``S_ω`` once ``f(t)`` inside the move is taken from the
-    accelerometer. Accelerations of the hand disturb it, but they average out over a move; scale, sign, axis order and
-    handedness come out right without any nominal figure.
+    accelerometer. Accelerations of the hand disturb it, but average out over a move; scale, sign, axis order and
+    handedness are determined without a nominal scale.
     """
     if recording.accelerometer is None:
         return None
@@ -86,7 +85,7 @@ def integral_start(
 def starts(
     recording: Recording, measured: MoveMeasurements, accelerometer: SensorCalibration, nominal: FloatArray | None
 ) -> FloatArray:
-    """Starts (k, 3, 3) for the alignment: the linear one, the nominal one, and the nominal one of the unit.
+    """Initial scales (k, 3, 3): the nominal one, else that of the unit, and that of :func:`integral_start`.
 
     Raises
     ------
@@ -113,10 +112,10 @@ def starts(
 def turned_starts(
     measured: MoveMeasurements, accelerometer: SensorCalibration, linear: FloatArray
 ) -> FloatArray | None:
-    """Starts (k, 3, 3) that carry gravity best among scales of one size on all axes, or ``None`` without whole moves.
+    """Initial scales (k, 3, 3) with the least tilt errors among scales equal on all axes; ``None`` with too few moves.
 
-    Moves of tenths of a second pull harder than gravity does, and through hundreds of degrees: the linear start then
-    tells nothing. Axes are tried as the accelerometer's, and turned as the ``linear`` start has them.
+    In moves of tenths of a second, through hundreds of degrees, accelerations exceed gravity: the ``linear`` start then
+    fails. The axes are tried parallel to the accelerometer's, and rotated as those of the ``linear`` start.
     """
     force = measured.reading @ accelerometer.S.T + accelerometer.b
     up = force / np.linalg.norm(force, axis=1, keepdims=True)
@@ -158,4 +157,4 @@ def _trapezoid_weights(time: FloatArray) -> FloatArray:
 _ACROSS = np.array(
     [[[0, 0, 0], [0, 0, 1], [0, -1, 0]], [[0, 0, -1], [0, 0, 0], [1, 0, 0]], [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]]
 )
-"""(3, 3, 3) what ``f`` is multiplied by in ``f × e_i``, for every i."""
+"""(3, 3, 3) matrix [i] that multiplies ``f`` to give ``f × e_i``."""

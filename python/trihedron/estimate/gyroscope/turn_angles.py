@@ -1,4 +1,4 @@
-"""Turns as measured, and by which known angle about which case axis each of them was."""
+"""Turns as measured, and identification of the known angle and case axis of each."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from trihedron.units import rate_to_si
 QUARTER = math.pi / 2.0
 
 SCALE_TOLERANCE = 0.05
-"""How far a nominal scale may be from the truth: data sheets promise 1 to 3 %."""
+"""Relative tolerance of a nominal scale: data sheets state 1 to 3 %."""
 
 MIN_SPREAD = 0.2
-"""Smallest singular value of three or more unit axes that are called not parallel: three axes some 10° from one plane
-have less."""
+"""Smallest singular value of unit turn axes that determine all of S: three axes within some 10° of one plane have
+less."""
 
 SLACK_RAD = math.radians(10.0)
-"""A turn further than this from every multiple was not made against a wall at all."""
+"""A turn further than this from every multiple of 90° was not made against a wall."""
 
 
 @dataclass(frozen=True)
 class Turn:
     """Samples ``[start, stop)`` of a turn; ``axis`` 0, 1, 2 of the case and the signed ``angle_rad`` where known.
 
-    ``direction`` (3,) is the turn's axis in the body where it is no axis of the case, ``sigma_direction_rad`` the
-    standard error of each of its two components. ``face`` (±1, ±2, ±3) is the axis of the case that pointed up, 0 where
-    that is not known: a face that is not flat tilts every turn on it alike.
+    ``direction`` (3,) is the unit axis in the body frame where it is no axis of the case, ``sigma_direction_rad`` the
+    standard error of each of its two components. ``face`` (±1, ±2, ±3) is the axis of the case that points up, 0 where
+    unknown: a face that is not flat tilts all turns on it equally.
     """
 
     start: int
@@ -59,7 +59,7 @@ class Turn:
 
     @property
     def stated(self) -> FloatArray | None:
-        """Rotation vector (3,) [rad] where both angle and axis are said."""
+        """Rotation vector (3,) [rad] where both angle and axis are stated, else ``None``."""
         if self.angle_rad is None or (self.axis is None and self.direction is None):
             return None
         return self.angle_rad * _unit(self.axis or 0, self.direction)
@@ -67,11 +67,11 @@ class Turn:
 
 @dataclass(frozen=True)
 class KnownTurn:
-    """What a turn was taken for: ``angle_rad`` about ``axis``; ``is_used`` is false when it is no such turn.
+    """An identified turn: ``angle_rad`` about ``axis``; ``is_used`` is false when the readings contradict these.
 
-    ``seen_rad`` is the angle by the nominal scale, ``off_axis_rad`` how far its axis lies from the case axis.
+    ``seen_rad`` is the angle by the nominal scale, ``off_axis_rad`` the angle between its axis and the case axis.
     ``direction`` is the axis where it is none of the case's, ``axis`` then the nearest one. ``is_ambiguous``: the scale
-    is known too badly to tell which multiple it was.
+    is too uncertain to identify the multiple of 90°.
     """
 
     axis: int
@@ -101,8 +101,8 @@ def _unit(axis: int, direction: tuple[float, float, float] | None) -> FloatArray
 class MeasuredTurns:
     """``raw_angle`` (k, 3) = ∫w' dt and ``duration_s`` (k,) of the turns and of the static intervals, and their noise.
 
-    ``var_rate`` (3,) is ``N²`` in raw unit² · s; ``bias_spread`` (3,) the variance of the true bias between
-    static intervals, ``bias_excess`` (3,) the χ² of its constancy. ``hidden``: what a coarse ADC hides of them.
+    ``var_rate`` (3,) is ``N²`` in raw unit² · s; ``bias_spread`` (3,) the variance of the true bias between static
+    intervals, ``bias_excess`` (3,) χ² of its constancy. ``hidden`` holds the rounding errors of a coarse ADC.
     """
 
     raw_angle: FloatArray
@@ -117,12 +117,12 @@ class MeasuredTurns:
 
 
 def measure_turns(recording: Recording, turns: Sequence[Turn], static: Sequence[tuple[int, int]]) -> MeasuredTurns:
-    """Integrate turns and static intervals; noise from the static intervals.
+    """Integrate turns and static intervals; the noise is measured in the static intervals.
 
     Raises
     ------
     ValueError
-        When there is no gyro, no turn, or no zero turn of a second or more to learn the noise from.
+        When there is no gyro, no turn, or no static interval, or these are too short to measure the noise.
     """
     if recording.gyroscope is None:
         raise RefusedError("the recording has no gyroscope")
@@ -174,8 +174,7 @@ def nominal_matrix(
 ) -> FloatArray:
     """Nominal scale (3, 3), rad/s per raw unit: from stated turns, else as given, else from the unit.
 
-    What the user says of the turns wins over everything that is guessed. Turns of unknown size show no scale: every
-    divisor of them would do.
+    Stated turns have precedence. Turns of unknown size determine no scale: any divisor of their angles would fit.
 
     Raises
     ------
@@ -197,7 +196,7 @@ def nominal_matrix(
 
 
 def scale_of_stated(measured: MeasuredTurns, turns: Sequence[Turn]) -> FloatArray | None:
-    """Scale (3, 3) that the stated turns show, ``None`` where they do not span three axes; deaf to a few wrong ones.
+    """Scale (3, 3), rad/s per raw unit, by a robust fit to stated turns; ``None`` where they do not span three axes.
 
     Least absolute deviations (reweighted least squares) of ``φ'_i - z̄ Δt_i = S_w φ_i``.
     """
@@ -211,7 +210,7 @@ def scale_of_stated(measured: MeasuredTurns, turns: Sequence[Turn]) -> FloatArra
     if np.linalg.svd(directions, compute_uv=False)[-1] < MIN_SPREAD:
         return None
     raw = (measured.raw_angle - np.outer(measured.duration_s, measured.bias_mean))[index]
-    # Every turn counts alike, whatever its size, until they contradict each other.
+    # Initial weights are equal in relative error; later ones are the inverse of the relative misfit.
     size = np.linalg.norm(angles, axis=1)
     weight: FloatArray = 1.0 / size
     solution = np.zeros((3, 3))
@@ -230,10 +229,10 @@ def identify_turns(
     nominal: FloatArray,
     tolerance: float = SCALE_TOLERANCE,
 ) -> list[KnownTurn]:
-    """Nearest case axis and nearest quarter turn for every one that does not say.
+    """Nearest case axis and nearest multiple of 90° for every turn without a stated one.
 
-    Small turns come first: each refines the scale by which the next larger one is read, so that eight whole turns are
-    recognised although the nominal scale is off by ``tolerance``.
+    Small turns are identified first: each refines the scale for the next larger one, so that eight whole turns are
+    identified although the nominal scale has the relative error ``tolerance``.
     """
     seen = (measured.raw_angle - np.outer(measured.duration_s, measured.bias_mean)) @ nominal.T
     size = np.linalg.norm(seen, axis=1)
@@ -250,7 +249,7 @@ def identify_turns(
         is_ambiguous = False
         if turn.angle_rad is None:
             unsure = abs(along) * (tolerance if sums[axis, 1] == 0.0 else 0.1 * tolerance)
-            # A turn of unknown size can only be read when the doubt about the scale is below half a multiple.
+            # A turn is identified only if the scale's uncertainty is below half of 90°.
             is_used = angle != 0.0 and abs(along - angle) < SLACK_RAD + min(unsure, 0.2 * QUARTER)
             is_ambiguous = unsure >= 0.5 * QUARTER
             is_used = is_used and not is_ambiguous

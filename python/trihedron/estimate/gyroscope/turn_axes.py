@@ -1,4 +1,4 @@
-"""Known turns on a table with the sensor in any pose: their axes in the body, told by the accelerometer."""
+"""Known turns on a table with the sensor in any pose: their axes in the body frame from the accelerometer."""
 
 from __future__ import annotations
 
@@ -16,18 +16,17 @@ from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
 
 SAME_POSE_RAD = math.radians(5.0)
-"""A turn on a table leaves gravity where it was, but for twice the table's tilt: a table leans two degrees at most."""
+"""Largest change of gravity's direction in a turn on a table: twice the table's tilt, which is two degrees at most."""
 TABLE_TILT_RAD = math.radians(1.0)
-"""How far a table's normal is from the vertical where a turn does not show it: rooms and tables are built to half of
-that."""
+"""Standard uncertainty of the table's tilt where a turn does not show it: rooms and tables are built to half of it."""
 BLOCK_S = 0.1
 """Blocks of force and angle for the axis: short against a turn, long against the correlation of filtered readings."""
 SEEN_TURN_RAD = math.radians(60.0)
-"""A turn by less than this hardly shows the circle that gravity moves on in the body."""
+"""Smallest turn whose axis is fitted: gravity must cover enough of its circle in the body frame."""
 
 
 def turns_about_vertical(segments: Segments, accelerometer: SensorCalibration, gravity_m_s2: float) -> list[Move]:
-    """Moves that leave gravity where it was (within ``SAME_POSE_RAD``): turns on a table, of whatever angle."""
+    """Moves that do not change gravity's direction (within ``SAME_POSE_RAD``): turns on a table by any angle."""
     assert segments.accelerometer_mean is not None
     force = segments.accelerometer_mean @ accelerometer.S.T + accelerometer.b
     limit = 2.0 * gravity_m_s2 * math.sin(0.5 * SAME_POSE_RAD)
@@ -46,16 +45,16 @@ def stated_turns(
     gravity_m_s2: float,
     angles_deg: Sequence[float],
 ) -> list[Turn]:
-    """The turns about the vertical with the angles that the user states, positive against the clock seen from above.
+    """The turns about the vertical by the angles that the user states, positive counter-clockwise seen from above.
 
-    The axis of a turn is the table's normal in the body. As the body turns by θ, gravity moves on a circle about it:
-    ``f(t) = n̄ + c cos θ + s sin θ + k θ'²`` (the last term for a sensor that does not sit on the axis), fitted over the
-    turn and the poses on both sides; ``n̄`` is the axis.
+    The axis of a turn is the table's normal in the body frame. As the body turns by θ, gravity moves on a circle about
+    it: ``f(t) = n̄ + c cos θ + s sin θ + k θ'²`` (k for a sensor off the axis), fitted over the turn and the poses on
+    both sides; ``n̄`` is the axis.
 
     Raises
     ------
     ValueError
-        When there are not as many turns as angles; says when each was found.
+        When the numbers of turns and angles differ; the message states when each turn was found.
     """
     moves = turns_about_vertical(segments, accelerometer, gravity_m_s2)
     if len(angles_deg) != len(moves):
@@ -93,10 +92,9 @@ def _turn(
 
 
 def shared_errors(turns: Sequence[Turn], accelerometer: SensorCalibration, gravity_m_s2: float) -> FloatArray:
-    """(k, 3, 12) by what one standard error of each of the accelerometer's principal errors changes the turns, rad.
+    """(k, 3, 12) change of the turns [rad] by one standard error of each principal error of the accelerometer.
 
-    All turns share these errors: a turn there and one back on the same side do not average them, as they do the noise
-    of each circle.
+    All turns share these errors: unlike the noise of each circle they do not average out over turns there and back.
     """
     values, vectors = np.linalg.eigh(accelerometer.covariance)
     principal = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -130,7 +128,7 @@ def axis_of_turn(
     assert segments.gyroscope_mean is not None
     bias = segments.gyroscope_mean[[move.pose_before, move.pose_after]].mean(axis=0)
     turned = np.asarray(raw) - np.outer(duration, bias)
-    # Along the turn, by the gyro's own reading of it: its scale is that of the stated angle.
+    # θ(t) is the gyro's integral, scaled to the stated angle.
     inside = (cuts >= move.start - length) & (cuts < move.stop)
     whole = turned[inside].sum(axis=0)
     along = np.where(inside, turned @ whole / float(whole @ whole), 0.0) * angle_rad

@@ -1,4 +1,4 @@
-"""How well known turns and moves would determine the gyro, before any is made (the manual's problems 3, 4 and 8)."""
+"""Predicted uncertainty of the gyro's parameters from planned turns and moves (the manual's problems 3, 4 and 8)."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from trihedron.transforms import cross_matrix
 
 @dataclass(frozen=True, eq=False)
 class TurnDesign:
-    """Standard errors by one route: ``scale`` (3,) of a row of ``S_w`` towards each axis, per unit of noise in the raw
-    reading's own unit per rad, and ``bias`` of ``b_w``. With the noise in rad/s/√Hz both are relative and rad/s."""
+    """Standard uncertainties: ``scale`` (3,) of the elements of each column of ``S_w``, ``bias`` of ``b_w``, in the
+    unit of the noise. With the noise in rad/s/√Hz, ``scale`` is relative and ``bias`` in rad/s."""
 
     scale: FloatArray
     bias: float
@@ -38,7 +38,7 @@ def design_least_squares(
     Raises
     ------
     ValueError
-        When the turns do not determine an axis, or nothing tells the bias.
+        When the turns do not determine an axis, or the bias is not determined.
     """
     if not 1e-30 < noise_density < 1e30:
         raise RefusedError(f"a noise density of {noise_density:g} is that of no gyro")
@@ -58,14 +58,14 @@ def design_bias_first(
     noise_density: float,
     sigma_turn_rad: float = 0.0,
 ) -> TurnDesign:
-    """``b_w = φ'_0/Δt_0`` from the static interval, then ``S_w`` from the turns freed of it: the manual's problem 3.
+    """``b_w = φ'_0/Δt_0`` from the static interval, then ``S_w`` from the turns less that bias: the manual's problem 3.
 
     ``var b = N²/Δt_0``, ``var S_j = 1/Q_j + (P_j/Q_j)² N²/Δt_0``; for one turn ``N² Δt (1 + Δt/Δt_0)/φ²``.
 
     Raises
     ------
     ValueError
-        When the turns do not determine an axis, or there is no zero turn.
+        When the turns do not determine an axis, or there is no static interval.
     """
     q, p, _ = _sums(axes, angles_rad, durations_s, noise_density, sigma_turn_rad)
     if not static_s > 0.0:
@@ -95,7 +95,7 @@ def _sums(
 
 @dataclass(frozen=True, eq=False)
 class PlannedMove:
-    """A turn by ``angle_rad`` about the unit ``axis`` (3,) of the body, which starts with ``up`` (3,) upwards."""
+    """A rotation by ``angle_rad`` about ``axis`` (3,), from the pose in which ``up`` (3,) is vertical; body frame."""
 
     up: FloatArray
     axis: FloatArray
@@ -103,11 +103,11 @@ class PlannedMove:
 
 
 def design_moves(moves: Sequence[PlannedMove], sigma_rad: float) -> tuple[int, float]:
-    """Rank of the nine elements of ``S_ω`` in what the moves show, and the largest relative standard error of one.
+    """Rank of the nine elements of ``S_ω`` by planned moves, and the largest relative standard uncertainty of one.
 
-    A rate error ``δS n θ'`` turns the body by ``ε = A(θ) δS n``, ``A = ∫₀^θ exp(-[n]× s) ds =
-    θ n nᵀ + sin θ (1 - n nᵀ) - (1 - cos θ) [n]×``; gravity after the move shows it as ``u × ε``, two numbers of error
-    ``sigma_rad`` each (5.7). Three turns about level axes therefore show six; all nine take a stop inside each turn.
+    A rate error ``δS n θ'`` rotates the body by ``ε = A(θ) δS n``, ``A = ∫₀^θ exp(-[n]× s) ds =
+    θ n nᵀ + sin θ (1 - n nᵀ) - (1 - cos θ) [n]×``; the tilt error after the move is ``u × ε``, two components of noise
+    ``sigma_rad`` each (5.7). Three turns about horizontal axes determine six elements; nine need a stop in each turn.
     """
     rows = []
     for move in moves:
@@ -115,7 +115,7 @@ def design_moves(moves: Sequence[PlannedMove], sigma_rad: float) -> tuple[int, f
         cross = cross_matrix(n)
         along = np.outer(n, n)
         gain = angle * along + math.sin(angle) * (np.eye(3) - along) - (1.0 - math.cos(angle)) * cross
-        # What is fixed in the room turns the other way in the body.
+        # A room-fixed vector rotates by -θ in the body frame.
         turned = along + math.cos(angle) * (np.eye(3) - along) - math.sin(angle) * cross
         up = turned @ (move.up / np.linalg.norm(move.up))
         rows.append(np.kron(cross_matrix(up) @ gain, n[None, :]))

@@ -1,4 +1,4 @@
-"""What method 1 noticed about the turns."""
+"""Findings of method 1 on the turns."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from trihedron.probability import chdtrc
 from trihedron.records.finding import Finding, FindingCode
 
 LOOSE_TURN_RAD = math.radians(1.0)
-"""A square case pushed against a wall repeats within some tenths of a degree."""
+"""Scatter of turns above which it is reported: a square case against a wall repeats to some tenths of a degree."""
 
 
 def turn_findings(
@@ -25,7 +25,7 @@ def turn_findings(
     inflation: float,
     dof: int,
 ) -> tuple[Finding, ...]:
-    """Turns that are no multiple, turns that contradict each other, turns nobody checks, handedness, drift."""
+    """Findings: turns that are no multiple of 90°, contradicting turns, axes with a single turn, handedness, drift."""
     found = [_not_a_multiple(i, turn) for i, turn in enumerate(known) if _is_wrong(turn)]
     for index in screened.suspects:
         turn = known[index]
@@ -53,7 +53,7 @@ def turn_findings(
 
 
 def _is_wrong(turn: KnownTurn) -> bool:
-    # A move that is no turn at all (the case was set on another face) is not worth a finding when nobody called it one.
+    # A move that is no turn (the case was set on another face) is reported only if it was stated as a turn.
     return not turn.is_used and (turn.was_given or turn.off_axis_rad < math.radians(20.0)) and abs(turn.seen_rad) > 0.2
 
 

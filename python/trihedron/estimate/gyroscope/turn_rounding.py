@@ -1,4 +1,4 @@
-"""What a coarse ADC hides of known turns and of the bias: a steady rate inside a step is misread all along."""
+"""Rounding errors of a coarse ADC in known turns and in the bias: a steady rate has one constant error."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.session.rounding import CHATTER, undithered_axes
 
 HIDDEN = (0.465, 0.567, 0.689, 1.0), (1.156, 0.957, 0.782, 0.500)
-"""Of a body that settles as exp(-t/τ), then of those that start as t⁴, t² and t do: time for the second step beside its
-bias's in that for the first, and how long its place inside the step acts, as a rate, before it leaves, in units of the
-first. At a rate r, reached at t(r), codes tell Σ t'(k - ½) of the time in which the place acts (to first order in the
-place, on the mean of both ways), that is τ(2 ln 2 + γ + ln k), or √k + ζ(½, ½)/2 of √k; what is left is still."""
+"""Table for a rate that settles as exp(-t/τ), then for rates that start as t⁴, t² and t: ratio of the time for the
+second LSB to that for the first; time before the first code change in which the bias's position inside the LSB acts
+as a rate, in times of the first LSB. With rate r reached at t(r), codes give Σ t'(k - ½) of the time in which it acts
+(first order, mean of both directions): τ(2 ln 2 + γ + ln k), √k + ζ(½, ½)/2 of √k; before it the axis is static."""
 STEPS = 0.75, 1.75, 2.75
-"""Distance from the reading at rest, in steps, up to which a reading is at rest, one step beside, two."""
+"""Limits, in LSB from the static reading, of the static code, of the next code and of the one after it."""
 
 
 def resting_ends(
     readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray, edges: IntArray
 ) -> BoolArray:
-    """Readings (n, 3) of ``axes`` (3,) at the ends of moves ``edges`` (m, 2) at which an axis does not turn yet, or no
-    more, until it leaves the step ``quantum`` (3,) of its reading at ``rest`` (3,).
+    """Samples (n, 3) of ``axes`` (3,) at the ends of the moves ``edges`` (m, 2) at which the axis is static: in the LSB
+    ``quantum`` (3,) of its static reading ``rest`` (3,), and not rotating yet, or no longer.
 
-    Before it leaves, it turns unseen, by more against its place inside the step than with it: on the mean of both ways
-    as if that place, read as a rate, had acted for a while, and for so long it is not still. Each axis by what it shows
-    itself, for one that leaves later was slower; one that never leaves is as still as the body.
+    Before its code changes an axis rotates undetected, further in the direction in which the bias is farther from the
+    edge of the LSB: on the mean of both directions as if the position inside the LSB, as a rate, acted for a while;
+    that time is not static. It is taken from the axis' own code changes; an axis without any is as static as the body.
     """
     out = np.zeros(readings.shape, dtype=np.bool_)
     for first, last in edges.tolist():
@@ -45,13 +45,13 @@ def resting_ends(
 
 
 def _away(readings: FloatArray, quantum: FloatArray, rest: FloatArray) -> FloatArray:
-    """Distance (n, 3) from ``rest`` without toggling between neighbouring codes; what is further was no toggling."""
+    """Distance (n, 3) from ``rest``, raw, without toggling between neighbouring codes (running median)."""
     columns = [_core.running_median(np.ascontiguousarray(column), CHATTER) for column in readings.T]
     return np.maximum(np.abs(np.column_stack(columns) - rest), np.abs(readings - rest) - quantum)
 
 
 def _still(away: FloatArray) -> int | None:
-    """Readings before a move that ``away`` (n,) [steps] from rest shows; ``None`` where it shows none."""
+    """Number of static samples before a rotation, from ``away`` (n,) [LSB] of rest; ``None`` without a code change."""
     left = [int(np.argmax(away >= step)) if np.any(away >= step) else None for step in STEPS]
     begin, second, third = left
     if begin is None:
@@ -63,17 +63,17 @@ def _still(away: FloatArray) -> int | None:
 
 
 AT_REST = 0.75
-"""Steps from the bias within which a reading at the ends of a turn is that of rest: a bias may toggle."""
+"""LSB from the bias within which a reading at the ends of a turn is static: the code of a bias may toggle."""
 
 Group = tuple[int, float, int]
 
 
 @dataclass(frozen=True, eq=False)
 class HiddenAngles:
-    """Raw angles of ``turns`` (k, 3, m) and ``static`` (z, 3, m) by one standard error of each of m independent errors.
+    """Rounding errors: raw angle errors of ``turns`` (k, 3, m) and ``static`` (z, 3, m) per σ of m independent errors.
 
-    ``passing`` (k, 3) is the variance by steps that a turn only passes through, where the errors run through all values
-    and cancel but for one of them.
+    ``passing`` (k, 3), raw², is the variance from codes that a turn passes through, in which the errors of all readings
+    but one cancel.
     """
 
     turns: FloatArray
@@ -81,12 +81,12 @@ class HiddenAngles:
     passing: FloatArray
 
     def variance_of_turns(self) -> FloatArray:
-        """(k, 3) raw²."""
+        """(k, 3) variance of the turns by rounding, raw²."""
         out: FloatArray = np.sum(self.turns**2, axis=2) + self.passing
         return out
 
     def variance_of_biases(self) -> FloatArray:
-        """(z, 3) raw²."""
+        """(z, 3) variance of the static intervals by rounding, raw²."""
         out: FloatArray = np.sum(self.static**2, axis=2)
         return out
 
@@ -99,13 +99,13 @@ def hidden_angles(
     static: Sequence[tuple[int, int]],
     raw_angle: FloatArray,
 ) -> HiddenAngles | None:
-    """What rounding to ``quantum`` (3,) hides of turns and static intervals; ``None`` where noise dithers every axis.
+    """Angle errors of turns and static intervals by rounding to ``quantum`` (3,); ``None`` if noise dithers all axes.
 
-    A rate that stays inside a step is misread by the same part of it, uniform with q²/12, as long as it stays: for T
-    seconds the angle is off by ``q T/√12``. Turns about one axis in one sense that read the same code may have run at
-    one rate (a table's): they share the error, and so do all static intervals. Another code, sense or axis
-    has its own: with w' = z at rest and z ± mω across a turn there and back, all read alike, (z, mω) is uniform on
-    ``|z| + |mω| < q/2``, where mω has the variance q²/24 that two independent errors give it.
+    While a rate stays inside an LSB its error is constant, uniform with variance q²/12: over T seconds the angle error
+    is ``q T/√12`` rms. Turns about one axis in one sense with the same code may have one rate (a table's): they share
+    the error, and so do all static intervals. Another code, sense or axis has an independent error: with w' = z at rest
+    and z ± mω across a turn there and back, all in one code, (z, mω) is uniform on ``|z| + |mω| < q/2``, where mω has
+    the variance q²/24 that two independent errors give it.
     """
     still = np.concatenate([readings[a:b] for a, b in static])
     axes = _undithered(still, quantum)
@@ -118,7 +118,7 @@ def hidden_angles(
     for axis in map(int, np.flatnonzero(axes)):
         size = float(quantum[axis]) / np.sqrt(12.0)
         for row, (a, b) in enumerate(turns):
-            # Its sense and axis, by the raw reading that turned farthest.
+            # Axis and sense of the turn: those of the largest raw angle.
             main = int(np.argmax(np.abs(raw_angle[row])))
             sense = (main + 1) * int(np.sign(raw_angle[row, main]))
             for first, last, level, is_passed in _dwells(readings[a:b, axis]):
@@ -140,13 +140,13 @@ def hidden_angles(
 
 
 def _undithered(still: FloatArray, quantum: FloatArray) -> BoolArray:
-    """Axes (3,) whose noise at rest does not reach the step; what toggles between two codes does not show its noise."""
+    """Axes (3,) whose static noise, less the variance of rounding, does not dither the LSB ``quantum`` (3,)."""
     white = np.sqrt(np.maximum(np.nanvar(still, axis=0) - quantum**2 / 12.0, 0.0))
     return undithered_axes(quantum, white)
 
 
 def _dwells(readings: FloatArray) -> Iterator[tuple[int, int, float, bool]]:
-    """Stretches of one code, freed of toggling: first, last, the reading, and whether the rate only passes through."""
+    """Stretches of one code without toggling: first, last (exclusive), reading, and whether the rate passes through."""
     codes = _core.running_median(np.ascontiguousarray(np.where(np.isfinite(readings), readings, np.inf)), CHATTER)
     begins = np.concatenate([[0], np.flatnonzero(codes[1:] != codes[:-1]) + 1])
     ends = np.concatenate([begins[1:], [len(codes)]])

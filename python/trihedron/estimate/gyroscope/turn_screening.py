@@ -1,4 +1,4 @@
-"""Turns that the others contradict, and how far turns and faces scatter."""
+"""Turns that the others contradict, and the scatter of turns and faces."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from trihedron.estimate.gyroscope.turn_system import TurnSystem, left_out, solve
 from trihedron.probability import MEDIAN_CHI2, chdtrc, chdtri
 
 FALSE_ALARM = 1e-3
-"""Chance that sound turns raise a statistical finding of one kind."""
+"""False alarm rate of each kind of statistical finding on turns."""
 
 LARGEST_SIGMA_TURN = math.radians(20.0)
 FLATNESS_RAD, FLATNESS_SPREAD = math.radians(0.05), 0.9
-"""How far the faces of a case are out of flat, one component: 0.04 mm over 50 mm, within a factor of 2.5 either way
-(turned and moulded cases: 0.02 to 0.1°)."""
+"""Prior of a face's deviation from its nominal plane, one component: 0.04 mm over 50 mm, within a factor of 2.5 either
+way (turned and moulded cases: 0.02 to 0.1°); the second is σ of the logarithm."""
 
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """What remains: ``used`` turns, ``suspects`` that the others contradict, those of them that were ``removed``."""
+    """Result: ``used`` turns (k,), ``suspects`` that the others contradict, those of them that were ``removed``."""
 
     system: TurnSystem
     used: BoolArray
@@ -34,9 +34,9 @@ class Screened:
 def screen(system: TurnSystem, used: BoolArray) -> Screened:
     """Find turns that the others contradict, and the standard error of a turn.
 
-    Each turn is predicted by all others. The scatter of a turn is first read from the median of these predictions,
-    which one wrong turn does not move; a turn far beyond it is a suspect. It is removed when two others about its
-    axis remain to say so. The scatter is then that of the rest, zero where the rate noise explains it.
+    Each turn is predicted by all others. The scatter of a turn is first estimated from the median of the prediction
+    errors, which is robust to one wrong turn; a turn far beyond it is a suspect. It is removed when two others about
+    its axis remain. The scatter is then that of the remaining turns, 0 where the rate noise explains it.
     """
     axes = np.argmax(np.abs(system.angles), axis=1)
     counts = {axis: int(np.count_nonzero(used & (axes == axis))) for axis in range(3)}
@@ -68,7 +68,7 @@ def _distances(system: TurnSystem, used: BoolArray) -> dict[int, float]:
 
 
 def _with_scatter(system: TurnSystem, used: BoolArray) -> TurnSystem:
-    """The scatter of a turn from the median of the predictions: one wrong turn does not move it."""
+    """The system with the scatter of a turn from the median squared prediction error, robust to one wrong turn."""
     for _ in range(3):
         along2, across2, noise2 = _components(system, left_out(system, used).residual)
         known = used & np.isfinite(along2)
@@ -82,12 +82,12 @@ def _with_scatter(system: TurnSystem, used: BoolArray) -> TurnSystem:
 
 
 def _matching_scatter(system: TurnSystem, used: BoolArray) -> TurnSystem:
-    """Scatter along and across the turns by moments, where the rate noise does not explain the residuals; that across
-    wherever it is seen.
+    """The system with the scatter along and across the turns by moments: along where the rate noise does not explain
+    the residuals, across always.
 
-    A case that lies flat to some hundredths of a degree scatters as much as the noise of a turn, which no test shows in
-    twelve turns: left out for want of proof, 95 % intervals held 91 %. Turns that follow each other about one axis
-    share how the case lies: as many of them count as one.
+    A case that lies flat to some hundredths of a degree scatters as much as the noise of a turn, which no test detects
+    in twelve turns: without it 95 % intervals covered 91 %. Consecutive turns about one axis share the case's tilt and
+    count as one.
     """
     system = _with_tilts(replace(system, sigma_turn=0.0, sigma_tilt=0.0), used)
     if system.sigma_face > 0.0:
@@ -103,7 +103,7 @@ def _matching_scatter(system: TurnSystem, used: BoolArray) -> TurnSystem:
     k = int(np.count_nonzero(used))
     for _ in range(3):
         along2, across2, noise2 = _components(system, system.residuals(solve(system, used)))
-        # Each axis spends one parameter along its turns and two across them.
+        # Per axis one parameter is fitted along the turns and two across them.
         system = replace(
             system,
             sigma_turn=_beyond(float(np.sum(along2[used])) / max(k - 3, 1), noise2),
@@ -113,7 +113,7 @@ def _matching_scatter(system: TurnSystem, used: BoolArray) -> TurnSystem:
 
 
 def _with_turns_astray(system: TurnSystem, used: BoolArray) -> TurnSystem:
-    """The scatter of turns' sizes by moments, where noise and tilts do not explain the residuals."""
+    """The system with the scatter of turn angles by moments, where noise and tilts do not explain the residuals."""
     fit = solve(system, used)
     if fit.dof < 1 or chdtrc(fit.dof, fit.chi2) > FALSE_ALARM:
         return system
@@ -126,11 +126,11 @@ def _with_turns_astray(system: TurnSystem, used: BoolArray) -> TurnSystem:
 
 
 def _with_tilts(system: TurnSystem, used: BoolArray) -> TurnSystem:
-    """How far faces are out of flat, and how differently the case lies at every turn: mean variances over what the
-    turns leave likely of both (restricted likelihood on a grid), the first with a prior.
+    """The system with the tilt of faces, which has a prior, and the tilt that differs from turn to turn: posterior mean
+    variances of both by restricted likelihood on a grid.
 
-    Turns on one face share its tilt, so that their own scatter does not show it; opposite faces differ by it, and one
-    face alone says nothing: the prior then stands. Where faces are not known turns are taken to lie each their own way.
+    Turns on one face share its tilt, which their scatter does not show; opposite faces differ by it. With one face
+    alone the prior is kept. Where faces are unknown, every turn has its own tilt.
     """
     if system.faces is None or not np.all(system.faces[used] != 0):
         return system
@@ -161,14 +161,14 @@ def _restricted_likelihood(system: TurnSystem, used: BoolArray) -> float:
 
 
 def _turns_a_placement(angles: FloatArray) -> float:
-    """How many turns follow each other about one axis, on the average."""
+    """Mean number of consecutive turns about one axis; ``angles`` (k, 3)."""
     axis = np.argmax(np.abs(angles), axis=1)
     return len(axis) / (1.0 + float(np.count_nonzero(np.diff(axis))))
 
 
 def _components(system: TurnSystem, raw: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Squares (k,) along and across each turn, rad², of raw deviations (k, 3), and the variance that noise alone
-    gives."""
+    """Squared deviations (k,) along and across each turn, rad², from raw ones (k, 3), and the variance per component
+    by noise alone."""
     to_si = np.linalg.inv(system.S_w)
     deviation = raw @ to_si.T
     along = np.einsum("ki,ki->k", deviation, system.axes)

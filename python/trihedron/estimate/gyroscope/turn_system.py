@@ -12,12 +12,12 @@ from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns
 
 @dataclass(frozen=True, eq=False)
 class TurnSystem:
-    """Turns with known ``angles`` (k, 3), rad; a rough ``S_w`` (3, 3) turns ``sigma_turn`` (rad) into raw units.
+    """Turns with known ``angles`` (k, 3), rad; a rough ``S_w`` (3, 3) converts their errors in rad into raw units.
 
-    ``sigma_turn`` is the standard error of a turn's size, ``sigma_tilt`` that of its axis times the turn (table, case).
-    ``sigma_directions`` (k,) rad is the standard error of each turn's axis as it was measured, across itself.
-    ``faces`` (k,) says on which face (±1, ±2, ±3; 0 not known) each turn was made, ``sigma_face`` (rad) how far faces
-    are out of flat, one component: what all turns on one face share, whichever way they go.
+    ``sigma_turn`` [rad] is the standard error along a turn, ``sigma_tilt`` [rad] that across it (tilt of table, case).
+    ``sigma_directions`` (k,) [rad] is the standard error of each turn's measured axis, per component across it.
+    ``faces`` (k,) is the face (±1, ±2, ±3; 0 unknown) of each turn, ``sigma_face`` [rad] the standard deviation of the
+    tilt of a face, one component, which all turns on that face share in either sense.
     """
 
     measured: MeasuredTurns
@@ -30,7 +30,7 @@ class TurnSystem:
     sigma_face: float = 0.0
 
     def covariances(self) -> FloatArray:
-        """(k, 3, 3) of each raw turn: rate noise ``N² Δt``, a bias that wanders between poses, the turn's own error."""
+        """(k, 3, 3) covariance of each raw turn: rate noise ``N² Δt``, bias drift between poses, error of the turn."""
         axis = self.axes @ self.S_w.T
         along = (self.sigma_turn**2 - self.sigma_tilt**2) * axis[:, :, None] * axis[:, None, :]
         covariance: FloatArray = self.noise() + along + self.sigma_tilt**2 * self.S_w @ self.S_w.T
@@ -41,7 +41,7 @@ class TurnSystem:
         return covariance
 
     def factor(self, used: BoolArray) -> FloatArray:
-        """(3n, 3n) that whitens the used raw turns, with what turns on one face share (see ``sigma_face``)."""
+        """(3n, 3n) whitening matrix of the used raw turns, with the correlation by ``sigma_face``."""
         n = int(np.count_nonzero(used))
         covariance = np.zeros((n, 3, n, 3))
         covariance[np.arange(n), :, np.arange(n)] = self.covariances()[used]
@@ -61,12 +61,12 @@ class TurnSystem:
         return self.angles / np.where(size > 0.0, size, 1.0)
 
     def noise(self) -> FloatArray:
-        """(k, 3, 3) of the raw turns from the sensor alone."""
+        """(k, 3, 3) covariance of the raw turns from the sensor alone."""
         hidden = self.measured.hidden
         return self._noise(self.measured.duration_s, None if hidden is None else hidden.variance_of_turns())
 
     def noise_of_biases(self) -> FloatArray:
-        """(z, 3, 3) of the raw static intervals."""
+        """(z, 3, 3) covariance of the raw integrals of the static intervals."""
         hidden = self.measured.hidden
         return self._noise(self.measured.static_duration_s, None if hidden is None else hidden.variance_of_biases())
 
@@ -100,13 +100,13 @@ class TurnSystem:
         return design, side
 
     def pull(self, fit: Solution, used: BoolArray, errors: FloatArray) -> FloatArray:
-        """(12, m) by what errors of the turns (k, 3, m), rad, that all of them share, pull the solution."""
+        """(12, m) change of the solution by shared errors of the turns (k, 3, m), rad."""
         matrix, _ = self.whitened(used, with_biases=False)
         moved = (fit.S_w @ errors[used]).reshape(len(matrix), -1)
         return fit.covariance @ matrix.T @ (self.factor(used) @ moved)
 
     def correlation(self, fit: Solution, used: BoolArray) -> FloatArray:
-        """(12, 12) to add to the solution's covariance where rounding errors are shared: weights take none as so."""
+        """(12, 12) to add to the solution's covariance for shared rounding errors, which have independent weights."""
         hidden = self.measured.hidden
         if hidden is None:
             return np.zeros((12, 12))
@@ -114,7 +114,7 @@ class TurnSystem:
         n = 3 * int(np.count_nonzero(used))
         of_biases = np.linalg.inv(np.linalg.cholesky(self.noise_of_biases()))
         errors = np.concatenate([hidden.turns[used], hidden.static])
-        # (n, 12, 3): by what an error of each row pulls the solution.
+        # (n, 12, 3): derivative of the solution by an error of each turn or static interval.
         pulls = matrix @ fit.covariance
         of_turns = (self.factor(used).T @ pulls[:n]).reshape(-1, 3, 12)
         still = np.swapaxes(of_biases, 1, 2) @ pulls[n:].reshape(-1, 3, 12)

@@ -49,26 +49,26 @@ def calibrate_turns(
         With raw gyro readings.
     turns : sequence of Turn
         Where the turns are; axis and angle (whole turns too) are found from the data where they are not given.
-    zeros : sequence of (start, stop)
+    static : sequence of (start, stop)
         Intervals without rotation.
     nominal_scale : (3, 3) or float, optional
-        rad/s per raw unit, to recognise quarter turns; the unit tells it unless readings are counts.
-        Turns whose angle and axis are given need none, and are believed where they span three axes.
+        rad/s per raw unit, to identify multiples of 90°; it follows from the unit unless readings are counts.
+        Stated turns (angle and axis) need none; their scale has precedence where they span three axes.
     nominal_tolerance : float
-        How far, relatively, the nominal scale may be from the truth.
+        Relative tolerance of the nominal scale.
     shared_errors : (k, 3, m), optional
-        What one standard error of each of m independent errors that all turns share does to the turns, rad.
+        Change of the turns [rad] by one standard error of each of m independent errors that all turns share.
 
     Returns
     -------
     SensorCalibration, tuple of Finding
-        Direct form ``ω = S raw + b`` in the case frame, and what was noticed.
+        Direct form ``ω = S raw + b`` in the case frame, and the findings.
 
     Raises
     ------
     ValueError
-        When an axis was never turned, no zero turn and no second duration fixes the bias; or, with the question to the
-        user, when readings are counts and neither the angles nor a nominal scale are given.
+        When an axis has no usable turn or there is no static interval; or, with the question to the user, when readings
+        are counts and neither the angles nor a nominal scale are given.
 
     Notes
     -----
@@ -108,14 +108,14 @@ def calibrate_turns(
 
 
 def _covariance(fit: Solution, inflation: float, added: FloatArray) -> FloatArray:
-    """(12, 12) of the direct form; ``added`` are errors that turns share, in the inverse form."""
+    """Covariance (12, 12) of the direct form; ``added`` (12, 12) is that of errors shared by turns, in inverse form."""
     jacobian = other_form_jacobian(fit.S_w, fit.b_w)
     covariance: FloatArray = jacobian @ (inflation * fit.covariance + added) @ jacobian.T
     return 0.5 * (covariance + covariance.T)
 
 
 def _inflation(fit: Solution) -> float:
-    """χ² per degree of freedom where it is beyond chance, else 1."""
+    """χ² per degree of freedom where it is significant at ``FALSE_ALARM``, else 1."""
     is_beyond_chance = fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < FALSE_ALARM
     return fit.chi2 / fit.dof if is_beyond_chance else 1.0
 
@@ -142,7 +142,7 @@ def _require_every_axis(known: Sequence[KnownTurn], used: npt.NDArray[np.bool_],
 
 
 def _quality(system: TurnSystem, used: npt.NDArray[np.bool_], fit: Solution, S: FloatArray) -> FitQuality:
-    """Deviation of each turn from its known angle, (k, 3) rad, in sample and with the turn left out of the fit."""
+    """Deviation of each turn from its known angle, (k, 3) rad, in sample and held out."""
     residual = system.residuals(fit) @ S.T
     noise = S @ system.covariances() @ S.T
     left = left_out(system, used)

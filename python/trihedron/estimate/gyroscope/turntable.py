@@ -1,7 +1,7 @@
-"""A table that turns at known speeds, the unit on it anyhow: ``|S w' + b| = W`` while the speed stands still.
+"""A rate table at known speeds, the unit on it in any orientation: ``|S w' + b| = W`` while the speed W is constant.
 
-The norm fit of an accelerometer's poses with another constant (docs/model-gyroscope.md). It goes into what moves and
-poses of the same log have told as rows of one more kind, so that the axes stay those of the accelerometer.
+It is the norm fit of an accelerometer's poses with another constant (docs/model-gyroscope.md). The speeds are added as
+rows to the fit of poses and moves of the same log, so that the frame stays that of the accelerometer.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from trihedron.session.rounding import undithered_axes
 
 
 def with_own_residuals(calibration: Calibration, recording: Recording, segments: Segments, paid: float) -> Calibration:
-    """Residuals of poses and moves at the S and b that are saved; ``paid`` is by how much χ² of the moves rose.
+    """The calibration with residuals of poses and moves at its S and b; ``paid`` is the increase of the moves' χ².
 
-    Predictions of fits that did not see a pose or move are of another model, and are left out.
+    Held-out residuals belong to the fit without the table and are removed.
     """
     accelerometer, gyroscope = calibration.accelerometer, calibration.gyroscope
     if accelerometer.quality is not None and segments.accelerometer_mean is not None:
@@ -76,17 +76,17 @@ def _seen_alone(quality: FitQuality) -> FitQuality:
 
 
 BLOCK_S = 0.2
-"""Of readings that are taken together: noise is small beside the speed, and a table at speed does not change."""
+"""Length of a block of readings: its noise is small against the speed, which is constant over a block."""
 STEADY = 0.01
-"""Change of a table's speed, relative, that is none: its control. A hand does not turn as evenly for a second."""
+"""Relative change of speed within a steady turn: the table's control. A hand is not as steady for a second."""
 SHORTEST_S = 1.0
 NOISE = 6.0
-"""Standard errors of a block's mean by which a steady rate may be off."""
+"""Standard errors of a block's mean by which a steady rate may deviate."""
 SLOWEST = 20.0
-"""Standard errors of a block's mean that a table turns faster than."""
+"""Smallest rate of a turn, in standard errors of a block's mean."""
 ITERATIONS = 20
 FALSE_ALARM = 1e-3
-"""Chance that the speeds of a sound table are said to scatter."""
+"""Probability that the speeds of an accurate table are found to scatter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ class Plateaus:
 
 
 def plateaus(recording: Recording, segments: Segments) -> Plateaus:
-    """Where the unit turns steadily for a second or longer, in the moves between poses."""
+    """Stretches of steady rotation of ``SHORTEST_S`` or longer, in the moves between poses."""
     assert recording.gyroscope is not None
     assert segments.gyroscope_mean is not None
     assert segments.gyroscope_sigma is not None
@@ -124,7 +124,7 @@ def plateaus(recording: Recording, segments: Segments) -> Plateaus:
 
 
 def _steady(blocks: FloatArray, rest: FloatArray, sigma: FloatArray) -> list[tuple[int, int]]:
-    """Runs of blocks (n, 3) that differ from their second one by no more than noise and a table's speed do."""
+    """Runs of block means (n, 3) within noise and ``STEADY`` of the run's second one, without the first and last."""
     away = np.linalg.norm(blocks - rest, axis=1)
     is_turning = np.all(np.isfinite(blocks), axis=1) & (away > SLOWEST * np.linalg.norm(sigma))
     out = []
@@ -135,7 +135,7 @@ def _steady(blocks: FloatArray, rest: FloatArray, sigma: FloatArray) -> list[tup
             allowed = STEADY * away[level] + NOISE * np.sqrt(2.0) * float(np.linalg.norm(sigma))
             apart = np.linalg.norm(blocks[first:end] - blocks[level], axis=1) > allowed
             last = first + max(int(np.argmax(apart)), 1) if np.any(apart) else end
-            # The first and the last block may hold the end of a ramp.
+            # The first and the last block may contain part of a ramp.
             if last - first > 3:
                 out.append((first + 1, last - 1))
             first = last
@@ -149,14 +149,14 @@ def on_turntable(
     speeds_deg_s: Sequence[float] | None,
     relative_sigma: float = 0.0,
 ) -> Calibration:
-    """The calibration with the speeds of a turntable, in whatever orientation the unit lay on it.
+    """The calibration updated with the speeds of a turntable, for any orientation of the unit on it.
 
     Parameters
     ----------
     calibration : Calibration
         Of the same log, with a gyro.
     speeds_deg_s : sequence of float
-        One for all steady turns, or one a turn in the order of the log; 0 leaves one out. Signs do not matter.
+        One for all steady turns, or one a turn in the order of the log; 0 excludes a turn. Signs do not matter.
     relative_sigma : float
         Standard error of the table's speed, common to all turns (0.001: one part in a thousand).
 
@@ -188,14 +188,14 @@ def on_turntable(
         chi2 = float(misfit @ np.linalg.solve(innovation, misfit))
         if scatter > 0.0 or fdtrc(float(len(W)), 100.0, chi2 / len(W)) >= FALSE_ALARM:
             break
-        # Speeds of a table that scatters, or a sensor that S and b do not describe: as uncertain as they miss.
+        # The table's speed scatters, or S and b do not describe the sensor: the rms misfit is added to the variance.
         scatter = float(np.sqrt(np.mean((misfit / W) ** 2)))
     posterior = calibration.covariance - gain @ H @ calibration.covariance[n - 12 :]
     posterior = 0.5 * (posterior + posterior.T)
     shift = gain @ misfit
     accelerometer = calibration.accelerometer
     values = np.concatenate([accelerometer.S.ravel(), accelerometer.b]) + shift[:12]
-    # What the speeds ask for is paid by the moves: the rise of their sum of squares, in linear steps.
+    # The shift from the optimum of poses and moves increases their χ² by this, to first order.
     paid = float(shift @ np.linalg.pinv(calibration.covariance, hermitian=True) @ shift)
     said = _said(scatter, misfit / W, float(np.sqrt(np.mean((_model(mean, theta)[0] / W - 1.0) ** 2))), relative_sigma)
     after = replace(
@@ -228,7 +228,7 @@ def _speeds(found: Plateaus, speeds_deg_s: Sequence[float], rate_hz: float) -> F
 
 
 def _model(mean: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Speeds (k,) and their derivatives (k, 12) by S (row by row) and b."""
+    """Speeds (k,) [rad/s] and their derivatives (k, 12) by S (row by row) and b."""
     rate = mean @ theta[:9].reshape(3, 3).T + theta[9:]
     speed = np.linalg.norm(rate, axis=1)
     along = rate / speed[:, None]
@@ -236,7 +236,7 @@ def _model(mean: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray]
 
 
 def _variance(mean: FloatArray, covariance: FloatArray, theta: FloatArray) -> FloatArray:
-    """(k,) variance of the speeds by the noise of the readings."""
+    """(k,) variance of the speeds [(rad/s)²] due to the noise of the readings."""
     S = theta[:9].reshape(3, 3)
     rate = mean @ S.T + theta[9:]
     gradient = (rate / np.linalg.norm(rate, axis=1)[:, None]) @ S
@@ -244,7 +244,7 @@ def _variance(mean: FloatArray, covariance: FloatArray, theta: FloatArray) -> Fl
 
 
 def _said(scatter: float, missed: FloatArray, rms: float, sigma: float) -> Finding:
-    """What came of the speeds, ``missed`` (k,) relative before the fit and ``rms`` behind it."""
+    """Finding on the speeds: relative misfits ``missed`` (k,) before the update and their ``rms`` after it."""
     common = float(np.mean(missed))
     figures = {"rms": rms, "scatter": scatter, "sigma": sigma, "common": common}
     if scatter > 0.0:
@@ -262,7 +262,7 @@ def _said(scatter: float, missed: FloatArray, rms: float, sigma: float) -> Findi
 def _updated(
     prior: FloatArray, start: FloatArray, mean: FloatArray, W: FloatArray, noise: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Most likely gyro (12,), gain (n, k), derivatives (k, 12), and what the prior misses by these."""
+    """Posterior gyro parameters (12,), gain (n, k), derivatives (k, 12), and linearised misfit (k,) of the prior."""
     n, theta = len(prior), start
     for _ in range(ITERATIONS):
         speed, H = _model(mean, theta)

@@ -1,1 +1,1 @@
-"""Calibration by Kalman filter with the identified noise in its state (docs/kalman.md)."""
+"""Calibration by Kalman filter with the identified noise as states (docs/kalman.md)."""

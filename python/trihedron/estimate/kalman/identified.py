@@ -1,4 +1,4 @@
-"""From identified noise terms (Allan variance, docs/noise.md) to the noise that the filter takes, in raw units."""
+"""Conversion of identified noise terms (Allan variance, docs/noise.md) to the filter's noise in raw units."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from trihedron.records.pose_noise import OctaveNoise
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 MOST_ABOVE = 2.0
-"""Noise of the session over that of the static log from which its uncertainties would be more than twice too small."""
+"""Largest ratio of the session's noise to the static log's: above it uncertainties are more than twice too small."""
 MOST_BELOW = 3.0
-"""The other way round: a sensor may be quieter in a session than in an office, not so in every octave."""
+"""Largest ratio of the static log's noise to the session's: a session may be quieter, but not in every octave."""
 LARGEST_MISS_OF_GRAVITY = 0.3
-"""Part of g by which a log of rest may miss it as the calibration reads it: ranges differ by factors of two, biases
-from one day to another, or of a second unit of a cheap kind, by less."""
+"""Largest relative gravity error of a static log under the session's calibration: ranges differ by factors of two;
+biases differ by less between days, and between units of a cheap part."""
 COARSER = math.sqrt(2.0)
-"""Steps that differ by more are of another ADC or range."""
+"""Largest ratio of two resolutions of one ADC and range."""
 
 
 class IdentifiedProcess(Protocol):
-    """A Gauss-Markov process that was seen as such."""
+    """An identified Gauss-Markov process."""
 
     @property
     def sigma_process(self) -> float:
@@ -39,7 +39,7 @@ class IdentifiedProcess(Protocol):
 
 
 class IdentifiedAxis(Protocol):
-    """What is needed of an axis of identified noise; values in ``unit`` and seconds."""
+    """Interface of an axis of identified noise; values in ``unit`` and seconds."""
 
     @property
     def name(self) -> str:
@@ -55,18 +55,18 @@ class IdentifiedAxis(Protocol):
 
     @property
     def sample_sigma(self) -> float:
-        """Scatter of one sample."""
+        """Standard deviation of one sample."""
 
     @property
     def resolution(self) -> float:
-        """Step of the ADC."""
+        """Resolution (LSB) of the ADC."""
 
     @property
     def gauss_markov(self) -> IdentifiedProcess | None:
-        """First-order process besides the five terms."""
+        """First-order Gauss-Markov process beside the five terms, or ``None``."""
 
     def fitted(self, symbol: str) -> float:
-        """Share of Q, N, B, K or R in the most likely sum of terms."""
+        """Coefficient of Q, N, B, K or R in the most likely sum of terms."""
 
 
 def noise_from_identified(
@@ -74,12 +74,12 @@ def noise_from_identified(
 ) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
     """Noise of the three accelerometer axes among the identified ones, in the raw unit of the log to be calibrated.
 
-    The axes with a unit of acceleration are taken; where there is none (counts), the first three.
+    The axes with a unit of acceleration are used; where there is none (counts), the first three.
 
     Raises
     ------
     ValueError
-        When there are not three such axes, or their unit cannot be turned into the raw unit.
+        When there are not three such axes, or their unit cannot be converted to the raw unit.
     """
     out = [_one(axis, AccelerationUnit(raw_unit)) for axis in _accelerometer_axes(axes)]
     return out[0], out[1], out[2]
@@ -95,14 +95,14 @@ def _accelerometer_axes(axes: Sequence[IdentifiedAxis]) -> list[IdentifiedAxis]:
 
 
 def check_same_gravity(axes: Sequence[IdentifiedAxis], accelerometer: SensorCalibration, gravity_m_s2: float) -> None:
-    """Refuse the noise of a log of rest that, read by the session's calibration, does not measure gravity.
+    """Check that a static log measures gravity under the session's calibration, so that its noise applies.
 
-    A range twice as large halves the noise in counts, which no test of densities tells from a quieter place.
+    Twice the range halves the noise in counts, which densities do not distinguish from a quieter place.
 
     Raises
     ------
     ValueError
-        With what the static log reads, and the remedy.
+        With the gravity that the static log reads, and the remedy.
     """
     raw_unit = AccelerationUnit(accelerometer.raw_unit)
     mean = np.array([axis.mean * _factor(axis, raw_unit) for axis in _accelerometer_axes(axes)])
@@ -132,7 +132,7 @@ def _one(axis: IdentifiedAxis, raw_unit: AccelerationUnit) -> AxisNoise:
 
 
 def _factor(axis: IdentifiedAxis, raw_unit: AccelerationUnit) -> float:
-    """Raw units of the log to be calibrated in one unit of the axis."""
+    """Raw units of the log to be calibrated per unit of the axis."""
     factor = 1.0
     if axis.unit != raw_unit.value:
         has = (
@@ -157,15 +157,15 @@ def check_same_adc(
     rate_hz: float,
     source: str,
 ) -> None:
-    """Refuse the noise of another ADC than the session's, of which ``steps`` and ``octaves`` by axis are given.
+    """Check that the noise is of the session's ADC, whose ``steps`` (LSB) and noise ``octaves`` are given by axis.
 
-    Steps are compared where the session's is not lost in the noise; densities octave by octave, beyond a factor in
-    every one of them: a filter or a hand's tremor changes some.
+    LSBs are compared where the session's exceeds the noise; densities are of another ADC where they differ by more than
+    a factor in every octave: a filter or a hand's tremor changes only some.
 
     Raises
     ------
     ValueError
-        Naming the axis, both figures and the remedy.
+        Naming the axis, both values and the remedy.
     """
     remedy = "record the static log with the range, rate and output of the session"
     for axis, noise, step, seen in zip(AXES, given, steps, octaves, strict=True):
@@ -195,7 +195,7 @@ def check_same_adc(
 
 
 def _density(noise: AxisNoise, frequency_hz: float, rate_hz: float) -> float:
-    """Two-sided density of identified noise (docs/noise.md, section 3)."""
+    """Two-sided power spectral density of identified noise, raw²/Hz (docs/noise.md, section 3)."""
     omega = 2.0 * math.pi * frequency_hz
     return (
         (omega * noise.quantisation) ** 2 / rate_hz

@@ -1,4 +1,4 @@
-"""The filter's model of an axis' noise, and whether what the filter then saw fits it."""
+"""The filter's model of an axis' noise, and tests of the innovations against it."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisNoise, Consistency
 
 SLOWEST_PER_SESSION, FASTEST_PER_POSE = 0.3, 6.0
-"""Extreme inverse correlation times, over those of the session and of a pose. With one Gauss-Markov process per decade
-between them the Allan deviation follows flicker within 2 %."""
+"""Extreme inverse correlation times of flicker, times the length of session and of pose. With one Gauss-Markov process
+per decade between them the Allan deviation follows flicker within 2 %."""
 
 
 @dataclass(frozen=True)
 class ShapingOptions:
-    """How the noise becomes states (docs/kalman.md, eq. 4-8).
+    """Representation of the noise by states (docs/kalman.md, eq. 4-8).
 
     ``flicker_rates_per_s`` are the inverse correlation times β of the Gauss-Markov processes for flicker: one for the
     article's filter, empty for as many as the session needs. ``ramp_frequency_rad_s`` is ω₀ of the second-order ramp, 0
     for one tenth of the session's inverse length: its slope then lasts for the whole session; ``ramp_damping`` is ζ.
-    With ``averages`` a reading is the mean over its pose, exactly; without, it is the value at its end (the article).
+    With ``averages`` a reading is the exact mean over its pose; without, it is the value at its end (the article).
     """
 
     flicker_rates_per_s: tuple[float, ...] = ()
@@ -62,11 +62,11 @@ def shaping_model(
 
 CONFIDENCE = 0.99
 DIFFUSE_RATIO = 30.0
-"""An innovation predicted this many times wider than the later ones tells of the diffuse start, not of noise."""
+"""Ratio of an innovation's σ to the later ones' above which the diffuse start dominates it, and not the noise."""
 
 
 def is_settled(innovation_sigma: FloatArray) -> npt.NDArray[np.bool_]:
-    """Which innovations (n,) were predicted by the data; the others only by the diffuse start."""
+    """Innovations (n,) that the data predict; the σ of the others is dominated by the diffuse start."""
     typical = float(np.median(innovation_sigma[len(innovation_sigma) // 2 :]))
     return innovation_sigma <= DIFFUSE_RATIO * typical
 
@@ -96,7 +96,7 @@ def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray) -> C
 
 
 def consistency_findings(axis: int | None, seen: Consistency) -> list[Finding]:
-    """What an inconsistent filter tells about the noise it was given; ``axis`` None stands for all three."""
+    """Findings where innovations contradict the noise model; ``axis`` None for the norm of all three."""
     out: list[Finding] = []
     case, name = ("norm", "") if axis is None else ("axis", AXES[axis])
     mean, low, high = seen.nis_mean, seen.nis_low, seen.nis_high

@@ -1,4 +1,4 @@
-"""Calibration without reference attitudes: a reading at rest is as long as gravity (docs/kalman.md, eq. 10)."""
+"""Calibration without reference attitudes: the norm of a static reading is gravity (docs/kalman.md, eq. 10)."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from trihedron.records.kalman import AxisNoise, NormKalmanCalibration
 
 @dataclass(frozen=True, eq=False)
 class NormStart:
-    """Where the filter starts: ``f = S (raw − bias)`` with S (3, 3) and bias (3,).
+    """Initial state of the filter: ``f = S (raw − bias)`` with S (3, 3) and bias (3,), raw.
 
-    S is good to ``sigma_relative`` of its size, the bias to ``sigma_bias_m_s2``. The signs of S decide
-    the signs of the result: the length of a vector cannot.
+    The standard uncertainty of S is ``sigma_relative`` of its size, that of the bias ``sigma_bias_m_s2``. The signs of
+    S are those of the result: the norm does not determine them.
     """
 
     S: FloatArray
@@ -53,7 +53,7 @@ class NormStart:
 
     @classmethod
     def from_range(cls, readings: npt.ArrayLike, gravity_m_s2: float) -> NormStart:
-        """A guess from mean readings (n, 3) alone: each axis has been near the vertical, both ways up.
+        """Initial values from the range of mean readings (n, 3): each axis was near the vertical, both ways up.
 
         Raises
         ------
@@ -78,7 +78,7 @@ N_PARAMETERS = 9
 
 
 class NormFilter:
-    """The filter of a triad in unknown attitudes, over poses in order.
+    """Kalman filter of a triad in unknown attitudes, over poses in order of time.
 
     Parameters
     ----------
@@ -87,11 +87,11 @@ class NormFilter:
     gravity_m_s2 : float
         Local gravity.
     start : NormStart
-        Rough calibration to start from, signs included.
+        Initial calibration, signs included.
     frame : "lower" or "symmetric"
-        Form of S, which fixes the rotation that the length of a vector leaves free.
+        Form of S, which fixes the rotation that the norm does not determine.
     session_s, pose_s : float
-        Rough length of the session, which sets the slowest noise that is modelled, and of a pose.
+        Approximate length of the session, which sets the slowest noise state, and of a pose.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class NormFilter:
         self.n_runs = 0
 
     def add(self, reading: FloatArray, start_s: float, pose_s: float, extra_variance: FloatArray) -> None:
-        """Take the mean raw reading (3,) of one pose, with its variance (3,) on top of the noise model, raw².
+        """Update with the mean raw reading (3,) of one pose; ``extra_variance`` (3,), raw², adds to the noise model.
 
         Raises
         ------
@@ -129,11 +129,11 @@ class NormFilter:
         self._filter.add([float(v) for v in reading - self._bias], start_s, pose_s, [float(v) for v in extra_variance])
 
     def load(self, readings: FloatArray, start_s: FloatArray, pose_s: FloatArray, extra_variance: FloatArray) -> None:
-        """Take many poses at once, (n, 3), (n,), (n,), (n, 3); :meth:`relinearise` then estimates from all of them."""
+        """Store many poses, (n, 3), (n,), (n,), (n, 3), without an update; :meth:`relinearise` estimates from all."""
         self._filter.load(readings - self._bias, start_s, pose_s, np.ascontiguousarray(extra_variance))
 
     def relinearise(self, most: int = MOST_RUNS) -> bool:
-        """Repeat the run over all poses until the constants stay; whether they did within ``most`` runs."""
+        """Repeat the run over all poses until the constants converge; whether they did within ``most`` runs."""
         runs = self._filter.relinearise(most)
         self.n_runs = runs or 0
         return runs is not None
@@ -163,7 +163,7 @@ class NormFilter:
         return S, theta[6:]
 
     def innovations(self) -> tuple[FloatArray, FloatArray]:
-        """(n,) innovations of the latest run and their predicted standard deviations, m/s²."""
+        """Innovations (n,) of the latest run and their predicted standard deviations (n,), m/s²."""
         rows = self._filter.innovations
         return rows[:, 0].copy(), np.sqrt(rows[:, 1])
 
@@ -181,7 +181,7 @@ def calibrate_without_references(
     options: ShapingOptions | None = None,
     raw_unit: str = "counts",
 ) -> NormKalmanCalibration:
-    """Calibrate a triad from mean readings in unknown attitudes, with the track after every pose.
+    """Calibrate a triad from mean readings in unknown attitudes, with the estimate after every pose.
 
     Parameters
     ----------
@@ -190,11 +190,11 @@ def calibrate_without_references(
     noise : AxisNoise or three of them
         Noise of the raw readings.
     start_s, pose_s : (n,)
-        When each pose starts and how long it lasts, s.
+        Start time and length of each pose, s.
     start : NormStart, optional
-        Default: guessed from the range of the readings, positive axes.
+        Default: from the range of the readings, with positive axes.
     extra_variance : scalar, (n,) or (n, 3)
-        Variance of a reading on top of the noise model, raw².
+        Variance of a reading in addition to the noise model, raw².
 
     Raises
     ------
@@ -216,7 +216,7 @@ def calibrate_without_references(
         )
 
     parameters, sigmas = _track(fresh(), a, begin, pose, extra)
-    # The answer does not depend on how the first few poses went: all together, from the start.
+    # A run over all poses from the start: the result does not depend on the linearisation at the first poses.
     one = fresh()
     one.load(a, begin, pose, extra)
     converged = one.relinearise()
@@ -268,10 +268,10 @@ def _flat(S: FloatArray, b: FloatArray, covariance: FloatArray) -> tuple[FloatAr
 def _track(
     one: NormFilter, a: FloatArray, begin: FloatArray, pose: FloatArray, extra: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """S row by row and b with standard errors (n, 12), as they stand after every pose."""
+    """S row by row and b, and their standard uncertainties, (n, 12) each, after every pose."""
     parameters, sigmas = np.empty((len(a), 12)), np.empty((len(a), 12))
     for i in range(len(a)):
-        # Every pose counts at first; later ones change the point of linearisation by less than its error.
+        # The first 40 poses are relinearised each; later ones change the linearisation point by less than its error.
         again = i < 40 or i % 10 == 0
         one.add(a[i], float(begin[i]), float(pose[i]), extra[i])
         if again:
@@ -281,7 +281,7 @@ def _track(
 
 
 def _observability(one: NormFilter) -> tuple[Observability, list[Finding]]:
-    """Directions of the nine parameters, from the covariance of ``[E | e/g]``."""
+    """Observability of the nine parameters, from their covariance relative to the scale of each axis and to |g|."""
     covariance = one._filter.covariance
     S, _ = one._centred()
     scale = np.array([1.0 / np.abs(np.diag(S))[j] for _, j in ENTRIES] + [1.0 / one._gravity] * 3)

@@ -1,4 +1,4 @@
-"""Calibration in known attitudes, axis by axis: the filter, and in the same run the least squares to compare with."""
+"""Calibration in known attitudes, axis by axis: the Kalman filter, and least squares for comparison."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from trihedron.records.kalman import AxisKalmanResult, AxisNoise, ConstantsTrack
 from trihedron.records.words import words
 
 DIFFUSE = 1e8
-"""Width of a diffuse start in standard deviations of one reading: its information is 1e-16 of one pose's."""
+"""σ of a diffuse start in standard deviations of one reading: its information is 1e-16 of one pose's."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What is believed before the first pose: ``mean``, ``sigma`` (3, 4) of ``(kx, ky, kz, U0)`` per axis.
+    """Prior of the constants: ``mean``, ``sigma`` (3, 4) of ``(kx, ky, kz, U0)`` per axis.
 
-    ``walk`` (3, 4) is the intensity of a slow walk of each constant, per √s; zero keeps the constants constant.
+    ``walk`` (3, 4) is the random walk intensity of each constant, per √s; 0 for constants that do not change.
     """
 
     mean: FloatArray
@@ -40,7 +40,7 @@ class Prior:
 
     @classmethod
     def diffuse(cls, reading_sigma: npt.ArrayLike) -> Prior:
-        """No belief at all: ``1e8`` standard deviations ``reading_sigma`` (3,) of one reading around zero."""
+        """Diffuse prior: mean 0, σ of ``DIFFUSE`` times the standard deviation ``reading_sigma`` (3,) of a reading."""
         sigma = np.broadcast_to(np.asarray(reading_sigma, dtype=np.float64), (3,))
         return cls(np.zeros((3, 4)), DIFFUSE * np.repeat(sigma[:, None], 4, axis=1), np.zeros((3, 4)))
 
@@ -54,7 +54,7 @@ class Prior:
 
 
 def noise_per_axis(noise: AxisNoise | Sequence[AxisNoise]) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
-    """One description for all axes, or one per axis."""
+    """Noise of each of the three axes, from one for all or one per axis."""
     if isinstance(noise, AxisNoise):
         return noise, noise, noise
     if len(noise) != 3:
@@ -75,7 +75,7 @@ def calibrate_with_references(
     raw_unit: str = "counts",
     with_baselines: bool = True,
 ) -> KalmanCalibration:
-    """Calibrate a triad from mean readings in known attitudes, with every method's track (docs/kalman.md, eq. 2).
+    """Calibrate a triad from mean readings in known attitudes, by all methods after every pose (docs/kalman.md, eq. 2).
 
     Parameters
     ----------
@@ -86,12 +86,12 @@ def calibrate_with_references(
     noise : AxisNoise or three of them
         Noise of the raw readings.
     start_s, pose_s : (n,)
-        When each pose starts and how long it lasts, s; scalars are not enough for ``start_s``.
+        Start time and length of each pose, s; ``pose_s`` may be a scalar.
     extra_variance : (n,), (n, 3) or scalar
-        Variance of a reading on top of the noise model, raw².
+        Variance of a reading in addition to the noise model, raw².
     prior : Prior, optional
-        Default: none at all (diffuse). With a prior the poses need not determine every constant (a head with one axis);
-        the batch solutions are then left out.
+        Default: diffuse. With a prior the poses need not determine every constant (a head with one axis); the batch
+        solutions are then omitted.
     with_baselines : bool
         Also run recursive and batch least squares, ordinary and generalised. The latter cost O(n³).
 
@@ -113,7 +113,7 @@ def calibrate_with_references(
     session = float(start[-1] + pose[-1] - start[0])
     models = [shaping_model(n, options, session_s=session, pose_s=float(np.median(pose))) for n in noises]
     if table.sigma_m_s2 > 0:
-        # An angle error moves the reference sideways by σ; the axis' own sensitivity turns it into raw units.
+        # An angle error changes the reference by σ across it; the axis' sensitivity converts it to raw units.
         extra = extra + (table.sigma_m_s2 * _sensitivity(z, f)) ** 2
     is_diffuse = prior is None
     if prior is None:
@@ -157,7 +157,7 @@ def pose_arrays(
 
 
 def _sensitivity(z: FloatArray, f: FloatArray) -> FloatArray:
-    """(3,) rough size of each axis' sensitivity row [raw/(m/s²)], good enough to scale an angle error."""
+    """(3,) approximate norm of each axis' sensitivity row [raw/(m/s²)], to scale an angle error."""
     rows = np.linalg.lstsq(np.column_stack([f, np.ones(len(f))]), z, rcond=None)[0][:3]
     out: FloatArray = np.linalg.norm(rows, axis=0)
     return out
@@ -185,7 +185,7 @@ def _one_axis(
     tracks = [ConstantsTrack("kalman", constants, stated)]
     batch: dict[str, tuple[FloatArray, FloatArray]] = {}
     if with_baselines:
-        # Ordinary least squares is told the scatter of one reading, which is all it can use.
+        # Ordinary least squares uses only the variance of one reading.
         white = model.fast_variance(float(np.median(pose))) + float(np.median(extra))
         recursive = _core.kalman_least_squares(z, f, white, mean, sigma)
         tracks.append(ConstantsTrack("recursive least squares", *recursive))
@@ -236,7 +236,7 @@ def direct_form(
         raise RefusedError("the three axes read the same component of gravity: the triad cannot be inverted")
     S = np.linalg.inv(inverse_S)
     b = -S @ inverse_b
-    # dS = −S dS_a S and db = −S (dS_a b + db_a): row i of S_a and b_a[i] move together, other rows independently.
+    # dS = −S dS_a S and db = −S (dS_a b + db_a): errors of row i of S_a and b_a[i] are correlated, rows independent.
     covariance = np.zeros((12, 12))
     for i, axis in enumerate(axes):
         jacobian = np.zeros((12, 4))
@@ -257,7 +257,7 @@ def direct_form(
 
 
 def _observability(f: FloatArray) -> tuple[Observability, list[Finding]]:
-    """How well the reference attitudes determine the four constants of any axis."""
+    """Observability of the four constants of any axis by the reference forces (n, 3)."""
     design = np.column_stack([f, np.full(len(f), np.sqrt(np.mean(f**2) * 3.0))])
     design = design / np.sqrt(np.mean(np.sum(f**2, axis=1)))
     singular = np.linalg.svd(design / np.sqrt(len(f)), compute_uv=True)

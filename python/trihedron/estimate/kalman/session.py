@@ -1,4 +1,4 @@
-"""From a recording and its poses to what the filters take: mean readings, times, noise."""
+"""Input of the filters from a recording and its poses: mean readings, times, noise."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from trihedron.records import (
 
 @dataclass(frozen=True, eq=False)
 class PoseReadings:
-    """Mean raw readings (n, 3) of the poses, their starts and lengths (n,) [s], and standard errors (n, 3)."""
+    """Mean raw readings (n, 3) of the poses, start times and lengths (n,) [s], standard errors (n, 3) of the means."""
 
     mean: FloatArray
     start_s: FloatArray
@@ -36,8 +36,8 @@ class PoseReadings:
 def pose_readings(recording: Recording, segments: Segments, table: PoseTable | None = None) -> PoseReadings:
     """Means of the poses, matched with a pose table.
 
-    A table with start and stop times is averaged over its own times; one with hold numbers picks poses of the
-    log; one with neither must have as many rows as the log has poses.
+    With start and stop times the readings are averaged over these; with pose numbers the table selects poses of the
+    log; with neither it must have as many rows as the log has poses.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def _timed_means(
 
 
 def noise_from_poses(recording: Recording, segments: Segments) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
-    """White noise as scattered inside the poses, and the LSB where it is coarse: nothing slow.
+    """White noise from the scatter inside the poses, and the LSB where it exceeds that; no slow noise.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def noise_from_poses(recording: Recording, segments: Segments) -> tuple[AxisNois
     for axis in range(3):
         white = float(sigma[axis]) / np.sqrt(recording.rate_hz)
         step = float(steps[axis])
-        # A step below the noise is dithered away and already in the scatter.
+        # An LSB below the noise is dithered and already in the scatter.
         resolution = step if step > float(sigma[axis]) else 0.0
         noises.append(AxisNoise(white=white, resolution=resolution, sample_sigma=float(sigma[axis])))
     return noises[0], noises[1], noises[2]
@@ -121,7 +121,7 @@ def _noise(
         return noise, np.zeros_like(poses.mean), ()
     assumed = noise_from_poses(recording, segments)
     white = np.array([one.white for one in assumed])
-    # What the segmentation saw beyond white noise inside a pose comes on top of each mean.
+    # The variance of each mean beyond white noise, from the segmentation, is added.
     extra = np.maximum(poses.sigma_mean**2 - white**2 / poses.pose_s[:, None], 0.0)
     finding = Finding.of(FindingCode.NOISE_ASSUMED)
     return assumed, extra, (finding,)
@@ -134,9 +134,9 @@ def calibrate_session(
     *,
     noise: AxisNoise | Sequence[AxisNoise] | None = None,
 ) -> KalmanCalibration:
-    """Calibrate the accelerometer of a recording in the known attitudes of a pose table, all methods side by side.
+    """Calibrate the accelerometer of a recording in the known attitudes of a pose table, by all methods for comparison.
 
-    ``noise`` None takes what the poses show (white noise and resolution) and says so in a finding.
+    With ``noise`` None white noise and resolution are estimated from the poses, with a finding.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def calibrate_session_without_references(
     noise: AxisNoise | Sequence[AxisNoise] | None = None,
     frame: NormFrame = "lower",
 ) -> NormKalmanCalibration:
-    """Calibrate the accelerometer of a recording from the length of gravity in its poses.
+    """Calibrate the accelerometer of a recording from the norm of gravity in its poses.
 
     Raises
     ------

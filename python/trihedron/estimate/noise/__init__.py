@@ -1,1 +1,1 @@
-"""NOISE: Allan curves at memory speed; which noise terms a static log holds, how large, with what certainty."""
+"""NOISE: Allan curves, and the noise terms of a static log with their values and 95 % intervals."""

@@ -1,4 +1,4 @@
-"""Allan deviation of arrays and of logs that arrive in chunks."""
+"""Allan deviation of arrays and of logs that are read in chunks."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ STREAM_BUDGET_BYTES = 384 << 20
 
 
 def default_clusters(n: int, kind: AllanKind = "overlapping") -> list[int]:
-    """Cluster sizes from 1 reading to the longest that still has terms, four to the octave."""
+    """Cluster sizes from 1 reading to the longest with a term, four per octave."""
     longest = max(1, n // _LONGEST[kind])
     steps = np.arange(int(CLUSTERS_AN_OCTAVE * math.log2(longest)) + 1)
     return [int(m) for m in np.unique(np.round(2.0 ** (steps / CLUSTERS_AN_OCTAVE)).astype(np.int64))]
@@ -49,7 +49,7 @@ def allan_deviation(
     ----------
     x : (n,) or (n, channels)
         Equally spaced readings in any unit, float64, float32, int16 or int32 (not copied when C-contiguous). NaN marks
-        a missing reading; clusters are then means of the readings they have, weighted by their number, with the
+        a missing reading; clusters are then means of the readings present, weighted by their number, with the
         scatter of such means about those of all readings subtracted (docs/noise.md, section 1).
     rate_hz : float
         Samples per second.
@@ -58,7 +58,7 @@ def allan_deviation(
     kind : str
         ``overlapping`` uses every start; see :data:`~trihedron.records.noise.AllanKind`.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
     names, units : sequence of str
         One per channel, for reports.
 
@@ -103,7 +103,7 @@ def curve_of_columns(
     names: tuple[str, ...],
     units: tuple[str, ...],
 ) -> AllanCurve:
-    """Overlapping curve of channels (n,) that lie apart in memory."""
+    """Overlapping curve of channels (n,) in separate arrays."""
     n = len(columns[0])
     sizes = default_clusters(n) if clusters is None else checked_clusters(clusters)
     found = [_core.allan_variance(column[:, np.newaxis], sizes, KINDS["overlapping"]) for column in columns]
@@ -118,10 +118,10 @@ def curve_of_columns(
 def streamed_curve(
     stream: _core.AllanStream, rate_hz: float, confidence: float, names: tuple[str, ...], units: tuple[str, ...]
 ) -> AllanCurve:
-    """The curve of all that a stream was given.
+    """The curve of all readings of a stream.
 
-    Longer clusters start at every ``stride``-th reading only, at least 64 times in a cluster: they hold the information
-    of every start, and have its degrees of freedom.
+    Longer clusters start at every ``stride``-th reading only, at least 64 times per cluster: they contain the
+    information of every start and have its degrees of freedom.
     """
     found, variance, terms, stride, n, _ = stream.finish()
     clusters = np.array(found)
@@ -142,12 +142,12 @@ def as_readings(x: npt.ArrayLike) -> npt.NDArray[np.float64]:
         if array.dtype.kind not in "iufb":
             raise RefusedError(f"readings must be real numbers, got the type {array.dtype}")
         array = array.astype(np.float64)
-    # The kernel reads all four types; float64 stands for any of them in the signatures.
+    # The kernel reads all four types; signatures name float64 for any of them.
     return np.ascontiguousarray(array)
 
 
 def check_question(rate_hz: float, kind: str, confidence: float) -> None:
-    """Refuse what cannot be answered.
+    """Check the arguments of an Allan deviation.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def curve_with_intervals(
     units: tuple[str, ...],
     stride: int = 1,
 ) -> AllanCurve:
-    """The curve with its degrees of freedom and chi-square intervals, the noise type read off the local slope."""
+    """The curve with its degrees of freedom and chi-square intervals; the noise type follows from the local slope."""
     channels = variance.shape[1]
     edf = np.column_stack([edf_along(n, clusters, variance[:, c], weight[:, c], kind) for c in range(channels)])
     bias = np.column_stack([bias_along(n, clusters, variance[:, c], kind) for c in range(channels)])

@@ -1,4 +1,4 @@
-"""Noise terms of one axis: spectrum, colouring, lines, selection, intervals."""
+"""Noise terms of one axis: spectrum, low-pass filtering, lines, selection, intervals."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.noise import AllanCurve, GaussMarkov, NoiseAxis, NoiseTerm, SlowPair, TermName
 
 FALLS = np.linspace(-0.3, 0.6, 37)
-"""Share of its power that the highest frequency may have lost, or won; next to that the band ends."""
+"""Fractions of the power at the end of the fit band that a filter may have removed (negative: added)."""
 WHITE = 1
 
 
 def straightened(selection: Selection) -> tuple[Selection, float]:
-    """The selection with the bend that its spectrum shows, and the relative standard error that this leaves in N.
+    """The selection with the spectrum's gain 1/(1 + a f²) fitted, and the relative standard error of N due to it.
 
-    Filters of any order fall as 1/(1 + a f²) where they have hardly begun to: a is free, and N is that of frequency
-    zero, its error what it takes up over every a, by their likelihood.
+    Far below its corner a filter of any order falls as 1/(1 + a f²): a is free, N is the density at frequency zero, and
+    its additional error is the spread of N over a, weighted by likelihood.
     """
     bent = [_bent(selection.spectrum, fall) for fall in FALLS]
     fits = [one.likelihood().fit(selection.active, selection.has_ramp) for one in bent]
@@ -45,44 +45,44 @@ def straightened(selection: Selection) -> tuple[Selection, float]:
 
 
 def _bent(spectrum: BinnedSpectrum, fall: float) -> BinnedSpectrum:
-    """What the terms foretell, less ``fall`` of it at the highest frequency."""
+    """The spectrum with its basis times 1/(1 + a f²), which is 1 - ``fall`` at the highest frequency."""
     a: FloatArray = (spectrum.frequency_hz / spectrum.frequency_hz[-1]) ** 2 * fall / (1.0 - fall)
     return replace(spectrum, basis=spectrum.basis / (1.0 + a))
 
 
 RISE = 4.6
-"""Rise of the deviance at the ends of a 95 % interval. A chi-square with one degree of freedom asks for 3.84; with the
-other terms on the edge of what can be, 3.84 held in 92 to 94 %."""
+"""Rise of the deviance at the ends of a 95 % interval. For χ² with one degree of freedom it is 3.84, which covers only
+92 to 94 % with other terms at their limit 0."""
 NAMED = 7.88
-"""Rise of the deviance without a term at which it is named: an absent term reaches it in 0.25 % (half a chi-square with
-one degree of freedom)."""
+"""Rise of the deviance without a term above which it is present: an absent term reaches it in 0.25 % (half a chi-square
+with one degree of freedom)."""
 PAIR_NAMED = 9.5
-"""The same without B and K together: absent, both reach it in 0.2 % (a chi-square with one or two degrees)."""
+"""Rise without B and K together above which they are present: absent, they reach it in 0.2 % (χ², 1 or 2 dof)."""
 RAMP_OUTSIDE = 0.025
-"""Weight outside the ramp's interval: as many intervals hold as with :data:`RISE`."""
+"""Posterior weight outside the ramp's interval, for the same coverage as with :data:`RISE`."""
 RAMP_TAIL = 0.0025
-"""Twice the weight of the other sign below which a ramp is named."""
+"""Twice the posterior weight of the opposite sign below which a ramp is present."""
 
 _QUANTISATION, _WHITE, _FLICKER, _WALK = range(len(SYMBOLS))
 
 
 def invert(selection: Selection) -> _core.SpectralInversion:
-    """The likelihood of the selection's spectrum with all terms in it, the ramp integrated out."""
+    """The inverted likelihood of the selection's spectrum with all terms in it, the ramp integrated out."""
     return selection.spectrum.likelihood().invert(RISE, (_FLICKER, _WALK), _WALK, RAMP_OUTSIDE)
 
 
 def slow_pair_of(found: _core.SpectralInversion) -> SlowPair:
-    """Whether B and K together are needed."""
+    """Whether the spectrum needs B and K together."""
     alone = max(found.rise_without[_FLICKER], found.rise_without[_WALK])
     return SlowPair(found.rise_without_pair, found.rise_without_pair > PAIR_NAMED or alone > NAMED)
 
 
 def terms_of(found: _core.SpectralInversion, pair: SlowPair) -> dict[TermName, NoiseTerm]:
-    """Q, N, B, K and R as the inverted likelihood has them."""
+    """Values and intervals of Q, N, B, K and R from the inverted likelihood."""
     strength = found.strength if pair.is_present else found.strength_without_pair
     out = {}
     for k, symbol in enumerate(SYMBOLS):
-        # Median of B and K: the most likely value is zero as soon as the other can do its work.
+        # Median of B and K: the most likely value of one is 0 where the other explains the slow noise.
         estimate = found.median[k] if k in (_FLICKER, _WALK) else found.most_likely[k]
         is_present = found.rise_without[k] > NAMED
         out[TermName(symbol)] = NoiseTerm(
@@ -102,7 +102,7 @@ def terms_of(found: _core.SpectralInversion, pair: SlowPair) -> dict[TermName, N
 
 
 def _ramp(found: _core.SpectralInversion) -> NoiseTerm:
-    """The slope without its sign; an interval that holds zero starts there."""
+    """Ramp R as the magnitude of the slope; an interval that contains zero starts there."""
     ends = sorted((abs(found.slope_lower), abs(found.slope_upper)))
     is_present = found.slope_tail < RAMP_TAIL
     value = abs(found.slope)
@@ -121,7 +121,7 @@ def _ramp(found: _core.SpectralInversion) -> NoiseTerm:
 
 
 def gauss_markov_of(found: _core.SpectralInversion, selection: Selection) -> GaussMarkov | None:
-    """The Gauss-Markov process that earned its place, at its most likely correlation time."""
+    """The selected Gauss-Markov process at its most likely correlation time, or ``None``."""
     if selection.correlation_time_s is None:
         return None
     k = len(SYMBOLS)
@@ -136,19 +136,19 @@ def gauss_markov_of(found: _core.SpectralInversion, selection: Selection) -> Gau
 
 
 LEAST_EDF = 8.0
-"""Degrees of freedom that give an Allan deviation to 25 %."""
+"""Degrees of freedom at which an Allan deviation has a relative uncertainty of 25 %."""
 TOLERANCE = 0.02
-"""Where a filter colours the upper spectrum it bends the rest by up to this: no half octave is believed to better."""
+"""Relative uncertainty of each half octave where a low-pass filter shows: it changes the band below by up to this."""
 
 
 def identify_axis(
     bands: Sequence[Ordinates], blank: NoiseAxis, curve: AllanCurve, channel: int, tails: float = 0.0
 ) -> NoiseAxis:
-    """``blank`` with the terms that its spectrum shows, its lines, and what was noticed on the way.
+    """``blank`` with the terms of its spectrum, its lines, and findings.
 
-    ``tails`` is what readings far out add to the relative error of N, which a spectrum of Gaussian noise does not show.
+    ``tails`` is the part of N's relative standard error due to non-Gaussian tails, which a spectrum does not show.
     """
-    # Thinned readings of slow noise show themselves as means only, and end where these do.
+    # With scattered losses and slow noise only block means are used: their spectrum ends below Nyquist.
     nyquist = min(blank.rate_hz / 2.0, max(float(band.frequency_hz[-1]) for band in bands) * (1.0 + 1e-9))
     findings: list[Finding] = []
     highest, at_nyquist = white_limit(bands, nyquist, None)
@@ -187,7 +187,7 @@ def identify_axis(
 
 
 def blank_axis(name: str, unit: str, rate_hz: float, n_samples: int, mean: float, written: Readout) -> NoiseAxis:
-    """An axis of which nothing is known but how it was written."""
+    """An axis without terms yet: length, mean, noise of a reading, resolution and findings on these."""
     unknown = {term: NoiseTerm(term, False, 0.0, 0.0, 0.0, math.inf, math.inf, 0.0) for term in TermName}
     findings = remarks.written(written)
     if written.sigma == 0.0 or written.is_dead:
@@ -207,7 +207,7 @@ def blank_axis(name: str, unit: str, rate_hz: float, n_samples: int, mean: float
 
 
 def stretches_between(n: int, steps: Sequence[Event]) -> list[tuple[int, int]]:
-    """Ranges ``[start, stop)`` of ``n`` readings that hold no step."""
+    """Ranges ``[start, stop)`` of ``n`` readings between the steps, of 64 readings or more."""
     edges = [0]
     for step in steps:
         edges += [step.start, step.stop]
@@ -216,9 +216,9 @@ def stretches_between(n: int, steps: Sequence[Event]) -> list[tuple[int, int]]:
 
 
 def _tempered(selection: Selection) -> tuple[Selection, float, tuple[float, float] | None]:
-    """Give bands that the terms miss less weight: no more than their own misfit allows.
+    """The selection refitted with less weight on half octaves that the terms do not explain (z² as variance factor).
 
-    Also the largest factor by which a band's variance was raised, and the worst deviation with its frequency.
+    Also the largest factor on a variance, and the worst deviation with its frequency where it exceeds 10 %.
     """
     groups = misfit_groups(selection)
     bad = [g for g in groups if abs(g.z) > 4.0]
@@ -234,16 +234,16 @@ def _tempered(selection: Selection) -> tuple[Selection, float, tuple[float, floa
     return replace(selection, fit=fit, spectrum=spectrum), max(g.z**2 for g in bad), large
 
 
-# White noise through an ADC of a coarse step: what hangs on where between two codes the log lies.
+# White noise through a coarse ADC: the measured noise depends on the position of the mean inside the LSB.
 
 NORMAL_95 = 1.96
 
 
 def level_share(sigma: float, resolution: float) -> float:
-    """Relative standard deviation of N over the levels that a log may have, for readings that scatter by ``sigma``.
+    """Relative standard deviation of N over the positions of the mean inside an LSB, for readings of noise ``sigma``.
 
-    Readings of noise s (in steps) scatter by ``s² + 1/12 - (1/π² + 4 s²) exp(-2π²s²) cos 2πx`` about a level x (to the
-    first harmonic; Widrow and Kollár 2008, ch. 4): 0.8 % of N at half a step, nothing from one step on.
+    Readings of noise s (in LSB) have the variance ``s² + 1/12 - (1/π² + 4 s²) exp(-2π²s²) cos 2πx`` at position x (to
+    the first harmonic; Widrow and Kollár 2008, ch. 4): 0.8 % of N at half an LSB, none from one LSB on.
     """
     if resolution <= 0.0:
         return 0.0
@@ -253,12 +253,12 @@ def level_share(sigma: float, resolution: float) -> float:
 
 
 def with_level(term: NoiseTerm, sigma: float, resolution: float) -> NoiseTerm:
-    """N with bars that hold whatever the level: N is that of noise and rounding, not of one level."""
+    """N with an interval that is valid for any position of the mean inside an LSB."""
     return widened(term, level_share(sigma, resolution) * term.estimate)
 
 
 def widened(term: NoiseTerm, own: float) -> NoiseTerm:
-    """A term with another independent error of standard deviation ``own``."""
+    """The term with an additional independent error of standard deviation ``own``."""
     if own <= 0.0 or not math.isfinite(term.upper):
         return term
     reach = NORMAL_95 * own

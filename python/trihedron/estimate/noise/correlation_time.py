@@ -1,9 +1,9 @@
-"""The time in which a sensor's coloured noise forgets: a first-order Gauss-Markov process in the octaves of its poses.
+"""Correlation time of a sensor's noise: a first-order Gauss-Markov process, from the octaves inside its poses.
 
     S(f) = N² + q / (1 + (2πfτ)²)                                                             (docs/noise.md, eq. N.1)
 
-with one τ for the axes of a sensor, N and q of each its own. It is stated only where such a corner explains the octaves
-better than any straight slope (1/f, a walk), and where it lies among them.
+with one τ for the axes of a sensor, N and q per axis. It is stated only where the corner explains the octaves better
+than any power of frequency (1/f, random walk), and where it lies within their range.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from trihedron.records.pose_noise import Measured, PoseNoise
 
 TIMES_PER_OCTAVE = 8
 BEYOND_OCTAVES = 4.0
-"""Corners are tried up to two octaves outside those seen: there the fit says that they are not among them."""
+"""Corners are tried up to this factor outside the octaves: an interval that reaches there is not within them."""
 SLOPES = np.linspace(0.5, 2.0, 7)
-"""Powers of 1/f of the rivals: from a shallow slope over 1/f to a walk."""
+"""Powers of 1/f of the alternatives: from a shallow slope over 1/f to a random walk."""
 BETTER = 6.63
-"""χ² by which a corner must beat the best slope: 1 % of one degree of freedom."""
+"""Least reduction of χ² against the best slope: 1 % for one degree of freedom."""
 FLOOR = 0.5
-"""Share of the floor in the uppermost octave: a low-pass filter has such a corner too, and no floor above it."""
+"""Least share of the white floor in the uppermost octave: a low-pass filter has a corner too, but no floor above it."""
 SMALLEST = 1e-6
-"""Part of a density that a prediction is at least: its logarithm is taken."""
+"""Smallest prediction, relative to the density, whose logarithm is taken."""
 TURNS = 4
-"""Turns of the relative errors: the third changes no digit that is used."""
+"""Iterations of the weights: from the third on no used digit changes."""
 FEWEST_OCTAVES = 5
-"""Five octaves hold a floor, a slope and a plateau."""
+"""Fewest octaves that can show a floor, a slope and a plateau."""
 
 
 def correlation_time(axes: Sequence[PoseNoise]) -> Measured | None:
-    """τ [s] of a sensor's axes with its 95 % interval; ``None`` where none shows."""
+    """τ [s] of a sensor's axes with its 95 % interval; ``None`` where none is detected."""
     tables = [_Octaves(axis) for axis in axes if axis.white is not None and len(axis.octaves) >= FEWEST_OCTAVES]
     if not tables:
         return None
@@ -47,7 +47,7 @@ def correlation_time(axes: Sequence[PoseNoise]) -> Measured | None:
     rival = min(sum(t.misfit(t.slope(power)) for t in tables) for power in SLOPES)
     dof = sum(len(t.low) - 2 for t in tables) - 1
     best = int(np.argmin(misfit))
-    # Octaves that no corner explains leave it known less well (Birge).
+    # Where no corner explains the octaves the interval is widened (Birge ratio).
     scale = max(float(misfit[best]) / max(dof, 1), 1.0)
     inside = np.flatnonzero(misfit < misfit[best] + float(chi2.isf(0.05, 1)) * scale)
     if rival - float(misfit[best]) < BETTER * scale or inside[0] == 0 or inside[-1] == n - 1:
@@ -80,18 +80,18 @@ class _Octaves:
         return np.asarray((self.high**p - self.low**p) / p / (self.high - self.low))
 
     def misfit(self, shape: FloatArray) -> float:
-        """χ² of the logarithms at the best floor and the best size of ``shape`` (m,)."""
+        """χ² of the logarithms for the best floor and size of ``shape`` (m,)."""
         floor, size = self._best(shape)
         predicted = np.maximum(floor + size * shape, SMALLEST * self.density)
         away = np.log(self.density / predicted) / self.sigma
         return float(away @ away)
 
     def floor(self, shape: FloatArray) -> float:
-        """The density that is left above ``shape`` (m,)."""
+        """White density beside ``shape`` (m,)."""
         return self._best(shape)[0]
 
     def _best(self, shape: FloatArray) -> tuple[float, float]:
-        """Floor and size of ``shape``, neither below zero, by relative errors."""
+        """Floor and size of ``shape``, both non-negative, by least squares of relative errors."""
         predicted, found = self.density, np.zeros(2)
         for _ in range(TURNS):
             weight = 1.0 / (self.sigma * predicted)

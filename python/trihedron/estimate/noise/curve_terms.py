@@ -1,13 +1,13 @@
-"""Noise terms from an Allan curve alone: the log is gone, published, or was never given.
+"""Noise terms from an Allan curve alone, published or stored, without its log.
 
 Moments in the manner of the generalised method of wavelet moments (S. Guerrier et al., "Wavelet-variance-based
 estimation for composite stochastic processes", JASA 108 (2013)): the logarithms of the curve's points are fitted by
-generalised least squares with the covariance that the terms themselves give them (below).
+generalised least squares with the covariance that the terms imply (below).
 
 Covariance of the overlapping Allan variances of one log at several averaging times, for any mixture of terms.
 
 Two points of a curve share their readings. With ``z_i(k)`` the second difference of the phase over ``m_i`` readings,
-``γ_ij(d)`` the covariance of ``z_i(k)`` and ``z_j(k+d)`` and ``μ_i`` the mean of ``z_i`` (the ramp's),
+``γ_ij(d)`` the covariance of ``z_i(k)`` and ``z_j(k+d)`` and ``μ_i`` the mean of ``z_i`` (due to the ramp),
 
     cov(V_i, V_j) = Σ_k Σ_l [2 γ_ij(l-k)² + 4 μ_i μ_j γ_ij(l-k)] / (4 τ_i² τ_j² M_i M_j)        (docs/noise.md, eq. 14)
 
@@ -32,9 +32,9 @@ from trihedron.records.noise import TermName
 
 _DIFFERENCE = ((0, 1.0), (1, -2.0), (2, 1.0))
 _GRID_RATIO = 1.12
-"""Lags between nodes of the sums grow by this away from every kink of the covariance: sums good to 1 %."""
+"""Ratio of consecutive distances of the nodes from a kink of the covariance: sums are accurate to 1 %."""
 _REACH = 40
-"""Lags beyond this many of the longer clusters: flicker has lost all but 1e-6 of its covariance squared."""
+"""Largest lag, in longer clusters: beyond it the squared covariance of flicker is below 1e-6 of its maximum."""
 
 
 def _wiener(t: FloatArray) -> FloatArray:
@@ -73,7 +73,7 @@ class CurveCovariance:
         return cls(pairs, with_ramp)
 
     def from_point(self, first: int) -> CurveCovariance:
-        """The same without the first points."""
+        """The table without the first ``first`` points."""
         return CurveCovariance(self.pairs[:, :, first:, first:], self.with_ramp[:, first:, first:])
 
     def at(self, squares: FloatArray) -> FloatArray:
@@ -95,13 +95,13 @@ def _pair(m_i: int, m_j: int, n: int, step_s: float) -> tuple[FloatArray, FloatA
     for row, phase in enumerate(_PHASE):
         smooth[row] = signs @ phase(distance)
     inside = (lag > kinks.min()) & (lag < kinks.max())
-    # Beyond their support white noise and walk are uncorrelated exactly, and only rounding is left.
+    # Beyond this range white noise and walk are exactly uncorrelated: rounding errors are removed.
     smooth[[0, 2]] *= inside
     white_phase = np.array([float(signs[kinks == at].sum()) for at in np.unique(kinks)])
     at_kinks = np.searchsorted(lag, np.unique(kinks))
     within = (np.unique(kinks) >= lag[0]) & (np.unique(kinks) <= lag[-1])
     white_phase, at_kinks = white_phase[within], at_kinks[within]
-    # A kink is one lag, not a stretch of the sum.
+    # Quantisation contributes at single lags (the kinks), without the nodes' weights.
     single = count[at_kinks] / weight[at_kinks]
     pairs = np.zeros((4, 4))
     pairs[1:, 1:] = 2.0 * (smooth * count) @ smooth.T
@@ -114,7 +114,7 @@ def _pair(m_i: int, m_j: int, n: int, step_s: float) -> tuple[FloatArray, FloatA
 
 
 def _nodes(kinks: npt.NDArray[np.int64], first: int, last: int) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Lags at which the sums are evaluated, dense at every kink, and the lags that each stands for."""
+    """Lags at which the sums are evaluated, dense at every kink, and the number of lags that each represents."""
     reach = max(last - first, 2)
     away = np.unique(np.round(_GRID_RATIO ** np.arange(int(np.log(reach) / np.log(_GRID_RATIO)) + 2)).astype(np.int64))
     away = np.concatenate([-away[::-1], [0], away])
@@ -128,18 +128,18 @@ def _nodes(kinks: npt.NDArray[np.int64], first: int, last: int) -> tuple[npt.NDA
 TERMS = tuple(TermName)
 _RAMP = TERMS.index(TermName.RATE_RAMP)
 EVIDENCE = 8.0
-"""Drop of the deviance that a term must earn, as for whole logs."""
+"""Least reduction of the deviance by a term, as for whole logs."""
 _RISE_95 = 3.841
 _RISE_95_ONE_SIDED = 2.706
 _CONVERGED = 3e-4
-"""Last step of a log square: a tenth of the least standard error that a curve of millions of readings gives."""
+"""Step of a log square at convergence: a tenth of the standard error from a curve of millions of readings."""
 LEAST_EDF = 1.5
-"""Points of fewer degrees of freedom say nothing that their neighbours do not."""
+"""Fewest degrees of freedom of a point: with fewer it adds nothing to its neighbours."""
 
 
 @dataclass(frozen=True, eq=False)
 class CurveFit:
-    """Squares (5,) of the terms, zero where absent; deviance; inverse covariance of the log squares of the active."""
+    """Squares (5,) of the terms, 0 where absent; deviance; ``covariance`` of the log squares of the free terms."""
 
     active: tuple[int, ...]
     squares: FloatArray
@@ -149,9 +149,9 @@ class CurveFit:
 
 @dataclass(frozen=True, eq=False)
 class CurvePoints:
-    """Points ``clusters`` (k,) readings, ``variance`` (k,), and how the terms make them vary together.
+    """Points of a curve: ``clusters`` (k,) in readings, Allan ``variance`` (k,), and the table of their covariance.
 
-    ``tolerance`` is the relative standard deviation of a point beyond chance: colouring bends a curve by a little.
+    ``tolerance`` is an additional relative standard deviation of a point, for residual low-pass filtering.
     """
 
     clusters: FloatArray
@@ -176,7 +176,7 @@ class CurvePoints:
         return np.stack([allan_variance_of_terms(self.tau_s, term.value, 1.0) for term in TERMS], axis=1)
 
     def from_point(self, first: int, tolerance: float) -> CurvePoints:
-        """The same without the first points."""
+        """The points without the first ``first``, with this ``tolerance``."""
         return CurvePoints(
             self.clusters[first:], self.variance[first:], self.rate_hz, self.covariance.from_point(first), tolerance
         )
@@ -186,7 +186,7 @@ class CurvePoints:
 
         The logarithm of a chi-square over its ν degrees of freedom has the mean ψ(ν/2) - ln(ν/2), the variance ψ'(ν/2).
         """
-        # Loaded here: a command that reads a log must not wait for it.
+        # Imported here: commands that read a log start faster.
         from scipy.special import digamma, polygamma
 
         mean = self.design @ squares
@@ -233,16 +233,16 @@ class CurvePoints:
         return chi2, np.asarray(residual / np.sqrt(np.diag(covariance)))
 
     def alone(self) -> FloatArray:
-        """(5,) largest square that each term could have: alone it would touch the lowest point."""
+        """(5,) largest square of each term: alone it would equal the curve at one point."""
         return np.asarray(np.min(self.variance[:, np.newaxis] / self.design, axis=0))
 
     def select(self) -> tuple[CurveFit, FloatArray]:
-        """The subset of least deviance plus :data:`EVIDENCE` per term, and what each term earns (5,)."""
+        """The subset of least deviance plus :data:`EVIDENCE` per term, and the reduction (5,) by each term."""
         fits: dict[tuple[int, ...], CurveFit] = {}
         largest = min(len(TERMS), len(self.clusters) - 1)
         for size in range(1, largest + 1):
             for active in combinations(range(len(TERMS)), size):
-                if active == (_RAMP,):  # a ramp alone has no scatter, and no log is without
+                if active == (_RAMP,):  # a ramp alone has no scatter, which every log has
                     continue
                 fits[active] = self.fit(active, self.alone())
         best = min(fits.values(), key=lambda fit: fit.deviance + EVIDENCE * len(fit.active))
@@ -258,7 +258,7 @@ class CurvePoints:
     def interval(self, fit: CurveFit, k: int, scale: float) -> tuple[float, float]:
         """Squares between which the deviance of term ``k`` stays within the 95 % rise, times ``scale``.
 
-        For an absent term the lower end is zero and the upper one one-sided.
+        For an absent term the lower end is 0 and the upper end a one-sided limit.
         """
         active = tuple(sorted({*fit.active, k}))
         is_present = k in fit.active
@@ -281,12 +281,12 @@ class CurvePoints:
 
 @lru_cache(maxsize=64)
 def _tabulated(clusters: tuple[int, ...], n: int, rate_hz: float) -> CurveCovariance:
-    """Shared by the channels of a log."""
+    """Table of the covariance, cached: the channels of a log share it."""
     return CurveCovariance.of(np.array(clusters, dtype=np.int64), n, rate_hz)
 
 
 def _crossing(excess: Callable[[float], float], first: float) -> float:
-    """Log ratio beyond zero, on the side of ``first``, at which ``excess`` rises through zero; to 1 %."""
+    """Log ratio, on the side of ``first``, at which ``excess`` crosses zero; accurate to 1 %."""
     inside, below = 0.0, excess(0.0)
     outside, above = first, excess(first)
     while above < 0.0:
@@ -296,7 +296,7 @@ def _crossing(excess: Callable[[float], float], first: float) -> float:
             return outside
         above = excess(outside)
     for _ in range(30):
-        # Where a chord would creep, halve.
+        # Regula falsi, limited to 0.1 to 0.9 of the interval.
         share = min(0.9, max(0.1, below / (below - above))) if below < 0.0 else 0.5
         middle = inside + share * (outside - inside)
         value = excess(middle)

@@ -1,4 +1,4 @@
-"""Equivalent degrees of freedom of Allan variances by type of noise, and the types along a curve."""
+"""Equivalent degrees of freedom of Allan variances by type of noise, and the type along a curve."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ KINDS = {
     "total": _core.AllanKind.Total,
 }
 FEWEST_CLUSTERS = 32
-"""Clusters in a log from which a slope of its curve is read."""
+"""Fewest clusters in a log for a slope of its curve."""
 TYPES = {
     2: _core.AllanNoise.Quantisation,
     0: _core.AllanNoise.White,
@@ -47,7 +47,7 @@ TYPES = {
 def edf_along(
     n: int, clusters: npt.NDArray[np.int64], variance: FloatArray, weight: FloatArray, kind: AllanKind
 ) -> FloatArray:
-    """(k,) degrees of freedom along a curve, the type of noise read off its slopes; between types edf is mixed.
+    """(k,) degrees of freedom along a curve; its slopes give the noise type, between types edf is interpolated.
 
     ``edf = 2 E(V)² / var(V)`` of each type after Greenhall and Riley (2003), docs/noise.md, eq. 6.
     """
@@ -62,17 +62,17 @@ def edf_along(
         first, second = (_core.allan_degrees(n, m, types[below + step], KINDS[kind]) for step in (0, 1))
         edf = first ** (1.0 - share) * second**share
         full = max(1, n // m - 1 if kind == "non-overlapping" else n - (3 if kind == "hadamard" else 2) * m + 1)
-        # Missing readings take degrees of freedom with them, in proportion.
+        # Missing readings reduce the degrees of freedom in proportion.
         lost = weight[i] / full if kind in ("overlapping", "non-overlapping", "hadamard") else 1.0
         out[i] = max(1.0, edf * min(1.0, lost))
     return out
 
 
 def bias_along(n: int, clusters: npt.NDArray[np.int64], variance: FloatArray, kind: AllanKind) -> FloatArray:
-    """(k,) expectation of a variance over the Allan variance: 1 but for the total variance (docs/noise.md, section 2).
+    """(k,) expectation of a variance over the Allan variance: 1 except for the total variance (docs/noise.md, 2).
 
-    Flicker and walk after Greenhall, Howe and Percival (1999); quantisation: both ends of the phase stand in every
-    reflected term.
+    Flicker and walk after Greenhall, Howe and Percival (1999); quantisation: every reflected term contains both ends of
+    the phase.
     """
     if kind != "total":
         return np.ones(len(clusters))
@@ -87,10 +87,10 @@ def bias_along(n: int, clusters: npt.NDArray[np.int64], variance: FloatArray, ki
 
 
 def slopes_along(n: int, clusters: npt.NDArray[np.int64], variance: FloatArray) -> FloatArray:
-    """(k,) slopes of log variance against log cluster size, never falling.
+    """(k,) slopes of log variance against log cluster size, non-decreasing.
 
-    A sum of noise terms is convex in these scales, and a curve that bends down at its end does so by chance: believing
-    it would take a low value for quantisation noise, of which a low value is certain.
+    A sum of noise terms is convex in these scales; a curve that bends down at its end does so by chance. Without this
+    a low value would be taken for quantisation noise, whose values have many degrees of freedom.
     """
     x = np.log2(clusters.astype(np.float64))
     good = np.isfinite(variance) & (variance > 0)
@@ -109,9 +109,9 @@ def slopes_along(n: int, clusters: npt.NDArray[np.int64], variance: FloatArray) 
 
 
 def _held_at_the_end(slope: FloatArray, middle: FloatArray, n: int) -> FloatArray:
-    """Slopes beyond ``n / FEWEST_CLUSTERS`` readings stay what they were there: a handful of clusters bends by chance.
+    """Slopes, constant beyond ``n / FEWEST_CLUSTERS`` readings: with few clusters a curve bends by chance.
 
-    A low end of the curve that bends by chance would choose its own degrees of freedom, and always the fewer.
+    Otherwise a random bend at the end of the curve would determine its own degrees of freedom, always too few.
     """
     reliable = np.flatnonzero(2.0**middle <= n / FEWEST_CLUSTERS)
     if len(reliable) == 0:

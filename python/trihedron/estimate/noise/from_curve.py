@@ -23,12 +23,12 @@ from trihedron.records.noise import AllanCurve, Noise, NoiseAxis, NoiseTerm, Ter
 
 FEWEST_POINTS = 6
 STEP = 1.9
-"""Ratio of neighbouring averaging times that are used: closer ones share nearly all their readings."""
+"""Least ratio of neighbouring averaging times that are used: closer points share nearly all their readings."""
 CHANCE = 1e-4
-"""Probability with which a curve of nothing but noise terms would be called something else."""
+"""p-value of χ² below which a sum of noise terms does not explain a curve."""
 MARGIN = 2
 TOLERANCE = 0.01
-"""Relative deviation that is allowed to every point of a curve that was found coloured somewhere."""
+"""Relative standard deviation added to every point of a curve on which low-pass filtering was detected."""
 
 
 def identify_curve(
@@ -41,7 +41,7 @@ def identify_curve(
     units: Sequence[str] = (),
     source: str = "curve",
 ) -> Noise:
-    """Noise terms of overlapping Allan deviations of which the log is not at hand.
+    """Noise terms of overlapping Allan deviations without their log.
 
     Parameters
     ----------
@@ -50,12 +50,12 @@ def identify_curve(
     deviation : (k,) or (k, channels)
         Overlapping Allan deviations in any unit; NaN where there is none.
     rate_hz, n_samples
-        Of the log behind the curve: they decide how certain its points are.
+        Of the log of the curve: they determine the uncertainty of its points.
 
     Raises
     ------
     ValueError
-        With fewer than six usable points, or times that no whole number of readings makes.
+        With fewer than six usable points, or times that are no whole numbers of readings.
 
     Examples
     --------
@@ -133,7 +133,7 @@ def _axis(curve: AllanCurve, channel: int) -> NoiseAxis:
 
 
 def _usable(curve: AllanCurve, channel: int) -> CurvePoints:
-    """Points about an octave apart with degrees of freedom to speak of."""
+    """Points about an octave apart with at least ``LEAST_EDF_OF_A_POINT`` degrees of freedom."""
     good = np.isfinite(curve.deviation[:, channel]) & (curve.deviation[:, channel] > 0.0)
     good &= curve.edf[:, channel] >= LEAST_EDF_OF_A_POINT
     chosen: list[int] = []
@@ -160,7 +160,7 @@ class _Found:
 
 
 def _screened(points: CurvePoints) -> _Found:
-    """Leave out short averaging times that no sum of terms explains; allow for what else they miss."""
+    """Exclude short averaging times that no sum of terms explains; widen the uncertainties by the remaining misfit."""
     findings: list[Finding] = []
     first, most = 0, len(points.clusters) - FEWEST_POINTS
     used = points
@@ -168,10 +168,10 @@ def _screened(points: CurvePoints) -> _Found:
         first += 1
         used = points.from_point(first, TOLERANCE)
     if _is_unlikely(used) and first == most:
-        # Dropping helped nothing: whatever it is does not sit at the short end.
+        # Excluding points does not help: the cause is not at short averaging times.
         first, used = 0, points.from_point(0, TOLERANCE)
     if first:
-        # What bends the curve fades by half an octave by octave: two more take it below the tolerance.
+        # The effect of a filter halves per octave: two more points reduce it below the tolerance.
         first = min(first + MARGIN, most)
         used = points.from_point(first, TOLERANCE)
         findings.append(Finding.of(FindingCode.SPECTRUM_COLOURED, "curve", first_s=float(used.tau_s[0])))

@@ -1,8 +1,8 @@
-"""Readings that are missing: long gaps cut a log, scattered losses thin it out, and what each does to a spectrum.
+"""Missing readings: long gaps divide a log, scattered losses change means and spectrum.
 
-Means of the readings that are there scatter about the mean of all of them by (1/c - 1/m) s², with c of m readings
-there and s² the variance of readings within the reach of the mean: what the theory of sampling calls the finite
-population. A transform of a thinned log has the power f² S + f (1 - f) h s² (docs/noise.md, eq. 16).
+The mean of c of m readings scatters about the mean of all m by (1/c - 1/m) s², s² the variance of readings inside the
+mean (sampling from a finite population). The transform of a log with the fraction f of its readings has the power
+f² S + f (1 - f) h s² (docs/noise.md, eq. 16).
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from trihedron.estimate.noise.degrees import never_falling
 from trihedron.ranges import edges_of, ranges_of
 
 MOST_BRIDGED = 0.02
-"""Share of missing readings up to which their place is bridged by a line: 2 % of white noise, given back."""
+"""Largest share of missing readings that are bridged by a line; the lost white noise is corrected by scaling."""
 SCATTERED_BLOCK = 16
-"""Readings per mean where losses are scattered: half of them lost, fewer than four are left in 1 % of the means."""
+"""Readings per mean with scattered losses: with half of them lost, 1 % of the means have fewer than four."""
 LONGEST_SCATTERED = 64
-"""Missing readings in a row beyond which it is a gap: half of all lost at random, a row of 64 has a chance of 1e-15."""
+"""Longest run of missing readings that is no gap: with half of all lost at random, 64 in a row have p = 1e-15."""
 MOST_SLOW = 3.0
-"""Variance of a log over that from reading to reading beyond which its thinned readings say little of fast noise."""
+"""Ratio of the variance to that from reading to reading above which a log with losses does not show its fast noise."""
 MOST_LOOKS = 8192
-"""Clusters from which the sampling is read: 1 % of a correction."""
+"""Most clusters used to estimate the correction for missing readings, which is then accurate to 1 %."""
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Means (k,) of blocks without a hole, the share that is bridged, and the mean of 1/c - 1/m of their readings."""
+    """Means (k,) of consecutive blocks, the share that is bridged, and the mean of 1/c - 1/m over the blocks."""
 
     means: FloatArray
     bridged: float
@@ -55,9 +55,9 @@ def slow_over_fast(x: FloatArray) -> float:
 
 
 def bridged(x: FloatArray) -> FloatArray:
-    """Readings with straight lines over scattered losses, which an event detector would take for jumps to the mean.
+    """Readings with straight lines over scattered losses, which the event detector would take for jumps to the mean.
 
-    Long gaps stay: a line across them would be an event itself.
+    Long gaps stay NaN: a line across them would be an event itself.
     """
     gone = ~np.isfinite(x)
     if not gone.any() or gone.all():
@@ -74,10 +74,10 @@ def bridged(x: FloatArray) -> FloatArray:
 
 
 def block_means(x: FloatArray, block: int) -> list[Run]:
-    """Runs of block means without a hole.
+    """Runs of consecutive block means.
 
-    A block that lacks half of what its like have is a hole. Holes that are short (1/64 of the run) and few (5 %) are
-    bridged by a straight line: they take away the waves that are as short, and nothing from the long ones.
+    A block with less than half of the median number of readings is missing. Short (1/64 of the run) and few (5 %)
+    missing blocks are bridged by a straight line, which affects only frequencies of that period and above.
     """
     n = len(x) // block
     parts = x[: n * block].reshape(n, block)
@@ -108,10 +108,10 @@ def block_means(x: FloatArray, block: int) -> list[Run]:
 
 
 def filled(parts: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Segments (k, n) about their means without a missing reading, and the share of each that was there (k,).
+    """Segments (k, n) less their means with missing readings replaced, and the share (k,) of each that was present.
 
-    Few missing readings are bridged and their share of white noise given back (1 is returned); scattered ones are left
-    at the mean; segments with a long gap are excluded.
+    Few missing readings are bridged and the segment is scaled for their white noise (1 is returned); scattered ones are
+    set to the mean; segments with a long gap are excluded.
     """
     missing = ~np.isfinite(parts)
     if not missing.any():
@@ -132,10 +132,10 @@ def filled(parts: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def true_share(x: FloatArray, clusters: npt.NDArray[np.int64], variance: FloatArray, order: int = 2) -> FloatArray:
-    """(k,) share of an Allan variance (k,) of means of the readings present that means of all readings would have.
+    """(k,) ratio of the Allan variance without missing readings to ``variance`` (k,), that of the readings present.
 
-    ``order`` 2 is the Allan, 3 the Hadamard variance. Between 1 (slow noise, which a mean of few readings has as well)
-    and the share of white noise; never falling in between along the clusters, as slow noise gains on white.
+    ``order`` 2 is the Allan, 3 the Hadamard variance. It lies between the ratio of white noise and 1 (slow noise, which
+    missing readings do not change); the share of slow noise is non-decreasing along the clusters.
     """
     present = np.isfinite(x)
     if present.all():
@@ -160,7 +160,7 @@ def true_share(x: FloatArray, clusters: npt.NDArray[np.int64], variance: FloatAr
             continue
         within = float((q - s**2 / np.maximum(c, 1.0))[:, whole].sum()) / degrees
         inverse = np.tensordot(factors, 1.0 / c[:, whole], axes=1)
-        # The weights of the variance itself: each term's by what white noise gives it.
+        # Weights as in the variance: the inverse of each term's variance by white noise.
         mean_inverse = len(inverse) / float(np.sum(1.0 / inverse))
         full = sum(factors) / m
         least[i] = full / mean_inverse

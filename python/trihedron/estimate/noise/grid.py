@@ -1,4 +1,4 @@
-"""A recording as equally spaced readings: lost rows become missing readings, nothing is moved or interpolated."""
+"""A recording as equally spaced readings: lost rows become NaN, nothing is shifted or interpolated."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from trihedron.units import acceleration_to_si, rate_to_si
 
 
 def refuse_size_of_a_unit(sensor: str, unit: str, size: float | None) -> None:
-    """Nothing, where readings are counts or no ``size`` of a count is stated.
+    """Check that the ``size`` of a count is stated only for readings in counts.
 
     Raises
     ------
     ValueError
-        When readings in a unit of their own would be multiplied by the size of a count.
+        When a ``size`` is stated and the readings have a physical unit.
     """
     if size is not None and unit != "counts":
         raise RefusedError(
@@ -30,12 +30,12 @@ def readings_of(
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
     """Readings (n, channels) in SI (counts stay counts), names and units of the channels; NaN where rows are lost.
 
-    ``rad_s_per_count`` and ``m_s2_per_count`` are the sizes of a count, where they are known.
+    ``rad_s_per_count`` and ``m_s2_per_count`` are the sizes of a count, where known.
 
     Raises
     ------
     ValueError
-        When most of the time has no reading, or the size of a count is stated of readings that are none.
+        When most of the time has no reading, or the size of a count is stated for readings in a physical unit.
     """
     columns: list[FloatArray] = []
     names: list[str] = []

@@ -1,4 +1,4 @@
-"""Noise terms of a static log: which are present, how large, how certain, and whether the log can answer at all."""
+"""Noise terms of a static log: presence, value, interval, and whether the log is sufficient."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
 
-# A bias that warms up: an exponential approach, which no noise term is, separated from a random walk by evidence.
+# Warm-up of the bias: an exponential approach, separated from a random walk by likelihood.
 MEANS = 64
-"""Means of equal length that the log is judged by: white noise and a walk are all that they show."""
+"""Number of means of equal length for the test: their noise is white noise and a random walk."""
 LEAST = 32
-"""Of them that must hold readings."""
+"""Fewest of them with readings."""
 WALKS = np.concatenate([[0.0], np.geomspace(1e-3, 1e4, 29)])
-"""Variances of a walk from mean to mean that are tried, in units of the white variance of a mean."""
+"""Random walk variances from mean to mean that are tried, in units of the white variance of a mean."""
 TIMES = np.geomspace(0.02, 0.5, 15)
-"""Time constants that are tried, in lengths of the log: slower is a straight line or a walk, as far as it can tell."""
+"""Time constants that are tried, in lengths of the log: a slower warm-up is like a straight line or a walk."""
 EARNED = 20.0
-"""Rise of twice the log-likelihood that it must earn: its time was searched, too. Of 900 logs without
-one, 450 of them with a walk, four earned 16."""
+"""Least rise of twice the log-likelihood, with the search over time constants. Of 900 logs without a warm-up, 450 of
+them with a walk, four reach 16."""
 
 
 @dataclass(frozen=True)
@@ -44,13 +44,13 @@ class WarmUp:
     time_s: float
 
     def at(self, t: FloatArray) -> FloatArray:
-        """(n,) what is left of the way at times (n,) [s] after the first reading, the end being none."""
+        """(n,) bias relative to its final value, at times (n,) [s] after the first reading."""
         return -self.size * np.exp(-t / self.time_s)
 
 
 def warm_up(x: FloatArray, rate_hz: float) -> WarmUp | None:
-    """The warm-up of readings ``x`` (n,), NaN where none is; ``None`` where a straight line beside a random walk and
-    white noise of any strength does as well."""
+    """The warm-up of readings ``x`` (n,), NaN where missing; ``None`` where a straight line with a random walk and
+    white noise of any strength explains them as well."""
     n = len(x) // MEANS
     if n < 1:
         return None
@@ -79,7 +79,7 @@ def warm_up(x: FloatArray, rate_hz: float) -> WarmUp | None:
 
 
 def _fitted(white: FloatArray) -> tuple[float, float]:
-    """Log-likelihood of whitened means, the first column, by the others with a free scale; the last one's weight."""
+    """Log-likelihood of whitened means (first column) regressed on the other columns, free scale; last coefficient."""
     weight, _, _, _ = np.linalg.lstsq(white[:, 1:], white[:, 0], rcond=None)
     left = float(np.sum((white[:, 0] - white[:, 1:] @ weight) ** 2))
     k = len(white)
@@ -87,9 +87,9 @@ def _fitted(white: FloatArray) -> tuple[float, float]:
 
 
 MOST_DISTURBED = 0.25
-"""Share of an axis that may be excluded by itself."""
+"""Largest share of an axis that is excluded automatically."""
 SHORTEST = 512
-"""Readings below which noise terms are not separated."""
+"""Fewest readings for the separation of noise terms."""
 
 
 def identify_noise(
@@ -179,7 +179,7 @@ def identify_noise(
 
 @dataclass(frozen=True, eq=False)
 class _Screened:
-    """One channel without its excluded stretches and events (NaN), what was cut by itself, where its level jumps."""
+    """One channel with excluded intervals and events as NaN, the automatic ``cuts``, and the ``steps`` of its level."""
 
     column: FloatArray
     blank: NoiseAxis
@@ -210,13 +210,13 @@ def _screen(
         for knock in knocks:
             calm[knock.start : knock.stop] = np.nan
         shocks = shaken(calm, rate_hz)
-        # What jumps while it is shaken is shaking.
+        # Steps during shaking are part of it.
         steps = [s for s in steps if not any(e.start <= s.start and s.stop <= e.stop for e in shocks)]
         findings += remarks.events(steps, knocks, shocks, rate_hz, unit)
         cuts = merged([(e.start, e.stop) for e in (*shocks, *knocks)])
         share = sum(stop - start for start, stop in cuts) / len(column)
         if share > MOST_DISTURBED:
-            # A log that is disturbed most of the time has no undisturbed rest to describe.
+            # With too large a share disturbed, no undisturbed noise can be measured: nothing is excluded.
             findings.append(Finding.of(FindingCode.LOG_MOTION, "throughout", share=share))
             steps, cuts = [], []
         for start, stop in cuts:
@@ -241,7 +241,7 @@ def _identified(seen: _Screened, rate_hz: float, curve: AllanCurve, channel: int
 
 
 def merged(stretches: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Stretches in order, overlapping ones joined."""
+    """Intervals ``(start, stop)`` in order, overlapping ones merged."""
     out: list[tuple[int, int]] = []
     for start, stop in sorted(stretches):
         if out and start <= out[-1][1]:

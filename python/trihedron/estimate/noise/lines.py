@@ -1,4 +1,4 @@
-"""Periodic disturbance and colouring: what in a spectrum no sum of noise terms can be."""
+"""Parts of a spectrum that no sum of noise terms explains: spectral lines, and low-pass filtering."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from trihedron.records.noise import SpectralLine
 
 FALSE_ALARM = 1e-4
 TOLERANCE = 0.05
-"""Deviation of a third of an octave from the fitted terms that counts as colouring, when it is significant as well:
-noise terms are idealisations, and the share of white noise that a filter takes below this does not change a digit."""
+"""Least relative deviation of a third of an octave from the fitted terms, if significant, that counts as filtering:
+noise terms are idealisations, and a smaller loss of white noise does not change a printed digit."""
 MOST_LINES = 24
 
 
 def expected_power(band: Ordinates, selection: Selection, step_s: float) -> FloatArray:
-    """(k,) power of every ordinate of ``band`` that the selected terms explain."""
+    """(k,) power of every ordinate of ``band`` by the selected terms."""
     out = np.asarray(selection.fit.strength[: len(SYMBOLS)]) @ band.basis
     if selection.correlation_time_s is not None:
         density = gauss_markov_density(band.frequency_hz, step_s, selection.correlation_time_s)
@@ -35,7 +35,7 @@ def expected_power(band: Ordinates, selection: Selection, step_s: float) -> Floa
 def find_lines(
     bands: Sequence[Ordinates], selection: Selection, step_s: float
 ) -> tuple[list[SpectralLine], list[npt.NDArray[np.bool_]]]:
-    """Sinusoids that stand out of the fitted noise, and the ordinates that they spoil."""
+    """Significant sinusoids above the fitted noise, and masks of the ordinates of each band that they affect."""
     lines: list[tuple[SpectralLine, float, int]] = []
     masks = []
     total = sum(len(band.power) for band in bands)
@@ -49,7 +49,7 @@ def find_lines(
         for i in np.argsort(-ratio):
             if ratio[i] < limit or len(lines) >= MOST_LINES:
                 break
-            # The lowest eight ordinates hold drift, of which no period was seen more than four times.
+            # The lowest eight ordinates contain drift; a period there has four cycles at most.
             if mask[i] or band.order[i] < 8:
                 continue
             near = _skirt(ratio, int(i))
@@ -60,7 +60,7 @@ def find_lines(
 
 
 def _merged(lines: Sequence[tuple[SpectralLine, float, int]]) -> list[SpectralLine]:
-    """One line for what is one: parts of a resonance add up, the same line in several stretches is averaged."""
+    """Merge lines of one frequency: powers inside a resonance are added, those of several stretches averaged."""
     groups: list[list[tuple[SpectralLine, float, int]]] = []
     for item in sorted(lines, key=lambda item: item[0].frequency_hz):
         if groups:
@@ -94,7 +94,7 @@ def _merged(lines: Sequence[tuple[SpectralLine, float, int]]) -> list[SpectralLi
 
 
 def _skirt(ratio: FloatArray, peak: int) -> slice:
-    """Ordinates around a peak that it raises: outward until the mean of the next 24 is below 1.4."""
+    """Ordinates affected by a peak: outward until the mean ratio of the next 24 is below 1.4."""
     window = 24
     start = stop = peak
     while start > 0 and np.mean(ratio[max(0, start - window) : start]) > 1.4:
@@ -122,7 +122,7 @@ def _line(band: Ordinates, power: FloatArray, expected: FloatArray, near: slice)
 
 
 def smooth_level(band: Ordinates, ratio: FloatArray) -> FloatArray:
-    """(k,) local level of ``ratio`` from medians of many ordinates: colouring is not a line."""
+    """(k,) local level of ``ratio`` from medians of many ordinates, so that broad deviations are not lines."""
     width = min(512, len(ratio) // 8)
     n = len(ratio) // max(width, 1)
     if width < 16:
@@ -137,10 +137,10 @@ def smooth_level(band: Ordinates, ratio: FloatArray) -> FloatArray:
 def white_limit(
     bands: Sequence[Ordinates], nyquist_hz: float, masked: Sequence[npt.NDArray[np.bool_]] | None
 ) -> tuple[float, float]:
-    """Highest frequency up to which the spectrum is a sum of noise terms, and the power at Nyquist over the terms'.
+    """Upper end [Hz] of the fit band, up to which the spectrum is a sum of terms, and power at Nyquist over the terms'.
 
     The upper two octaves of the band are compared, by thirds of an octave, with the fit of all terms; while one of them
-    deviates, the band is lowered by half an octave.
+    deviates, the band is reduced by half an octave.
     """
     highest = nyquist_hz
     while True:
@@ -159,14 +159,14 @@ def white_limit(
 
 
 def _droops(spectrum: BinnedSpectrum, highest_hz: float) -> bool:
-    """Whether the upper two octaves fall below what the terms found under them foretell: no noise term falls there."""
+    """Whether the top of the band falls below the terms fitted two octaves below it, as no noise term does."""
     low = spectrum.frequency_hz <= highest_hz / 4.0
     if np.count_nonzero(low) < 8:
         return False
     below = BinnedSpectrum(*(values[..., low] for values in vars(spectrum).values()))
     fit = below.likelihood().fit((1, 2, 3), True)
     ratio = spectrum.without_line(fit.slope) / spectrum.expectation(fit.strength)
-    # The level under the top is a median of bins: a resonance there is not what the top falls short of.
+    # The level below is a median of bins, robust to a resonance there.
     level = float(np.median(ratio[low & (spectrum.frequency_hz > highest_hz / 32.0)]))
     top = spectrum.frequency_hz > highest_hz / 2.0 ** (1 / 3)
     count = spectrum.count[top].sum()
@@ -199,7 +199,7 @@ class MisfitGroup:
 
 
 def misfit_groups(selection: Selection) -> list[MisfitGroup]:
-    """How far the spectrum is from the selected terms, by half octaves."""
+    """Deviation of the spectrum from the selected terms by half octaves."""
     spectrum = selection.spectrum
     ratio = spectrum.without_line(selection.fit.slope) / spectrum.expectation(selection.fit.strength)
     key = np.floor(2.0 * np.log2(spectrum.frequency_hz / spectrum.frequency_hz[0]))

@@ -1,4 +1,4 @@
-"""How long to record: the precision of each term that a log of a given length can give, before it is recorded."""
+"""How long to record: predicted relative uncertainty of each noise term for a log of given length."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def relative_sigma(axis: NoiseAxis, duration_s: float) -> dict[TermName, float]:
     The Cramér-Rao bound of the likelihood with which terms are identified; the identification attains it.
     """
     highest = min(axis.highest_hz or axis.rate_hz / 2.0, axis.rate_hz / 2.0)
-    # Whole-length ordinates in bins of 2 %: a million of them carry no more than these.
+    # Ordinates of the whole length, summed in narrow bins without loss of information.
     edges = np.unique(np.round(np.geomspace(1.0, max(2.0, 2.0 * highest * duration_s), 1200)))
     count = np.diff(edges)
     f = 0.5 * (edges[:-1] + edges[1:] - 1.0) / (2.0 * duration_s)
@@ -52,12 +52,12 @@ def relative_sigma(axis: NoiseAxis, duration_s: float) -> dict[TermName, float]:
 
 
 def recording_length_s(axis: NoiseAxis, symbol: TermName | str, relative: float) -> float | None:
-    """Seconds of recording after which ``symbol`` is known to ``relative``; None when a month does not suffice.
+    """Recording time [s] after which ``symbol`` has the relative uncertainty ``relative``; None beyond a month.
 
     Raises
     ------
     ValueError
-        When the axis does not hold the term, or ``relative`` is no positive share.
+        When the term is not present on the axis, or ``relative`` is not positive.
     """
     term = TermName(symbol)
     if not axis.terms[term].is_present:

@@ -1,8 +1,8 @@
 """Noise inside the poses of a session: white density, spectrum by octaves, lines, filter corner, resolution.
 
-A session's poses are seconds long and differ a little (temperature, gravity on the axis, a hand): every figure is a
-mean of logarithms over poses, whose error comes from the number of readings and from the poses' own scatter. Two logs
-are then compared figure by figure (:func:`ratio_of`). docs/noise.md, section 8.
+A session's poses are seconds long and differ slightly (temperature, gravity on the axis, a hand): every figure is a
+mean of logarithms over poses, whose error comes from the number of readings and from the scatter between poses. Two
+logs are then compared figure by figure (:func:`ratio_of`). docs/noise.md, section 8.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise
 from trihedron.transforms import cosine_transform
 
 SHAPE_TERMS = 2
-"""Even powers of frequency by which the shape below the corner may differ from the best of the list: of running means,
-Butterworth filters to order 4 and their squares the density is off by 1.3 % at most then (2.6 % with one)."""
+"""Even powers of frequency by which the shape below the corner may differ from the best of the list: for running means,
+Butterworth filters to order 4 and their squares the density's error is then 1.3 % at most (2.6 % with one)."""
 SHAPE_ERROR = 0.01
-"""What is left of that, of the density's power."""
+"""Standard uncertainty of the density's logarithm due to that error."""
 SCORING_STEPS = 30
 
 
 @dataclass(frozen=True, eq=False)
 class _Below:
-    """Bins (k,) of one axis below the corner: ``shape`` (k, m) even powers of frequency, ``slow`` (k, j)."""
+    """Bins (k,) of one axis below the corner: ``shape`` (k, m) even powers of frequency, ``slow`` (k, j) slow noise."""
 
     gain: FloatArray
     shape: FloatArray
@@ -44,7 +44,7 @@ class _Below:
 
 
 def _bounded_step(J: FloatArray, r: FloatArray, lowest: FloatArray, n_levels: int) -> tuple[FloatArray, FloatArray]:
-    """Inverse information and a Gauss-Newton step whose first parts stay above ``lowest``: those at it do not move."""
+    """Inverse information and a Gauss-Newton step bounded below by ``lowest``; steps at the bound are held there."""
     held = np.zeros(J.shape[1], dtype=bool)
     step = np.zeros(J.shape[1])
     inverse = np.zeros((J.shape[1], J.shape[1]))
@@ -67,11 +67,11 @@ def _bounded_step(J: FloatArray, r: FloatArray, lowest: FloatArray, n_levels: in
 
 
 def densities_below(spectra: Sequence[Spectrum], low_pass: LowPass, rate_hz: float) -> list[tuple[float, float]]:
-    """White density [u²/Hz] of each axis below a corner they share, and the standard error of its logarithm.
+    """White density [u²/Hz] of each axis below a common corner, and the standard error of its logarithm.
 
     Whittle likelihood of the ordinates below the corner: density times the gain of ``low_pass`` times exp of an even
-    polynomial of frequency common to the axes, over each one's flicker and rounding. The level at zero is the density:
-    the shape of the filter is paid for, not believed.
+    polynomial of frequency common to the axes, plus each axis' flicker and rounding. The density is the level at
+    frequency zero: the uncertainty of the filter's shape is included.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def densities_below(spectra: Sequence[Spectrum], low_pass: LowPass, rate_hz: flo
         blocks, rests = [], []
         for k, axis in enumerate(axes):
             white = np.exp(level[k] + axis.shape @ bend) * axis.gain
-            # Relative to the level; what fell below nothing is none, unless the data lift it again.
+            # Slow noise relative to the level, bounded below by 0.
             unit = axis.slow * math.exp(level[k])
             mean = white + unit @ beneath[k] + axis.rounding
             design = np.zeros((len(mean), int(first[-1]) + SHAPE_TERMS))
@@ -117,22 +117,22 @@ def densities_below(spectra: Sequence[Spectrum], low_pass: LowPass, rate_hz: flo
         covariance = inverse[:n, :n]
         if float(np.abs(step[:n]).max()) < 1e-6:
             break
-    # What was cut off may leak as much as the level itself where it ends, and falls with frequency squared at least.
+    # Leakage from below the band: at most the level at its lower end, falling with frequency squared at least.
     leak = np.array([(s.frequency_hz[0] / corner) ** 2 if s.slow == LEAKAGE else 0.0 for s in spectra])
     sigma = np.sqrt(np.diag(covariance) + SHAPE_ERROR**2 + leak**2)
     return [(float(np.exp(a)), float(s)) for a, s in zip(level, sigma, strict=True)]
 
 
 FEWEST_POSES = 3
-"""Poses that must show an octave, where there are as many: the scatter of one is not known."""
+"""Fewest poses with an octave, where there are as many: one pose does not show the scatter."""
 LEVEL_KNOWN = 1.0
-"""Standard error of the logarithm of a density below a corner, from which on the differences of readings say more."""
+"""Largest standard error of the log density below a corner; above it the differences of readings are used."""
 
 
 def noise_of_poses(readings: npt.ArrayLike, rate_hz: float, poses: Sequence[tuple[int, int]]) -> tuple[PoseNoise, ...]:
     """Noise of every axis inside the poses of a session, each figure with its interval.
 
-    The channels are those of one sensor: they share a low-pass unless their spectra deny it.
+    The channels are those of one sensor: they share a low-pass filter unless their spectra contradict it.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def noise_of_poses(readings: npt.ArrayLike, rate_hz: float, poses: Sequence[tupl
     Raises
     ------
     ValueError
-        When the rate is no rate, a window is none, or none has 32 readings in a row.
+        When the rate is not positive, a pose is not a range of readings, or none has 32 readings in a row.
 
     Examples
     --------
@@ -185,7 +185,7 @@ def noise_of_poses(readings: npt.ArrayLike, rate_hz: float, poses: Sequence[tupl
 
 
 def _white(axes: Sequence[AxisAtRest], filters: Sequence[LowPass], rate_hz: float) -> list[Measured | None]:
-    """Densities of white noise: below the corner where a filter shows, of all frequencies where none does."""
+    """White noise densities: below the corner where a filter is detected, else from all frequencies."""
     out = [_of_differences(axis, rate_hz) for axis in axes]
     for one in dict.fromkeys(filters):
         if one.corner_hz is None:
@@ -194,7 +194,7 @@ def _white(axes: Sequence[AxisAtRest], filters: Sequence[LowPass], rate_hz: floa
         levels = densities_below([axes[k].spectrum for k in sharing], one, rate_hz)
         for k, level in zip(sharing, levels, strict=True):
             if not level[1] < LEVEL_KNOWN:
-                continue  # the band below the corner is too narrow, or too uneven, to say
+                continue  # the band below the corner is too narrow or too uneven
             out[k] = _of_level(axes[k], *level, one.corner_hz.value, rate_hz)
     return out
 
@@ -202,7 +202,7 @@ def _white(axes: Sequence[AxisAtRest], filters: Sequence[LowPass], rate_hz: floa
 def _band_power(
     parts: Sequence[FloatArray], rate_hz: float, low_hz: float, high_hz: float
 ) -> tuple[FloatArray, FloatArray]:
-    """(k,) mean power of each pose between two frequencies, and its number of ordinates; holds too short left out."""
+    """(k,) mean power of each pose between two frequencies, and its number of ordinates; short poses are skipped."""
     power, ordinates = [], []
     for part in parts:
         first, last = (math.ceil(f * 2.0 * len(part) / rate_hz) for f in (low_hz, high_hz))
@@ -214,10 +214,10 @@ def _band_power(
 
 
 def _of_differences(axis: AxisAtRest, rate_hz: float) -> Measured | None:
-    """White density where the spectrum is flat: half the mean squared difference less rounding."""
+    """White density of a flat spectrum: half the mean squared difference of readings less the variance of rounding."""
     if not axis.is_dithered:
         return None
-    # The rounding is known: what is left carries the whole error.
+    # The variance of rounding is known: the rest has the whole error.
     share = axis.total / (axis.total - axis.rounding)
     sensor = as_measured(axis.total - axis.rounding, share * axis.pooled.sigma, axis.pooled.dof)
     return root_of(sensor, 1.0 / rate_hz)
@@ -226,8 +226,8 @@ def _of_differences(axis: AxisAtRest, rate_hz: float) -> Measured | None:
 def _of_level(axis: AxisAtRest, density: float, sigma_log: float, corner_hz: float, rate_hz: float) -> Measured | None:
     """White density below a filter's corner, of a typical pose.
 
-    ``density`` is that of the mean over poses, which loud ones fill: how far a typical one lies beneath it is read off
-    the same band, for holds differ there by a hand's tremor too, and by less in their differences.
+    ``density`` is that of the mean over poses, which noisy ones dominate. The ratio of a typical pose to it is measured
+    in the same band: there poses also differ by tremor of a hand, more than in the differences of readings.
     """
     if not (density > 0.0 and axis.dithers(2.0 * corner_hz * density)):
         return None
@@ -245,7 +245,7 @@ def _of_level(axis: AxisAtRest, density: float, sigma_log: float, corner_hz: flo
 
 
 def _octaves(parts: Sequence[FloatArray], rate_hz: float) -> tuple[OctaveNoise, ...]:
-    """Mean power between powers of two of a hertz, over the poses long enough to have four ordinates there."""
+    """Mean power in octaves between powers of 2 Hz, over the poses with at least four ordinates in the octave."""
     nyquist = rate_hz / 2.0
     found: dict[int, tuple[list[float], list[float]]] = {}
     for part in parts:
@@ -264,7 +264,7 @@ def _octaves(parts: Sequence[FloatArray], rate_hz: float) -> tuple[OctaveNoise, 
             dofs.append(float(n))
     out = []
     for octave in sorted(found):
-        # One long pose, perhaps with the hand still on it, is not the sensor's low octave.
+        # A single long pose, perhaps still held by hand, does not determine the sensor's low octave.
         if len(found[octave][0]) < min(FEWEST_POSES, len(parts)):
             continue
         pooled = pooled_logarithm(np.array(found[octave][0]), np.array(found[octave][1]))

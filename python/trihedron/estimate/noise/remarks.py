@@ -1,4 +1,4 @@
-"""What is said about a log and its terms: every finding of the noise stage in words."""
+"""Findings of the noise stage on a log and its terms."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
     from trihedron.estimate.noise.screening import Event, Readout
 
 NAMED = 4
-"""So many lines are told one by one."""
+"""Most spectral lines that a finding lists one by one."""
 
 
 def events(
     steps: Sequence[Event], knocks: Sequence[Event], shocks: Sequence[Event], rate_hz: float, unit: str
 ) -> list[Finding]:
-    """Steps, knocks and shaking of one axis, the largest of each with its time."""
+    """Findings for steps, knocks and shaking of one axis; the largest step and knock with their times."""
     out = []
     if steps:
         worst = max(steps, key=lambda e: abs(e.size))
@@ -49,7 +49,7 @@ def events(
 
 
 def stretches_excluded(stretches: Sequence[tuple[int, int]], n: int, rate_hz: float) -> Finding:
-    """What was excluded."""
+    """Finding with the number, duration and share of the excluded intervals."""
     total = sum(b - a for a, b in stretches)
     return Finding.of(
         FindingCode.STRETCHES_EXCLUDED, n_stretches=len(stretches), excluded_s=total / rate_hz, share=total / n
@@ -57,14 +57,14 @@ def stretches_excluded(stretches: Sequence[tuple[int, int]], n: int, rate_hz: fl
 
 
 def written(readings: Readout) -> list[Finding]:
-    """Saturation of one axis."""
+    """Finding for readings at the range limit of one axis."""
     if readings.clipped == 0.0:
         return []
     return [Finding.of(FindingCode.CLIPPING, "at-rest", share=readings.clipped)]
 
 
 def dead(readings: Readout, unit: str) -> Finding:
-    """The noise does not move the ADC."""
+    """Finding for noise that is too small for the resolution of the ADC."""
     return Finding.of(
         FindingCode.QUANTISATION_DEAD,
         sigma=readings.sigma,
@@ -75,7 +75,7 @@ def dead(readings: Readout, unit: str) -> Finding:
 
 
 def lines(found: Sequence[SpectralLine], unit: str) -> Finding:
-    """Periodic disturbances, the strongest first."""
+    """Finding for spectral lines, the strongest first."""
     strong = sorted(found, key=lambda line: -line.amplitude)
     return Finding.of(
         FindingCode.SPECTRAL_LINE,
@@ -89,7 +89,7 @@ def lines(found: Sequence[SpectralLine], unit: str) -> Finding:
 
 
 def coloured(highest_hz: float, nyquist_hz: float, at_nyquist: float) -> Finding:
-    """The upper end of the spectrum is not noise terms alone."""
+    """Finding for an upper end of the spectrum that no sum of noise terms explains (low-pass filtering)."""
     if math.isnan(at_nyquist):
         return Finding.of(FindingCode.SPECTRUM_COLOURED, "throughout")
     return Finding.of(
@@ -102,7 +102,7 @@ def coloured(highest_hz: float, nyquist_hz: float, at_nyquist: float) -> Finding
 
 
 def _slow_noise_unresolved(axis: NoiseAxis) -> Finding:
-    """B and K together are needed, neither by itself."""
+    """Finding where slow noise is significant, but B and K are not separable."""
     flicker, walk = axis.terms[TermName.BIAS_INSTABILITY], axis.terms[TermName.RATE_RANDOM_WALK]
     evidence = axis.slow_pair.evidence if axis.slow_pair is not None else 0.0
     return Finding.of(
@@ -117,7 +117,7 @@ def _slow_noise_unresolved(axis: NoiseAxis) -> Finding:
 
 
 def about_terms(axis: NoiseAxis) -> list[Finding]:
-    """Drift, and a log too short to show any minimum."""
+    """Findings for drift, inseparable slow noise, and a log too short for a minimum of the Allan deviation."""
     out = []
     ramp = axis.terms[TermName.RATE_RAMP]
     if ramp.is_present:

@@ -1,7 +1,7 @@
-"""What in a static log is not stationary noise: steps, knocks, shaking; and what the ADC left of the readings.
+"""Detection of steps, knocks and shaking in a static log, and of resolution and saturation of its readings.
 
-Every detector measures the log's own scatter robustly and asks what Gaussian noise of any colour would exceed once in
-10 000 logs; no threshold is set by hand.
+Every detector measures the log's own scatter robustly; its threshold is the value that Gaussian noise of any spectrum
+exceeds once in 10 000 logs.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from trihedron.channel_facts.limits import share_at_limits
 FALSE_ALARM = 1e-4
 """Probability that a clean log shows an event of one kind."""
 READOUT_SAMPLE = 200_000
-"""Readings from which resolution, noise and saturation are judged."""
+"""Readings from which resolution, noise and saturation are measured."""
 MOST_EVENTS = 500
-"""Events of one axis that are looked at, the strongest first."""
+"""Most events of one axis that are examined, the strongest first."""
 STEP_REACHES = (4, 16, 64)
-"""Over how many of its own widths a step must hold its level on either side."""
+"""Multiples of its own width over which a step must keep its level on either side."""
 FEW, CLOSELY = 2, 0.7
-"""Events that are no tail, and the part of the limit that is closely below it."""
+"""Most events that are accepted without the test for tails, and the fraction of the limit that is close to it."""
 _MAD_TO_SIGMA = 1.4826
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened at readings ``[start, stop)``: ``size`` in their unit, ``score`` over the limit."""
+    """Event at readings ``[start, stop)``: ``size`` in their unit (shaking: ratio of scatter), ``score`` of a test."""
 
     start: int
     stop: int
@@ -42,10 +42,10 @@ class Event:
 
 
 def steps_and_knocks(x: FloatArray) -> tuple[list[Event], list[Event]]:
-    """Jumps of the level, and short excursions that return, of one channel ``x`` (n,); NaN marks a missing reading.
+    """Steps of the level, and short excursions (knocks), of one channel ``x`` (n,); NaN marks a missing reading.
 
-    Means of neighbouring clusters are differenced at every power of two; the differences of stationary or
-    random-walk noise are Gaussian whatever the spectrum, so that one far outside their own spread is an event.
+    Means of neighbouring clusters are differenced at every power of two; the differences of stationary or random-walk
+    noise are Gaussian for any spectrum, so that one far outside their spread is an event.
     """
     n = len(x)
     scales = []
@@ -65,7 +65,7 @@ def steps_and_knocks(x: FloatArray) -> tuple[list[Event], list[Event]]:
         reach = 4 * width
         levels = [_level_change(x, at, width, times * width) for times in STEP_REACHES if times * width < n // 4]
         slack = max(width // 4, 2)
-        # A step keeps at least half of what it jumped, for long; a knock comes back, be it after a while.
+        # A step keeps at least half of its jump over all reaches; a knock returns.
         if at + reach < n and at > reach and all(change / jump > 0.5 for change in levels):
             steps.append(Event(max(0, at - slack), min(n, at + slack), levels[0], score_ratio))
             taken.append((at - 2 * width, at + 2 * width))
@@ -77,25 +77,25 @@ def steps_and_knocks(x: FloatArray) -> tuple[list[Event], list[Event]]:
 
 
 def _level_change(x: FloatArray, at: int, width: int, reach: int) -> float:
-    """Mean of the ``reach`` readings after the jump at ``at``, itself ``width`` wide, less that of those before."""
+    """Mean of the ``reach`` readings after the jump at ``at``, of width ``width``, less that of those before."""
     before = _mean(x[max(0, at - reach) : max(1, at - width // 4)])
     after = _mean(x[min(len(x) - 1, at + width + width // 4) : min(len(x), at + reach + width)])
     return after - before
 
 
 def shaken(x: FloatArray, rate_hz: float) -> list[Event]:
-    """Stretches in which the scatter from reading to reading is far above that of the rest."""
+    """Stretches in which the scatter from reading to reading is far above that of the rest of the log."""
     size = int(max(16, min(rate_hz, len(x) // 64)))
     n = len(x) // size
     if n < 32:
         return []
     level = np.log(_core.block_scatter(x, size) + 1e-300)
     centre = np.nanmedian(level)
-    # Counts that rarely change have a scatter of their own: never believe less than the chi-square's.
+    # With counts that rarely change the spread may be underestimated: at least that of chi-square is used.
     spread = max(_MAD_TO_SIGMA * float(np.nanmedian(np.abs(level - centre))), math.sqrt(2.0 / size))
     distance, limit = (level - centre) / spread, _limit(n, n)
     hit = (distance > limit) & (level - centre > math.log(1.5))
-    # As many closely below the limit as above it are the tail of one law, as in `find_jumps`: readings far out make it.
+    # As many close below the limit as above it are the tail of one distribution, as in `find_jumps`: no events.
     if FEW < np.count_nonzero(hit) < np.count_nonzero((distance > CLOSELY * limit) & (distance <= limit)):
         return []
     out: list[Event] = []
@@ -116,14 +116,14 @@ def _mean(values: FloatArray) -> float:
 
 def _limit(n_looks: int, n_independent: float) -> float:
     gaussian = math.sqrt(float(chdtri(1.0, FALSE_ALARM / n_looks)))
-    # The spread itself is known to 1.17/√(2k) from k independent values: three of its errors.
+    # The robust spread of k values has the relative standard error 1.17/√(2k): three of these are added.
     return gaussian * (1.0 + 3.0 * 1.17 / math.sqrt(2.0 * n_independent))
 
 
 @dataclass(frozen=True)
 class Readout:
-    """How the readings were written: ``resolution`` the smallest change, ``sigma`` the noise of one reading above it,
-    shares of readings that repeat the one before, and that lie at a limit."""
+    """Properties of the readings: ``resolution`` (LSB), ``sigma`` noise of one reading, shares of readings that repeat
+    the one before, and of readings at a range limit."""
 
     resolution: float
     sigma: float
@@ -132,13 +132,13 @@ class Readout:
 
     @property
     def is_dead(self) -> bool:
-        """The noise is too small to carry the readings from one LSB to the next."""
+        """Whether the noise is below half an LSB, too small to dither the readings."""
         return self.resolution > 0.0 and self.sigma < 0.5 * self.resolution
 
 
 def readout(x: FloatArray) -> Readout:
     """Resolution, noise and saturation of one channel."""
-    # Evenly spread pieces of the log: what holds for them holds for it, at a fraction of the time.
+    # Evenly spread pieces represent a long log.
     pieces = 1 if len(x) <= READOUT_SAMPLE else 16
     length = len(x) // pieces if pieces == 1 else READOUT_SAMPLE // pieces
     starts = np.linspace(0, len(x) - length, pieces).astype(int)
@@ -154,10 +154,10 @@ def readout(x: FloatArray) -> Readout:
 
 
 def tail_error(x: FloatArray) -> float:
-    """What the tails of readings ``x`` (n,) add to the relative standard error of their white noise's density.
+    """Relative standard error of the white noise density of readings ``x`` (n,) due to their excess kurtosis.
 
-    The variance of n independent readings of excess kurtosis κ is known to (2 + κ)/n, where a spectrum knows only of 2;
-    the differences of neighbours, which slow noise leaves alone, have half their κ.
+    The variance of n independent readings with excess kurtosis κ has the relative variance (2 + κ)/n, of which the
+    spectral likelihood includes 2/n; κ is twice that of differences of neighbours, which slow noise does not affect.
     """
     change = np.diff(x)
     change = change[np.isfinite(change)]
@@ -169,14 +169,14 @@ def tail_error(x: FloatArray) -> float:
 
 
 def repeated_rows(x: npt.NDArray[np.float64]) -> float:
-    """Share of rows ``x`` (n, channels) that were written twice: channels repeat together, not one at a time."""
+    """Share of rows ``x`` (n, channels) that repeat the row before in all channels together, beyond chance."""
     sample = x[:200_000]
     if x.shape[1] < 2 or len(sample) < 2:
         return 0.0
     same = np.diff(sample, axis=0) == 0.0
     both = float(np.mean(np.all(same, axis=1)))
     chance = float(np.prod(same.mean(axis=0)))
-    # Of what the quietest channel repeats beyond chance, more than half falls on rows that repeat as a whole.
+    # More than half of the repetitions of the quietest channel beyond chance must be in rows that repeat as a whole.
     possible = float(same.mean(axis=0).min()) - chance
     error = 4.0 * math.sqrt(max(chance, 1.0 / len(sample)) / len(sample))
     return both - chance if both - chance > max(error, 0.5 * possible) else 0.0

@@ -1,4 +1,4 @@
-"""Which noise terms a spectrum holds: every subset is fitted, and a term must earn its place."""
+"""Selection of the noise terms of a spectrum: every subset is fitted, and each term has a penalty."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
 
 EVIDENCE = 8.0
-"""Drop of the deviance that a term must earn. An absent term earns it by chance with a probability of 0.25 % (half a
-chi-square with one degree of freedom; the ramp, which has two signs, 0.5 %): four absent terms together 1.5 %."""
+"""Penalty of a term: the least reduction of the deviance. An absent term reaches it with a probability of 0.25 % (half
+a chi-square with one degree of freedom; the ramp, which has two signs, 0.5 %): four absent terms together 1.5 %."""
 
 EVIDENCE_GAUSS_MARKOV = 16.0
-"""The same for a Gauss-Markov process, whose time constant was searched over a grid as well."""
+"""Penalty of a Gauss-Markov process, whose time constant is searched on a grid."""
 
 TOLERANCE_GAUSS_MARKOV = 0.02
-"""Share by which a half octave may miss its terms without being called a Gauss-Markov process."""
+"""Relative uncertainty of a half octave in the search for a Gauss-Markov process."""
 
 BIN_WIDTH = 1.025
-"""Ratio of the edges of a bin: a random walk varies by 5 % inside it, and its mean is taken."""
+"""Ratio of the edges of a bin: the density of a random walk varies by 5 % inside it, and its mean is used."""
 
 
 @dataclass(frozen=True, eq=False)
 class BinnedSpectrum:
-    """Ordinates averaged over narrow bins: all (b,), the basis (terms, b)."""
+    """Ordinates averaged over narrow bins: all (b,), ``basis`` (terms, b)."""
 
     frequency_hz: FloatArray
     count: FloatArray
@@ -41,12 +41,12 @@ class BinnedSpectrum:
     basis: FloatArray
 
     def with_gauss_markov(self, step_s: float, correlation_time_s: float) -> BinnedSpectrum:
-        """The same bins with a unit Gauss-Markov process as a fifth term."""
+        """The bins with a unit Gauss-Markov process as a fifth term."""
         row = gauss_markov_density(self.frequency_hz, step_s, correlation_time_s)
         return replace(self, basis=np.vstack([self.basis, row]))
 
     def capped(self, tolerance: float) -> BinnedSpectrum:
-        """The same bins, no half octave of which is believed to better than ``tolerance``."""
+        """The bins with counts reduced so that no half octave has a relative uncertainty below ``tolerance``."""
         key = np.floor(2.0 * np.log2(self.frequency_hz / self.frequency_hz[0])).astype(np.int64)
         total = np.bincount(key, weights=self.count)
         return replace(self, count=self.count * np.minimum(1.0, 2.0 / tolerance**2 / total[key]))
@@ -60,7 +60,7 @@ class BinnedSpectrum:
         return np.asarray(np.asarray(strength) @ self.basis)
 
     def without_line(self, slope: float) -> FloatArray:
-        """(b,) power with a line of ``slope`` taken out."""
+        """(b,) power after subtraction of a ramp of ``slope``."""
         return self.power - 2.0 * slope * self.cross + slope**2 * self.square
 
 
@@ -69,7 +69,7 @@ def binned(
     highest_hz: float,
     masked: Sequence[npt.NDArray[np.bool_]] | None = None,
 ) -> BinnedSpectrum:
-    """Ordinates up to ``highest_hz`` that are not ``masked``, averaged over bins of 2.5 %."""
+    """Ordinates up to ``highest_hz`` that are not ``masked``, averaged in bins of ``BIN_WIDTH``."""
     pick = [band.frequency_hz <= highest_hz for band in bands]
     if masked is not None:
         pick = [p & ~m for p, m in zip(pick, masked, strict=True)]
@@ -123,12 +123,12 @@ def select(
     tolerance: float = 0.0,
     is_cornered: bool = False,
 ) -> Selection:
-    """The subset of {Q, N, B, K, R} of least deviance plus ``evidence`` per term, and a Gauss-Markov process if earned.
+    """The subset of {Q, N, B, K, R} of least deviance plus ``evidence`` per term, and a Gauss-Markov process if needed.
 
     Raises
     ------
     ValueError
-        When the channel does not change, or nothing is left of the spectrum.
+        When the channel does not change, or no ordinate of the spectrum remains.
     """
     spectrum = binned(bands, highest_hz, masked)
     if tolerance > 0.0:
@@ -162,28 +162,28 @@ def select(
 
 
 def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[npt.NDArray[np.bool_]]:
-    """Ordinates in which the unpaired first and last phase of quantisation weigh: all share two random numbers.
+    """Masks of ordinates that the unpaired first and last phase of quantisation affect: these are correlated.
 
-    The first ordinate of a band stays: alone it shares them with none, and it is where a ramp shows.
+    The first ordinate of a band is not masked: alone it has no correlation, and it is where a ramp shows.
     """
     out = []
     for band in bands:
         expectation = np.asarray(strength) @ band.basis
-        # Two numbers shared by hundreds of ordinates add up like a signal: a ramp, of all signals.
+        # Two random values common to hundreds of ordinates would look like a ramp.
         out.append((strength[0] * band.corner_floor > 0.002 * expectation) & (band.order > 1))
     return out
 
 
 def _with_gauss_markov(step_s: float, plain: Selection, evidence: float) -> Selection | None:
-    # Filters bend a spectrum by a few per cent: a process must show in what is left when that is not believed.
+    # Filters change a spectrum by a few per cent: a process must be significant beyond this tolerance.
     spectrum = plain.spectrum.capped(TOLERANCE_GAUSS_MARKOV)
     frequency = spectrum.frequency_hz
     price_plain = spectrum.likelihood().fit(plain.active, plain.has_ramp).deviance
     price_plain += evidence * (len(plain.active) + plain.has_ramp)
-    # Shorter than this it is white, longer a random walk, as far as this log can tell.
+    # With a shorter time constant the process is white in this log, with a longer one a random walk.
     shortest, longest = 1.0 / (2 * np.pi * frequency[-1]), 1.0 / (2 * np.pi * frequency[0])
     extra = len(SYMBOLS)
-    # It may stand beside the terms found, or explain what B, K or both were found for.
+    # The process is added to the selected terms, or replaces B, K or both.
     models = {(*(k for k in plain.active if k not in drop), extra) for drop in ((), (2,), (3,), (2, 3))}
     if not longest > 64 * shortest:
         return None
@@ -197,7 +197,7 @@ def _with_gauss_markov(step_s: float, plain: Selection, evidence: float) -> Sele
             found.append((price, model, plain.has_ramp))
         return min(found)
 
-    # A corner in the uppermost three octaves is the colouring of a filter, not a process of the sensor.
+    # A corner in the uppermost three octaves is that of a filter, not of a process of the sensor.
     grid = np.geomspace(8 * shortest, longest / 2, max(4, int(np.log2(longest / shortest)) - 3))
     coarse = [best_at(time_s)[0] for time_s in grid]
     place = int(np.argmin(coarse))

@@ -1,20 +1,20 @@
-"""Bias instability and rate random walk of a session, as the poses of a session show them.
+"""Bias instability and rate random walk of a session from the means of its poses.
 
-A hold of seconds shows neither; the means of some tens of poses over minutes do. Per axis, with one constant, the
+A pose of seconds shows neither; the means of some tens of poses over minutes do. Per axis, with a free constant, the
 biases y of poses at t with lengths T have the covariance
 
     V = σ² + s² I + K² V_K + B² V_B,   V_K = min(t, t') - δ T/6,   V_B = -L/π
 
-where σ² are the variances of the means by white noise, s the scatter of biases from pose to pose, free because every
-pose may have an accident of its own, and L the mean of ln|t - t'| over both windows, by its second integral
-x²/2 ln|x| - 3x²/4 (1/f noise of two-sided density B²/2πf has no variance, only the variogram (2B²/π) ln; constants drop
-out beside the free mean). A pose tells one number of an accelerometer's bias: its part along gravity. With ``u`` (n, 3)
-the directions of gravity the residuals of the lengths have
+where σ² are the variances of the means by white noise, s is the bias repeatability from pose to pose, free because
+single poses may be disturbed, and L the mean of ln|t - t'| over both windows, by its second integral
+x²/2 ln|x| - 3x²/4 (1/f noise of two-sided density B²/2πf has no variance, only the variogram (2B²/π) ln; constants are
+absorbed by the free mean). A pose shows one component of an accelerometer's bias, along gravity. With ``u`` (n, 3) the
+directions of gravity the norm residuals have
 
     V = σ² + s² I + Σ_k (u_k u_kᵀ) ∘ (B_k² V_B + K_k² V_K)
 
-The likelihood is restricted to what the calibration does not take up; all strengths and ``s`` are integrated over a
-low-discrepancy sequence: what one axis is taken to do changes what is left for the others. docs/noise.md, section 9.
+The likelihood is restricted to contrasts that the calibration does not absorb; all strengths and ``s`` are integrated
+jointly over a low-discrepancy sequence, because the axes are correlated. docs/noise.md, section 9.
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ from trihedron.arrays import FloatArray
 from trihedron.records.pose_noise import Measured, Ratio
 
 FEWEST_CONTRASTS = 11
-"""A variance from eleven differences is known to a factor of 1.5, its root to 1.25: with fewer nothing is compared."""
+"""Fewest contrasts for a comparison: with eleven a variance is uncertain by a factor of 1.5, its root by 1.25."""
 SPACING = 1.3
-"""Levels of B and of K are this factor apart, half of what an interval of 30 poses spans."""
+"""Ratio of neighbouring levels of B and of K: half of the width of an interval from 30 poses."""
 LOWEST, HIGHEST = 0.03, 8.0
-"""Range of the levels in parts of what the biases spread by: a tenth of it is not seen, three times it is refuted."""
+"""Range of the levels relative to the biases' spread: a tenth of it is not detectable, three times it is excluded."""
 LEAST_SIDE = 0.02
-"""A side whose biases spread by less than this share of the other's is silent, as a simulation without noise is: how
-silent says nothing more."""
+"""Smallest spread of one session's biases relative to the other's: a simulation without noise has none, and a smaller
+value gives no more information."""
 MIDDLE_OF_WALK = 6.0
-"""A walk's mean square about its mean over a span: K² span/6."""
+"""The mean square of a random walk about its mean over a span is K² span/6."""
 DRAWS = {1: 4096, 3: 8192}
-"""Points over the strengths of so many axes and a scatter: some hundred share the weight of a session of 30 poses."""
+"""Points over the strengths of so many axes and s: some hundred share the weight for a session of 30 poses."""
 ABSENT = 0.1
-"""Share of the points at which a strength is zero."""
+"""Prior probability that a strength is zero."""
 SHOWN = 0.1
-"""A strength is there where its absence has lost nine tenths of its odds (Jeffreys' strong evidence)."""
+"""A strength is present where the odds of its absence fall to a tenth (Jeffreys' strong evidence)."""
 INTERVAL = np.array([0.025, 0.5, 0.975])
 """Ends of a 95 % interval and the median between."""
 
@@ -55,7 +55,7 @@ INTERVAL = np.array([0.025, 0.5, 0.975])
 class PoseBiases:
     """Biases of one axis (n,), their standard errors by white noise (n,), middles and lengths of the poses [s] (n,).
 
-    With directions ``up`` (n, 3) of gravity in the sensor: lengths of gravity less g, as any calibration leaves them.
+    With unit verticals ``up`` (n, 3) in the body frame, values are gravity errors in static poses of any calibration.
     """
 
     values: FloatArray
@@ -66,7 +66,7 @@ class PoseBiases:
 
     @property
     def basis(self) -> FloatArray:
-        """(n, m) contrasts that no calibration changes: no constant of a gyro; no zero, scale or angle of the other."""
+        """(n, m) contrasts independent of the calibration: of a gyro's constant; of an accelerometer's S and b."""
         if self.up is None:
             return np.linalg.qr(np.ones((len(self.values), 1)), mode="complete")[0][:, 1:]
         x, y, z = self.up.T
@@ -76,7 +76,7 @@ class PoseBiases:
 
     @property
     def span_s(self) -> float:
-        """From the first pose to the last."""
+        """Time from the first pose to the last [s]."""
         return float(self.time_s[-1] - self.time_s[0])
 
     @property
@@ -87,9 +87,9 @@ class PoseBiases:
 
 @dataclass(frozen=True, eq=False)
 class SlowDifference:
-    """Slow noise of two sessions: the chance of such a difference between equal ones, and the term that carries it.
+    """Slow noise of two sessions: p-value of the difference, and the ``term`` that differs most.
 
-    ``first``, ``second`` per axis B and K of either; ``ratio`` per axis those of ``term``, first over second.
+    ``first``, ``second``: B and K of either session per axis; ``ratio``: B and K per axis, first over second.
     """
 
     p_value: float
@@ -102,9 +102,9 @@ class SlowDifference:
 def compare_slow(first: Sequence[PoseBiases], second: Sequence[PoseBiases]) -> SlowDifference | None:
     """Bias instability and rate random walk of two sessions; ``None`` where one has too few poses.
 
-    Twice the log-likelihood by which B and K of either session's own beat common ones (one B and one K for all axes of
-    lengths of gravity) is held against χ² of two degrees of freedom an entry; the term whose own values alone win more
-    of it is the one that differs. Figures and ratios are per axis.
+    Twice the gain in log-likelihood of separate B and K per session over common ones (one B and one K for all axes of
+    norm residuals) is tested by χ² with two degrees of freedom per entry; the term whose separate values alone gain
+    more is reported. Values and ratios are per axis.
     """
     if min(z.basis.shape[1] for z in (*first, *second)) < FEWEST_CONTRASTS:
         return None
@@ -119,7 +119,7 @@ def compare_slow(first: Sequence[PoseBiases], second: Sequence[PoseBiases]) -> S
         p, q = (_log_likelihood(of, b, k) for of in parts)
         together = float((p + q).max())
         won += float(p.max() + q.max()) - together
-        # B of either, K in common; and the other way round.
+        # B separate and K common; then K separate and B common.
         by_b += float((p.max(axis=0) + q.max(axis=0)).max()) - together
         by_k += float((p.max(axis=1) + q.max(axis=1)).max()) - together
         drawn.append((_Drawn.of(parts[0], b, k), _Drawn.of(parts[1], b, k)))
@@ -130,13 +130,13 @@ def compare_slow(first: Sequence[PoseBiases], second: Sequence[PoseBiases]) -> S
 
 
 def _free_of_calibration(one: PoseBiases) -> PoseBiases:
-    """The same contrasts, and nothing else that the spread would count."""
+    """The biases projected on their contrasts: the part that a calibration absorbs is removed."""
     basis = one.basis
     return replace(one, values=basis @ (basis.T @ one.values))
 
 
 def _levels(sizes: Sequence[float]) -> FloatArray:
-    """Strengths to be tried, zero first, for biases spreading by ``sizes`` (what one unit of strength makes of it)."""
+    """Strengths to be tried, zero first, from the ``sizes`` of strength that would give the spread of the biases."""
     low, high = LOWEST * min(sizes), HIGHEST * max(sizes)
     n = math.ceil(math.log(high / low) / math.log(SPACING)) + 1
     return np.concatenate([[0.0], np.geomspace(low, high, n)])
@@ -144,7 +144,7 @@ def _levels(sizes: Sequence[float]) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """Contrasts (m,), their white covariance (m, m), those of each axis per B² and per K² (axes, m, m); a scatter."""
+    """Contrasts (m,), their white covariance (m, m), covariances (axes, m, m) per B² and per K², rms ``spread``."""
 
     contrasts: FloatArray
     white: FloatArray
@@ -154,7 +154,7 @@ class _Parts:
 
     @classmethod
     def of(cls, one: PoseBiases, least: float) -> _Parts:
-        """Of a session whose white noise is at least what makes ``least`` the least spread that is seen."""
+        """Parts of a session; ``LOWEST`` times ``least`` is added to its white noise in squares."""
         basis, up = one.basis, np.ones((len(one.values), 1)) if one.up is None else one.up
         gram = np.einsum("ik,jk->kij", up, up)
         of_b, of_k = (basis.T @ (gram * kernel) @ basis for kernel in _kernels(one))
@@ -170,7 +170,7 @@ class _Parts:
 
 
 def _log_likelihood(parts: _Parts, b: FloatArray, k: FloatArray) -> FloatArray:
-    """(b, k) log-likelihood of strengths that all axes share, the best scatter for each."""
+    """(b, k) log-likelihood of strengths common to all axes, at the best ``s`` for each."""
     s = np.concatenate([[0.0], np.geomspace(0.15, 1.5, 5) * parts.spread])
     scatter = (s**2)[:, None, None] * np.eye(len(parts.contrasts))
     of_k = (k**2)[:, None, None, None] * parts.of_k.sum(axis=0) + parts.white + scatter
@@ -180,7 +180,7 @@ def _log_likelihood(parts: _Parts, b: FloatArray, k: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """Strengths (draws, axes) of B and of K with the weight (draws,) that a session gives them."""
+    """Strengths (draws, axes) of B and of K with their posterior weights (draws,)."""
 
     B: FloatArray
     K: FloatArray
@@ -188,7 +188,7 @@ class _Drawn:
 
     @classmethod
     def of(cls, parts: _Parts, b: FloatArray, k: FloatArray) -> _Drawn:
-        """Within levels ``b``, ``k``: flat in the logarithm, with a share of the points at zero."""
+        """Draws within the levels ``b``, ``k``: prior flat in the logarithm, with a share of the points at zero."""
         axes = len(parts.of_b)
         u = qmc.Sobol(2 * axes + 1, seed=0).random(DRAWS[axes])
         depth, there = (u - ABSENT) / (1.0 - ABSENT), u >= ABSENT
@@ -201,7 +201,7 @@ class _Drawn:
         return cls(B, K, weight / weight.sum())
 
     def terms(self) -> tuple[dict[str, Measured], ...]:
-        """B and K of every axis: median and 95 % interval, from zero where zero is not excluded."""
+        """B and K of every axis: median and 95 % interval, which starts at zero where the term may be absent."""
         return tuple(
             {name: _measured(of, self.weight) for name, of in (("B", b), ("K", k))}
             for b, k in zip(self.B.T, self.K.T, strict=True)
@@ -209,7 +209,7 @@ class _Drawn:
 
 
 def _quantiles(values: FloatArray, weight: FloatArray, places: FloatArray) -> FloatArray:
-    """Values (k,) below which shares ``places`` (k,) of the weight lie."""
+    """Weighted quantiles (k,) of ``values`` at ``places`` (k,)."""
     order = np.argsort(values)
     reached = np.cumsum(weight[order]) / max(float(weight.sum()), 1e-300)
     return values[order[np.minimum(np.searchsorted(reached, places), len(order) - 1)]]
@@ -224,7 +224,7 @@ def _measured(values: FloatArray, weight: FloatArray) -> Measured:
 
 
 def _ratios(first: _Drawn, second: _Drawn, axis: int) -> dict[str, Ratio]:
-    """First over second: every quantile of one beside every quantile of the other."""
+    """Ratios first over second, from all pairs of quantiles of both posteriors."""
     out = {}
     places = (np.arange(200) + 0.5) / 200
     for name in ("B", "K"):
@@ -239,7 +239,7 @@ def _ratios(first: _Drawn, second: _Drawn, axis: int) -> dict[str, Ratio]:
 
 
 def _kernels(biases: PoseBiases) -> tuple[FloatArray, FloatArray]:
-    """(n, n) covariance of the means of the poses per B² and per K², beside a free constant."""
+    """(n, n) covariances of the pose means per B² and per K², up to a free constant."""
     t, length = biases.time_s - biases.time_s[0], biases.length_s
     begin, end = t - length / 2.0, t + length / 2.0
     mean_log = (

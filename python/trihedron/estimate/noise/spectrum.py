@@ -2,8 +2,8 @@
 
 The discrete cosine transform (type II) of the block means of a stretch diagonalises the covariance of white noise and
 of a random walk from an unknown level *exactly* (docs/noise.md, eq. 9): the likelihood of these two is exact, that of
-the others nearly so. A long stretch is seen through two bands: block means of its whole length for low frequencies,
-segments of the readings themselves for high ones.
+the others nearly so. A long stretch has two bands: block means of its whole length for low frequencies, segments of
+the readings for high ones.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ from trihedron.estimate.noise.gaps import (
 from trihedron.transforms import cosine_transform
 
 LONGEST_TRANSFORM = 1 << 17
-"""Longest transform; a longer stretch is averaged to block means first."""
+"""Longest transform; a longer stretch is first averaged to block means."""
 SEGMENT = 1 << 14
 MOST_SEGMENTS = 64
 """Segments used for the high band of one log: a million readings determine white noise to 0.07 %."""
 USED_SHARE = 8
-"""Of the spectrum of block means the lowest eighth is used: aliasing by the averaging is below 1 % there."""
+"""The lowest 1/8 of the spectrum of block means is used: aliasing by the averaging is below 1 % there."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ordinates:
     """Squared coefficients of one band, times the step: two-sided densities.
 
-    ``frequency_hz``, ``power``, ``count`` (k,): place, mean over segments, number of segments; ``line`` (k,) the
+    ``frequency_hz``, ``power``, ``count`` (k,): frequency, mean over segments, number of segments; ``line`` (k,) the
     coefficient of a line of slope 1/s, ``cross`` (k,) the mean product with it; ``length`` readings or means of
     ``block`` readings in ``step_s`` steps per transform; ``order`` (k,) the index of the coefficient.
-    Where readings are missing here and there, ``kept`` is the share of the power that is left, and ``sampling`` what
-    the variance of a reading within the reach of a mean, or of the transform, adds to every ordinate (eq. 16).
+    With scattered missing readings ``kept`` is the remaining fraction of the power, and ``sampling`` the factor with
+    which the variance of readings inside a mean, or the transform, is added to every ordinate (eq. 16).
     """
 
     frequency_hz: FloatArray
@@ -64,7 +64,7 @@ class Ordinates:
 
     @property
     def corner_floor(self) -> float:
-        """White floor for Q = 1 that the first and last phase of a transform leave: they have no partner."""
+        """White floor for Q = 1 by the unpaired first and last phase of a transform."""
         return 4.0 / (self.length * self.step_s)
 
     @cached_property
@@ -84,7 +84,7 @@ class Ordinates:
 def unit_densities(
     frequency_hz: FloatArray, order: npt.NDArray[np.int64], length: int, step_s: float, block: int
 ) -> FloatArray:
-    """(4, k) expected power of ordinates for Q = N = B = K = 1, no reading missing (docs/noise.md, eq. 9)."""
+    """(4, k) expected power of ordinates for Q = N = B = K = 1 without missing readings (docs/noise.md, eq. 9)."""
     h = step_s
     eigenvalue = 4.0 * np.sin(np.pi * frequency_hz * h) ** 2
     corners = 4.0 / (length * h) * np.cos(np.pi * order / (2.0 * length)) ** 2
@@ -104,14 +104,14 @@ def ordinates(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]
     Raises
     ------
     ValueError
-        When no stretch is long enough to hold a spectrum.
+        When no stretch is long enough for a spectrum.
     """
     total = sum(stop - start for start, stop in stretches)
     block = -(-total // LONGEST_TRANSFORM) if total > LONGEST_TRANSFORM else 1
     used = USED_SHARE
     if scattered_loss(x) > MOST_BRIDGED:
         block = max(block, SCATTERED_BLOCK)
-        # Slow noise of thinned readings drowns their fast noise: means alone, as far as they go.
+        # With losses, slow noise masks fast noise: only the means are used, up to half their ordinates.
         used = 2 if slow_over_fast(x) > MOST_SLOW else USED_SHARE
     bands: list[Ordinates] = []
     for start, stop in stretches:
@@ -130,9 +130,9 @@ def ordinates(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]
 def ordinates_of_means(
     means: FloatArray, block: int, rate_hz: float, stretches: Sequence[tuple[int, int]], head: FloatArray
 ) -> list[Ordinates]:
-    """Bands of a log of which only means of ``block`` readings (k,) and its first readings ``head`` (n,) are known.
+    """Bands of a log from means (k,) of ``block`` readings and its first readings ``head`` (n,).
 
-    ``stretches`` count means.
+    ``stretches`` are indices of means.
     """
     step_s = block / rate_hz
     bands = [_whole(Run(means[a:b], 0.0, 0.0), step_s, block) for a, b in stretches if b - a >= 32]
@@ -147,7 +147,7 @@ def _whole(run: Run, step_s: float, block: int, used: int = USED_SHARE) -> Ordin
     last = n - 1 if block == 1 else n // used
     order = np.arange(1, last + 1)
     coefficient = cosine_transform(means - means.mean())[1 : last + 1]
-    # What is bridged holds no white noise.
+    # Bridged means contain no white noise: the power is scaled up.
     coefficient /= np.sqrt(1.0 - run.bridged)
     line = line_coefficients(n, order) * step_s
     return Ordinates(
@@ -165,7 +165,7 @@ def _whole(run: Run, step_s: float, block: int, used: int = USED_SHARE) -> Ordin
 
 
 def _segments(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]], block: int) -> list[Ordinates]:
-    # The bands meet where the block means' lowest eighth ends; 16 ordinates of a segment lie below that.
+    # The band begins where the used eighth of the block means ends, at ordinate 16 of a segment.
     length = max(SEGMENT, 1 << (128 * block - 1).bit_length())
     total = max((stop - start for start, stop in stretches), default=0)
     while length > total and length > 256 * USED_SHARE:
@@ -214,7 +214,7 @@ _ORDERS = 32
 
 @lru_cache(maxsize=1)
 def _table() -> FloatArray:
-    """Expectation of a cosine coefficient of 1/f noise over the density at its frequency, orders 1 to 32."""
+    """Expected squared cosine coefficient of 1/f noise over the density at its frequency, orders 1 to 32."""
     n, pad = 512, 1 << 14
     k = np.arange(n)
     omega = 2.0 * np.pi * np.arange(1, pad // 2) / pad

@@ -29,7 +29,7 @@ Keep = Callable[[int, Callable[[], Mapping[str, FloatArray]]], None]
 _PARTS = ("numbers", "fine", "window", "sums")
 """Names of the arrays of a channel's state."""
 HEAD = 1 << 20
-"""Readings kept as they are, from the start of the log: they show what is faster than the means."""
+"""Readings kept from the start of the log: they determine the noise that is faster than the means."""
 
 
 def stream_noise(
@@ -45,13 +45,13 @@ def stream_noise(
     state: Mapping[str, FloatArray] | None = None,
     keep: Keep | None = None,
 ) -> Noise:
-    """Noise terms and Allan curve of a log that arrives in chunks (k, channels), in one pass (docs/noise.md, 4).
+    """Noise terms and Allan curve of a log that is read in chunks (k, channels), in one pass (docs/noise.md, 4).
 
-    Slow terms come from means over the whole log, fast ones from its first million readings. Steps are found in the
-    means; knocks are not left out.
+    Slow terms come from means over the whole log, fast ones from its first million readings. Steps are detected in the
+    means; knocks are not excluded.
 
-    ``keep`` is called after every chunk with the readings so far and a function that gives the state of the pass; with
-    such a ``state`` the pass goes on, and ``chunks`` begin where it was taken.
+    ``keep`` is called after every chunk with the number of readings so far and a function that returns the state of the
+    pass; with such a ``state`` the pass continues, and ``chunks`` begin where it was taken.
 
     Raises
     ------

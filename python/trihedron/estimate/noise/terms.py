@@ -1,4 +1,4 @@
-"""What each noise term contributes to a spectral ordinate, and to the Allan variance (docs/noise.md, eq. 7-10)."""
+"""Contribution of each noise term to a spectral ordinate and to the Allan variance (docs/noise.md, eq. 7-10)."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from trihedron.arrays import FloatArray
 
 SYMBOLS = ("Q", "N", "B", "K")
-"""Order of the terms in every basis; the ramp R is a line, not a spectrum."""
+"""Order of the terms in every basis; the ramp R is a deterministic line and has no density."""
 
 
 def gauss_markov_density(frequency_hz: FloatArray, step_s: float, correlation_time_s: float) -> FloatArray:
     """Two-sided density of a Gauss-Markov process of unit variance, sampled in steps of ``step_s``."""
     ratio = step_s / correlation_time_s
     decay = math.exp(-ratio)
-    # 1 - 2 d cos + d² loses its digits where time constant and period are a million steps.
+    # 1 - 2 d cos + d² loses its digits for time constants and periods of a million steps.
     denominator = math.expm1(-ratio) ** 2 + 4.0 * decay * np.sin(np.pi * frequency_hz * step_s) ** 2
     return np.asarray(-step_s * math.expm1(-2.0 * ratio) / denominator)
 

@@ -1,4 +1,4 @@
-"""Both sensors held against motion that is known beside the log (docs/reference.md)."""
+"""Both sensors compared with reference motion (docs/reference.md)."""
 
 from trihedron.estimate.reference.accelerometer import turns_of_frame
 from trihedron.estimate.reference.fit import fit_reference, fit_references, moves_along

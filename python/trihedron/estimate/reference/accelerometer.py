@@ -1,4 +1,4 @@
-"""An accelerometer held against known motion: its 12 numbers, where it sits (lever arm), and which way is up."""
+"""An accelerometer fitted to reference motion: S and b, lever arm, and the direction of up."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from trihedron.estimate.reference.windows import Windows
 from trihedron.sensor_model import other_form, other_form_jacobian
 
 KNOWN = 0.05
-"""σ of S, as a part of the scale, up to which a force is told by the fit: g-sensitivity is then wrong by as much."""
+"""Largest relative σ of S with which the fitted force is used: the relative error of g-sensitivity is the same."""
 CLOCK_STEP_S = 1e-3
 TURNS = 4
-"""Steps of the direction of gravity: it starts within a degree or two, and each squares the error."""
+"""Iterations of the direction of gravity: from an error of one or two degrees each squares it."""
 
 
 @dataclass(frozen=True, eq=False)
 class ForceFit:
     """``f_reference = S a' + b`` with ``covariance`` (12, 12).
 
-    ``up`` (3,): unit vector of the specific force at rest in the reference's world, with its covariance (3, 3); ``arm``
+    ``up`` (3,): unit vector of the static specific force in the reference's world, with its covariance (3, 3); ``arm``
     (3,) [m] from the reference's origin to the accelerometer, in the reference's body.
 
-    These are so far under attitudes and a clock that are right. ``wrt_attitude`` (n, k, 3) and ``wrt_clock`` (n, k):
-    errors of the n numbers of S, b, up and arm, as far as there, where in a window the attitude is short of a small
-    turn about an axis of the world [1/rad] (``None``: attitudes have no part in it), the clock of its offset [1/s].
+    The covariances assume exact attitudes and clock. ``wrt_attitude`` (n, k, 3) [1/rad] and ``wrt_clock`` (n, k) [1/s]
+    are the errors of the n elements of S, b, up and arm (where present) per attitude error about a world axis
+    (``None``: the fit uses no attitude) and per clock error in each of k windows.
     """
 
     S: FloatArray
@@ -45,7 +45,7 @@ class ForceFit:
     wrt_clock: FloatArray
 
     def with_error(self, covariance: FloatArray) -> ForceFit:
-        """The same where attitudes and clock are wrong, which adds a covariance (n, n) to the n numbers."""
+        """The fit with the covariance (n, n) of its n elements by errors of attitudes and clock added."""
         up, arm = self.up_covariance, self.arm_covariance
         n = 12 if up is None else 15
         return replace(
@@ -57,27 +57,27 @@ class ForceFit:
 
 
 def turns(columns: FloatArray) -> FloatArray:
-    """(3 n, 3) by how much vectors (3, n), row by row, change with small turns of the frame that they stand in."""
+    """(3 n, 3) derivative of vectors (3, n), row by row, by small rotations of their frame [1/rad]."""
     return np.stack([np.cross(axis, columns.T).T.ravel() for axis in np.eye(3)], axis=1)
 
 
 def turns_of_frame(S: FloatArray, b: FloatArray) -> FloatArray:
-    """(12, 3) by how much (S row by row, b) change with small turns of the frame that they lead to."""
+    """(12, 3) derivative of (S row by row, b) by small rotations of the frame of S a' + b [1/rad]."""
     return np.vstack([turns(S), turns(b[:, None])])
 
 
 def fit_accelerometer(
     grid: Grid, reference: Reference, windows: Windows, offset_s: float, rate: float, gravity: float, handedness: float
 ) -> ForceFit | None:
-    """Fit by windows; ``None`` where the reference knows no force. ``handedness`` is the sign of the gyro's det A.
+    """Fit by windows; ``None`` where the reference has no force. ``handedness`` is the sign of the gyro's det A.
 
-    With attitude alone the acceleration of the body is unknown: the second derivative of a path that stays in the room
-    has little power where gravity turns slowly, and the colour of what is left says how little.
+    With attitude alone the acceleration of the body is unknown: the second derivative of a bounded path has little
+    power at the low frequencies of gravity's rotation, and the spectrum of the residuals shows how much.
 
     Raises
     ------
     ValueError
-        When too few windows are left, or the reference's frames are mirrored.
+        When there are too few windows, or the reference's frames are mirrored.
     """
     if grid.accelerometer is None:
         return None
@@ -93,10 +93,10 @@ def fit_accelerometer(
 
 
 def force_along(grid: Grid, force: ForceFit, gyro: FloatArray, gravity: float) -> FloatArray | None:
-    """(n, 3) [m/s²] specific force in the reference's body, for what the gyro feels of it.
+    """(n, 3) [m/s²] specific force in the reference's body, for the gyro's g-sensitivity.
 
-    A multicopter leans into its acceleration, and an attitude alone does not tell its accelerometer's numbers: beside
-    a gyro of scale (3, 3) ``gyro`` it is then taken to share the gyro's axes, and to read gravity on the whole.
+    A multicopter leans into its acceleration, and an attitude alone does not determine its accelerometer's parameters:
+    the axes are then taken as those of a gyro of scale ``gyro`` (3, 3), and the median norm as gravity.
     """
     if grid.accelerometer is None:
         return None
@@ -110,7 +110,7 @@ def force_along(grid: Grid, force: ForceFit, gyro: FloatArray, gravity: float) -
 
 
 def _in_body(grid: Grid, reference: Reference, windows: Windows, time: FloatArray, handedness: float) -> ForceFit:
-    """Beside another unit: ``S a' + b = f + dω/dt x ℓ + ω x (ω x ℓ)``, all in the other's body."""
+    """Fit to another unit: ``S a' + b = f + dω/dt x ℓ + ω x (ω x ℓ)``, all in the other's body."""
     assert grid.accelerometer is not None
     signals = windows.of(windows.weight, np.column_stack([grid.accelerometer, np.ones(len(time))]))
     k = len(windows.start)
@@ -143,7 +143,7 @@ def _in_body(grid: Grid, reference: Reference, windows: Windows, time: FloatArra
 def _along_path(
     grid: Grid, reference: Reference, windows: Windows, time: FloatArray, gravity: float, handedness: float
 ) -> ForceFit:
-    """``C (S a' + b) = d²(p + C ℓ)/dt² + g u`` in the reference's world."""
+    """Fit to attitude and position: ``C (S a' + b) = d²(p + C ℓ)/dt² + g u`` in the reference's world."""
     assert grid.accelerometer is not None
     k = len(windows.start)
     averaged = _averaged(grid.accelerometer)
@@ -181,35 +181,35 @@ def _along_path(
     by_average = np.einsum("nka,ka->n", influence, windows.of(windows.weight, turned)) / np.sqrt(12.0)
     found = ForceFit(
         S, b, solution.covariance[:12, :12], up, up_covariance, arm, arm_covariance, solution,
-        # Attitudes short of a turn ε predict (C S a' + ...) short of ε x itself.
+        # An attitude error -ε changes the prediction (C S a' + ...) by -ε x itself.
         np.einsum("nka,kab->nkb", influence, _cross(base @ own)), _wrt_clock(influence, left, time),
     )  # fmt: skip
     return found.with_error(np.outer(by_average, by_average))
 
 
 def _averaged(readings: FloatArray) -> FloatArray:
-    """(n, 3) by how much averages over a sample differ from instants, T²/24 of the second derivative.
+    """(n, 3) difference of averages over a sample interval from instantaneous values: T²/24 of the second derivative.
 
-    Some parts give averages and some instants: readings are taken halfway, and how far either way stays open (uniform).
+    Some parts average and others do not: readings are corrected by half, and the rest is an uncertainty (uniform).
     """
     padded = np.pad(readings, ((1, 1), (0, 0)), mode="edge")
     return np.asarray((padded[2:] - 2.0 * readings + padded[:-2]) / 24.0)
 
 
 def _wrt_clock(influence: FloatArray, left: Callable[[FloatArray], FloatArray], time: FloatArray) -> FloatArray:
-    """(n, k) errors of numbers whose ``influence`` (n, k, 3) acts on what is left (k, 3) at times (n,), by its change
-    with them."""
+    """(n, k) errors of the parameters per clock error [1/s], from their ``influence`` (n, k, 3) and the time derivative
+    of the residuals ``left`` (k, 3)."""
     change = (left(time + CLOCK_STEP_S) - left(time - CLOCK_STEP_S)) / (2.0 * CLOCK_STEP_S)
     return np.asarray(-np.einsum("nka,ka->nk", influence, change))
 
 
 def _turning(windows: Windows, reference: Reference, time: FloatArray) -> FloatArray:
-    """(k,) mean rate in each window: a hand that turns also pushes."""
+    """(k,) magnitude of the mean rate in each window, with which noise may grow: rotation by hand also accelerates."""
     return np.asarray(np.linalg.norm(windows.of(windows.weight, reference.rate(time)), axis=1), dtype=np.float64)
 
 
 def _first_up(base: FloatArray, path: FloatArray, gravity: float) -> FloatArray:
-    """The direction that is left of readings turned into the world when the path's acceleration is taken off."""
+    """Initial direction of up (3,): readings rotated into the world less the acceleration of the path."""
     k, _, n = base.shape
     scale = np.sqrt(np.mean(base**2, axis=(0, 1))) + 1e-300
     X = np.column_stack([(base / scale).reshape(3 * k, n), np.tile(-gravity * np.eye(3), (k, 1))])
@@ -220,9 +220,9 @@ def _first_up(base: FloatArray, path: FloatArray, gravity: float) -> FloatArray:
 def _under_gravity(
     grid: Grid, reference: Reference, windows: Windows, time: FloatArray, gravity: float, handedness: float
 ) -> ForceFit:
-    """``a' = M Cᵀ g u + c``: the acceleration of the body is unknown, and is noise.
+    """Fit to attitude alone: ``a' = M Cᵀ g u + c``; the unknown acceleration of the body is noise.
 
-    The readings are what is predicted: with the noise among the regressors M would be too small.
+    The readings are the dependent variable: with their noise in the regressors M would be too small.
     """
     assert grid.accelerometer is not None
     readings = windows.of(windows.weight, grid.accelerometer)
@@ -247,7 +247,7 @@ def _under_gravity(
         M = solution.theta[:9].reshape(3, 3)
         up = up + across @ solution.theta[12:]
         up /= np.linalg.norm(up)
-        # The change of u was taken with M: it is in u now, and no longer wanted in the prediction.
+        # The change of u is linearised with M and now part of u.
     S, b = other_form(M, solution.theta[9:12])
     jacobian = other_form_jacobian(M, solution.theta[9:12])
     covariance = jacobian @ solution.covariance[:12, :12] @ jacobian.T
@@ -267,9 +267,9 @@ def _under_gravity(
 
 
 def _gravity_seen(readings: FloatArray, back: FloatArray, handedness: float) -> tuple[FloatArray, FloatArray]:
-    """u and M to begin with: the best of an axis of the world and of what the readings alone say.
+    """Initial u and M: the best of starts from each axis of the world and from a rank-one fit to the readings.
 
-    Each reading is a linear form of Cᵀ of rank one in (M, u), which tells both only where the motion tilts enough.
+    Each reading is a linear form of Cᵀ of rank one in (M, u), which determines both only with sufficient tilt.
     """
     k = len(readings)
     X = np.column_stack([back.reshape(k, 9), np.ones(k)])
@@ -290,7 +290,7 @@ def _gravity_seen(readings: FloatArray, back: FloatArray, handedness: float) -> 
             best = misfit, u, M
     assert best is not None
     _, u, M = best
-    # The norm of gravity does not tell up from down: the handedness of the gyro's axes does.
+    # The norm of gravity does not distinguish up from down; the handedness of the gyro's axes does.
     sign = 1.0 if np.linalg.det(M) * handedness > 0.0 else -1.0
     return sign * u, sign * M
 
@@ -305,7 +305,7 @@ def _refuse_mirror(reference: Reference, determinant: float, handedness: float) 
 
 
 def _across(up: FloatArray) -> FloatArray:
-    """(3, 2) unit vectors across a direction."""
+    """(3, 2) orthonormal vectors perpendicular to ``up`` (3,)."""
     return np.asarray(np.linalg.svd(up[None, :])[2][1:].T, dtype=np.float64)
 
 

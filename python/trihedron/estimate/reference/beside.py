@@ -1,4 +1,4 @@
-"""One recording beside its reference: parameters, their point of linearisation, and the blocks there."""
+"""One recording with its reference: parameters, point of linearisation, and the linear problem about it."""
 
 from __future__ import annotations
 
@@ -19,51 +19,51 @@ from trihedron.gravity import EARTH_RATE_RAD_S
 Mask = npt.NDArray[np.bool_]
 
 BLOCK_S = 1.0
-"""Length of a block: a gyro carries a second without error that matters, and a reference's slow error lasts longer."""
+"""Length of a block: gyro errors over 1 s are negligible, and a reference's slow error lasts longer."""
 
 NUMBERS = {
     "S": 9, "gyro-g-sensitivity": 9, "quadratic": 3, "cubic": 3, "b": 3, "clock": 2, "earth": 3, "mounting": 3,
 }  # fmt: skip
-"""Parameters and how many numbers each has."""
+"""Parameters and the number of elements of each."""
 SHARED = ("S", "gyro-g-sensitivity", "quadratic", "cubic")
-"""Those that are the instrument's in every recording."""
+"""Parameters of the instrument, common to all recordings."""
 SIZES = {
     "gyro-g-sensitivity": np.radians(0.1) / 9.81, "quadratic": 2.5e-4, "cubic": 5e-5, "b": 0.3,
     "earth": EARTH_RATE_RAD_S / np.sqrt(3.0), "mounting": np.radians(0.3),
 }  # fmt: skip
-"""Prior σ. Data sheets: 0.1 °/s/g; 0.1 % of full scale at 250 °/s, in 1/(rad/s) and 1/(rad/s)². The Earth's rate is a
-vector of its length and of unknown direction; markers are put back within some tenths of a degree."""
+"""Prior σ. Data sheets: 0.1 °/s/g; 0.1 % of full scale at 250 °/s, in 1/(rad/s) and 1/(rad/s)². The Earth's rate has
+its known length and an unknown direction; a remounted marker repeats to some tenths of a degree."""
 OF_SCALE, CLOCK = 0.3, (0.1, 1e-3)
-"""Prior σ of S beside its start (a third of each scale), and of the clock's offset [s] and rate."""
+"""Prior σ of S about its initial value (relative to each scale), and of the clock's offset [s] and rate."""
 
 
 @dataclass(frozen=True, eq=False)
 class SlowError:
-    """What a reference's attitudes are off by at times (m,) of the log: exp(world) C exp(body), both (m, 3) [rad]."""
+    """Slow error of a reference's attitudes at times (m,) of the log: exp(world) C exp(body), both (m, 3) [rad]."""
 
     time_s: FloatArray
     world: FloatArray
     body: FloatArray
 
     def at(self, time: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """World's and body's error (n, 3) at other times; beyond the ends as there."""
+        """World and body errors (n, 3) [rad] at other times; constant beyond the ends."""
         inside = np.clip(time, self.time_s[0], self.time_s[-1])
         both = CubicSpline(self.time_s, np.hstack([self.world, self.body]))(inside)
         return both[:, :3], both[:, 3:]
 
     def taken_off(self, time: FloatArray, attitude: FloatArray) -> FloatArray:
-        """Attitudes (n, 3, 3) without it."""
+        """Attitudes (n, 3, 3) with the slow error removed."""
         world, body = (Rotation.from_rotvec(-one).as_matrix() for one in self.at(time))
         return np.ascontiguousarray(world @ attitude @ body)
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Where the model is linearised: ω = S w' + b - G f - bends in the reference's body turned by ``mounting``;
-    t_reference = t (1 + rate) + offset; ``slow`` is what the reference's attitudes are off by.
+    """Point of linearisation: ω = S w' + b - G f - nonlinearity ``bend``, in the reference's body rotated by
+    ``mounting``; t_reference = t (1 + rate) + offset; ``slow`` is the slow error of the reference's attitudes.
 
-    About attitudes that are degrees off, a body's constant error and a turn of S are not quite one, and the evidence
-    would know them apart.
+    About attitudes with errors of degrees a constant body error and a rotation of S would differ at second order, and
+    the evidence would seem to separate them.
     """
 
     S: FloatArray
@@ -78,8 +78,8 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """A log on its grid, its reference, which samples hold, the specific force (n, 3) in the reference's body if known,
-    and the numbers to begin with."""
+    """A log on its grid, its reference, valid samples ``seen`` (n,), initial values ``start``, and the specific force
+    (n, 3) [m/s²] in the reference's body, if known."""
 
     grid: Grid
     reference: Reference
@@ -89,11 +89,11 @@ class Beside:
 
     @property
     def middle_s(self) -> float:
-        """Time of the log about which the clock's rate turns."""
+        """Time of the log at which the clock's offset is defined [s]."""
         return float(self.grid.time_s[0] + 0.5 * self.grid.step_s * len(self.grid.time_s))
 
     def has(self, name: str) -> bool:
-        """Whether a parameter means anything beside this reference."""
+        """Whether a parameter is defined with this reference."""
         motion = self.reference.motion
         is_without = {
             "clock": motion.is_stepwise,
@@ -109,7 +109,7 @@ class Beside:
         return np.array(CLOCK) if name == "clock" else np.full(NUMBERS[name], SIZES[name])
 
     def values(self, point: Point, name: str) -> FloatArray:
-        """(k,) a parameter at a point, SI."""
+        """Value (k,) of a parameter at a point, SI."""
         by = {
             "S": point.S.ravel(), "b": point.b, "earth": np.zeros(3), "gyro-g-sensitivity": point.g.ravel(),
             "clock": np.array([point.offset_s + point.rate * self.middle_s, point.rate]),
@@ -126,7 +126,7 @@ class Beside:
         return Point(
             S=point.S + change["S"].reshape(3, 3),
             b=point.b + change["b"],
-            # The offset is that of the log's middle.
+            # The clock parameter is the offset at the middle of the log.
             offset_s=float(point.offset_s + point.rate * self.middle_s + clock[0] - rate * self.middle_s),
             rate=rate,
             g=point.g + change.get("gyro-g-sensitivity", np.zeros(9)).reshape(3, 3),
@@ -153,7 +153,7 @@ class Beside:
     def problem(
         self, point: Point, places: Mapping[str, IntArray], wider: Mapping[str, float], block_s: float = BLOCK_S
     ) -> Problem:
-        """The linear problem about a point; ``places`` of the parameters wanted, priors ``wider`` than usual."""
+        """The linear problem about a point; ``places`` of the free parameters, factors ``wider`` on their prior σ."""
         own, along = self._own(point)
         n = len(self.grid.time_s)
         force = np.zeros((n, 0)) if self.force is None else self.force
@@ -163,10 +163,10 @@ class Beside:
         blocks = log.blocks(self.corrected(point), time, attitude, max(2, round(block_s / self.grid.step_s)))
         M = blocks.moments().reshape(-1, 3, 3, signals.shape[1])
         m = len(M)
-        # A reference timestamped later by dτ is compared with the gyro earlier by it.
+        # A reference whose timestamps are later by dτ is compared with the gyro earlier by dτ.
         clock = [-c for c in blocks.wrt_clock()]
         if self.reference.motion.attitude is None:
-            # A rate is summed over the log's own time: its clock moves rows, and does not stretch what they say.
+            # A rate is integrated over the log's time: the clock shifts rows without scaling their angles.
             clock[1] = clock[1] + np.einsum("maij,ij->ma", M[:, :, :, :3], point.S) + M[:, :, :, 3] @ point.b
         columns = {
             "S": M[:, :, :, :3].reshape(m, 3, 9),
@@ -197,11 +197,11 @@ class Beside:
         )
 
     def _prior(self, name: str) -> FloatArray:
-        """(k,) where a prior stands: an effect's at none."""
+        """Prior mean (k,) of a parameter: the initial value, and 0 for effects."""
         return self.values(replace(self.start, g=np.zeros((3, 3)), bend=np.zeros(6)), name)
 
     def attitudes(self, point: Point) -> tuple[FloatArray, FloatArray]:
-        """The reference's attitudes (m, 3, 3) at times (m,) of the log; rates are summed to one."""
+        """Times (m,) of the log and the reference's attitudes (m, 3, 3) there; a reference rate is integrated."""
         motion = self.reference.motion
         if motion.attitude is not None:
             time, attitude = (motion.time_s - point.offset_s) / (1.0 + point.rate), motion.attitude @ point.mounting
@@ -222,7 +222,7 @@ class Beside:
 
 
 def places(sides: list[Beside], wanted: tuple[str, ...]) -> list[dict[str, IntArray]]:
-    """Where each recording's parameters stand among all: those of the instrument first, then the recording's own."""
+    """Indices of each recording's parameters among all: first those of the instrument, then those per recording."""
     at, shared, out = 0, {}, []
     for name in SHARED:
         if name in wanted and any(side.has(name) for side in sides):

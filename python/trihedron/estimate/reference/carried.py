@@ -1,8 +1,8 @@
-"""What the gyro's fit leaves open, carried to an accelerometer: attitudes and clock are known to their posterior only.
+"""Uncertainty of attitudes and clock from the gyro's fit, propagated to the accelerometer's parameters.
 
-A clock that is off by δτ turns the attitudes by ω δτ and moves the path, and what is smoothed as the reference's slow
-error turns with it. With errors δφ of parameters and η of the slow error where the parameters are known, both from
-their joint posterior, an accelerometer's number errs by
+A clock error δτ rotates the attitudes by ω δτ and shifts the path, and changes the smoothed slow error of the
+reference. With errors δφ of the parameters and η of the slow error at known parameters, both from their joint
+posterior, the error of an accelerometer parameter is
 
     h(δφ, η) = (L - Gᵀ V⁻¹ A) δφ + Σ_t H(t) η(t),   var Σ H η = H P Hᵀ - Gᵀ V⁻¹ G,   G = cov(observations, Σ H e)   (1)
 
@@ -23,10 +23,10 @@ from trihedron.estimate.reference.smoothed import posterior, without_slow_error
 
 
 def error_carried(found: MotionFit, k: int, force: ForceFit, time_s: FloatArray, frame: FloatArray) -> FloatArray:
-    """(n, n) covariance of the n numbers of ``force``, fitted in windows about ``time_s`` of the log of recording k.
+    """(n, n) covariance of the n elements of ``force``, fitted in windows about ``time_s`` of the log of recording k.
 
-    Averaged over the strengths' posterior. The turn that both sensors have in common, known to ``frame`` (3, 3) [rad²],
-    is in it in full.
+    It is averaged over the posterior of the strengths. The common rotation of both sensors, with covariance ``frame``
+    (3, 3) [rad²], is included in full.
     """
     side, problem, own, point = found.sides[k], found.problems[k], found.places[k], found.points[k]
     direct = np.zeros((len(force.wrt_clock), len(problem.index)))
@@ -48,8 +48,8 @@ def error_carried(found: MotionFit, k: int, force: ForceFit, time_s: FloatArray,
 def _under(
     found: MotionFit, k: int, strengths: FloatArray, direct: FloatArray, nodes: tuple[FloatArray, FloatArray] | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean (n,), but for what is alike under all ``strengths`` (a recording, 7), and covariance (n, n) of the errors of
-    (1); L is ``direct`` (n, p), and H of the world's and the body's error (m, 3, n) each stands at ``nodes``."""
+    """Mean (n,), up to a constant common to all ``strengths`` (a recording, 7), and covariance (n, n) of the errors of
+    (1); L is ``direct`` (n, p), ``nodes`` holds H of the world and of the body error, (m, 3, n) each."""
     problem = found.problems[k]
     all_of = posterior(found, strengths)
     mean, cov = all_of.mean[problem.index], all_of.covariance[np.ix_(problem.index, problem.index)]
@@ -67,7 +67,7 @@ def _under(
 def _prior(
     problem: Problem, nodes: tuple[FloatArray, FloatArray], strengths: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """``G`` (3 m, n) and ``H P Hᵀ`` (n, n) of (1) before anything was observed."""
+    """``G`` (3 m, n) and ``H P Hᵀ`` (n, n) of (1) under the prior of the slow error."""
     at = problem.blocks.time_s()
     m, n = len(at), nodes[0].shape[2]
     step_s = (at[-1] - at[0]) / max(m - 1, 1)
@@ -84,8 +84,8 @@ def _prior(
 def _on_nodes(
     problem: Problem, wrt_attitude: FloatArray, C: FloatArray, time_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Responses (n, k, 3) to turns about the world's axes at ``time_s`` (k,), attitudes ``C`` there, shared out to the
-    blocks beside: (m, 3, n) to the world's and to the body's error."""
+    """Responses (n, k, 3) to rotations about the world's axes at ``time_s`` (k,), with attitudes ``C``, distributed
+    over the two nearest blocks: (m, 3, n) to the world and to the body error."""
     at = problem.blocks.time_s()
     m = len(at)
     place = np.interp(time_s, at, np.arange(m))
@@ -100,7 +100,7 @@ def _on_nodes(
 
 
 def _with_frame(covariance: FloatArray, force: ForceFit, frame: FloatArray) -> FloatArray:
-    """The covariance with the common turn's part no smaller than ``frame`` makes it: the sensors' joint covariance."""
+    """The covariance with at least the contribution of ``frame``, for a positive joint covariance of both sensors."""
     J = np.zeros((len(covariance), 3))
     J[:12] = turns_of_frame(force.S, force.b)
     if force.arm is not None:
@@ -110,7 +110,7 @@ def _with_frame(covariance: FloatArray, force: ForceFit, frame: FloatArray) -> F
 
 
 def _positive(covariance: FloatArray) -> FloatArray:
-    """The covariance without what rounding makes negative."""
+    """The covariance with negative eigenvalues (rounding errors) set to 0."""
     scale = np.sqrt(np.abs(np.diag(covariance))) + 1e-300
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))

@@ -1,4 +1,4 @@
-"""Where a reference and a log lie against one another in time, by the size of the turning rate: it needs no axes."""
+"""Time alignment of a reference and a log by the magnitude of the rate, which does not depend on the axes."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from trihedron.errors import RefusedError
 from trihedron.estimate.reference.together import Grid, Reference
 
 LEAST_CORRELATION = 0.7
-"""Below this the two motions are not taken for one: of 7140 pairs of unrelated hand motions of 30 to 60 s one in a
-thousand reaches 0.70 at its best lag (the median 0.42), shared ones reach 0.93 and more."""
+"""Least correlation of shared motion: of 7140 pairs of unrelated hand motions of 30 to 60 s one in a thousand reaches
+0.70 at its best lag (the median 0.42), shared ones reach 0.93 and more."""
 LEAST_OVERLAP = 0.25
-"""Share of the shorter of the two that must lie within both."""
+"""Least overlap, relative to the shorter of the two."""
 BLOCK_S = 8.0
-"""Stretches whose own lag is found: long enough for several turns of a hand."""
+"""Length of the stretches whose lags are estimated: several turns of a hand."""
 BLOCK_PARTS = 8
-"""Less than this part of a stretch behind the last one tells nothing that it does not."""
+"""A remainder of less than 1/8 of a stretch after the last one is not used."""
 JUMP_S = 0.05
-"""A lag that changes by more from one stretch to the next is a jump: those of stretches scatter by milliseconds."""
+"""Least change of the lag between stretches that is a jump: lags of stretches scatter by milliseconds."""
 LOCKED = 0.9
-"""Correlation of a stretch that is believed: unrelated turns of 8 s reach 0.8 at some lag within six seconds."""
+"""Least correlation of a stretch whose lag is used: unrelated turns of 8 s reach 0.8 at some lag within six seconds."""
 FEWEST_BEYOND = 2
-"""Stretches on either side of a jump whose lags bear each other out."""
+"""Fewest stretches on either side of a jump with consistent lags."""
 SURE = 0.97
-"""Correlation of a lone stretch at either end of the log that, with less than ``LOCKED`` at the lag of the others, is
-beyond a jump: one that found a neighbouring turn instead fits worse there than at its own lag."""
+"""Least correlation of a single stretch at either end of the log that, with less than ``LOCKED`` at the lag of the
+others, proves a jump: one that matched a neighbouring turn instead fits worse at its own lag."""
 FASTEST = 0.01
-"""No clock gains a hundredth: stretches of a motion that repeats itself found one period after another."""
+"""Largest plausible clock rate: a larger one means that a periodic motion was matched at successive periods."""
 SEARCH_S = 6.0
 ALIKE = 0.01
-"""Peaks whose correlation is this near the best are not separated by it: the timestamps then decide."""
+"""Peaks with a correlation within this of the best are equivalent: the timestamps then decide."""
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """``t_reference = t_log (1 + rate) + offset_s``; the correlation there, and whether another lag fits as well."""
+    """``t_reference = t_log (1 + rate) + offset_s``; the correlation, and whether another lag fits equally."""
 
     offset_s: float
     rate: float
@@ -49,18 +49,18 @@ class Alignment:
 def align(grid: Grid, reference: Reference, stamped_offset_s: float | None) -> Alignment:
     """Offset and rate of the reference's clock, to about a sample.
 
-    ``stamped_offset_s`` is what the two logs' own dates say, where they have any.
+    ``stamped_offset_s`` is the offset by the absolute timestamps of both logs, where they have any.
 
     Raises
     ------
     ValueError
-        When no lag makes them one motion, or the reference's clock jumps.
+        When the motions differ at every lag, or the reference's clock jumps.
     """
     ours = _size_of_rate(grid)
     theirs = _reference_size(reference, grid.step_s)
     offset, correlation, is_ambiguous = _best_lag(ours, theirs, grid.step_s, stamped_offset_s)
     offset += reference.motion.time_s[0] - grid.time_s[0]
-    # A clock that jumps spoils the correlation of the whole: stretches are asked first.
+    # A clock jump reduces the correlation of the whole log: stretches are tested first.
     refined = _refined(ours, grid, reference, offset)
     if correlation < LEAST_CORRELATION:
         raise RefusedError(
@@ -72,7 +72,7 @@ def align(grid: Grid, reference: Reference, stamped_offset_s: float | None) -> A
 
 
 def _size_of_rate(grid: Grid) -> FloatArray:
-    """(n,) length of the raw rate about its median per axis; NaN within gaps."""
+    """(n,) magnitude of the raw rate about its median per axis; NaN within gaps."""
     raw = grid.gyroscope - np.median(grid.gyroscope[grid.is_valid], axis=0)
     size = np.linalg.norm(raw, axis=1)
     size[~grid.is_valid] = np.nan
@@ -81,7 +81,7 @@ def _size_of_rate(grid: Grid) -> FloatArray:
 
 def _reference_size(reference: Reference, step: float) -> FloatArray:
     t = np.arange(reference.motion.time_s[0], reference.motion.time_s[-1], step)
-    # A tracker's noise differentiated is larger than the motion unless it is averaged first.
+    # The differentiated noise of a tracker exceeds the motion unless it is averaged.
     rate = _averaged(reference.rate(t), max(1, round(0.1 / step)))
     size = np.linalg.norm(rate, axis=1)
     size[~reference.covers(t)] = np.nan
@@ -98,7 +98,7 @@ def _averaged(x: FloatArray, n: int) -> FloatArray:
 
 
 def _best_lag(a: FloatArray, b: FloatArray, step: float, stamped: float | None) -> tuple[float, float, bool]:
-    """Lag of b (seconds to add to a's time to be in b's), the correlation there, whether another is as good."""
+    """Lag of b (seconds added to a's time give b's), the correlation there, and whether another lag is equivalent."""
     keep = max(1, int(np.ceil((len(a) + len(b)) / 2**19)))
     a, b, step = a[::keep], b[::keep], step * keep
     correlation, lag, n = _correlations(a, b)
@@ -118,7 +118,7 @@ def _best_lag(a: FloatArray, b: FloatArray, step: float, stamped: float | None) 
 
 
 def _correlations(a: FloatArray, b: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64], FloatArray]:
-    """Correlation over what overlaps at every lag, missing values left out; lags of b against a; how many overlap."""
+    """Correlation of the overlap at every lag, without missing values; lags of b against a; common samples at each."""
     n = 1 << (len(a) + len(b) - 1).bit_length()
     ma, mb = np.isfinite(a).astype(float), np.isfinite(b).astype(float)
     za, zb = np.where(ma > 0, a - np.nanmean(a), 0.0), np.where(mb > 0, b - np.nanmean(b), 0.0)
@@ -142,10 +142,10 @@ def _correlations(a: FloatArray, b: FloatArray) -> tuple[FloatArray, npt.NDArray
 
 
 def _stretches(n: int, whole: int) -> list[tuple[int, int]]:
-    """Beginning and length of stretches of ``n`` samples, by their middles: whole ones, and more at both ends.
+    """Start and length of stretches of ``n`` samples, in order of their middles: whole ones, and shorter at both ends.
 
-    A clock that jumps within the first or the last of them spoils it: half of it, and what is behind the last whole
-    one, tell.
+    A clock jump inside the first or last stretch reduces its correlation: half of it, and one at the very end of the
+    log, still determine a lag.
     """
     found = [(start, whole) for start in range(0, n - whole + 1, whole)]
     found += [(0, whole // 2), (n - whole // 2, whole // 2)]
@@ -155,12 +155,12 @@ def _stretches(n: int, whole: int) -> list[tuple[int, int]]:
 
 
 def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) -> tuple[float, float]:
-    """Offset and rate from the lags of stretches.
+    """Offset [s] and rate from the lags of stretches.
 
     Raises
     ------
     ValueError
-        When two neighbouring stretches each fit well at lags that no steady clock joins.
+        When neighbouring stretches fit well at lags that no steady clock explains.
     """
     if len(ours) < 3 * round(BLOCK_S / grid.step_s):
         return offset, 0.0
@@ -191,7 +191,7 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
         return offset, 0.0
     found, at = np.array(lags), np.array(middles)
     step = np.diff(found)
-    # Beyond a jump the lag stays; a lone stretch that locked on a neighbouring turn comes back.
+    # After a jump the lag persists; after a single stretch that matched a neighbouring turn it returns.
     for k in np.flatnonzero(np.abs(step) > JUMP_S).tolist():
         before, after = np.median(found[max(0, k - 2) : k + 1]), np.median(found[k + 1 : k + 4])
         steady = np.median(np.abs(np.delete(step, k))) if len(step) > 1 else 0.0

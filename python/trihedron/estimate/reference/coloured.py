@@ -1,7 +1,7 @@
-"""Least squares under coloured residuals: several noise models, the one whose answers repeat best from block to block.
+"""Least squares with coloured residuals: of several noise models, the one whose estimates repeat best between blocks.
 
-A tracker's noise is blue, a table's wobble has lines, a bias wanders, and all of it grows with motion. A model that is
-wrong about one of these can make an answer worse than none; blocks of time left out in turn show which one does.
+A tracker's noise is blue, a table's wobble has lines, a bias drifts, and all of it grows with motion. A wrong noise
+model can make an estimate worse than ordinary least squares; a jackknife over blocks of time selects the model.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from trihedron.errors import RefusedError
 Mask = npt.NDArray[np.bool_]
 
 ORDERS = (0, 2, 12)
-"""Orders of the autoregression tried: none, one slope or line, wobble of some lines (two poles each)."""
+"""Orders of the autoregression that are tried: none; one slope or line; wobble with some lines (two poles each)."""
 ROWS_PER_POLE = 15
-"""An autoregression of order p is fitted to 15 p rows of an axis or more: p lags cost 1/15 of its variance."""
+"""Fewest rows per order of an autoregression: p lags cost 1/15 of its variance."""
 OUTLIER = 7.0
-"""Residuals beyond 7 robust sigmas, and their neighbours, are excluded: a normal one is that far once in 4e11."""
+"""Residuals beyond 7 robust sigmas, and their neighbours, are excluded: p = 1/4e11 for a normal residual."""
 BLOCKS = 16
-"""Blocks of time that are excluded in turn. With 16 the pooled ratio of 12 parameters scatters by a tenth."""
+"""Blocks of time of the jackknife. With 16 the pooled variance ratio of 12 parameters scatters by 10 %."""
 MOST_STRETCHES = 100
-"""More stretches than this are gaps of a bad log, not plateaus of a table."""
+"""Most stretches that are taken for plateaus of a table; more are gaps of a bad log."""
 MOST_OUT = 0.2
-"""Where more than this share would be excluded the scale is wrong, not the rows."""
+"""Largest share of outliers: with more the robust sigma is wrong, and none is excluded."""
 
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Whether the noise grows with the size of what is predicted, and the order of its autoregression."""
+    """Whether the noise grows with the motion, and the order of its autoregression."""
 
     grows: bool
     order: int
@@ -40,9 +40,9 @@ class NoiseModel:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """θ (p,), covariance (p, p), residuals (k, 3) as they are, rows used (k,), and rms of rows left out in turn.
+    """θ (p,), covariance (p, p), unweighted residuals (k, 3), rows used (k,), and rms of held-out rows.
 
-    ``influence`` (p, k, 3): change of θ with each row of the target.
+    ``influence`` (p, k, 3): derivative of θ by each row of the target; ``widened``: median factor on the errors.
     """
 
     theta: FloatArray
@@ -58,15 +58,15 @@ class Solution:
 def solve(
     design: FloatArray, target: FloatArray, index: IntArray, size: FloatArray, model: NoiseModel | None = None
 ) -> Solution:
-    """θ of ``target (k, 3) = design (k, 3, p) θ``.
+    """Estimate θ of ``target (k, 3) = design (k, 3, p) θ``.
 
-    ``index`` (k,) counts windows, gaps included; ``size`` (k,) is the motion with which noise may grow; ``model`` the
-    noise where it was settled before.
+    ``index`` (k,) numbers the windows, gaps included; ``size`` (k,) is the motion with which noise may grow; ``model``
+    the noise model where it is fixed.
 
     Raises
     ------
     ValueError
-        When there are fewer rows than parameters need.
+        When there are too few rows for the parameters.
     """
     k, _, p = design.shape
     if 3 * k < 2 * p + 30:
@@ -93,7 +93,7 @@ def solve(
 def _solve(
     X: FloatArray, target: FloatArray, index: IntArray, size: FloatArray, model: NoiseModel
 ) -> tuple[float, Solution]:
-    """The answer under one noise model, and how far it scatters from block to block (mean log variance)."""
+    """The solution under one noise model, and its scatter between blocks (mean log variance)."""
     k, _, p = X.shape
     used = np.ones(k, dtype=bool)
     weight = np.ones(k)
@@ -118,7 +118,7 @@ def _solve(
     jackknife, held_out = _by_blocks(X, target, index, used, Z, y, at, theta)
     predicted = variance * np.diag(inverse)
     is_known = (predicted > 0.0) & (jackknife > 0.0)
-    # Each number by its own blocks and by those of all: sixteen blocks tell a variance to a third.
+    # Mean of the parameter's own ratio and the median over all: sixteen blocks determine a variance to a third.
     ratio = np.ones(p)
     ratio[is_known] = jackknife[is_known] / predicted[is_known]
     wide = np.sqrt(np.maximum(0.5 * (ratio + np.median(ratio)), 1.0))
@@ -135,11 +135,11 @@ def _least_squares(X: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _weights(r: FloatArray, size: FloatArray, used: Mask) -> FloatArray:
-    """One over the scale of the noise at each row: its square grows with the square of the motion."""
+    """Weights (k,), the inverse of the noise σ of each row, whose square grows linearly with the squared motion."""
     square = np.sum(r**2, axis=1)
     order = np.argsort(size[used])
     parts = np.array_split(np.flatnonzero(used)[order], 8)
-    # Medians of squares stand a third below their mean alike in every part.
+    # The ratio of median to mean of the squares is the same in every part.
     level = np.array([np.median(square[part]) for part in parts])
     at = np.array([np.mean(size[part] ** 2) for part in parts])
     slope = max(float(np.polyfit(at, level, 1)[0]), 0.0) if np.ptp(at) > 0.0 else 0.0
@@ -160,7 +160,7 @@ def _without_outliers(length: FloatArray) -> Mask:
 
 
 def _autoregression(r: FloatArray, index: IntArray, used: Mask, order: int) -> FloatArray:
-    """Coefficients (order + 1,): one first, then minus the lags', and all over the innovation's sigma."""
+    """Whitening filter (order + 1,): 1, then minus the coefficients of the lags, divided by the innovation's σ."""
     rows = _with_past(index, used, order)
     if order == 0 or len(rows) < 3 * order:
         return np.array([1.0 / max(float(np.sqrt(np.mean(r[used] ** 2))), 1e-300)])
@@ -171,7 +171,7 @@ def _autoregression(r: FloatArray, index: IntArray, used: Mask, order: int) -> F
 
 
 def _with_past(index: IntArray, used: Mask, order: int) -> IntArray:
-    """Rows whose ``order`` predecessors are all there, without a gap between."""
+    """Rows with all ``order`` predecessors used and no gap between."""
     rows = np.arange(order, len(index))
     near = index[rows] - index[rows - order] == order
     bad = np.concatenate([[0], np.cumsum(~used)])
@@ -191,7 +191,7 @@ def _whitened(
 
 
 def _influence(of_white: FloatArray, index: IntArray, used: Mask, filters: list[FloatArray]) -> FloatArray:
-    """Change (p, k, 3) of θ with the rows before they were whitened, from that with the whitened ones."""
+    """Derivative (p, k, 3) of θ by the rows before whitening, from that by the whitened rows."""
     out = np.zeros((len(of_white), len(index), 3))
     first = 0
     for axis, f in enumerate(filters):
@@ -203,7 +203,7 @@ def _influence(of_white: FloatArray, index: IntArray, used: Mask, filters: list[
 
 
 def _blocks(index: IntArray) -> IntArray:
-    """(k,) number of each row's block of time: the stretches between gaps (a table's plateaus), or equal parts."""
+    """(k,) block number of each row: stretches between gaps (a table's plateaus), or equal parts."""
     k = len(index)
     stretch = np.concatenate([[0], np.cumsum(np.diff(index) > 1)])
     if BLOCKS // 2 <= stretch[-1] < MOST_STRETCHES:
@@ -215,7 +215,7 @@ def _by_blocks(
     X: FloatArray, target: FloatArray, index: IntArray, used: Mask, Z: FloatArray, y: FloatArray, rows: IntArray,
     theta: FloatArray,
 ) -> tuple[FloatArray, float]:  # fmt: skip
-    """Jackknife variances (p,) of the answers without each block of time; rms of what is excluded, as it was."""
+    """Jackknife variances (p,) over blocks of time, and unweighted rms of the held-out rows."""
     block = _blocks(index)
     normal, moment = Z.T @ Z, Z.T @ y
     moved, error, n = [], 0.0, 0

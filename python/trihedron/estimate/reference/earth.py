@@ -1,4 +1,4 @@
-"""The Earth's rate in the room of a reference: a vector of known length that a good gyro tells the direction of."""
+"""The Earth's rate in the world frame of a reference: a vector of known length, whose direction a good gyro shows."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.records.reference import Estimate
 
 RESOLVED = 1.0 / 3.0
-"""A vector known to a third of its length has a direction."""
+"""Largest σ of the vector, relative to its length, with which its direction is determined."""
 FAR = 3.0
-"""Standard errors by which a vector may be shorter than the Earth's."""
+"""Standard uncertainties by which the estimate may be shorter than the Earth's rate."""
 
 
 def earth_of(found: MotionFit, k: int) -> Estimate | None:
-    """The vector along the room's axes [rad/s] with its length imposed; ``None`` where the log does not tell it.
+    """The vector in the world frame [rad/s] with its length imposed; ``None`` where the log does not determine it.
 
-    A reference that a gyro carried turns with the Earth itself: then nothing of that length is there.
+    A reference computed from a gyro rotates with the Earth: the estimate is then too short.
     """
     if "earth" not in found.places[k] or found.sides[k].reference.motion.attitude is None:
         return None

@@ -1,4 +1,4 @@
-"""Everything that a reference says of a log: composition of the room (docs/reference.md)."""
+"""Fit of a log, or several, to reference motion: composition of the steps (docs/reference.md)."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ from trihedron.sensor_model import reframing
 Mask = npt.NDArray[np.bool_]
 
 MOST_WINDOWS = 20_000
-"""More windows than this are made longer instead: a log of an hour has them at 0.18 s, which a hand still fills."""
+"""Most windows; a longer log has longer windows: 0.18 s for an hour, still short for motion by hand."""
 FINEST = 4
-"""Samples between windows: a cubic B-spline over 16 samples is summed without error that matters (1e-6)."""
+"""Fewest samples between windows: a cubic B-spline over 16 samples has a summation error of 1e-6."""
 FORCE_WINDOW_S = 0.1
-"""Forces are compared up to 5 Hz: beyond it a position differentiated twice is noise."""
+"""Least spacing of windows for forces, up to 5 Hz: above it a twice differentiated position is noise."""
 TURNED_ROUND = 0.2
-"""Beyond this part of the motion left the other direction is tried: shared motion leaves some hundredths."""
+"""Residual share of the motion above which the inverse attitude is tried: shared motion leaves some 0.01."""
 UNITS = {
     "gyro-g-sensitivity": "(rad/s)/(m/s^2)",
     "gyro-scale-nonlinearity": "1/(rad/s), 1/(rad/s)^2",
@@ -54,7 +54,7 @@ LABELS = {
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A log laid beside its reference: the start of the model, and what only windows tell."""
+    """A log aligned with its reference: initial values of the model, and the fits by windows."""
 
     recording: Recording
     gravity_m_s2: float
@@ -75,16 +75,16 @@ def fit_reference(
     *,
     given: tuple[FloatArray, FloatArray] | None = None,
 ) -> AgainstReference:
-    """Hold a log against known motion.
+    """Fit a log to reference motion.
 
-    ``given`` is a gyro's (S, b) whose replay is shown beside; it lies in a frame of its own, and the turn from there to
-    the reference's body is taken from the fit.
+    ``given`` is a gyro's (S, b) whose replay is compared; it has its own frame, and its rotation to the reference's
+    body is taken from the fit.
 
     Raises
     ------
     ValueError
-        When the two share no motion, the clock jumps or has two places, units differ by a factor, frames are mirrored,
-        or the motion is too little for 12 numbers.
+        When the two share no motion, the clock jumps or has two possible offsets, units differ by a factor, frames are
+        mirrored, or the motion does not determine the 12 parameters.
     """
     return fit_references([(recording, motion)], gravity_m_s2, given=given)[0]
 
@@ -95,14 +95,14 @@ def fit_references(
     *,
     given: tuple[FloatArray, FloatArray] | None = None,
 ) -> tuple[AgainstReference, ...]:
-    """Recordings of one unit, each beside its reference, in one fit: S and effects shared, biases and clocks their own.
+    """Fit recordings of one unit, each with its reference: S and effects are common, biases and clocks per recording.
 
-    Mountings are their own where the evidence asks for it. One answer for each recording; what is shared is alike.
+    Mountings are per recording where the evidence prefers it. One result per recording; common parameters are equal.
 
     Raises
     ------
     ValueError
-        As :func:`fit_reference`, for the first pair it holds of.
+        As :func:`fit_reference`, for the first pair concerned.
     """
     ready = [_prepared(recording, motion, gravity_m_s2) for recording, motion in pairs]
     found, effects = _fitted([one.side for one in ready])
@@ -113,7 +113,7 @@ def fit_references(
 
 
 def _fitted(sides: list[Beside]) -> tuple[MotionFit, list[Scored]]:
-    """The fit with the effects that its score accepts, and own mountings if the evidence asks for them."""
+    """The fit with all accepted effects, and a mounting per recording if the evidence prefers it; scored effects."""
     found = fit_motion(sides)
     wanted: tuple[str, ...] = ALWAYS
     if len(sides) > 1:
@@ -199,7 +199,7 @@ def _answer(
 
 
 def laid_beside(recording: Recording, motion: ReferenceMotion, gravity_m_s2: float) -> Beside:
-    """A log on its grid beside its reference, with numbers to begin a fit with.
+    """A log on its grid with its aligned reference and initial values for a fit.
 
     Raises
     ------
@@ -210,12 +210,12 @@ def laid_beside(recording: Recording, motion: ReferenceMotion, gravity_m_s2: flo
 
 
 def moves_along(recording: Recording, motion: ReferenceMotion) -> float:
-    """Correlation of the turning rates where a log and a reference hold one motion.
+    """Correlation of the magnitudes of the rates of a log and a reference with one motion.
 
     Raises
     ------
     ValueError
-        When they do not, or the clock jumps.
+        When they share no motion, or the clock jumps.
     """
     grid, reference = grid_of(recording), Reference(motion)
     found = align(grid, reference, _stamped(recording, motion))
@@ -223,7 +223,7 @@ def moves_along(recording: Recording, motion: ReferenceMotion) -> float:
     windows = _windows(grid, reference, grid.is_valid & reference.covers(time))
     gyro = fit_gyroscope(grid, reference, windows, found.offset_s, found.rate, clock=1)
     refuse_strangers(gyro, motion)
-    # Laid over each other where hardly anything turns, two logs resemble each other by chance.
+    # With little rotation two logs resemble each other by chance.
     refuse_still(motion, gyro.A.ravel(), gyro.solution.covariance[:9, :9])
     return found.correlation
 
@@ -231,7 +231,7 @@ def moves_along(recording: Recording, motion: ReferenceMotion) -> float:
 def _right_way_round(
     grid: Grid, reference: Reference, windows: Windows, gyro: GyroFit, clock: int
 ) -> tuple[Reference, GyroFit, bool]:
-    """The reference as given, or with attitudes from world to body where only that is the log's motion."""
+    """The reference as given, or with inverted attitudes (given as world to body) where only these fit the log."""
     attitude = reference.motion.attitude
     if attitude is None or share_left(gyro) < TURNED_ROUND:
         return reference, gyro, False
@@ -243,7 +243,7 @@ def _right_way_round(
 
 
 def _stamped(recording: Recording, motion: ReferenceMotion) -> float | None:
-    """What both logs' own timestamps say of the offset; ``None`` where they do not count from one epoch."""
+    """Offset of the clocks by both logs' timestamps [s]; ``None`` where these have no common epoch."""
     offset = recording.start_epoch_s - motion.start_epoch_s
     return offset if abs(offset) < 0.5 * max(recording.duration_s, motion.time_s[-1]) else None
 
@@ -256,14 +256,14 @@ def _windows(grid: Grid, reference: Reference, seen: Mask) -> Windows:
 
 
 def _own_counts(offset: float, recording: Recording, motion: ReferenceMotion) -> float:
-    """By how much the reference's timestamps run ahead of the log's, in both own counts if they share an epoch."""
+    """Offset of the reference's timestamps from the log's [s], in their original counts if they share an epoch."""
     if abs(recording.start_epoch_s - motion.start_epoch_s) > 1e5:
         return float(offset)
     return float(offset + motion.start_epoch_s - recording.start_epoch_s)
 
 
 def _earth(found: MotionFit, effects: list[Scored], k: int) -> Estimate | None:
-    """The Earth's rate: its upward part is a g-sensitivity alike on all axes, so it is told where none is named."""
+    """The Earth's rate; its vertical part is confounded with g-sensitivity, which is excluded if not accepted."""
     for one in effects:
         if one.ident == "gyro-g-sensitivity" and not one.is_accepted:
             return earth_of(one.without, k)
@@ -290,7 +290,7 @@ def _fit(S: FloatArray, b: FloatArray, covariance: FloatArray, solution: Solutio
 
 
 def _mounting(S: FloatArray, b: FloatArray, covariance: FloatArray) -> Estimate:
-    """The rotation of the gyro triad's symmetric frame into the reference's body, as a vector [rad]."""
+    """Rotation vector [rad] from the gyro triad's symmetric frame to the reference's body frame."""
     change = reframing(S, b, "symmetric")
     turn = change.rotation.T
     angle = float(np.arccos(np.clip((np.trace(turn) - 1.0) / 2.0, -1.0, 1.0)))
@@ -303,7 +303,7 @@ def _mounting(S: FloatArray, b: FloatArray, covariance: FloatArray) -> Estimate:
 
 
 def _estimates(found: MotionFit, k: int, effects: list[Scored]) -> dict[str, Estimate]:
-    """Every effect that was tried with its score; its size from a fit that holds it."""
+    """Every scored effect with its score, and its value from a fit that includes it."""
     out = {}
     for one in effects:
         names = EFFECTS[one.ident]

@@ -1,4 +1,4 @@
-"""A gyro's 12 numbers and the clock to begin with, by windows: what the model of the whole motion starts from."""
+"""Initial S and b of a gyro and the clock, by windows, for the fit of the whole motion."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from trihedron.records.reference import FitToReference
 
 WHITE = NoiseModel(grows=False, order=0)
 TURNS = 6
-"""Gauss-Newton steps of the clock: from a sample off, three reach a microsecond."""
+"""Gauss-Newton steps of the clock: from an error of one sample, three reach a microsecond."""
 TURNING_RAD_S = np.radians(0.5)
-"""A body that turns faster lies in no pose: gravity leaves its place by a hundredth of g within a second."""
+"""Largest rate in a pose: at a higher one gravity changes by 0.01 g in the body frame within a second."""
 
 
 @dataclass(frozen=True, eq=False)
 class GyroFit:
-    """θ = A (3, 3) row by row, a (3), clock offset at ``middle_s`` and rate; ``offset_s`` is that at
-    zero; ``size`` (k,) the reference's rate in each window."""
+    """``ω = A w' + a`` and the clock: ``offset_s`` at time 0, ``rate``; in ``solution`` θ is A row by row, a, offset at
+    ``middle_s``, rate. ``size`` (k,) is the magnitude of the reference's rate in each window [rad/s]."""
 
     A: FloatArray
     a: FloatArray
@@ -35,14 +35,14 @@ class GyroFit:
 
     @property
     def handedness(self) -> float:
-        """The sign of det A: -1 where log and reference have frames of opposite handedness."""
+        """Sign of det A: -1 where log and reference have frames of opposite handedness."""
         return float(np.sign(np.linalg.det(self.A)))
 
 
 def fit_gyroscope(
     grid: Grid, reference: Reference, windows: Windows, offset_s: float, rate: float, *, clock: int = 2
 ) -> GyroFit:
-    """``ω_reference(t (1 + ε) + τ) = A w' + a`` by windows; ``clock`` 0 poses τ and ε, 1 frees τ, 2 both."""
+    """Fit ``ω_reference(t (1 + ε) + τ) = A w' + a`` by windows; ``clock`` 0 fixes τ and ε, 1 frees τ, 2 both."""
     middle = float(np.mean(grid.time_s[windows.middle]))
     n_clock = clock
     solution: Solution | None = None
@@ -66,7 +66,7 @@ def fit_gyroscope(
             break
         moved = solution.theta[-n_clock:]
         rate_change = float(moved[1]) if n_clock == 2 else 0.0
-        # Never further than a correlation leaves open.
+        # Limited to the uncertainty of the alignment by correlation.
         change = float(np.clip(moved[0], -0.1, 0.1))
         offset_s += change - rate_change * middle
         rate += rate_change
@@ -92,7 +92,7 @@ def _rows(
     signals = np.column_stack([grid.gyroscope, np.ones(len(time))])
     k, q = len(windows.start), signals.shape[1]
     if reference.motion.attitude is None:
-        # The area of a window is one: averages of both.
+        # Windows have unit area: averages of both sides.
         target = windows.of(windows.weight, reference.rate(time))
         mean = windows.of(windows.weight, signals)
         per = np.zeros((k, 3, 3, q))
@@ -121,9 +121,9 @@ def _vector(D: FloatArray) -> FloatArray:
 
 
 def poses_at_rest(segments: Segments, gyroscope: FitToReference, has_own_bias: bool) -> int:
-    """Poses in which the unit rested: a vehicle in steady flight reads as evenly as one on a table, and turns.
+    """Number of static poses: a vehicle in steady flight has constant readings too, but rotates.
 
-    A reference that is another gyro ``has_own_bias``: what all poses read alike beside it is no turning.
+    A reference that is another gyro ``has_own_bias``: the median rate of the poses is then bias, not rotation.
     """
     if segments.gyroscope_mean is None:
         return segments.n_poses

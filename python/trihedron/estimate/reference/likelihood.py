@@ -1,9 +1,9 @@
 """Attitude of gyros against their references over whole recordings: parameters and noise strengths by one evidence.
 
 The parameters enter linearly (``trihedron._core.ReferenceBlocks``); each has a Gaussian prior, and in units of its
-prior σ the evidence of a hypothesis is that of a ridge regression under the covariance that the noise strengths give.
-The strengths are unknown in every hypothesis and integrated out (docs/reference.md). Several
-recordings share some parameters and have strengths of their own.
+prior σ the evidence of a hypothesis is that of a ridge regression under the covariance of the noise strengths. The
+strengths are unknown in every hypothesis and integrated out (docs/reference.md). Several recordings share some
+parameters; strengths are per recording.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ Height = Callable[[FloatArray], float]
 
 STRENGTHS = ("angle_walk", "bias_walk", "white", "world", "world_s", "body", "body_s")
 TYPICAL = np.log([2e-4, 2e-5, 3e-4, 1e-3, 8.0, 1e-3, 8.0])
-"""Consumer gyros and optical trackers: rad/√s, rad/s/√s, rad, rad, s, rad, s."""
+"""Prior means of the logarithms: consumer gyros and optical trackers; rad/√s, rad/s/√s, rad, rad, s, rad, s."""
 SPREAD = np.log([30.0, 30.0, 30.0, 30.0, 4.0, 30.0, 4.0])
-"""A prior σ of a factor of 30 either way; the time constants of a factor of 4."""
+"""Prior σ of the logarithms: a factor of 30 either way, of 4 for time constants."""
 FARTHEST = 4.0
-"""Strengths beyond four prior σ are strengths of nothing."""
+"""Limit of the search in prior σ: beyond it a strength is negligible."""
 LEAST_SPREAD = 0.01
-"""Of the prior's: strengths known better than that are strengths known."""
+"""Smallest posterior σ of a strength that is used, relative to the prior's."""
 STEP = 0.02
 CURVATURE_STEP = 0.25
-"""Steps in the logarithm of a strength for the slope, and for the curvature that a walk begins with."""
+"""Steps in the logarithm of a strength for the gradient, and for the curvature at the start of the Metropolis walk."""
 STEPS, ADAPTED, THINNED = 600, 150, 12
-"""Steps of the walk over strengths; its steps learn from the last 150; every twelfth counts after the first 150."""
+"""Steps of the Metropolis walk; steps between adaptations of its proposal, and burn-in; thinning."""
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
     """One recording: its blocks, observations (3 m,), and columns (3 m, p) of parameters in units of ``sigma`` (p,).
 
-    ``centre`` (p,) is where each prior stands from the point of linearisation, in the same units; ``index`` (p,) their
-    place among all parameters of the fit; ``bias`` the places here of the bias at the start.
+    ``centre`` (p,) is each prior mean relative to the point of linearisation, in the same units; ``index`` (p,) the
+    indices among all parameters of the fit; ``bias`` the indices here of the bias at the start.
     """
 
     blocks: ReferenceBlocks
@@ -55,15 +55,15 @@ class Problem:
 
     @cached_property
     def table(self) -> FloatArray:
-        """Columns and observations side by side, as the filter takes them."""
+        """Columns and observations (3 m, p + 1), the filter's input."""
         return np.ascontiguousarray(np.column_stack([self.columns, self.observed]))
 
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """Normal equations under strengths: information (p, p), moment (p,), and what does not depend on parameters.
+    """Normal equations under strengths: information (p, p), moment (p,), and the constant of the log evidence.
 
-    ``mean_bias`` (3, p + 1) and its covariance (3, 3) are the bias walk's mean over time by columns.
+    ``mean_bias`` (3, p + 1), by columns, is the mean over time of the bias walk, ``cov_mean_bias`` its covariance.
     """
 
     information: FloatArray
@@ -74,7 +74,7 @@ class Equations:
 
 
 def equations(problem: Problem, strengths: FloatArray) -> Equations:
-    """Normal equations of a recording under ``strengths``, logarithms in the order of :data:`STRENGTHS`."""
+    """Normal equations of a recording under ``strengths`` (7,), logarithms in the order of :data:`STRENGTHS`."""
     found = problem.blocks.normal(problem.table, np.exp(strengths).tolist())
     gram, far = found.gram, (strengths - TYPICAL) / SPREAD
     constant = -0.5 * (gram[-1, -1] + found.log_det + 3 * found.rows * np.log(2.0 * np.pi) + float(far @ far))
@@ -91,14 +91,14 @@ class Together:
 
 
 def together(problems: Sequence[Problem], found: Sequence[Equations]) -> Together:
-    """Recordings in one fit, the prior of every parameter counted once."""
+    """Posterior of several recordings in one fit; the prior of every parameter counts once."""
     L, half, evidence = _eliminated(problems, found)
     inverse = np.linalg.inv(L)
     return Together(inverse.T @ half, inverse.T @ inverse, evidence)
 
 
 def _eliminated(problems: Sequence[Problem], found: Sequence[Equations]) -> tuple[FloatArray, FloatArray, float]:
-    """Root L of the information, L⁻¹ times the moment, and the log evidence."""
+    """Cholesky root L of the information, L⁻¹ times the moment, and the log evidence."""
     n = 1 + max(int(p.index.max()) for p in problems)
     information, moment, centre, constant = np.eye(n), np.zeros(n), np.zeros(n), 0.0
     for problem, one in zip(problems, found, strict=True):
@@ -124,8 +124,8 @@ def at_the_point(problems: Sequence[Problem], strengths: FloatArray) -> float:
 class Fitted:
     """Parameters of one hypothesis with the strengths integrated out: mean (p,) and covariance (p, p) in prior units.
 
-    The biases among them are their means over time. ``strengths`` (a recording, 7) are the likeliest logarithms and
-    ``evidence`` that at them; ``draws`` (k, a recording, 7) their posterior.
+    Biases are means over time. ``strengths`` (recordings, 7) are the logarithms at the posterior maximum, ``evidence``
+    the log evidence there; ``draws`` (k, recordings, 7) their posterior.
     """
 
     mean: FloatArray
@@ -135,8 +135,8 @@ class Fitted:
     draws: FloatArray
 
     def spread(self) -> FloatArray:
-        """(a recording, 7, 7) roots of the covariance of the strengths' logarithms."""
-        # A walk that hardly moved has draws of fewer directions than there are strengths.
+        """Cholesky roots (recordings, 7, 7) of the covariance of the strengths' logarithms."""
+        # With few accepted steps the draws' covariance is singular.
         least = np.diag((LEAST_SPREAD * SPREAD) ** 2)
         return np.array([np.linalg.cholesky(np.cov(one.T) + least) for one in self.draws.swapaxes(0, 1)])
 
@@ -144,14 +144,14 @@ class Fitted:
 def most_likely(
     problems: Sequence[Problem], start: FloatArray | None = None, spread: FloatArray | None = None
 ) -> tuple[FloatArray, float]:
-    """(a recording, 7) logarithms of the strengths of greatest posterior, and the log evidence there.
+    """Logarithms (recordings, 7) of the strengths at the posterior maximum, and the log evidence there.
 
-    ``spread`` (a recording, 7, 7) are roots of the covariance that a neighbouring hypothesis gives them at ``start``:
-    in their units the descent is round, and a few steps are enough.
+    ``spread`` (recordings, 7, 7) are roots of their covariance under a neighbouring hypothesis at ``start``: in these
+    units the problem is well conditioned, and a few steps are enough.
     """
     best = np.tile(TYPICAL, (len(problems), 1)) if start is None else start.copy()
     roots = np.tile(np.eye(len(TYPICAL)), (len(problems), 1, 1)) if spread is None else spread
-    # From strengths of a neighbouring hypothesis one round over the recordings is enough.
+    # From the strengths of a neighbouring hypothesis one round over the recordings is enough.
     for _ in range(1 if len(problems) == 1 or start is not None else 2):
         for k, root in enumerate(roots):
             height = _heights(problems, best, k)
@@ -160,7 +160,7 @@ def most_likely(
 
 
 def _highest(height: Height, start: FloatArray, root: FloatArray) -> FloatArray:
-    """(7,) where the height is greatest, sought from ``start`` in units of ``root`` (7, 7)."""
+    """Maximum (7,) of ``height`` by L-BFGS from ``start``, in units of ``root`` (7, 7)."""
 
     def at(z: FloatArray) -> FloatArray:
         return np.clip(start + root @ z, TYPICAL - FARTHEST * SPREAD, TYPICAL + FARTHEST * SPREAD)
@@ -174,7 +174,7 @@ def _highest(height: Height, start: FloatArray, root: FloatArray) -> FloatArray:
 
 
 def _heights(problems: Sequence[Problem], strengths: FloatArray, k: int) -> Height:
-    """Log evidence as a function of the strengths of one recording, those of the others as they are."""
+    """Log evidence as a function of the strengths of recording k, with those of the others fixed."""
     found = [equations(p, s) if j != k else None for j, (p, s) in enumerate(zip(problems, strengths, strict=True))]
 
     def height(x: FloatArray) -> float:
@@ -185,7 +185,7 @@ def _heights(problems: Sequence[Problem], strengths: FloatArray, k: int) -> Heig
 
 
 def fit(problems: Sequence[Problem], start: FloatArray | None = None) -> Fitted:
-    """Mode of the strengths, a walk over their posterior for each recording, and the parameters averaged over it."""
+    """Mode of the strengths, a Metropolis walk over their posterior per recording, and parameters averaged over it."""
     best, evidence = most_likely(problems, start)
     walks = [_walk(_heights(problems, best, k), best[k]) for k in range(len(problems))]
     draws = np.stack(walks, axis=1)
@@ -196,7 +196,7 @@ def fit(problems: Sequence[Problem], start: FloatArray | None = None) -> Fitted:
 
 
 def _walk(height: Height, start: FloatArray) -> FloatArray:
-    """(k, 7) draws by a Metropolis walk: Haario's steps, from the curvature first and then from the walk itself."""
+    """(k, 7) draws by an adaptive Metropolis walk (Haario): proposals from the curvature first, then from the draws."""
     n = len(start)
     values, vectors = np.linalg.eigh(_curvature(height, start))
     covariance = (vectors / np.maximum(values, 1.0 / SPREAD.max() ** 2)) @ vectors.T
@@ -216,7 +216,7 @@ def _walk(height: Height, start: FloatArray) -> FloatArray:
 
 
 def _with_mean_bias(problems: Sequence[Problem], strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Posterior where every bias is its mean over time instead of its value at the start."""
+    """Posterior mean and covariance with every bias as its mean over time instead of its value at the start."""
     found = [equations(p, s) for p, s in zip(problems, strengths, strict=True)]
     all_of = together(problems, found)
     change, shift = np.eye(len(all_of.mean)), np.zeros(len(all_of.mean))
@@ -230,7 +230,7 @@ def _with_mean_bias(problems: Sequence[Problem], strengths: FloatArray) -> tuple
 
 
 def _curvature(function: Height, at: FloatArray) -> FloatArray:
-    """Minus the second derivatives (n, n) of a function of (n,)."""
+    """Negative Hessian (n, n) of a function of (n,), by finite differences."""
     n, h = len(at), CURVATURE_STEP * np.eye(len(at))
     here = function(at)
     ahead = [function(at + h[i]) for i in range(n)]

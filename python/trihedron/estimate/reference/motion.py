@@ -1,4 +1,4 @@
-"""The gyro's part: parameters of one or several recordings about a common point, and effects by their score."""
+"""Fit of the gyro: parameters of one or several recordings, and effects by their score."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ from trihedron.estimate.reference.likelihood import (
 from trihedron.records.reference import NAMED_FROM
 
 ALWAYS = ("S", "b", "clock", "earth", "gyro-g-sensitivity")
-"""What every hypothesis holds: g-sensitivity by the size that data sheets give it, named or not."""
+"""Parameters of every hypothesis: g-sensitivity with a data-sheet prior, reported or not."""
 EFFECTS = {"gyro-g-sensitivity": ("gyro-g-sensitivity",), "gyro-scale-nonlinearity": ("quadratic", "cubic")}
 WIDER = (0.3, 1.0, 3.0, 10.0, 30.0)
-"""Sizes, in those of data sheets, that a recording may ask for."""
+"""Factors on the data-sheet prior σ of an effect that are tried."""
 MARGIN = 2.0
 PAID = 2.0 * np.log(len(WIDER) * len(EFFECTS))
-"""What a score pays for what was tried."""
+"""Correction of a score for multiple testing."""
 LARGEST = 100.0
-"""Effects beyond this many times the size in data sheets are no effects of a working part."""
+"""Largest size of an effect of a working part, in data-sheet sizes."""
 RELINEARISED = 3
 SHORTER = 0.5 ** np.arange(6)
-"""Parts of a step that are tried: beyond a quarter of a period of the motion a clock's offset is not linear."""
+"""Factors on a step that are tried: a clock offset is linear only up to a quarter of a period of the motion."""
 
 
 @dataclass(frozen=True, eq=False)
 class MotionFit:
-    """Recordings in one fit: the point of each, places of their parameters, what was fitted about it."""
+    """Recordings in one fit: point of linearisation of each, indices of its parameters, fit about the points."""
 
     sides: list[Beside]
     points: list[Point]
@@ -49,7 +49,7 @@ class MotionFit:
     wider: Mapping[str, float]
 
     def value(self, k: int, name: str) -> FloatArray:
-        """(n,) a parameter of recording k, SI."""
+        """Value (n,) of a parameter of recording k, SI."""
         at = self.places[k][name]
         sigma = self.wider.get(name, 1.0) * self.sides[k].sigma(name)
         return np.asarray(self.sides[k].values(self.points[k], name) + sigma * self.fitted.mean[at])
@@ -65,9 +65,9 @@ def fit_motion(
     sides: list[Beside], wanted: tuple[str, ...] = ALWAYS, wider: Mapping[str, float] | None = None,
     block_s: float = BLOCK_S, before: MotionFit | None = None,
 ) -> MotionFit:  # fmt: skip
-    """Parameters and strengths of recordings that share the instrument's, relinearised until they stand."""
+    """Fit parameters and strengths of recordings of one instrument, relinearised up to ``RELINEARISED`` times."""
     wider = wider or {}
-    # One instrument: one point to begin with.
+    # One instrument: a common initial S.
     S = np.median([side.start.S for side in sides], axis=0)
     sides = [replace(side, start=replace(side.start, S=S)) for side in sides]
     where = places(sides, wanted)
@@ -78,7 +78,7 @@ def fit_motion(
         if turn:
             strengths, _ = most_likely(problems, strengths)
         mean = together(problems, [equations(p, s) for p, s in zip(problems, strengths, strict=True)]).mean
-        # A linear model about another slow error is another model: heights are compared about the same.
+        # Log densities are compared about the same slow error: another one is another linear model.
         points = [
             point if side.reference.motion.attitude is None else replace(point, slow=slow_error(problem, s, mean))
             for side, point, problem, s in zip(sides, points, problems, strengths, strict=True)
@@ -100,7 +100,7 @@ def fit_motion(
 
 
 def slow_error(problem: Problem, strengths: FloatArray, mean: FloatArray) -> SlowError:
-    """The reference's slow error, smoothed under ``strengths`` (7,), of parameters (p,) with biases at the start."""
+    """The reference's smoothed slow error under ``strengths`` (7,), at parameters ``mean`` with biases at the start."""
     *_, world, body = problem.blocks.smoothed(problem.table, np.exp(strengths).tolist())
     theta = np.append(-mean[problem.index], 1.0)
     return SlowError(problem.blocks.time_s(), *((one @ theta).reshape(-1, 3) for one in (world, body)))
@@ -119,9 +119,9 @@ def _problems(
 
 @dataclass(frozen=True, eq=False)
 class Scored:
-    """An effect's score: twice its gain in log evidence, what was tried paid for; the prior's width that gains most.
+    """Score of an effect: twice its gain in log evidence, corrected for multiple testing; best factor on its prior σ.
 
-    The fits with it and ``without`` it stand under their own likeliest strengths.
+    The fits with it and ``without`` it have their own most likely strengths.
     """
 
     ident: str
@@ -132,13 +132,13 @@ class Scored:
 
     @property
     def is_accepted(self) -> bool:
-        """Whether it is named."""
+        """Whether the effect is reported."""
         return self.score > NAMED_FROM
 
     def shown_from(self) -> float:
-        """Size of all its numbers, in those of data sheets, whose expected score is ``NAMED_FROM``; infinite if none.
+        """Size of all its elements, in data-sheet sizes, with expected score ``NAMED_FROM``; infinite if none.
 
-        Beside a reference with information Λ of them, numbers of size s raise twice the log evidence by
+        With information Λ (eigenvalues λ) about them, elements of size s increase twice the log evidence by
         Σ λs² - ln(1 + λs²) on average.
         """
         names = EFFECTS[self.ident]
@@ -156,7 +156,7 @@ class Scored:
 
 
 def scores(found: MotionFit) -> list[Scored]:
-    """Score of every effect beside its absence, strengths tuned in both; best first."""
+    """Score of every effect against its absence, with strengths optimised in both; best first."""
     out = []
     held = set().union(*(own for own in found.places))
     for ident, names in EFFECTS.items():
@@ -167,7 +167,7 @@ def scores(found: MotionFit) -> list[Scored]:
         tried: list[MotionFit] = []
         for by in WIDER:
             tried.append(_tuned(found, (*base, *names), dict.fromkeys(names, by)))
-            # Evidence falls off on both sides of the size that the recordings ask for.
+            # The evidence has one maximum over the size: stop beyond it.
             if len(tried) > 1 and tried[-1].fitted.evidence < tried[-2].fitted.evidence - MARGIN:
                 break
         best = int(np.argmax([one.fitted.evidence for one in tried]))
@@ -177,7 +177,7 @@ def scores(found: MotionFit) -> list[Scored]:
 
 
 def _tuned(found: MotionFit, names: tuple[str, ...], wider: Mapping[str, float]) -> MotionFit:
-    """Another hypothesis about the same point but for its effects, under its own likeliest strengths."""
+    """Another hypothesis about the same point, with effects at 0 there, under its own most likely strengths."""
     points = [replace(p, g=np.zeros((3, 3)), bend=np.zeros(6)) for p in found.points]
     where = places(found.sides, names)
     problems = _problems(found.sides, points, where, wider)

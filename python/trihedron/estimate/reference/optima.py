@@ -1,4 +1,4 @@
-"""Two places of a clock that the motion does not separate."""
+"""Detection of two clock offsets that the motion does not separate."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from trihedron.estimate.reference.motion import MotionFit
 from trihedron.records.reference import NAMED_FROM
 
 REACH_S, STEP_S = 0.3, 0.02
-"""Shifts that are tried: beyond them the sizes of the rates have told one place from another."""
+"""Range and step of the shifts that are tried: larger ones are excluded by the alignment of the rates' magnitudes."""
 
 
 def refuse_two_clocks(found: MotionFit, k: int) -> None:
-    """Raise ``RefusedError`` with both offsets where the evidence of another one comes near that of the best."""
+    """Raise ``RefusedError`` with both offsets where the evidence of another is within ``NAMED_FROM`` of the best."""
     if "clock" not in found.places[k]:
         return
     side, point = found.sides[k], found.points[k]

@@ -1,4 +1,4 @@
-"""Parts of a log that lie elsewhere in a reference's time than the rest: a clock that jumped late or for a while."""
+"""Parts of a log with another offset of the reference's clock: a clock that jumps late or for a short time."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ from trihedron.estimate.reference.settled import running_mean
 from trihedron.estimate.reference.together import Grid, Mask, Reference
 
 STRETCH_S, HOP_S = 2.0, 1.0
-"""A hand turns about within two seconds: what is left then shows a lag of its own."""
+"""Length and spacing of the stretches: a hand reverses its rotation within two seconds, which determines a lag."""
 SMOOTH_S = 0.1
-"""A tracker's noise of 0.05 deg is 7 deg/s from row to row and 0.7 deg/s over this."""
+"""Averaging time: a tracker's noise of 0.05 deg is 7 deg/s from row to row and 0.7 deg/s over this time."""
 STEP_S = 0.04
 SEARCH_S = 2.0
 LEFT_AT_ZERO = 0.05
-"""Part of a stretch's rate² that misfits without another lag: a jump of 50 ms leaves a tenth of a turn of 1 Hz."""
+"""Least misfit at lag 0, relative to the stretch's rate²: a jump of 50 ms leaves a tenth for rotation at 1 Hz."""
 LEFT_AT_LAG = 0.25
-"""Part of that misfit that another lag leaves: noise and knocks are as large at every lag."""
+"""Largest misfit at another lag, relative to that at lag 0: noise and knocks are equal at every lag."""
 TURNING = 0.2
-"""Stretches that turn by less of the log's rms tell no lag."""
+"""Least rms rate of a stretch, relative to the log's, for a lag."""
 FEWEST = 2
-"""Stretches, one after the other, that tell one lag."""
+"""Consecutive stretches with one lag that prove a jump."""
 
 
 def refuse_parts_elsewhere(grid: Grid, reference: Reference, gyro: GyroFit) -> None:
-    """Refuse a reference of which a part fits at another lag than all of it was fitted at.
+    """Check that no part of the reference fits at another lag than the whole.
 
-    The clock's own stretches are 8 s long and see only sizes of rates: a jump in the last seconds is excluded by them
-    as a stretch of another motion, and by the fit as outliers.
+    The alignment's stretches are 8 s long and use only magnitudes of rates: it excludes a jump in the last seconds as
+    another motion, and the fit excludes it as outliers.
 
     Raises
     ------
     ValueError
-        With the place and the lag, when stretches one after the other tell the same one.
+        With the interval and the lag, when consecutive stretches have the same other lag.
     """
     if reference.motion.is_stepwise:
         return
@@ -75,7 +75,7 @@ def refuse_parts_elsewhere(grid: Grid, reference: Reference, gyro: GyroFit) -> N
 
 
 def _lag(ours: FloatArray, theirs: FloatArray, covered: Mask, least: float, jump: float) -> int:
-    """Steps by which the reference must be read later in this stretch; 0 where its place fits or none does."""
+    """Lag of the reference in this stretch, in steps; 0 where lag 0 fits or no lag does."""
     n, ahead = len(ours), (len(theirs) - len(ours)) // 2
     size = float(np.sum(ours**2))
     if size < least or not covered[ahead : ahead + n].all():

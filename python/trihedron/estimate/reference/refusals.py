@@ -1,4 +1,4 @@
-"""What a reference and a log cannot answer together, in one sentence each."""
+"""Checks that a reference and a log fit together; each error is one sentence."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from trihedron.records.reference import ReferenceMotion
 from trihedron.units import rate_to_si
 
 STRANGERS = 0.6
-"""A fit that leaves this part of the reference's rate has found no shared motion, whatever the sizes correlate."""
+"""Residual share of the reference's rate above which there is no shared motion, whatever the correlation."""
 TURNING = 0.5
-"""Part of the rate's rms from which on a row turns: of a session of poses its moves, of a restless hand most."""
+"""Least rate of a row that rotates, relative to the rms rate: in a session of poses the rows of its moves."""
 
 
 def share_left(gyro: GyroFit) -> float:
-    """What is left over the reference's rate, middle rows (medians: knocks do not decide) of those that turn."""
+    """Median residual over the median reference rate, of rows that rotate; medians are robust to knocks."""
     turns = gyro.size >= TURNING * float(np.sqrt(np.mean(gyro.size**2)))
     left = np.linalg.norm(gyro.solution.residual, axis=1)[turns]
     return float(np.median(left) / max(float(np.median(gyro.size[turns])), 1e-300))
 
 
 def refuse_strangers(gyro: GyroFit, motion: ReferenceMotion) -> None:
-    """Raise ``RefusedError`` where the rates are alike in size and no mounting makes them one."""
+    """Raise ``RefusedError`` where the rates agree in magnitude, but no mounting rotation makes them equal."""
     left = share_left(gyro)
     if left > STRANGERS and not motion.is_stepwise:
         raise RefusedError(
@@ -35,7 +35,7 @@ def refuse_strangers(gyro: GyroFit, motion: ReferenceMotion) -> None:
 
 
 def refuse_units(recording: Recording, gyro: GyroFit, motion: ReferenceMotion) -> None:
-    """Raise ``RefusedError`` at a factor of 57.3 or of a power of ten between two that both state their unit."""
+    """Raise ``RefusedError`` where the rates differ by a factor of units: 57.3, 1000, 60 or 9.55 (rpm)."""
     nominal = rate_to_si(recording.gyroscope_unit)
     if nominal is None:
         return
@@ -58,7 +58,7 @@ def refuse_units(recording: Recording, gyro: GyroFit, motion: ReferenceMotion) -
 
 
 def refuse_still(motion: ReferenceMotion, S: FloatArray, covariance: FloatArray) -> None:
-    """Raise ``RefusedError`` for axes of S (9,) that its covariance (9, 9) leaves open."""
+    """Raise ``RefusedError`` for axes of S (9,) whose relative σ by its covariance (9, 9) is 0.5 or more."""
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3)
     size = np.linalg.norm(S.reshape(3, 3), axis=0)
     weak = [XYZ[j] for j in range(3) if not np.linalg.norm(sigma[:, j]) < 0.5 * size[j]]

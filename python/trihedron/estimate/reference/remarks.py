@@ -1,4 +1,4 @@
-"""What about a reference bears on the answer, as findings."""
+"""Findings on a reference that affect the result."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from trihedron.records import Finding, FindingCode
 from trihedron.records.reference import AgainstReference
 
 TILT_DEG = 10.0
-"""A world whose z leans more than this from the plumb line is some other frame than a floor's."""
+"""Largest angle of the world's z axis from the vertical without a finding."""
 COLOURED = 3.0
-"""Windows of an accelerometer that disagree three times more than the noise model says: more than noise is left."""
+"""Factor on the accelerometer's uncertainties above which its residuals are not explained by the noise model."""
 LEFT_OUT = 0.05
 
 
 def remarks(result: AgainstReference, is_turned: bool) -> tuple[Finding, ...]:
-    """Findings of a fit: what the reference is worth, which way is up, rows left out, what the noise does not hold."""
+    """Findings of a fit: independence of the reference, direction of up, outliers, deviating intervals, misfit."""
     error, out = result.error, []
     if is_turned:
         out.append(Finding.of(FindingCode.REFERENCE_TURNED_ROUND))

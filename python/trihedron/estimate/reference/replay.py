@@ -1,4 +1,4 @@
-"""Attitude carried by the gyro alone against the reference's, on a part of the log that no fit saw."""
+"""Attitude integrated from the gyro alone against the reference's, on the held-out part of a log."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from trihedron.records.reference import ReplayStage
 Mask = npt.NDArray[np.bool_]
 
 HORIZON_S = 10.0
-"""Time over which attitude is carried: some turns of a hand, and a bias of 0.1 °/s adds a degree."""
+"""Time over which attitude is integrated: some turns of a hand, and a bias of 0.1 °/s adds a degree."""
 TRAINED = 0.6
-"""Part of the time that the replay's fits see; the rest is held out."""
+"""Fraction of the time for the fit; the rest is held out."""
 LEAST_HELD_OUT_S = 12.0
 
 
@@ -29,7 +29,7 @@ def held_out(
     side: Beside, seen: Mask, gyro: GyroFit, given: tuple[FloatArray, FloatArray] | None,
     windows: Callable[[Grid, Reference, Mask], Windows],
 ) -> tuple[ReplayStage, ...]:  # fmt: skip
-    """Replay on the last part of a log by what the first part teaches, and by what was known without the reference."""
+    """Replay on the last part of a log: nominal, as ``given``, and calibrated on the first part by the reference."""
     grid, reference = side.grid, side.reference
     inside = np.flatnonzero(seen)
     cut = inside[int(TRAINED * len(inside))]
@@ -46,7 +46,7 @@ def held_out(
         ("one scale, bias from static poses", _nominal(grid, taught, reference.rate(time), first))
     ]
     if given is not None:
-        # The given numbers lie in a frame of their own: the turn between the two is the mounting, no fault of theirs.
+        # The given parameters have their own frame: the rotation between both is the mounting, not an error.
         S, b = given
         u, _, vt = np.linalg.svd(taught.A @ S.T)
         turn = (u * np.array([1.0, 1.0, np.linalg.det(u @ vt)])) @ vt
@@ -57,7 +57,7 @@ def held_out(
 
 
 def _nominal(grid: Grid, gyro: GyroFit, rate: FloatArray, seen: Mask) -> FloatArray:
-    """What a data sheet gives: one scale for all axes, axes square, and the bias read where it stands stillest."""
+    """Nominal rates (n, 3): one scale for all axes, orthogonal axes, bias from the second with the least rotation."""
     u, s, vt = np.linalg.svd(gyro.A)
     A = (u @ vt) * float(np.mean(s))
     n = max(round(1.0 / grid.step_s), 8)
@@ -71,13 +71,13 @@ def _nominal(grid: Grid, gyro: GyroFit, rate: FloatArray, seen: Mask) -> FloatAr
 def replay(
     stage: str, rate: FloatArray, grid: Grid, reference: Reference, time: FloatArray, where: Mask
 ) -> ReplayStage | None:
-    """Rms angle between attitude carried over ten seconds and the reference's; ``rate`` (n, 3) in the reference's body.
+    """Rms angle between attitude integrated over ``HORIZON_S`` and the reference's.
 
-    ``where`` (n,) marks the part to use; ``None`` where it holds no ten seconds in a row.
+    ``rate`` (n, 3) is in the reference's body, ``where`` (n,) the part to use; ``None`` where it is too short.
     """
     n = round(HORIZON_S / grid.step_s)
     middle = 0.5 * (rate[1:] + rate[:-1])
-    # Second term: the rate turns while it is integrated (coning).
+    # Second term: coning correction.
     turn = middle * grid.step_s + np.cross(rate[:-1], rate[1:]) * grid.step_s**2 / 12.0
     steps = rotation_from_vector(np.ascontiguousarray(turn))
     bad = np.concatenate([[0], np.cumsum(~where)])
@@ -95,7 +95,7 @@ def replay(
 
 
 def _product(rotations: FloatArray) -> FloatArray:
-    """Product of (n, 3, 3) in order, pair by pair."""
+    """Product (3, 3) of rotations (n, 3, 3) in order, pairwise."""
     while len(rotations) > 1:
         if len(rotations) % 2:
             rotations = np.concatenate([rotations, np.eye(3)[None]])

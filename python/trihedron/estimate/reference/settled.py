@@ -1,4 +1,4 @@
-"""Commands of a rate table: which samples lie on a plateau, where the table has reached the rate it was told."""
+"""Commands of a rate table: samples on a plateau, where the table has reached the commanded rate."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from trihedron.estimate.reference.together import Grid, Reference
 Mask = npt.NDArray[np.bool_]
 
 GUARD_S = 0.2
-"""Left out on either side of a command at least: commands are timestamped by another computer."""
+"""Least time excluded on either side of a command: commands are timestamped by another computer."""
 LEVELS = 6.0
-"""A sample further from its plateau's median than six robust sigmas is not on it: the table still speeds up."""
+"""Robust sigmas from the plateau's median above which a sample is not on it: the table still accelerates."""
 
 
 def plateaus(grid: Grid, reference: Reference, time: FloatArray) -> Mask:
-    """(n,) True from where the gyro has come to the level it keeps until the next command."""
+    """(n,) True from where the gyro has reached the level that it keeps until the next command."""
     out = np.zeros(len(time), dtype=bool)
     row = np.searchsorted(reference.motion.time_s, time, side="right")
     guard = int(np.ceil(GUARD_S / grid.step_s))

@@ -1,4 +1,4 @@
-"""What moves over a recording, smoothed: the gyro's bias, and the reference's own slow error."""
+"""Smoothed estimates over a recording: the gyro's bias, and the reference's slow error."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def bias_over_time(found: MotionFit, k: int) -> BiasOverTime:
     """Bias of recording k in every block, g-sensitivity at the recording's mean specific force included."""
     each = [_bias_at(found, k, strengths) for strengths in found.fitted.draws]
     values = np.array([value for value, _ in each])
-    # Of strengths that nobody knows: their mean, and how far the answers lie apart besides.
+    # Averaged over the posterior of the strengths; the scatter over the draws is added to the variance.
     variance = np.mean([own for _, own in each], axis=0) + values.var(axis=0)
     return BiasOverTime(found.problems[k].blocks.time_s(), values.mean(axis=0), np.sqrt(variance))
 
@@ -37,7 +37,7 @@ def _bias_at(found: MotionFit, k: int, strengths: FloatArray) -> tuple[FloatArra
     change[:, :, problem.bias] += np.diag(problem.sigma[problem.bias])
     value = found.points[k].b + columns[:, :, -1]
     if side.force is not None and "gyro-g-sensitivity" in own:
-        # Bias and g-sensitivity hardly separate where the force keeps its direction; what both add up to is known.
+        # Bias and g-sensitivity are hardly separable where the force keeps its direction; their sum is determined.
         force = side.force[side.seen].mean(axis=0)
         at = np.flatnonzero(np.isin(problem.index, own["gyro-g-sensitivity"]))
         for i in range(3):
@@ -48,10 +48,10 @@ def _bias_at(found: MotionFit, k: int, strengths: FloatArray) -> tuple[FloatArra
 
 
 def error_over_time(found: MotionFit, k: int) -> ErrorOverTime:
-    """Attitude of the reference of recording k against the gyro's, whose parameters and bias over time are taken off.
+    """Attitude of the reference of recording k relative to the gyro's, after subtraction of parameters and bias drift.
 
-    ``angle = observed - columns theta - Σ ΔM Δb``: M is the sum of attitudes that a bias acts through, Δb what the bias
-    has walked since the beginning.
+    ``angle = observed - columns theta - Σ ΔM Δb``: M is the derivative of the angle by a constant bias, Δb the change
+    of the bias since the start.
     """
     problem = found.problems[k]
     mean = posterior(found, found.fitted.strengths).mean[problem.index]
@@ -70,8 +70,8 @@ def error_over_time(found: MotionFit, k: int) -> ErrorOverTime:
 
 
 def without_slow_error(found: MotionFit, k: int) -> Reference:
-    """The reference of recording k, its attitudes turned back by its slow error: gyro and reference together know them
-    better than either, and what is left hardly tilts gravity."""
+    """The reference of recording k with its slow error subtracted from its attitudes: gyro and reference together
+    determine them better than either, and the remaining tilt error is small."""
     side, point, problem = found.sides[k], found.points[k], found.problems[k]
     motion = side.reference.motion
     if motion.attitude is None:
@@ -83,17 +83,17 @@ def without_slow_error(found: MotionFit, k: int) -> Reference:
 
 
 def frame_covariance(found: MotionFit, k: int) -> FloatArray:
-    """(3, 3) [rad²] of the turn between the body and what recording k's reference shows of it on the whole.
+    """Covariance (3, 3) [rad²] of the rotation between the body and the mean body frame of recording k's reference.
 
-    The mean of a slow error in the body is a mounting like any other: no motion tells it, and it turns both sensors
-    alike. It is what the rotation of S is less well known by with that error in the fit.
+    The mean of a slow error in the body frame is equivalent to a mounting: no motion determines it, and it rotates both
+    sensors equally. It is the increase of the covariance of the rotation of S by that error.
     """
     side = found.sides[k]
     if side.reference.motion.attitude is None:
         return np.zeros((3, 3))
     at = found.places[k]["S"]
     sigma = found.wider.get("S", 1.0) * side.sigma("S")
-    # Turns of the body about each axis as changes of S, and back again by least squares.
+    # Pseudoinverse of the change of S by rotations of the body about each axis.
     turn = np.linalg.pinv(turns(found.value(k, "S").reshape(3, 3))) * sigma
     out = np.zeros((3, 3))
     for strengths in found.fitted.draws:
@@ -106,5 +106,5 @@ def frame_covariance(found: MotionFit, k: int) -> FloatArray:
 
 
 def posterior(found: MotionFit, strengths: FloatArray) -> Together:
-    """All parameters at given strengths, biases those at the start."""
+    """Posterior of all parameters at given strengths; biases are those at the start."""
     return together(found.problems, [equations(p, s) for p, s in zip(found.problems, strengths, strict=True)])

@@ -1,4 +1,4 @@
-"""Log and reference on one even grid: the log's own clock, the reference read at ``(1 + ε) t + τ``."""
+"""Log on an even grid of its own clock, and the reference as functions of its time ``(1 + ε) t + τ``."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from trihedron.records.reference import ReferenceMotion
 Mask = npt.NDArray[np.bool_]
 
 LONGEST_GAP = 3.5
-"""Rows further apart than this many usual steps are a gap: a cubic over three steps still follows a hand (0.03 s)."""
+"""Rows further apart than this many usual steps are a gap: a cubic over three steps (0.03 s) follows motion by hand."""
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """The log on even times: ``time_s`` (n,), raw ``gyroscope`` and ``accelerometer`` (n, 3), where ``is_valid``."""
+    """The log at even times ``time_s`` (n,): raw ``gyroscope`` and ``accelerometer`` (n, 3), ``is_valid`` (n,)."""
 
     time_s: FloatArray
     step_s: float
@@ -32,7 +32,7 @@ class Grid:
 
 
 def grid_of(recording: Recording) -> Grid:
-    """The log at even times of its own rate, by cubic interpolation; within gaps it is not valid.
+    """The log at even times of its own rate, by cubic interpolation; not valid within gaps.
 
     Raises
     ------
@@ -56,14 +56,14 @@ def grid_of(recording: Recording) -> Grid:
 
 
 def within(timestamps: FloatArray, time: FloatArray, step: float) -> Mask:
-    """Whether times (n,) lie among timestamps (m,) that are no more than ``LONGEST_GAP`` steps apart there."""
+    """Whether times (n,) lie between timestamps (m,) that are at most ``LONGEST_GAP`` steps apart."""
     after = np.clip(np.searchsorted(timestamps, time), 1, len(timestamps) - 1)
     is_close = timestamps[after] - timestamps[after - 1] <= LONGEST_GAP * step
     return np.asarray(is_close & (time >= timestamps[0]) & (time <= timestamps[-1]), dtype=bool)
 
 
 class Reference:
-    """A reference as functions of its own time: splines of what it knows."""
+    """A reference as functions of its own time: splines of its attitude, rate, position and specific force."""
 
     def __init__(self, motion: ReferenceMotion) -> None:
         self.motion = motion
@@ -80,7 +80,7 @@ class Reference:
         self._force = None if motion.specific_force is None else CubicSpline(t, motion.specific_force)
 
     def covers(self, time: FloatArray) -> Mask:
-        """Whether the reference has rows about these of its own times (n,)."""
+        """Whether the reference has rows around these times (n,) of its own clock."""
         if self.motion.is_stepwise:
             return np.asarray((time >= self.motion.time_s[0]) & (time <= self.motion.time_s[-1]), dtype=bool)
         return within(self.motion.time_s, time, self.step_s)
@@ -91,7 +91,7 @@ class Reference:
         return np.asarray(Rotation.from_quat(self._attitude(self._clip(time))).as_matrix())
 
     def rate(self, time: FloatArray) -> FloatArray:
-        """(n, 3) [rad/s] in the body; of an attitude its derivative, noisy as it is."""
+        """(n, 3) [rad/s] in the body; from an attitude by differentiation, with its noise."""
         time = self._clip(time)
         if self.motion.is_stepwise:
             assert self.motion.rate is not None

@@ -1,7 +1,7 @@
-"""Comparison without differentiating: both sides weighed by the same smooth windows (modulating functions).
+"""Comparison without differentiation: both sides are weighted by the same smooth windows (modulating functions).
 
-With a cubic B-spline h that begins and ends at zero, ``∫ h dx/dt = -∫ dh/dt x``: a derivative of the reference is never
-taken. Windows follow one another at the spacing of the knots, so that nothing below half of 1/spacing is lost.
+With a cubic B-spline h that begins and ends at zero, ``∫ h dx/dt = -∫ dh/dt x``: the reference is not differentiated.
+Windows follow at the spacing of the knots, so that no frequency below 1/(2 spacing) is lost.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Windows:
 
     @property
     def middle(self) -> IntArray:
-        """(k,) grid index of each window's middle."""
+        """(k,) grid index of the middle of each window."""
         return np.asarray(self.start + 2 * self.spacing, dtype=np.int64)
 
     def of(self, weights: FloatArray, signal: FloatArray) -> FloatArray:
@@ -42,15 +42,15 @@ class Windows:
 
 
 def windows_on(is_valid: Mask, step_s: float, spacing: int) -> Windows:
-    """Every window whose samples are all valid; ``spacing`` samples between neighbours."""
+    """All windows with valid samples only; ``spacing`` samples between neighbours."""
     m = spacing
     x = np.arange(-2 * m, 2 * m + 1) / m
     a = np.abs(x)
     h = np.where(a <= 1.0, 2.0 / 3.0 - a**2 + a**3 / 2.0, np.where(a < 2.0, (2.0 - a) ** 3 / 6.0, 0.0))
     slope = np.sign(x) * np.where(a <= 1.0, -2.0 * a + 1.5 * a**2, np.where(a < 2.0, -((2.0 - a) ** 2) / 2.0, 0.0))
     curvature = np.where(a <= 1.0, -2.0 + 3.0 * a, np.where(a < 2.0, 2.0 - a, 0.0))
-    # Sampled, the second derivative's spectrum repeats at the rate and adds (ωT)²/12 of itself, by which a lever arm
-    # would come out short (0.05 % at 1 Hz and 100 samples/s); its own second difference takes that off again.
+    # Aliasing of the sampled second derivative adds (ωT)²/12 of itself and would make a lever arm too short (0.05 % at
+    # 1 Hz and 100 samples/s); its second difference corrects this.
     padded = np.pad(curvature, 1)
     curvature = curvature + (padded[2:] - 2.0 * curvature + padded[:-2]) / 12.0
     spacing_s = m * step_s

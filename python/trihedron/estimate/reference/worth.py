@@ -1,4 +1,4 @@
-"""What a reference is worth: its own error, its gaps, and whether it was computed from this very gyro."""
+"""Quality of a reference: its error, its gaps, and whether it was computed from this gyro."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from trihedron.records.reference import ReferenceError, Sign
 from trihedron.sensor_model import reframing
 
 FINE_S, COARSE = 0.1, 4.0
-"""Blocks whose differences show noise from some tenths of a hertz to five; and how much longer ones see S again."""
+"""Block length [s] whose differences show noise from some 0.1 to 5 Hz; block length [s] of a second estimate of S."""
 SQUARE = np.radians(0.01)
-"""Nobody mounts a unit within a hundredth of a degree: then the reference's body is the unit's own."""
+"""No mounting is accurate to 0.01°: a smaller angle means that the reference's body frame is the gyro's."""
 QUIET_PARTS = 50
-"""Part of the log, its quietest fiftieth, whose scatter from sample to sample is no more than noise at rest."""
+"""The quietest 1/50 of the log gives an upper limit of the static noise."""
 QUIETER = 0.8
-"""The difference holds the gyro's noise, whatever the reference adds; each of the two is told to some per cent."""
+"""Ratio of the difference's noise, which contains the gyro's, to static noise below which the two are dependent."""
 CERTAIN = 1e-4
 SURPRISE = 1e-6
-"""False alarms of a block that stands apart, the number of blocks paid for."""
+"""False alarm rate of a deviating block, divided by the number of blocks."""
 
 
 def error_of(found: MotionFit, k: int = 0) -> ReferenceError:
-    """Strengths of the reference's error in recording k, medians over their posterior, and rows that it lacks."""
+    """Error of the reference in recording k: posterior medians of its strengths, rows, gaps and deviating intervals."""
     problem, draws = found.problems[k], np.exp(found.fitted.draws[:, k])
     middle = np.median(draws, axis=0)
     rows = problem.blocks.rows()
@@ -47,25 +47,25 @@ def error_of(found: MotionFit, k: int = 0) -> ReferenceError:
 
 
 def surprises(found: MotionFit, k: int) -> FloatArray:
-    """(m,) probability that a block lies as far from its prediction as it does, the fit being right; 1 without rows."""
+    """(m,) p-value of each block's innovation under the fit; 1 without rows."""
     problem = found.problems[k]
     with_ = np.exp(found.fitted.strengths[k]).tolist()
     normal = problem.blocks.normal(problem.table, with_)
     theta = found.fitted.mean[problem.index]
     left = (normal.innovations @ np.append(-theta, 1.0)).reshape(-1, 3)
-    # The bias in `mean` is that over time; at the start it is another: the filter's own first blocks take that up.
+    # `mean` has the bias averaged over time, not that at the start: the filter's first blocks absorb the difference.
     return np.asarray(chi2.sf(np.sum(left**2, axis=1), 3))
 
 
 def _runs(time: FloatArray, where: np.ndarray) -> tuple[tuple[float, float], ...]:
-    """Beginning and end of every run."""
+    """Start and end times of every run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
     last = len(time) - 1
     return tuple((float(time[a]), float(time[min(b, last)])) for a, b in edges.reshape(-1, 2))
 
 
 def signs_of_this_gyro(side: Beside, found: MotionFit, k: int) -> tuple[Sign, ...]:
-    """Signs that the reference was computed from this gyro: S and b are then confirmed by it and not measured."""
+    """Evidence that the reference was computed from this gyro: it then confirms S and b, but does not measure them."""
     motion = side.reference.motion
     if motion.attitude is None:
         return ()
@@ -89,17 +89,17 @@ def signs_of_this_gyro(side: Beside, found: MotionFit, k: int) -> tuple[Sign, ..
 
 
 def residual_density(side: Beside, found: MotionFit, k: int) -> float:
-    """White density [rad/s/√Hz] of the difference between gyro and reference from some tenths of a hertz to five."""
+    """White density [rad/s/√Hz] of the difference between gyro and reference from some 0.1 to 5 Hz."""
     fine = side.problem(found.points[k], found.places[k], found.wider, FINE_S)
     rows = fine.blocks.rows()[:, 0] > 0
     change = np.diff(fine.observed.reshape(-1, 3), axis=0)[rows[1:] & rows[:-1]]
-    # Means over neighbouring blocks of a walk differ by two thirds of what it adds in one; a knock does not move the
-    # median of three squares, that of chi-square.
+    # Means of a random walk over neighbouring blocks differ by 2/3 of its variance per block; the median is robust
+    # to knocks and divided by that of chi-square with 3 degrees of freedom.
     return float(np.sqrt(np.median(np.sum(change**2, axis=1)) / (2.0 / 3.0 * FINE_S * chi2.median(3))))
 
 
 def noise_at_rest(side: Beside, found: MotionFit, k: int) -> float:
-    """White density of the gyro's own noise where the log is quietest; more than that is motion."""
+    """White density [rad/s/√Hz] of the gyro's noise in the quietest part of the log; motion adds to it elsewhere."""
     rate = side.corrected(found.points[k])
     n = max(len(rate) // QUIET_PARTS, 8)
     change = np.sum(np.diff(rate, axis=0) ** 2, axis=1) / 6.0

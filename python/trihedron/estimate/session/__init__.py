@@ -1,1 +1,1 @@
-"""The joint estimator of a session, as ``calibrate`` uses it: no effects (docs/model-session.md)."""
+"""The joint estimator of a session as ``calibrate`` uses it, without effects (docs/model-session.md)."""

@@ -1,8 +1,7 @@
-"""Gravity carried through moves by the gyro, and what noise and stated errors allow it to miss (equation 5.1).
+"""Tilt errors after rotations with their noise (equation 5.1), and gravity errors in static poses.
 
-The published figures of a calibration, in sample and held out: always those of the saved S and b.
-
-Norm of gravity at rest with one bias for the session; gravity carried through each move with a bias per pose.
+The published figures of a calibration, in sample and held out, always use the saved S and b: the gravity error in
+static poses with one bias for the session, the tilt error after each rotation with a bias per pose.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ N_ACCELEROMETER, N_GYROSCOPE = 9, 9
 def norm_quality(
     observed: Observed, solution: SessionSolution, held: FloatArray | None, held_sigma: FloatArray | None
 ) -> FitQuality:
-    """Norm of every pose at the saved S, b of the accelerometer; ``held`` (n,) is that of fits without the pose."""
+    """Gravity errors in static poses at the saved S, b of the accelerometer; ``held`` (n,) are the held-out ones."""
     residual, sigma = norm_errors(observed, solution.S_a, solution.b_a)
     dof = max(len(residual) - N_ACCELEROMETER, 0)
     total, chi2 = float(np.sum(residual**2)), float(np.sum((residual / np.maximum(sigma, 1e-300)) ** 2))
@@ -45,13 +44,13 @@ def norm_quality(
         held_out_rms=None if held is None else float(np.sqrt(np.mean(held**2))),
         n_iterations=solution.iterations,
         stopped_because=solution.stopped_because,
-        # What one bias for the session misses of a drift is in the covariance.
+        # The covariance includes the error of one bias for the session under bias drift.
         covariance_scale=max(chi2 / dof, 1.0) if solution.is_drifting and dof else 1.0,
     )
 
 
 def norm_errors(observed: Observed, S_a: FloatArray, b_a: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """``|S a' + b| - |g|`` (n,) and its noise."""
+    """``|S a' + b| - |g|`` (n,) and its noise (n,), m/s²."""
     force = (observed.pose_force + observed.force_origin) @ S_a.T + b_a
     norm = np.linalg.norm(force, axis=1)
     gain = (force / norm[:, None]) @ S_a
@@ -60,7 +59,7 @@ def norm_errors(observed: Observed, S_a: FloatArray, b_a: FloatArray) -> tuple[F
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """What fits without them leave of every pose's norm (n,) with its sigma, and of every move."""
+    """Held-out residuals: gravity error of every pose (n,) with its standard error, m/s², and tilt errors of moves."""
 
     norm: FloatArray
     norm_sigma: FloatArray
@@ -74,10 +73,10 @@ def held_out(
     solution: SessionSolution,
     n_folds: int,
 ) -> HeldOut | None:
-    """Every k-th hold, then every k-th move, left out of the whole fit; ``None`` where too few would remain.
+    """Cross-validation over every k-th pose, then every k-th move; ``None`` where too few would remain.
 
-    Strengths of the biases and widening of the moves are those of the whole session; what the others say is one linear
-    step from its optimum (eq. 11.15).
+    Noise strengths, and the factors on the moves' errors, are those of the whole session; a fit without the fold is one
+    linear step from the optimum (eq. 11.15).
     """
     n, m = len(observed.pose_force), len(observed.before)
     if n_folds < 2 or m - -(-m // n_folds) < N_GYROSCOPE // 2 + 1 or n - -(-n // n_folds) < N_ACCELEROMETER:
@@ -107,7 +106,7 @@ def held_out(
 
 
 def _of_model(observed: Observed, S: FloatArray, b_centred: FloatArray, covariance: FloatArray) -> FloatArray:
-    """(n,) variance of the norm by the model's own uncertainty, ``J C Jᵀ`` with ``J = (u ⊗ a', u)``."""
+    """(n,) variance of the norm by the uncertainty of S, b: ``J C Jᵀ`` with ``J = (u ⊗ a', u)``."""
     force = observed.pose_force @ S.T + b_centred
     up = force / np.linalg.norm(force, axis=1, keepdims=True)
     means = observed.pose_force + observed.force_origin
@@ -119,7 +118,7 @@ def _of_model(observed: Observed, S: FloatArray, b_centred: FloatArray, covarian
 def move_quality(
     measured: MoveMeasurements, solution: SessionSolution, seen: Carried, held: Carried | None, used: FloatArray
 ) -> FitQuality:
-    """The gyro's residuals in sample and held out; a move is two numbers, so rms is per tangent component."""
+    """The gyro's residuals in sample and held out; a tilt error has two components, and rms is per component."""
     is_used = used > 0.0
     g = np.linalg.norm(measured.reading @ solution.S_a.T + solution.b_a, axis=1).mean()
     n = 2 * int(np.count_nonzero(is_used))
@@ -151,9 +150,9 @@ def move_quality(
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """Gravity carried through moves: ``residual`` (m, 3) m/s² with its ``covariance`` (m, 3, 3), ``angle_deg`` (m,).
+    """Tilt errors after moves: ``residual`` (m, 3) m/s² with its ``covariance`` (m, 3, 3), ``angle_deg`` (m,).
 
-    ``floor2`` (m,) is the variance across the vertical by noise of poses and samples, (m/s²)²; ``up`` (m, 3) the
+    ``floor2`` (m,) is the variance across the vertical by noise of poses and samples, (m/s²)²; ``up`` (m, 3) the unit
     vertical after a move, ``wrt_scale`` (m, 3, 9) the derivative of the residual by the gyro's S row by row.
     """
 
@@ -171,7 +170,7 @@ class Carried:
         return out
 
     def spread(self, which: IntArray, n_moves: int) -> Carried:
-        """The same as those ``which`` (m,) of more moves; the others are NaN."""
+        """These moves as the moves ``which`` (m,) of ``n_moves``; the others are NaN."""
 
         def filled(values: FloatArray) -> FloatArray:
             out = np.full((n_moves, *values.shape[1:]), np.nan)
@@ -198,16 +197,16 @@ def carried(
     b_a: FloatArray,
     S_w: FloatArray,
 ) -> Carried:
-    """``B f_i - f_j`` of every move with the pose means at both ends, each pose with a bias of its own.
+    """Tilt error ``B f_i - f_j`` of every move, from the pose means at both ends, with a bias per pose.
 
-    The one definition of gravity after moves: in sample, held out, and of a calibration held against another session.
+    The one definition of the tilt error: in sample, held out, and for a calibration verified on another session.
     """
     model = Linear(np.arange(len(measured.links)), S_a, b_a, S_w)
     return carried_each(measured, anchors_s, [model])
 
 
 def carried_by(calibration: Calibration, S_w: FloatArray, measured: MoveMeasurements, segments: Segments) -> Carried:
-    """:func:`carried` by a calibration, its gyro's scale ``S_w``, of readings as it reads them."""
+    """:func:`carried` with a calibration's accelerometer and averaging, and the gyro's scale ``S_w`` (3, 3)."""
     accelerometer = calibration.accelerometer
     read = replace(measured, rate=sharpened(measured.rate, measured.time_s, calibration.averaging))
     return carried(read, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b, S_w)
@@ -215,7 +214,7 @@ def carried_by(calibration: Calibration, S_w: FloatArray, measured: MoveMeasurem
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """The linear models ``S_a``, ``b_a``, ``S_w`` by which some ``moves`` (k,) are carried."""
+    """Linear models ``S_a``, ``b_a``, ``S_w`` for some ``moves`` (k,)."""
 
     moves: IntArray
     S_a: FloatArray
@@ -224,7 +223,7 @@ class Linear:
 
 
 def carried_each(measured: MoveMeasurements, anchors_s: FloatArray, models: list[Linear]) -> Carried:
-    """:func:`carried` of every move by the model that names it."""
+    """:func:`carried` of every move with the model that contains it."""
     before, after = measured.links[:, 0], measured.links[:, 1]
     m = len(before)
     rotation, wrt_before, wrt_after, cov_rate = np.zeros((4, m, 3, 3))
@@ -251,12 +250,12 @@ def carried_each(measured: MoveMeasurements, anchors_s: FloatArray, models: list
     turn = rotation @ skew
 
     sigma_force, sigma_bias = (np.sqrt(variance)[:, None, :] for variance in (measured.var_reading, measured.var_bias))
-    # Roots of covariances side by side: sums of squares do not go negative by rounding, as turns of gravity about
-    # itself make differences of large parts do.
+    # Roots of covariances side by side: sums of squares stay positive under rounding, unlike the differences of large
+    # terms that rotations about the vertical cause.
     roots = [turn @ _root(cov_rate), rotation @ (S_a * sigma_force[before]), S_a * sigma_force[after],
              turn @ wrt_before @ (S_w * sigma_bias[before]), turn @ wrt_after @ (S_w * sigma_bias[after])]  # fmt: skip
     root = np.concatenate(roots, axis=2)
-    # Zero readings are subtracted: S enters through the rate and through the biases -S z.
+    # Raw biases z are subtracted: S enters through the rate and through -S z.
     wrt_S = wrt_scale.copy()
     for i in range(3):
         wrt_S[:, :, 3 * i : 3 * i + 3] -= (
@@ -275,7 +274,7 @@ def _across2(up: FloatArray, root: FloatArray) -> FloatArray:
 
 
 def _root(covariance: FloatArray) -> FloatArray:
-    """L of L Lᵀ for covariances (..., n, n) that are positive semidefinite but for rounding."""
+    """L with L Lᵀ = C for covariances C (..., n, n) that are positive semidefinite up to rounding."""
     values, vectors = np.linalg.eigh(covariance)
     out: FloatArray = vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]
     return out

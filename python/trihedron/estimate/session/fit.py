@@ -17,28 +17,28 @@ from trihedron.session.averaging import EITHER, sharpened
 from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, START_STRENGTHS, Bounds, Strengths
 
 FALSE_ALARM = 1e-3
-"""Chance that the moves of a sound session are taken for noisier than their samples."""
+"""Probability that moves of a sound session are found to exceed the noise of their samples."""
 NOISE_DOF = 100.0
-"""The predicted noise is itself measured in the recording: to about 7 %, as 100 degrees of freedom give."""
+"""Degrees of freedom of the predicted noise, which is measured in the recording to about 7 %."""
 DEAF = 1e3
-"""Widening at which a row no longer says anything beside the others."""
+"""Factor on a row's standard error at which it has no weight beside the others."""
 LOOSE = 100.0
-"""Widening of moves on the way from a start that may be tens of degrees off: to some degrees, so that it is the gyro's
-scale that follows, and no pose."""
+"""Factor on the moves' standard errors, to some degrees, for a start with tilt errors of tens of degrees: the gyro's
+scale then changes, and the poses do not."""
 LEAST_SHRINK = 0.1
-"""Of residuals by what was fitted to them: hardly any freedom is left, and a ratio of noise says no more."""
+"""Lower limit of degrees of freedom per component: with fewer the ratio of residuals to noise is not meaningful."""
 STATIC_FORCE, MOVES, DYNAMICS = 0, 2, 3
-"""Labels of rows: accelerometer at rest, gravity after a move, velocity over it."""
+"""Labels of rows: accelerometer in poses, tilt error after a rotation, velocity error over a rotation."""
 
 
 @dataclass(frozen=True, eq=False)
 class SessionSolution:
-    """A session at its optimum, in the lower frame, on raw readings.
+    """A session at its optimum, in the lower-triangular frame, on raw readings.
 
-    ``S_a``, ``b_a``, ``S_w``, ``b_w`` with their ``covariance`` (24, 24); biases are those of one for the session.
-    ``moves_chi2`` over ``moves_dof`` degrees of freedom of gravity after the moves, in the noise of the samples.
-    ``inflation`` of the moves' standard errors; ``accel_bias_rms`` the rms by which the biases of the poses differ from
-    the session's by, m/s²: as far as S, b alone must miss.
+    ``S_a``, ``b_a``, ``S_w``, ``b_w`` with their ``covariance`` (24, 24); one bias for the session. ``moves_chi2`` with
+    ``moves_dof`` degrees of freedom is χ² of the tilt errors after rotations by the noise of the samples. ``inflation``
+    has the factors on the standard errors of tilt and velocity; ``accel_bias_rms`` [m/s²] is the rms difference of the
+    poses' biases from the session's: the least gravity error of S, b alone.
     """
 
     S_a: FloatArray
@@ -58,12 +58,12 @@ class SessionSolution:
 
     @property
     def is_drifting(self) -> bool:
-        """Whether the accelerometer's bias walks faster than the noise of parts makes it."""
+        """Whether the accelerometer's bias random walk is stronger than the noise of parts explains."""
         return self.core.strengths[0][0] < NOISE_CORNER_S
 
     def as_read(self, measured: MoveMeasurements) -> MoveMeasurements:
-        """The moves as this solution reads them: sharpened as far as their means are found to be, a bias that its LSB
-        hides in its place, at rest and where readings stand there, and without the errors that they share."""
+        """The moves with this solution's corrections: averaging over the interval, position of undithered biases inside
+        the LSB (in poses and in readings of that LSB), and the errors that all moves share."""
         effect, hidden = self.core.effect, np.flatnonzero(measured.is_undithered)
         place = np.zeros(3)
         place[hidden] = effect[: len(hidden)]
@@ -73,18 +73,18 @@ class SessionSolution:
 
     @property
     def parameters(self) -> FloatArray:
-        """(24,) in the order of ``covariance``."""
+        """Parameters (24,) in the order of ``covariance``."""
         return np.concatenate([self.S_a.ravel(), self.b_a, self.S_w.ravel(), self.b_w])
 
 
 def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray) -> SessionSolution:
-    """Fit a session from a start on raw readings (``S_a`` lower triangular).
+    """Fit a session from initial values on raw readings (``S_a`` lower-triangular).
 
-    How strong the noise of the session is, poses and gravity after moves say. Velocities are heard with a delay between
-    the sensors free: a millisecond hides in their noise, and turned about one axis after another S_ω followed it by
-    eight standard errors. A velocity that is not expected so is left out: what makes it miss (arms between the
-    accelerometers) follows the motion and is no noise. Widened to its size it still pulled a real accelerometer by five
-    of its standard errors.
+    Noise strengths are determined from poses and tilt errors. Velocity errors over rotations are then added, with the
+    delay between the sensors as an unknown: a delay of 1 ms is below their noise, but biased S_ω by eight standard
+    errors in rotations about one axis after another. Velocities are excluded where noise does not explain their χ²: the
+    cause (arms between the accelerometers) follows the motion and is no noise. Even with their variance widened to
+    their size they biased a real accelerometer by five standard errors.
     """
     core = _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (1.0, DEAF)), ANYTHING)
     corner, scatter, between, (gravity, _) = core.strengths
@@ -95,17 +95,17 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
 
 
 def approached(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray) -> _core.SessionFit:
-    """The fit from a start that may be far off: moves count little beside the poses."""
+    """The fit from an initial scale that may be far off: moves have little weight beside the poses."""
     return _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (LOOSE, DEAF)), None)
 
 
 def refitted(observed: Observed, solution: SessionSolution) -> SessionSolution:
-    """The solution with another prior, from where it stands, at the same strengths of all noise."""
+    """The solution with another prior (in ``observed``), started from ``solution``, at the same noise strengths."""
     return _solution(observed, _again(observed, solution.core, solution.core.strengths))
 
 
 def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths) -> _core.SessionFit:
-    """The fit of a session from where another one stands, strengths of all noise given."""
+    """The fit of a session started from another fit, at given noise strengths."""
     state = _core.SessionState(
         force_scale=core.force_scale,
         force_bias=core.force_bias,
@@ -143,7 +143,7 @@ def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
 
 
 def far_moves(solution: SessionSolution, n_moves: int) -> BoolArray:
-    """Moves (m,) that miss far more than the others."""
+    """Moves (m,) whose tilt errors are outliers among all moves."""
     labels = solution.core.labels
     of_gravity = labels[:, 0] == MOVES
     squared = (solution.core.residual[of_gravity] * solution.inflation[0]) ** 2
@@ -152,14 +152,14 @@ def far_moves(solution: SessionSolution, n_moves: int) -> BoolArray:
 
 
 def are_far(distance: FloatArray, dof: float) -> BoolArray:
-    """Of moves that miss by squared Mahalanobis distances (n,) of two components each, with ``dof`` in all, those that
-    none of so many does by chance, in units of the usual miss where that is above the noise of the samples."""
+    """Outliers among squared Mahalanobis distances (n,) of two components each, with ``dof`` degrees of freedom in all:
+    beyond χ² at ``FALSE_ALARM`` for all n, in units of :func:`usual_miss`."""
     return distance > chdtri(2, FALSE_ALARM / len(distance)) * usual_miss(distance, dof)
 
 
 def usual_miss(distance: FloatArray, dof: float) -> float:
-    """What is usual among such distances, of a component, where that is above the noise of the samples; else one."""
-    # Residuals of fitted parameters are smaller.
+    """Squared distance per component, from the median of ``distance`` (n,) and ``dof``; at least 1 (sample noise)."""
+    # The fit reduces the residuals by dof over the number of components.
     shrink = max(dof / (2.0 * len(distance)), LEAST_SHRINK)
     return max(1.0, median(distance) / (MEDIAN_CHI2[2] * shrink))
 
@@ -167,7 +167,7 @@ def usual_miss(distance: FloatArray, dof: float) -> float:
 def _fitted(
     observed: Observed, near: tuple[FloatArray, FloatArray, FloatArray], strengths: Strengths, within: Bounds | None
 ) -> _core.SessionFit:
-    """One fit from a start on raw readings, its strengths chosen ``within`` bounds where these are given."""
+    """One fit from initial values on raw readings; its noise strengths are optimised ``within`` bounds if given."""
     S_a, b_a, S_w = near
     b_a = b_a + S_a @ observed.force_origin
     force = observed.pose_force @ S_a.T + b_a
@@ -190,7 +190,7 @@ def _fit(
     strengths: Strengths,
     within: Bounds | None,
 ) -> _core.SessionFit:
-    """One fit; effects on the readings are taken to SI by the ``scales`` of the sensors (3, 3)."""
+    """One fit; effects on the readings are converted to SI with the ``scales`` (3, 3) of the sensors."""
     force, rate = (
         np.ascontiguousarray(np.einsum("ij,njk->nik", S, effect))
         for S, effect in zip(scales, (observed.force_effect, observed.rate_effect), strict=True)
@@ -206,7 +206,7 @@ def _fit(
 
 
 def _misfits(core: _core.SessionFit) -> tuple[FloatArray, FloatArray]:
-    """χ² and degrees of freedom of every domain."""
+    """χ² (4,) and degrees of freedom (4,) by domain (label of the rows)."""
     domain = core.labels[:, 0]
     chi2, dof = (np.bincount(domain, of_rows, DYNAMICS + 1) for of_rows in (core.residual**2, 1.0 - core.leverage()))
     return np.asarray(chi2, dtype=np.float64), np.asarray(dof, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""What the session model is given: pose means, moves and their noise, centred, in raw units."""
+"""Input of the session model: pose means, moves and their noise, centred, in raw units."""
 
 from __future__ import annotations
 
@@ -16,25 +16,23 @@ from trihedron.session.averaging import EITHER, sharpened
 from trihedron.session.noise import Along, measure_noise, scatter_unit
 
 LOWER = np.tril_indices(3)
-"""Elements of a lower triangular scale, row by row."""
+"""Indices of a lower-triangular scale, row by row."""
 DELAY_S = 0.005
-"""By how much one sensor's filter delays it more than the other's, beforehand, or one is read out later: parts of
-their data sheets differ by up to some ms."""
+"""Prior σ of the delay between the sensors, by filters or readout: data sheets differ by up to some ms."""
 HELD = 1e-10
-"""Relative standard error of what is given: far below any noise, and above what rounding does to the rows."""
+"""Relative prior σ of a given accelerometer: far below any noise, and above rounding errors in the rows."""
 
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """One session for the core, readings minus ``force_origin``, ``rate_origin`` (3,).
+    """One session for the core; readings are relative to ``force_origin``, ``rate_origin`` (3,).
 
     Pose means and standard errors (n, 3), densities (3,) raw · √s, the samples of the ``moves`` with the poses
-    ``before`` (m,) they begin in; ``force_up``, ``force_scatter`` as in :class:`SessionNoise`. ``force_effect``,
-    ``rate_effect`` (poses, then samples of moves, 3, k), raw, are what k unknowns of standard deviation
-    ``effect_sigma`` (k,) add to the readings: the place of the bias inside its LSB, of the ``n_hidden`` axes whose
-    noise does not dither it; how far readings are means over their interval, from ``EITHER`` on; errors that all moves
-    share; the delay of the accelerometer. ``prior``: mean (18,) and covariance (18, 18) of both linear models on
-    centred readings.
+    ``before`` (m,) in which they begin; ``force_up``, ``force_scatter`` as in :class:`SessionNoise`. ``force_effect``,
+    ``rate_effect`` (poses, then samples of moves, 3, k), raw, are the derivatives of the readings by k unknowns with
+    prior σ ``effect_sigma`` (k,): position of the bias inside its LSB, for the ``n_hidden`` axes whose noise does not
+    dither it; averaging of readings over their interval, relative to ``EITHER``; errors that all moves share; delay of
+    the accelerometer. ``prior``: mean (18,) and covariance (18, 18) of both linear models on centred readings.
     """
 
     gravity_m_s2: float
@@ -60,7 +58,7 @@ class Observed:
     prior: tuple[FloatArray, FloatArray] | None = None
 
     def model(self) -> _core.SessionModel:
-        """The Rust model; biases may scatter from pose to pose as far as the evidence goes."""
+        """The Rust model; bias repeatability from pose to pose is not bounded, but determined by the evidence."""
         poses = _core.SessionPoses(
             time_s=self.pose_time_s,
             force=self.pose_force,
@@ -85,7 +83,7 @@ class Observed:
 def arranged(
     recording: Recording, segments: Segments, measured: MoveMeasurements, gravity_m_s2: float, used: BoolArray
 ) -> Observed:
-    """Arrange measured holds and the moves in use; neighbouring still samples bracket each move."""
+    """Arrange the poses and the moves ``used`` (m,) for the core; one static sample on either side brackets a move."""
     assert recording.accelerometer is not None
     n = recording.n_samples
     force_origin, rate_origin = measured.reading.mean(axis=0), measured.bias_read.mean(axis=0)
@@ -107,11 +105,11 @@ def arranged(
     assert noise.rate_density is not None
     unresolved = noise.unresolved
     if measured.reading_variance is not None:
-        # What rounding and bridged clipping leave open, beside what any session has.
+        # Variance of rounding and of bridged clipping, in addition to that of any session.
         for k, (a, b) in enumerate(ranges):
             unresolved[k, 1] += measured.reading_variance[a:b].sum(axis=0) * measured.nominal_step_s**2
     pose_time_s = np.ascontiguousarray(segments.time_mid_s, dtype=np.float64)
-    # Of readings that noise does not dither, what toggles and what drifts; their place in the step is a column.
+    # Undithered readings: noise and drift; the position of the bias inside the LSB is a column.
     is_coarse, coarse = measured.is_undithered, np.flatnonzero(measured.is_undithered)
     lasts_s = np.array([pose.stop - pose.start for pose in segments.poses]) * measured.nominal_step_s
     of_coarse = np.sqrt(measured.var_bias + measured.noise_density**2 / lasts_s[:, None])
@@ -122,7 +120,7 @@ def arranged(
         rate_origin=rate_origin,
         pose_time_s=pose_time_s,
         pose_force=measured.reading - force_origin,
-        # Where readings dither too little their rounding does not average out: the larger of the two.
+        # Without dither the rounding error does not average out: the larger of both standard errors is used.
         pose_force_sigma=np.maximum(noise.force_sigma, np.sqrt(measured.var_reading_noise)),
         force_density=noise.force_density,
         pose_rate=np.where(is_coarse, measured.bias, measured.bias_read) - rate_origin,
@@ -154,7 +152,7 @@ def arranged(
 def _effects(
     recording: Recording, measured: MoveMeasurements, readings: FloatArray, ranges: list[tuple[int, int]]
 ) -> tuple[FloatArray, FloatArray]:
-    """What a unit of each unknown adds to force and rate, see :class:`Observed`; ``readings`` are the force's."""
+    """``force_effect`` and ``rate_effect`` of :class:`Observed`; ``readings`` (samples, 3) are the accelerometer's."""
     n_poses = len(measured.reading)
     places = np.eye(3)[:, measured.is_undithered]
     force, rate = (
@@ -173,8 +171,8 @@ def _effects(
 
 
 def with_prior(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray, *, is_given: bool) -> Observed:
-    """The session with what is known of both models beforehand: scales are as large as they look (``S_a`` (3, 3) lower
-    triangular, ``b_a`` (3,) m/s², ``S_w`` (3, 3)), or an accelerometer ``is_given``.
+    """The session with a prior on both linear models: mean ``S_a`` (3, 3) lower-triangular, ``b_a`` (3,) m/s², ``S_w``
+    (3, 3); σ is the norm of either scale, and |g| for ``b_a``. The accelerometer is fixed if it ``is_given``.
     """
     mean = np.concatenate([S_a[LOWER], b_a + S_a @ observed.force_origin, S_w.ravel()])
     sizes = float(np.linalg.norm(S_a, 2)), observed.gravity_m_s2, float(np.linalg.norm(S_w, 2))
@@ -183,19 +181,19 @@ def with_prior(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatA
 
 
 def _samples_of(ranges: list[tuple[int, int]], samples: FloatArray) -> FloatArray:
-    """Samples (n,) or (n, 3) of the moves alone, move after move: nothing else of a long log is asked for."""
+    """Samples of the moves alone, move after move, from (n,) or (n, 3): nothing else of a long log is read."""
     return np.concatenate([samples[a:b] for a, b in ranges]) if ranges else samples[:0]
 
 
 def _in_turn(ranges: list[tuple[int, int]]) -> npt.NDArray[np.int64]:
-    """Where each move lies in what :func:`_samples_of` makes of these ``ranges``, (m, 2)."""
+    """Range (m, 2) of each move in the result of :func:`_samples_of`."""
     ends = np.cumsum([b - a for a, b in ranges], dtype=np.int64)
     starts = np.concatenate([[0], ends[:-1]]) if ranges else ends
     return np.ascontiguousarray(np.column_stack([starts, ends]), dtype=np.int64).reshape(-1, 2)
 
 
 def _slopes(time_s: FloatArray, values: FloatArray, ranges: list[tuple[int, int]]) -> FloatArray:
-    """Time derivative of ``values`` (n, 3) at the samples of ``ranges``, one after the other."""
+    """Time derivative of ``values`` (n, 3), per second, at the samples of ``ranges``, move after move."""
     if not ranges:
         return np.zeros((0, 3))
     return _core.move_derivative(_samples_of(ranges, time_s), _samples_of(ranges, values), _in_turn(ranges))

@@ -1,4 +1,4 @@
-"""A recording's session solved: from the moves alone to both sensors and the certainty of both."""
+"""Solution of a recording's session: initial scale, outlier moves, fit of both sensors, and their uncertainties."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def calibrate_moves(
     gravity_m_s2: float,
     options: MoveOptions | None = None,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
-    """Calibrate the gyro so that its integrated moves carry each pose's gravity into the next (equations 5.1-5.7).
+    """Calibrate the gyro from the tilt errors after rotations between poses (equations 5.1-5.7).
 
     Parameters
     ----------
@@ -53,12 +53,12 @@ def calibrate_moves(
     Returns
     -------
     SensorCalibration, tuple of Finding
-        ``ω = S raw + b`` in rad/s, and what was noticed.
+        ``ω = S raw + b`` in rad/s, and the findings.
 
     Raises
     ------
     ValueError
-        When a sensor or every move is missing, or nothing tells the scale to start from.
+        When a sensor or every move is missing, or no initial scale can be determined.
     """
     log = Log(recording, segments, accelerometer, gravity_m_s2, is_given=True)
     found = solved(log, options or MoveOptions())
@@ -66,15 +66,15 @@ def calibrate_moves(
 
 
 HIDDEN_S = 0.01 * 2.0 ** np.arange(7)
-"""Turns that are tried, in seconds of a rate of one LSB: what settles unseen stays below it for tenths of a second."""
+"""Rotations below the LSB that are tried, in seconds at a rate of one LSB: a support settles in tenths of a second."""
 
 
 @dataclass(frozen=True, eq=False)
 class SolvedSession:
-    """A session at its optimum, in the lower frame.
+    """A session at its optimum, in the lower-triangular frame.
 
-    ``covariance`` (24, 24) with all that is charged to its parameters; ``gyroscope``'s record and ``held_out``
-    predictions follow from it; ``findings`` are those of the moves.
+    ``covariance`` (24, 24) of the parameters includes bias dependence on attitude and lost samples; ``gyroscope`` is
+    the gyro's record, ``held_out`` the cross-validated residuals; ``findings`` are those of the moves.
     """
 
     observed: Observed
@@ -87,7 +87,7 @@ class SolvedSession:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """A session fitted to the moves ``used`` (m,), others being lost or far from these; all are ``seen``."""
+    """A session fitted to the moves ``used`` (m,), without clipped moves and outliers; ``seen`` are all tilt errors."""
 
     measured: MoveMeasurements
     used: BoolArray
@@ -97,17 +97,17 @@ class _Fit:
 
     @property
     def outliers(self) -> tuple[int, ...]:
-        """Moves that were excluded."""
+        """Moves that were excluded as outliers."""
         return tuple(np.flatnonzero(~self.used & ~self.measured.is_lost).tolist())
 
 
 def solved(log: Log, options: MoveOptions) -> SolvedSession:
-    """The session model from the scale that is nearest to the moves (docs/model-session.md).
+    """Fit the session model from the initial scale with the least tilt errors (docs/model-session.md).
 
     Raises
     ------
     ValueError
-        When a sensor or every move is missing, or nothing tells the scale to start from.
+        When a sensor or every move is missing, or no initial scale can be determined.
     """
     measured, near = begun(log, options.nominal())
     found = _with_hidden_turns(log, _fitted(log, measured, near), near)
@@ -140,8 +140,8 @@ def solved(log: Log, options: MoveOptions) -> SolvedSession:
 
 
 def _fitted(log: Log, measured: MoveMeasurements, near: Near) -> _Fit:
-    """The fit of the moves that are not far from the others: one that was knocked would be shared out among all as if
-    each were so uncertain. What was excluded at first comes back where the fit of the others does not deny it."""
+    """The fit without outlier moves: a disturbed move would widen the variance of all. Moves that were excluded at
+    first are included again where the fit of the others does not contradict them."""
     used = near_one_another(log, measured, near)
     found = _fit(log, measured, used, near)
     if found.outliers:
@@ -165,7 +165,7 @@ def _fit(log: Log, measured: MoveMeasurements, used: BoolArray, near: Near) -> _
 
 
 def _denied(found: _Fit) -> BoolArray:
-    """Moves (m,) that miss beyond what they and the fit leave open."""
+    """Moves (m,) whose tilt error exceeds its noise and the uncertainty of the fit at ``FALSE_ALARM``."""
     residual, noise, slope = found.seen.in_plane()
     of_fit = slope @ found.solution.covariance[12:21, 12:21] @ np.swapaxes(slope, 1, 2)
     covariance = found.solution.inflation[0] ** 2 * noise + of_fit
@@ -175,9 +175,9 @@ def _denied(found: _Fit) -> BoolArray:
 
 
 def _with_hidden_turns(log: Log, plain: _Fit, near: Near) -> _Fit:
-    """Every move with a turn that its LSB hides, as a support makes that settles, of the rms that is likeliest.
+    """The fit with the variance of a rotation below the LSB, as of a settling support, in every move, by likelihood.
 
-    Where samples may have been lost unseen these are asked for first: they would be as good a reason for the misses.
+    Unchanged where lost samples may explain the tilt errors: these are tested first.
     """
     measured = plain.measured
     if not np.any(measured.is_undithered) or _is_asked_for_losses(log, plain):
@@ -196,9 +196,9 @@ def _with_hidden_turns(log: Log, plain: _Fit, near: Near) -> _Fit:
 
 
 def in_frame_of(accelerometer: SensorCalibration, found: SolvedSession) -> SensorCalibration:
-    """The gyro in the frame of the accelerometer that was given, whose own errors are in its covariance.
+    """The gyro in the frame of the given accelerometer, whose covariance is propagated into the gyro's.
 
-    Each of the accelerometer's standard errors turns the frame and moves what the session is held to.
+    For each principal error of the accelerometer the session is refitted with the shifted prior in the rotated frame.
     """
     R = lower(accelerometer.S, accelerometer.b)[2].T
     to_frame = np.zeros((12, 12))
@@ -215,9 +215,9 @@ def in_frame_of(accelerometer: SensorCalibration, found: SolvedSession) -> Senso
 
 
 def _standard_errors(covariance: FloatArray) -> FloatArray:
-    """Rows (k, 12) whose squares sum to a covariance (12, 12)."""
+    """Principal errors: rows (k, 12) whose outer products sum to the covariance (12, 12)."""
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    # Scaled first: counts and m/s² spread the variances over many decades.
+    # Scaled to a correlation matrix: in counts and m/s² the variances span many decades.
     values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
     keep = values > 1e-10 * float(values.max())
     out: FloatArray = (size[:, None] * vectors[:, keep] * np.sqrt(values[keep])).T
@@ -229,7 +229,7 @@ def _is_asked_for_losses(log: Log, found: _Fit) -> bool:
 
 
 def _losses(log: Log, found: _Fit) -> PossibleLosses:
-    """Samples lost unseen that may be behind what the moves miss."""
+    """Undetected lost samples that may explain the tilt errors."""
     if not _is_asked_for_losses(log, found):
         return PossibleLosses()
     missed, dof = (found.seen.angle_deg, found.seen.floor2), found.solution.moves_dof

@@ -1,4 +1,4 @@
-"""Where the fit of a session begins: what was cut or not at the gyro's limit, and the scale nearest to the moves."""
+"""Initial values for the fit of a session: whether the gyro clipped, and the scale with the least tilt errors."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from trihedron.sensor_model import reframing
 from trihedron.units import rate_to_si
 
 ASTRAY_DEG = 5.0
-"""Nine numbers bend to a dozen moves in a wrong minimum until half of them miss by 10°; of the real recordings none
-misses by 2° in the median (`benches/recordings.py`)."""
+"""Median tilt error that shows a wrong minimum: there half of a dozen moves are off by 10°; of the real recordings none
+has a median of 2° (`benches/recordings.py`)."""
 DENIED = 0.1
-"""Part of what peaks that were cut would be short of by which gravity is missed, and they were not."""
+"""Tilt error without bridging, relative to the angle that bridging adds, below which nothing was clipped."""
 
 CAUCHY = 3.0
-"""Usual misses at which a move counts half while it is found out which moves are far from the others."""
+"""Distance, in usual ones, at which a move has half the weight in the robust fit (Cauchy)."""
 ROUNDS = 20
-"""Of weighing moves anew: it converges in ten."""
+"""Iterations of the weights: they converge in ten."""
 
 Near = tuple[FloatArray, FloatArray, FloatArray]
-"""``S_a`` (3, 3) lower triangular, ``b_a`` (3,) and ``S_w`` (3, 3) to begin from."""
+"""Initial ``S_a`` (3, 3) lower-triangular, ``b_a`` (3,) and ``S_w`` (3, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """What a session is solved from; an accelerometer that ``is_given`` is held."""
+    """Input of a session's fit; an accelerometer that ``is_given`` is fixed."""
 
     recording: Recording
     segments: Segments
@@ -47,7 +47,7 @@ class Log:
     is_given: bool
 
     def measured(self, *, is_bridged: bool) -> MoveMeasurements:
-        """Its moves."""
+        """Measurements of its moves; clipped readings are bridged if ``is_bridged``."""
         return measure_moves(self.recording, self.segments, self.accelerometer, is_bridged=is_bridged)
 
     def observed(self, measured: MoveMeasurements, used: BoolArray, near: Near) -> Observed:
@@ -56,16 +56,16 @@ class Log:
         return with_prior(out, *near, is_given=self.is_given)
 
     def anchors_s(self, measured: MoveMeasurements) -> FloatArray:
-        """(m, 2) the middles of the poses at the ends of each move."""
+        """(m, 2) times of the middles of the poses before and after each move [s]."""
         return self.segments.time_mid_s[measured.links]
 
 
 def begun(log: Log, nominal: FloatArray | None) -> tuple[MoveMeasurements, Near]:
-    """Moves of a session, and where its fit begins; ``nominal`` (3, 3) is the gyro's scale where it is given.
+    """Moves of a session and initial values of its fit; ``nominal`` (3, 3) is the gyro's scale where it is given.
 
-    A machine that always turns at one speed, seen through an ADC coarser than its noise, ends at one code, as a
-    gyro at its limit does. Had peaks been cut there, the readings as they are would fall short by what bridges them.
-    Where gravity is carried far better than that, nothing was cut, unless the code is the end of an ADC's word.
+    A machine that always turns at one speed, logged by an ADC coarser than its noise, ends at one code as a clipping
+    gyro does. With clipping the tilt errors of the readings as logged would be as large as the angle that bridging
+    adds. Where they are far smaller nothing was clipped, unless the code is the end of an ADC's word.
     """
     bridged = log.measured(is_bridged=True)
     is_word = any(limit.is_word for limit in log.recording.facts.of("gyroscope").limits)
@@ -78,15 +78,15 @@ def begun(log: Log, nominal: FloatArray | None) -> tuple[MoveMeasurements, Near]
 
 
 def lower(S: FloatArray, b: FloatArray) -> Near:
-    """An accelerometer in the lower frame, and the rotation (3, 3) into it."""
+    """S and b of an accelerometer in the lower-triangular frame, and the rotation (3, 3) into it."""
     R = reframing(S, b, "lower").rotation
     return np.tril(R @ S), R @ b, R
 
 
 def near_one_another(log: Log, measured: MoveMeasurements, near: Near) -> BoolArray:
-    """Moves (m,) that are not far from the others at a robust fit of the gyro's scale, which those do not bend.
+    """Moves (m,) that are no outliers at a robust fit (Cauchy weights) of the gyro's scale.
 
-    Of too few moves none is judged by the others.
+    With too few moves none is excluded.
     """
     used = ~measured.is_lost
     residual, covariance, slope = carried(measured, log.anchors_s(measured), *near).in_plane()
@@ -107,7 +107,7 @@ def near_one_another(log: Log, measured: MoveMeasurements, near: Near) -> BoolAr
 
 
 def is_enough(used: BoolArray) -> bool:
-    """Whether moves (m,) determine a gyro and more, so that they judge others."""
+    """Whether the moves ``used`` (m,) overdetermine the gyro's scale, so that outliers can be identified."""
     return 2 * int(np.count_nonzero(used)) > N_GYROSCOPE + 2
 
 
@@ -127,7 +127,7 @@ def _near(log: Log, measured: MoveMeasurements, nominal: FloatArray | None) -> N
 
 
 def _nearest(log: Log, measured: MoveMeasurements, scales: FloatArray) -> Near:
-    """Of the scales (k, 3, 3), each followed to where the moves are missed least, the one that misses least."""
+    """The best fit from the initial scales (k, 3, 3): that with the least χ² after each was fitted to the moves."""
     S_a, b_a, R = lower(log.accelerometer.S, log.accelerometer.b)
     observed = arranged(log.recording, log.segments, measured, log.gravity_m_s2, ~measured.is_lost)
     found = []
@@ -152,9 +152,9 @@ def _usually_missed_deg(log: Log, measured: MoveMeasurements, near: Near) -> flo
 
 
 def usual_deg(angle_deg: FloatArray, measured: MoveMeasurements, S_a: FloatArray, b_a: FloatArray) -> float:
-    """Median of angles (m,) over the moves that bring gravity elsewhere; over all where none does.
+    """Median of tilt errors (m,) over the moves that change gravity's direction; over all where none does.
 
-    A turn about the vertical carries gravity right whatever the gyro's scale.
+    A rotation about the vertical has no tilt error whatever the gyro's scale.
     """
     forces = measured.reading @ S_a.T + b_a
     up = forces / np.linalg.norm(forces, axis=1, keepdims=True)
@@ -164,9 +164,9 @@ def usual_deg(angle_deg: FloatArray, measured: MoveMeasurements, S_a: FloatArray
 
 
 def denies_cut(S: FloatArray, missed_deg: FloatArray, bridged: MoveMeasurements, measured: MoveMeasurements) -> bool:
-    """Whether gravity is carried through the moves that look cut as only whole turns carry it.
+    """Whether the tilt errors of seemingly clipped moves are too small for readings that are clipped.
 
-    ``missed_deg`` (m,) is by how much the readings as they are (``measured``) miss it, under the scale S.
+    ``missed_deg`` (m,) are the tilt errors of the readings as logged (``measured``), with the scale S.
     """
     added = (bridged.rate - measured.rate) @ S.T * measured.nominal_step_s
     cut = bridged.clipped_s > 0.0

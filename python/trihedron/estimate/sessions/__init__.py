@@ -1,1 +1,1 @@
-"""Many sessions of one unit: variances between them, changes among them, and how they follow temperature."""
+"""Many sessions of one unit: variances between sessions, changes among them, and dependence on temperature."""

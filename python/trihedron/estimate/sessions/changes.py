@@ -1,9 +1,9 @@
-r"""Is a number the same in all sessions, and where does it change? (docs/many-recordings.md)
+r"""Test whether a parameter is the same in all sessions, and where it changes (docs/many-recordings.md).
 
-Per group of numbers (three of an id) the sessions' values y_s with covariance V_s (own error and wander) are held
-against one common value: ``H = Σ (y_s - ȳ)ᵀ V_s⁻¹ (y_s - ȳ)``, ``H/(3(n-1)) ~ F(3(n-1), ν)``; Holm's procedure pays for
-the ids. Where they differ, the simplest change that leaves the rest alike is named: one session apart, a step at one
-place, an even trend; else every session scatters.
+Per group of parameters (three of an id) the sessions' values y_s with covariance V_s (own error and bias drift) are
+tested against one common value: ``H = Σ (y_s - ȳ)ᵀ V_s⁻¹ (y_s - ȳ)``, ``H/(3(n-1)) ~ F(3(n-1), ν)``; Holm's procedure
+corrects for the number of ids. Where they differ, the simplest change after which the rest agrees is reported: one
+session apart, a step at one place, an even trend; else scatter.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from trihedron.probability import fdtrc
 from trihedron.records.sessions import PARAMETERS, Change, ChangeKind, Session
 
 SPREAD_DOF, DRIFT_DOF = 25.0, 5.0
-"""Degrees of freedom a session that its covariance and its wander bring: some 25 poses, and half of what was measured
-for the wander of a pair of sessions (:mod:`trihedron.diagnose.against.numbers`). An inverse of an estimate is too large
-by ν/(ν - 2) on average; the weights of sessions are taken back by it, or ten sessions would be called changed by chance
-in 3.5 % of units instead of 1."""
+"""Degrees of freedom per session of its covariance and of its bias drift: some 25 poses, and half of that measured for
+the drift of a pair of sessions (:mod:`trihedron.diagnose.against.numbers`). The inverse of an estimated covariance is
+too large by ν/(ν - 2) on average; the weights are reduced by it, or 3.5 % of units with ten sessions would be reported
+as changed instead of 1 %."""
 RIDGE = 1e-9
-"""Variance, relative to its group's largest, below which a covariance is not told from zero."""
+"""Variance added to the diagonal, relative to the mean variance, so that a singular covariance can be inverted."""
 
 
 @dataclass(frozen=True)
@@ -34,10 +34,10 @@ class _Candidate:
 
 
 def changes_among(units: Sequence[Sequence[Session]], *, alpha: float) -> tuple[Change, ...]:
-    """One :class:`Change` an id and unit, in the order of the contract; a unit's sessions are in their order in time.
+    """One :class:`Change` per id and unit, in the order of ``PARAMETERS``; a unit's sessions are in order of time.
 
-    ``alpha`` is the chance that any id of any unit is called changed where none did: Holm's procedure over all of them.
-    Units with a single session are passed over.
+    ``alpha`` is the probability that any id of any unit without a change is significant: Holm's procedure over all.
+    Units with a single session are skipped.
     """
     found: list[Change] = []
     for sessions in units:
@@ -58,7 +58,7 @@ def changes_among(units: Sequence[Sequence[Session]], *, alpha: float) -> tuple[
 def _change(sessions: Sequence[Session], name: str) -> Change:
     picked = [k for k, parameter in enumerate(PARAMETERS) if parameter.id == name]
     values = np.array([session.numbers[picked] for session in sessions])
-    # The wander of one session is read off few poses: that of the unit is the mean over its sessions.
+    # The bias drift of one session is estimated from few poses: the mean over the unit's sessions is used.
     drift = np.mean([session.drift[picked] for session in sessions], axis=0)
     weights = np.array([_weight(session, picked, drift) for session in sessions])
     names = tuple(PARAMETERS[k].name for k in picked)
@@ -84,7 +84,7 @@ def _change(sessions: Sequence[Session], name: str) -> Change:
 
 
 MIN_REST_P = 0.01
-"""What is left after the change named may be chance: at 1 % one change in a hundred is called scatter instead."""
+"""p-value of the rest after the reported change, below which it is scatter: 1 % of true changes are called scatter."""
 
 
 def _weight(session: Session, picked: list[int], drift: FloatArray) -> FloatArray:
@@ -124,7 +124,7 @@ def _p(statistic: float, dof: int, name: str, n_sessions: int) -> float:
 
 
 def _candidates(n: int) -> Iterator[_Candidate]:
-    """One session apart, then steps that leave two on either side, then an even trend."""
+    """Candidates for n sessions: one session apart, then steps with two or more on either side, then an even trend."""
     if n == 2:
         yield _Candidate("differs", 1, np.array([0.0, 1.0]))
         return
@@ -137,7 +137,7 @@ def _candidates(n: int) -> Iterator[_Candidate]:
 
 
 def _best(values: FloatArray, weights: FloatArray, name: str) -> tuple[_Candidate | None, float]:
-    """The candidate that leaves least, and how well the rest then agrees."""
+    """The candidate with the least H after it, and the p-value of that rest."""
     n, k = values.shape
     left = [(_left(values, weights, candidate.column), candidate) for candidate in _candidates(n)]
     least, best = min(left, key=lambda pair: pair[0])
@@ -146,7 +146,7 @@ def _best(values: FloatArray, weights: FloatArray, name: str) -> tuple[_Candidat
 
 
 def _stands_out(values: FloatArray, weights: FloatArray, best: _Candidate) -> bool:
-    """Whether a change stands out of the scatter of the rest, however large that is; the search is paid for."""
+    """Whether a change exceeds the scatter of the rest (F test), corrected for the number of candidates."""
     n, k = values.shape
     dof = k * (n - 2)
     if n < 4:
@@ -159,7 +159,7 @@ def _stands_out(values: FloatArray, weights: FloatArray, best: _Candidate) -> bo
 def _as_gravity(
     name: str, names: tuple[str, ...], values: FloatArray, weights: FloatArray
 ) -> tuple[float, FloatArray, FloatArray, str, tuple[str, ...]]:
-    """p of one common value; accelerometer scales that change alike on all axes are gravity, one number a session."""
+    """p of one common value; accelerometer scales that change equally on all axes are gravity, one value a session."""
     n, k = values.shape
     p_value = _p(_left(values, weights, None), k * (n - 1), name, n)
     if name != "accel-scale" or p_value >= MIN_REST_P:
@@ -167,7 +167,7 @@ def _as_gravity(
     ones = np.ones(k)
     variance = np.array([1.0 / float(ones @ w @ ones) for w in weights])
     common = np.array([v * float(ones @ w @ y) for v, w, y in zip(variance, weights, values, strict=True)])
-    # What each axis has beside the common scale of its session is alike in all sessions: two numbers each.
+    # Gravity only if the scales relative to the session's common one are equal in all sessions (k - 1 dof each).
     shape = values - common[:, None]
     if _p(_left(shape, weights, None), (k - 1) * (n - 1), name, n) < MIN_REST_P:
         return p_value, values, weights, name, names

@@ -1,4 +1,4 @@
-"""Standard deviations between sessions with intervals that hold for few of them (docs/many-recordings.md).
+"""Standard deviations between sessions with intervals that are valid for few sessions (docs/many-recordings.md).
 
 The model of one parameter: ``y_ij = μ + d_i + u_ij + e_ij``, ``d`` of the group (day, device) with variance σ_d²,
 ``u`` of the session with σ_u², ``e`` the session's own error with known variance. The point is the restricted maximum
@@ -7,7 +7,7 @@ of likelihood. The interval inverts the weighted sum of squares
     Q(σ²) = Σ w_ij (y_ij - ȳ_i)²,   w = 1/(σ² + v_ij),   Q(σ_u²) ~ χ²_ν                                        (1)
 
 which is exact for any number of sessions (Hartung and Knapp 2005; Viechtbauer 2007). Between groups the variance of a
-group's mean depends on σ_u, which is not known: (1) is averaged over what (1) says of σ_u (a generalised interval).
+group's mean depends on the unknown σ_u: (1) is averaged over the distribution of σ_u by (1) (a generalised interval).
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from trihedron.records.sessions import PARAMETERS, Repeated, Session, Spread
 
 
 def repeated_parameters(sessions: Sequence[Session]) -> tuple[Repeated, ...]:
-    """The numbers of all sessions, one parameter after the other; sessions are grouped by their ``group``.
+    """Mean and spreads of each parameter over all sessions, which are grouped by their ``group``.
 
-    Where every session is a group of its own there is one spread, from session to session, as ``within``.
+    Where every session is its own group there is one spread, between sessions, in ``within``.
 
     Raises
     ------
@@ -50,9 +50,9 @@ def repeated_parameters(sessions: Sequence[Session]) -> tuple[Repeated, ...]:
 
 
 def next_session(sessions: Sequence[Session], repeated: Sequence[Repeated]) -> tuple[FloatArray, FloatArray]:
-    """(k,) by how much the next session's numbers differ from the common ones, and the errors of those, one sigma.
+    """(k,) standard deviations of the next session's parameters from the common ones, and of the errors of these.
 
-    The axes of a kind repeat alike: three axes of two sessions say more of how far than one.
+    The axes of an id are assumed to have one repeatability, which is estimated from all of them.
     """
     groups = _groups(sessions)
     numbers = np.array([session.numbers for session in sessions])
@@ -74,15 +74,15 @@ def _groups(sessions: Sequence[Session]) -> list[str]:
 
 LEVEL = 0.95
 QUANTILES = 60
-"""Points of the distribution of σ_u over which an interval of σ_d is averaged: twice as many move its ends by less
+"""Points of the distribution of σ_u over which an interval of σ_d is averaged: twice as many change its ends by less
 than 1 %."""
 BISECTIONS = 60
-"""Halvings of an interval of seven decades: the result is exact to rounding."""
+"""Bisections of the interval of ln σ²: the result is exact to rounding."""
 
 
 @dataclass(frozen=True)
 class Mean:
-    """``value`` with its standard error, and half the width of its interval at :data:`LEVEL`."""
+    """``value`` with its standard uncertainty, and half the width of its interval at :data:`LEVEL`."""
 
     value: float
     std: float
@@ -90,7 +90,7 @@ class Mean:
 
 
 def spread_within(values: FloatArray, variances: FloatArray, groups: Sequence[object]) -> Spread | None:
-    """σ_u of sessions (n,) about the mean of their group; ``None`` where no group holds two.
+    """σ_u of sessions (n,) about the mean of their group; ``None`` where no group has two sessions.
 
     ``variances`` (n,) are those of the sessions' own errors.
     """
@@ -102,10 +102,10 @@ def spread_within(values: FloatArray, variances: FloatArray, groups: Sequence[ob
 
 
 def spread_between(values: FloatArray, variances: FloatArray, groups: Sequence[object]) -> Spread | None:
-    """σ_d of groups about their mean; ``None`` for a single group or where no group holds two sessions.
+    """σ_d of groups about their mean; ``None`` for a single group or where no group has two sessions.
 
-    With one session a group, what differs from group to group and from session to session is one number: that of
-    :func:`spread_within` with all sessions in one group.
+    With one session per group, σ_d and σ_u are not separable: :func:`spread_within` with all sessions in one group
+    estimates both together.
     """
     members = _members(groups)
     dof_within = sum(len(group) - 1 for group in members)
@@ -128,11 +128,11 @@ def spread_between(values: FloatArray, variances: FloatArray, groups: Sequence[o
 
 
 def spread_of_next(spread: Spread | None) -> float:
-    """Standard deviation of which ±1.96 pose another session, about the mean, in 95 %.
+    """Standard deviation of which ±1.96 about the mean contain another session with 95 %.
 
-    The likeliest spread of few sessions is often zero, and never certain: what (1) leaves possible is a χ² law of the
-    variance through its upper end, and a value drawn with a variance of that law is Student's. Without errors of the
-    sessions' own that is exact.
+    The most likely spread of few sessions is often zero but uncertain: the variance has a scaled inverse χ²
+    distribution through the upper end of its interval, and a value drawn with it is Student's t. This is exact where
+    the sessions' own errors are zero.
     """
     if spread is None:
         return 0.0
@@ -144,9 +144,9 @@ def spread_of_next(spread: Spread | None) -> float:
 def common_mean(
     values: FloatArray, variances: FloatArray, groups: Sequence[object], within: Spread | None, between: Spread | None
 ) -> Mean:
-    """μ with an interval that counts how few groups there are (Hartung and Knapp 2001).
+    """μ with an interval that accounts for the number of groups (Hartung and Knapp 2001).
 
-    The weighted mean of group means; its variance is that of their scatter about it, never less than stated.
+    The weighted mean of group means; its variance is that of their scatter about it, at least the stated one.
     """
     if within is None:
         value = float(np.average(values, weights=1.0 / variances))
@@ -173,7 +173,7 @@ def _chi_square(above: Iterable[float], dof: int) -> FloatArray:
 
 @cache
 def _exceeded(above: float, dof: int) -> float:
-    # The same some hundred values for each of the 21 parameters.
+    # Cached: the same hundred values serve all 21 parameters.
     return chdtri(dof, above)
 
 
@@ -187,7 +187,7 @@ def _spread(values: FloatArray, variances: FloatArray, members: list[IntArray], 
     targets = _chi_square([tail, 1.0 - tail], dof)
     low, high = np.sqrt(_solved(values, variances, members, targets))
     if high == 0.0:
-        # Sessions agree better than their uncertainties allow: those are too wide, and "no spread at all" is not shown.
+        # Sessions agree better than their uncertainties allow: these are reduced for the upper limit, which is not 0.
         q = float(_q(values, variances, members, np.zeros(1))[0])
         high = float(np.sqrt(_solved(values, variances * max(q / dof, 1e-6), members, targets[1:])[0]))
     point = _restricted(values, variances, members)
@@ -195,7 +195,7 @@ def _spread(values: FloatArray, variances: FloatArray, members: list[IntArray], 
 
 
 def _q(values: FloatArray, variances: FloatArray, members: list[IntArray], s2: FloatArray) -> FloatArray:
-    """Equation (1) at every σ² (m,)."""
+    """Q (m,) of equation (1) at every σ² (m,)."""
     y, v, is_there = _padded(values, variances, members)
     weights = np.where(is_there, 1.0 / (v + s2[:, None, None]), 0.0)
     mean = (weights * y).sum(axis=2) / weights.sum(axis=2)
@@ -206,7 +206,7 @@ def _q(values: FloatArray, variances: FloatArray, members: list[IntArray], s2: F
 def _padded(
     values: FloatArray, variances: FloatArray, members: list[IntArray]
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Values, variances and which of them there are, one group a row (g, most): all groups in one sum."""
+    """Values, variances and their mask, one group a row (g, most): the sums over all groups are vectorised."""
     size = np.array([len(group) for group in members])
     is_there = np.arange(size.max()) < size[:, None]
     y, v = np.zeros(is_there.shape), np.ones(is_there.shape)
@@ -216,7 +216,7 @@ def _padded(
 
 
 def _solved(values: FloatArray, variances: FloatArray, members: list[IntArray], targets: FloatArray) -> FloatArray:
-    """σ² (m,) at which Q falls to each target (m,); 0 where it is less from the start: Q falls with σ²."""
+    """σ² (m,) at which Q, which decreases with σ², equals each target (m,); 0 where Q(0) is below it."""
     scale = max(
         sum(float(np.sum((values[g] - values[g].mean()) ** 2)) for g in members), float(variances.max()), 1e-300
     )
@@ -242,7 +242,7 @@ def _solved_for_all(means: FloatArray, variances: FloatArray, targets: FloatArra
     shape = (len(means), len(targets))
     low, high = np.full(shape, np.log(1e-12 * scale)), np.full(shape, np.log(1e6 * scale))
     is_zero = q(np.exp(low)) <= targets
-    # Four decades more than the accuracy of an end of an interval asks for.
+    # Half the bisections: accurate to four decades more than the ends of an interval need.
     for _ in range(BISECTIONS // 2):
         middle = 0.5 * (low + high)
         above = q(np.exp(middle)) > targets
@@ -251,7 +251,7 @@ def _solved_for_all(means: FloatArray, variances: FloatArray, targets: FloatArra
 
 
 def _restricted(values: FloatArray, variances: FloatArray, members: list[IntArray]) -> float:
-    """σ that maximises the restricted likelihood, group means free."""
+    """σ at the maximum of the restricted likelihood, with free group means."""
     largest = max(float(np.sqrt(max(np.ptp(values[group]) for group in members) ** 2 + variances.max())), 1e-300)
 
     y, v, is_there = _padded(values, variances, members)
@@ -272,7 +272,7 @@ def _restricted(values: FloatArray, variances: FloatArray, members: list[IntArra
 def _group_means(
     values: FloatArray, variances: FloatArray, members: list[IntArray], s2: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Weighted mean of every group and its variance, at a given σ_u²."""
+    """Weighted mean (g,) of every group and its variance (g,), at a given σ_u²."""
     y, v, is_there = _padded(values, variances, members)
     weights = np.where(is_there, 1.0 / (v + s2), 0.0)
     total = weights.sum(axis=1)

@@ -1,8 +1,8 @@
-r"""Numbers along temperature, from sessions at different temperatures (docs/many-recordings.md).
+r"""Parameters as functions of temperature, from sessions at different temperatures (docs/many-recordings.md).
 
-Each number is a polynomial ``Σ c_p (T - T₀)^p`` and what a session differs by; the order of each group of three is the
-one that predicts sessions which its fit did not see best. Where sessions were taken while heating and while cooling,
-half the difference between both branches is tested on top.
+Each parameter is a polynomial ``Σ c_p (T - T₀)^p`` plus a random difference per session; the order of each group of
+three is chosen by cross-validation over sessions. Where sessions were recorded while heating and while cooling, half
+the difference between both branches is tested too.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from trihedron.records.sessions import PARAMETERS, Session, Spread, ThermalModel
 
 MAX_ORDER = 3
 SPARE = 2
-"""Sessions beyond the coefficients of a polynomial: one left out must leave a degree of freedom."""
+"""Sessions needed beyond the coefficients of a polynomial: without one of them a degree of freedom must remain."""
 GAIN = 6.0
-"""Held-out score (twice a log likelihood, three numbers together) by which a higher order must win. With 6 a group that
-does not follow temperature is given an order in 1 % of cases."""
+"""Gain of the held-out score (twice a log likelihood, three parameters together) that a higher order needs. With 6, a
+group that does not depend on temperature gets an order in 1 % of cases."""
 HYSTERESIS_P = 0.01 / 7.0
-"""One in a hundred units without hysteresis is given one, over the seven groups."""
+"""p-value of hysteresis: a false alarm in 1 % of units, over the seven groups."""
 MIN_SPAN_DEGC = 2.0
-"""Sessions closer together in temperature than the thermometers of parts agree with their own sensor say nothing."""
+"""Least temperature range of the sessions: the thermometer of a part differs from its sensor by as much."""
 
 
 def thermal_model(sessions: Sequence[Session]) -> ThermalModel:
@@ -35,7 +35,7 @@ def thermal_model(sessions: Sequence[Session]) -> ThermalModel:
     Raises
     ------
     ValueError
-        Where temperatures are missing, or too close together.
+        Where temperatures are missing, or within ``MIN_SPAN_DEGC``.
     """
     T = np.array([session.temperature_degc for session in sessions])
     if not np.all(np.isfinite(T)):
@@ -91,7 +91,7 @@ def _columns(t: FloatArray, order: int) -> FloatArray:
 
 
 def _fit(y: FloatArray, v: FloatArray, X: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Coefficients, covariance and σ² of sessions about them, so that Σ r²/(σ² + v) is its degrees of freedom."""
+    """Coefficients, their covariance, and the variance σ² between sessions for which Σ r²/(σ² + v) equals its dof."""
     dof = len(y) - X.shape[1]
 
     def solve(s2: float) -> tuple[FloatArray, FloatArray, float]:
@@ -112,7 +112,7 @@ def _fit(y: FloatArray, v: FloatArray, X: FloatArray) -> tuple[FloatArray, Float
 
 
 def _held_out(values: FloatArray, variances: FloatArray, X: FloatArray) -> float:
-    """Twice the log predictive density of every session by the fit of the others, Student's t for their few degrees."""
+    """Twice the log predictive density of all sessions, each by the fit of the others, as Student's t."""
     n = len(values)
     total = 0.0
     for left in range(n):
@@ -129,7 +129,7 @@ def _held_out(values: FloatArray, variances: FloatArray, X: FloatArray) -> float
 
 
 def _branches(values: FloatArray, variances: FloatArray, X: FloatArray, branch: FloatArray) -> tuple[FloatArray, float]:
-    """Half the difference of both branches and the F test of all three axes together, against the sessions' scatter."""
+    """Half the difference of both branches, and p of the F test on all axes together against the sessions' scatter."""
     n, k = values.shape
     wide = np.column_stack([X, branch])
     dof = n - wide.shape[1]
@@ -143,13 +143,13 @@ def _branches(values: FloatArray, variances: FloatArray, X: FloatArray, branch: 
         gain += float(np.sum(w * (values[:, axis] - X @ narrow) ** 2)) - after
         left += after
         size.append(float(c[-1]))
-    # The scatter is never taken as less than the sessions' own uncertainties say.
+    # The scatter is at least that of the sessions' own uncertainties.
     ratio = (gain / k) / max(left / (k * dof), 1.0)
     return np.array(size), fdtrc(k, k * dof, ratio)
 
 
 def _remaining(y: FloatArray, v: FloatArray, X: FloatArray) -> Spread:
-    """Spread of sessions about the fit: that of residuals, their lost degrees of freedom given back."""
+    """Spread of sessions about the fit: that of the residuals, scaled for the degrees of freedom of the fit."""
     c, _, s2 = _fit(y, v, X)
     residual = y - X @ c
     dof = max(len(y) - X.shape[1], 1)

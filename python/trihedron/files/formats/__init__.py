@@ -1,8 +1,8 @@
-"""Calibrations in the files of other programs, each with its own equation stated in it: written and, mostly, read.
+"""Calibrations in the file formats of other programs: written with their equation stated, and in most cases read.
 
-The direction of the matrices is the field's biggest trap: some tools store raw → true, some true → raw, some subtract
-the bias before the matrix and some after it. One module holds one format (``FORMAT``); every one that is here is found.
-Writers are tested by evaluating the target's equation, readers as the inverse of their writers.
+Programs differ in the direction of the matrices: some store raw → true, some true → raw, some subtract the bias before
+the matrix and some after it. Each module contains one format (``FORMAT``) and is found automatically. Writers are
+tested by evaluating the target's equation, readers as the inverse of their writers.
 """
 
 from __future__ import annotations
@@ -45,18 +45,18 @@ __all__ = [
 
 @cache
 def formats() -> dict[str, Format]:
-    """Every format by its name."""
+    """Every format by name."""
     found = [module.FORMAT for module in modules_of(__name__, __path__) if hasattr(module, "FORMAT")]
     return {one.name: one for one in sorted(found, key=lambda one: one.name)}
 
 
 def targets() -> list[str]:
-    """What a calibration can be written for."""
+    """Names of the formats in which a calibration can be written."""
     return [name for name, one in formats().items() if one.write is not None]
 
 
 def needs(one: Format) -> list[str]:
-    """The options without which a format cannot be written, as its own refusal names them."""
+    """The options that a format requires, from the error that its writer raises without them."""
     identity = (np.eye(3), np.zeros(3))
     try:
         one.write(given("trihedron", {"accelerometer": identity, "gyroscope": identity}), ExportOptions())  # type: ignore[misc]
@@ -66,34 +66,34 @@ def needs(one: Format) -> list[str]:
 
 
 def export_files(calibration: Calibration, target: str, options: ExportOptions | None = None) -> dict[str, str]:
-    """A calibration for ``target``, one of :func:`targets`: text by the ending of its file's name, ``""`` for one file.
+    """A calibration for ``target``, one of :func:`targets`: text by file name ending; ``""`` where there is one file.
 
     Raises
     ------
     ValueError
-        When there is no such target, the calibration is no sensor's, or cannot be expressed in that convention.
+        When the target is unknown, the calibration is not plausible, or it cannot be expressed in that convention.
     """
     one = formats().get(target)
     if one is None or one.write is None:
         raise RefusedError(f"there is no export to {target!r}; there are {', '.join(targets())}.")
     made = one.write(require_plausible(calibration), options or ExportOptions())
     texts = {"": made} if isinstance(made, str) else made
-    # Names of files stand in them, and control characters may stand in names.
+    # The texts contain file names, which may contain control characters.
     return {ending: printable(text) for ending, text in texts.items()}
 
 
 def export_calibration(calibration: Calibration, target: str, options: ExportOptions | None = None) -> str:
-    """As :func:`export_files`, in one text; where a target wants several files, one after the other."""
+    """As :func:`export_files`, in one text; several files are joined one after the other."""
     return "\n".join(export_files(calibration, target, options).values())
 
 
 def any_calibration(path: str | os.PathLike[str]) -> Calibration:
-    """A calibration file of ours or of any maker whose format is read here, told by content.
+    """Read a calibration file of trihedron or of another program; its format is recognised by content.
 
     Raises
     ------
     CalibrationFileError
-        (a ``ValueError``) when the file is missing or of no format that is read.
+        (a ``ValueError``) when the file is missing or its format is not supported.
     """
     path = Path(path)
     text = _text(path)
@@ -103,7 +103,7 @@ def any_calibration(path: str | os.PathLike[str]) -> Calibration:
         found = _recognised(text, path)
     except RefusedError as error:
         raise CalibrationFileError(f"{path}: {error}") from None
-    # What nobody recognises is a damaged file of ours, or none: our own reader says which.
+    # An unrecognised file is a damaged own file or no calibration: the own reader reports which.
     return found or read_calibration(path)
 
 
@@ -117,12 +117,12 @@ def is_calibration(path: str | os.PathLike[str]) -> bool:
     try:
         return f'"{OWN}"' in text or _recognised(text, path) is not None
     except RefusedError:
-        # A maker's file that lacks what is asked of it: read as a calibration it says so.
+        # Another program's file without readings to correct: reading it as a calibration reports that.
         return True
 
 
 LARGEST = 4_000_000
-"""Characters: a calibration with everything beside it has a tenth of this; what is longer is a log."""
+"""Characters, ten times those of a large calibration file; a longer file is a log."""
 
 
 def _text(path: Path) -> str:
@@ -134,7 +134,7 @@ def _text(path: Path) -> str:
 
 
 def _whole(text: str, path: Path, one: Format) -> str:
-    """The text with that of the file beside it, where one format writes a file for each sensor."""
+    """The text, joined with that of the other sensor's file where a format writes one file per sensor."""
     if one.pair is None or one.pair[0] not in path.name:
         return text
     beside = path.with_name(path.name.replace(*one.pair))

@@ -1,6 +1,6 @@
-"""AirSim: noise of an IMU in ``settings.json``; deg/√h, deg/h, mg and µg by its keys, no bias and no scale.
+"""AirSim: noise of an IMU in ``settings.json``, in deg/√h, deg/h, mg and µg by its keys; no bias and no scale.
 
-Its bias walks by ``stability/√tau`` per √s, so that ``stability = K √tau``. By ImuSimple and ImuSimpleParams of
+Its bias is a random walk of ``stability/√tau`` per √s, so ``stability = K √tau``. By ImuSimple and ImuSimpleParams of
 https://github.com/microsoft/AirSim.
 """
 
@@ -15,7 +15,7 @@ from trihedron.records import Calibration
 from trihedron.units import degrees_from_radians, mg_from_m_s2
 
 TAU_S = 500.0
-"""Any value will do where the stability is stated for it: only their quotient is used."""
+"""Arbitrary, because AirSim uses only ``stability/√tau``."""
 
 
 def to_airsim(calibration: Calibration, options: ExportOptions) -> str:

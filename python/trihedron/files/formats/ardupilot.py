@@ -1,7 +1,7 @@
 """Parameters of ArduPilot: ``R (SCAL o (reading - P(T) + P(CALTEMP) - OFFS))`` per sensor, gyros without a scale.
 
-``P`` is a cubic of ``T - 35 degC`` whose coefficients are a millionth of ``INS_TCALn_*``; T and CALTEMP are held
-between TMIN and TMAX. By AP_InertialSensor (Backend and tempcal) of ArduPilot, https://github.com/ArduPilot/ardupilot.
+``P`` is a cubic of ``T - 35 degC`` with coefficients 1e-6 ``INS_TCALn_*``; T and CALTEMP are clamped to the range from
+TMIN to TMAX. By AP_InertialSensor (Backend and tempcal) of ArduPilot, https://github.com/ArduPilot/ardupilot.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from trihedron.records import Calibration, Onboard
 from trihedron.records.plain import as_plain
 
 REFERENCE_DEGC = 35.0
-"""Temperature that ArduPilot's polynomials are counted from."""
+"""Reference temperature of ArduPilot's polynomials."""
 _SCALE = 1e-6
 
 
 def to_ardupilot(calibration: Calibration, options: ExportOptions) -> str:
-    """What the board must hold: lines ``NAME,VALUE``, composed with what the log's readings had been through."""
+    """Parameters for the board as lines ``NAME,VALUE``, composed with the corrections of the log's readings."""
     board = board_of(calibration, options, "ardupilot", "INS_")
     own, sensors = composed(calibration, options, "ArduPilot", lambda name: correction_of(board, name))
     equation = "corrected = (reading - P(T) + P(CALTEMP) - OFFS) * SCAL per axis, SI; a gyro has no SCAL."
@@ -59,7 +59,7 @@ def to_ardupilot(calibration: Calibration, options: ExportOptions) -> str:
 
 
 def from_ardupilot(text: str) -> Calibration | None:
-    """The first IMU's parameters as a calibration of readings in the axes of the sensor."""
+    """The first IMU's parameters as a calibration of readings in the sensor's axes."""
     parameters = parameters_in(text)
     if not {"INS_ACCOFFS_X", "INS_ACCSCAL_X"} <= parameters.keys():
         return None
@@ -72,20 +72,20 @@ def from_ardupilot(text: str) -> Calibration | None:
 
 
 def against_log(held: Onboard, known: Onboard) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """S and b by sensor of what parameters make of readings that a board has logged."""
+    """S and b by sensor that convert logged readings to those of a board with the parameters ``held``."""
     as_there = Onboard("ardupilot", known.accel, known.gyro, known.stage, {**_turns(known), **held.parameters})
     return relative(lambda name: correction_of(as_there, name), lambda name: correction_of(known, name))
 
 
 def correction_of(board: Onboard, name: str) -> AxisCorrection:
-    """What the board does to one sensor; nothing where its readings were logged raw."""
+    """The board's correction of one sensor; none where its readings were logged raw."""
     if board.stage == "raw":
         return AxisCorrection(np.zeros(3), np.ones(3), np.eye(3))
     is_accel = name == "accelerometer"
     imu, letters = (board.accel, "ACC") if is_accel else (board.gyro, "GYR")
     root, suffix = f"INS_{letters}", _suffix(imu)
     scale = triple(board.parameters, f"{root}{suffix}SCAL_{{}}", 1.0) if is_accel else np.ones(3)
-    # A scale of zero is that of a sensor which was never calibrated.
+    # A scale of 0 means that the sensor was never calibrated.
     scale = np.where(scale == 0.0, 1.0, scale)
     turn = np.eye(3) if board.stage == "corrected" else orientation(board.parameters.get("AHRS_ORIENTATION", 0.0))
     return AxisCorrection(triple(board.parameters, f"{root}{suffix}OFFS_{{}}"), scale, turn, _held_thermal(board, name))
@@ -113,8 +113,8 @@ def _held_thermal(board: Onboard, name: str) -> Thermal | None:
 
 
 def _thermal_lines(board: Onboard, name: str, one: Composed) -> tuple[FloatArray, list[str]]:
-    """Lines of the sum of both polynomials, and what it adds to the offset: what is held already is counted from the
-    temperature of its own calibration, the sum from that of this one."""
+    """Lines of the sum of both polynomials, and its contribution (3,) to the offset: the polynomial on the board refers
+    to the temperature of the board's calibration, the sum to that of this one."""
     held, new = _held_thermal(board, name), one.thermal
     if new is None:
         return np.zeros(3), []
@@ -145,7 +145,7 @@ def _thermal_lines(board: Onboard, name: str, one: Composed) -> tuple[FloatArray
 
 
 def said_of_misfit(thermal: Thermal, name: str) -> list[str]:
-    """What a cubic of the bias alone leaves, where it leaves anything."""
+    """Sentences on the temperature dependence that a cubic of the bias cannot represent, if there is any."""
     unit = "m/s^2" if name == "accelerometer" else "rad/s"
     said = []
     if thermal.scale > 1e-6:

@@ -1,8 +1,8 @@
-"""What autopilots share: parameters read from files and logs, and their composition with a calibration.
+"""Shared by ArduPilot and PX4: parameters read from files and logs, and their composition with a calibration.
 
-Both correct in the axes of the sensor and turn the result into those of the board: ``R (s o (r - p(T) - o))``. Readings
-of a log have been through that already; the exported offsets and scales replace those of the log, so that
-``R (s' o (r - p'(T) - o'))`` is what the calibration makes of the log.
+Both correct in the sensor's axes and rotate the result to the board's axes: ``R (s o (r - p(T) - o))``. Readings of a
+log are corrected by that already; the exported offsets and scales replace those of the log, so that
+``R (s' o (r - p'(T) - o'))`` equals the calibration applied to the log.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ _DEG_ROLL_PITCH_YAW = (
     (0, 270, 0), (0, 180, 90), (0, 180, 270), (90, 90, 0), (180, 90, 0), (270, 90, 0), (90, 180, 0), (270, 180, 0),
     (90, 270, 0), (180, 270, 0), (270, 270, 0), (90, 180, 90), (90, 0, 270), (90, 68, 293), (0, 315, 0), (90, 315, 0),
 )  # fmt: skip
-"""MAVLink's MAV_SENSOR_ORIENTATION by its number."""
+"""Roll, pitch and yaw [deg] of MAVLink's MAV_SENSOR_ORIENTATION by number."""
 
 
 @dataclass(frozen=True)
 class AxisCorrection:
-    """``turn (scale o (reading - thermal(T) - offset))`` of one sensor: (3,), (3,), (3, 3); thermal is switched on."""
+    """``turn (scale o (reading - thermal(T) - offset))``: (3, 3), (3,), (3,); ``thermal`` is None where disabled."""
 
     offset: FloatArray
     scale: FloatArray
@@ -40,12 +40,12 @@ class AxisCorrection:
 
 
 def orientation(number: float) -> FloatArray:
-    """(3, 3) sensor's axes to the board's, of one of MAVLink's orientations.
+    """(3, 3) rotation from the sensor's to the board's axes for one of MAVLink's orientations.
 
     Raises
     ------
     ValueError
-        When the number has no fixed meaning.
+        When the number is none of the fixed orientations.
     """
     if number != int(number) or not 0 <= number < len(_DEG_ROLL_PITCH_YAW):
         raise RefusedError(f"the board's orientation {number:g} is not one of MAVLink's fixed ones (0 to 40).")
@@ -53,7 +53,7 @@ def orientation(number: float) -> FloatArray:
 
 
 def euler(roll_deg: float, pitch_deg: float, yaw_deg: float) -> FloatArray:
-    """(3, 3) yaw pitch roll, as both autopilots turn."""
+    """(3, 3) rotation matrix yaw · pitch · roll, as in both autopilots."""
     c, s = np.cos(np.radians([roll_deg, pitch_deg, yaw_deg])), np.sin(np.radians([roll_deg, pitch_deg, yaw_deg]))
     roll = np.array([[1, 0, 0], [0, c[0], -s[0]], [0, s[0], c[0]]])
     pitch = np.array([[c[1], 0, s[1]], [0, 1, 0], [-s[1], 0, c[1]]])
@@ -62,7 +62,7 @@ def euler(roll_deg: float, pitch_deg: float, yaw_deg: float) -> FloatArray:
 
 
 def parameters_in(text: str) -> dict[str, float]:
-    """Values by name from a file of parameters: ``NAME,VALUE``, ``NAME VALUE`` or QGroundControl's five columns."""
+    """Values by name from a parameter file: ``NAME,VALUE``, ``NAME VALUE`` or QGroundControl's five columns."""
     out: dict[str, float] = {}
     for line in text.splitlines():
         words = line.partition("#")[0].replace(",", " ").replace("=", " ").split()
@@ -76,12 +76,12 @@ def parameters_in(text: str) -> dict[str, float]:
 
 
 def board_of(calibration: Calibration, options: ExportOptions, autopilot: str, prefix: str) -> Onboard:
-    """What the readings that were calibrated had been through on the board.
+    """The corrections that the board had applied to the calibrated readings.
 
     Raises
     ------
     ValueError
-        When neither the calibration nor a file of parameters tells, or the log was of another autopilot.
+        When neither the calibration nor a parameter file states them, or the log is of another autopilot.
     """
     name = {"ardupilot": "ArduPilot", "px4": "PX4"}[autopilot]
     stated = calibration.extensions.get("onboard")
@@ -122,7 +122,7 @@ _SHARED = ("AHRS_ORIENTATION", "SENS_BOARD_", "SENS_EN_THERMAL", "TC_")
 
 @dataclass(frozen=True)
 class Composed:
-    """What the board is to hold for one sensor, and what of the calibration its equation leaves out."""
+    """Offset (3,), scale (3,) and temperature dependence of one sensor for the board."""
 
     offset: FloatArray
     scale: FloatArray
@@ -132,15 +132,15 @@ class Composed:
 def composed(
     calibration: Calibration, options: ExportOptions, target: str, before: Callable[[str], AxisCorrection]
 ) -> tuple[Calibration, dict[str, Composed]]:
-    """The calibration of the sensor's own readings in its own axes, and what the board holds of it, by sensor.
+    """The calibration of the sensor's uncorrected readings in its own axes, and the board's values by sensor.
 
     With ``logged = R (s o (r - o))``, ``truth = S logged + b`` is ``S' r + b'`` with ``S' = Rᵀ S R diag(s)`` and
-    ``b' = Rᵀ b - S' o``. The offset is the reading that means zero, the scale that of the axis itself.
+    ``b' = Rᵀ b - S' o``. The offset is the reading at zero input; the scale is along the sensitive axis.
 
     Raises
     ------
     ValueError
-        When an axis is mirrored, which no positive scale can say.
+        When an axis is mirrored, which a positive scale cannot represent.
     """
     known = of_si_readings(calibration, target, options)
     made, out = {}, {}
@@ -166,7 +166,7 @@ def composed(
 
 
 def moved_to(thermal: Thermal, reference_degc: float) -> tuple[FloatArray, FloatArray]:
-    """Coefficients (3, 3) of the same polynomial counted from another temperature, and its constant (3,) there."""
+    """Coefficients (3, 3) of the same polynomial about another reference temperature, and its constant (3,) there."""
     shift = reference_degc - thermal.reference_degc
     columns = []
     for axis in range(3):
@@ -180,7 +180,7 @@ def moved_to(thermal: Thermal, reference_degc: float) -> tuple[FloatArray, Float
 
 
 def _turned(covariance: FloatArray, own: AxisCorrection) -> FloatArray:
-    """Covariance of ``Rᵀ S R diag(s)``; that of b along, its share through the offset left out (only S is judged)."""
+    """(12, 12) covariance of ``Rᵀ S R diag(s)`` and ``Rᵀ b``, without the term S' o: only that of S is used."""
     J = np.zeros((12, 12))
     J[:9, :9] = np.kron(own.turn.T, (own.turn * own.scale).T)
     J[9:, 9:] = own.turn.T
@@ -188,12 +188,12 @@ def _turned(covariance: FloatArray, own: AxisCorrection) -> FloatArray:
 
 
 def triple(parameters: Mapping[str, float], name: str, default: float = 0.0) -> FloatArray:
-    """(3,) of ``name`` with X, Y and Z for ``{}``."""
+    """(3,) values of the parameters ``name`` with ``{}`` replaced by X, Y and Z."""
     return np.array([parameters.get(name.format(axis), default) for axis in XYZ])
 
 
 def relative(held: Callable[[str], AxisCorrection], known: Callable[[str], AxisCorrection]) -> dict[str, _Pair]:
-    """S and b by sensor of what a board that holds other parameters would make of readings that were logged."""
+    """S and b by sensor that convert readings logged with parameters ``known`` to those of a board with ``held``."""
     out = {}
     for name in ("accelerometer", "gyroscope"):
         new, old = held(name), known(name)

@@ -1,4 +1,4 @@
-"""Basalt's calibration: ``(I + M) raw - b``; b, then M by columns, of the accelerometer its lower triangle."""
+"""Basalt's calibration: ``(I + M) raw - b``; b, then M by columns, for the accelerometer only its lower triangle."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from trihedron.records import Calibration
 
 
 def to_basalt(calibration: Calibration, options: ExportOptions) -> str:
-    """Intrinsics, and noise densities and rate where they are known."""
+    """Intrinsics, and noise densities and rate where they are given."""
     known, _, _ = in_lower(calibration, "Basalt", options)
     M = known.accelerometer.S - np.eye(3)
     value: dict[str, object] = {"calib_accel_bias": [*(-known.accelerometer.b), *M[:, 0], *M[1:, 1], M[2, 2]]}

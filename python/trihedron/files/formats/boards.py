@@ -1,4 +1,4 @@
-"""Parameters of an autopilot as a calibration of readings that a board has logged."""
+"""Parameters of an autopilot as a calibration of the readings that its board logged."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _AGAINST = {"ardupilot": ardupilot.against_log, "px4": px4.against_log}
 
 
 def as_logged(calibration: Calibration, known: Onboard | None) -> Calibration:
-    """What the board would have logged with other parameters, as S and b of what it did log; others as they are."""
+    """S and b that convert logged readings to those under the calibration's board parameters; others are unchanged."""
     stated = calibration.extensions.get("board_parameters")
     if stated is None or known is None or known.stage == "raw":
         return calibration

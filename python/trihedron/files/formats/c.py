@@ -10,7 +10,7 @@ from trihedron.records import Calibration
 
 
 def to_c(calibration: Calibration, _options: ExportOptions) -> str:
-    """A header: one struct a sensor, correction in double and float."""
+    """A header with one struct per sensor, and the correction in double and float."""
     lines = [
         f"/* {line.replace('*/', '* /')} */"
         for line in heading(calibration, "true = S * raw + b, raw to true, row by row.")
@@ -44,7 +44,7 @@ def to_c(calibration: Calibration, _options: ExportOptions) -> str:
             "}",
             "",
         ]
-    # The arrays and functions that a program does not use are no reason for a warning in it.
+    # Unused arrays and functions must not cause compiler warnings.
     text = "\n".join([*lines, "#endif", ""])
     return text.replace(
         "static const trihedron",

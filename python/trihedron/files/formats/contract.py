@@ -1,4 +1,4 @@
-"""What the file of another program is made of and read into: calibration, noise, rate; text, and what was lost."""
+"""Records and functions that formats of other programs share: options, noise, temperature, headings, parsed results."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NO_GYRO = "no gyroscope in this calibration"
 
 @dataclass(frozen=True)
 class NoiseFigure:
-    """One term of one sensor, SI, one number for its axes; ``is_limit`` where it was not seen and this bounds it."""
+    """One noise term of one sensor, SI, one number for its axes; an upper limit (``is_limit``) if not detected."""
 
     value: float
     is_limit: bool = False
@@ -47,10 +47,10 @@ class SensorNoise:
 
 @dataclass(frozen=True)
 class Thermal:
-    """A bias that follows temperature: what it adds to the readings, ``sum_n c_n (T - reference)^n``, without constant.
+    """Temperature dependence of a bias: ``sum_n c_n (T - reference)^n``, n = 1 to 3, is added to the readings.
 
-    ``coefficients`` (3, 3): order 1 to 3, then axis; ``misfit`` the largest part that a cubic leaves, ``scale`` the
-    largest relative change of S over ``range_degc``, both of which the file cannot hold.
+    ``coefficients`` (3, 3): row per order 1 to 3, column per axis. ``misfit`` is the largest residual of the cubic,
+    ``scale`` the largest relative change of S over ``range_degc``; a file cannot represent either.
     """
 
     reference_degc: float
@@ -62,11 +62,11 @@ class Thermal:
 
 @dataclass(frozen=True)
 class ExportOptions:
-    """What a file of another program holds besides S and b.
+    """Content of another program's file besides S and b.
 
-    ``accelerometer_noise``, ``gyroscope_noise`` from a static log; ``rate_hz`` of the samples; ``topic`` where they are
-    published; ``accel_lsb``, ``gyro_lsb`` the size of a count that the target's driver assumes (``3.33 mg``);
-    ``current_parameters`` the text of a file of the parameters that a flight controller held while the log was made.
+    ``accelerometer_noise``, ``gyroscope_noise`` from a static log; ``rate_hz`` of the samples; ``topic`` on which they
+    are published; ``accel_lsb``, ``gyro_lsb`` the LSB that the target's driver assumes (``3.33 mg``);
+    ``current_parameters`` the text of a file with the flight controller's parameters during the log.
     """
 
     accelerometer_noise: SensorNoise | None = None
@@ -80,9 +80,9 @@ class ExportOptions:
 
 @dataclass(frozen=True)
 class Format:
-    """One kind of file. ``write`` gives text, or text by the ending of each file's name; ``read`` a calibration, or
-    ``None`` where the text is of another kind; ``in_si`` where readings are expected in SI; ``pair`` the parts of two
-    file names that belong together, whose texts are read as one with a form feed between."""
+    """One file format. ``write`` returns text, or text by file name ending; ``read`` a calibration, or ``None`` where
+    the text is of another format. With ``in_si`` the target expects readings in SI. ``pair`` are the parts of two file
+    names that differ where each sensor has a file; their texts are read as one, separated by a form feed."""
 
     name: str
     write: Callable[[Calibration, ExportOptions], str | dict[str, str]] | None
@@ -92,12 +92,12 @@ class Format:
 
 
 def of_si_readings(calibration: Calibration, target: str, options: ExportOptions) -> Calibration:
-    """The calibration for readings that the target's driver has already put into SI.
+    """The calibration for readings that the target's driver converts to SI.
 
     Raises
     ------
     ValueError
-        When it maps counts and the size of a count was not said.
+        When it is for counts and the LSB is not given.
     """
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     unit = acceleration_to_si(AccelerationUnit(accel.raw_unit))
@@ -129,7 +129,7 @@ def _rescaled(sensor: SensorCalibration, unit: float) -> SensorCalibration:
 
 
 def heading(calibration: Calibration, equation: str, held: tuple[str, ...] = ()) -> list[str]:
-    """What a file says of itself: source, equation, units, trust, and what it cannot hold but for effects ``held``."""
+    """Comments at the head of a file: source, equation, units, trust, and effects it lacks, except those ``held``."""
     sensors = [sensor for _, sensor in named_sensors(calibration)]
     rows = [
         f"Calibration of {calibration.recording_source or 'an unnamed recording'}, written by trihedron.",
@@ -156,7 +156,7 @@ def effect_ids(calibration: Calibration) -> list[str]:
 
 
 def effect_parameters(calibration: Calibration, effect_id: str) -> dict[str, float]:
-    """Parameters of one effect of an extended calibration by name; empty where it has none."""
+    """Parameters by name of one effect of an extended calibration; empty where it lacks the effect."""
     effects = calibration.extensions.get("effects")
     for effect in effects if isinstance(effects, list | tuple) else ():
         if effect["id"] == effect_id:
@@ -165,9 +165,9 @@ def effect_parameters(calibration: Calibration, effect_id: str) -> dict[str, flo
 
 
 def thermal_of(calibration: Calibration, name: str) -> Thermal | None:
-    """How a sensor's bias follows temperature, in its readings: from the effects of one recording or several at once.
+    """Temperature dependence of a sensor's bias in raw units, from the effects of one recording or of several.
 
-    An effect is ``v (T - reference)`` of an axis in SI, so that the reading moves by v times the axis's sensitivity.
+    An effect is ``v (T - reference)`` on an axis in SI, which changes the reading by v times the axis's sensitivity.
     """
     sensor = getattr(calibration, name)
     if sensor is None:
@@ -189,7 +189,7 @@ def thermal_of(calibration: Calibration, name: str) -> Thermal | None:
 
 
 def _through_sessions(calibration: Calibration, name: str, range_degc: tuple[float, float]) -> Thermal | None:
-    """A cubic through the readings that mean zero, which is exact where the bias is one and S does not change."""
+    """A cubic fitted to the raw readings at zero input; exact where the bias is a cubic and S is constant."""
     thermal = calibration.extensions["thermal"]
     reference = float(thermal["reference_degc"])  # type: ignore[index]
     own = slice(0, 12) if name == "accelerometer" else slice(12, 24)
@@ -214,7 +214,7 @@ def _through_sessions(calibration: Calibration, name: str, range_degc: tuple[flo
 
 
 def lost_temperature(calibration: Calibration) -> list[str]:
-    """What a file of constants leaves of a calibration that follows temperature, in words with sizes."""
+    """Sentences, with sizes, on the temperature dependence that a file of constants cannot represent."""
     said = []
     for name, sensor in named_sensors(calibration):
         thermal = thermal_of(calibration, name)
@@ -237,12 +237,12 @@ def lost_temperature(calibration: Calibration) -> list[str]:
 
 
 def row(values: npt.NDArray[np.floating]) -> str:
-    """Numbers with all their digits."""
+    """Numbers with all digits, separated by commas."""
     return ", ".join(number(float(v)) for v in values)
 
 
 def number(value: float) -> str:
-    """All digits of a number, with a point: YAML 1.1 takes ``4e-05`` for a word."""
+    """All digits of a number, with a decimal point: YAML 1.1 reads ``4e-05`` as a string."""
     text = repr(value + 0.0)
     return text.replace("e", ".0e") if "e" in text and "." not in text else text
 
@@ -261,10 +261,10 @@ def given(
     g_sensitivity: FloatArray | None = None,
     **more: object,
 ) -> Calibration:
-    """A calibration as another program's file states it: ``(S, b)`` by sensor, no uncertainty.
+    """A calibration from another program's file: ``(S, b)`` by sensor, without uncertainty.
 
-    ``units`` are those of the readings; where the file does not say, SI is what scales near one are of, and counts what
-    others are of. ``without_bias`` names sensors whose bias the file does not hold. ``more`` goes to the extensions.
+    ``units`` are those of the readings; where the file does not state them, SI is assumed for scales near 1 and counts
+    for others. ``without_bias`` names sensors whose bias the file lacks. ``more`` is added to the extensions.
     """
     made = {}
     for name, (S, b) in sensors.items():

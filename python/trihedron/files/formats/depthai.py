@@ -1,4 +1,4 @@
-"""Luxonis' depthai: the EEPROM of an OAK camera holds where its IMU sits, and nothing of its readings."""
+"""Luxonis' depthai: the EEPROM of an OAK camera contains the pose of its IMU and no calibration of its readings."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from trihedron.records import Calibration
 
 
 def from_depthai(text: str) -> Calibration | None:
-    """Refused with what it lacks, since depthai corrects no readings of the IMU.
+    """None for other files; depthai's file is refused, because it contains no correction of IMU readings.
 
     Raises
     ------
     ValueError
-        When it is such a file.
+        When it is depthai's file.
     """
     if "imuExtrinsics" in (json_of(text) or {}):
         raise without_readings("depthai's JSON of an OAK camera")

@@ -1,7 +1,7 @@
-"""FAST-LIO's covariances: of one sample, ``N² rate`` and ``K² rate``, since its filter squares the step of time.
+"""FAST-LIO's covariances of one sample, ``N² rate`` and ``K² rate``, because its filter squares the time step.
 
-Its prediction adds ``(dt F) Q (dt F)ᵀ``: white noise of density N adds N² dt to the angle, a walk of K adds K² dt to
-the bias.
+Its prediction adds ``(dt F) Q (dt F)ᵀ``: white noise of density N adds N² dt to the variance of the angle, a random
+walk K adds K² dt to that of the bias.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Noise alone, for the filters that ask for it, in their own keys and units; static values beside as comments."""
+"""Noise parameters alone, in the keys and units of each filter; values of the static log are comments."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from trihedron.records.filter_noise import Bounded, FilterNoise, SensorFilterNoi
 
 @dataclass(frozen=True)
 class _Written:
-    """What rows are made of: the four figures, and the densities of X, Y and Z of both sensors."""
+    """The four noise figures, and the densities of X, Y and Z of both sensors."""
 
     figures: Figures
     accel_axes: tuple[float, ...]
@@ -22,27 +22,27 @@ class _Written:
 
     @property
     def rate_hz(self) -> float:
-        """Of the samples."""
+        """Rate of the samples."""
         return self.figures.rate_hz
 
     def four(self) -> tuple[NoiseFigure, NoiseFigure, NoiseFigure, NoiseFigure]:
-        """Accelerometer N, K, gyro N, K."""
+        """N and K of the accelerometer, N and K of the gyro."""
         f = self.figures
         return f.accel_N, f.accel_K, f.gyro_N, f.gyro_K
 
     def by_axis(self) -> tuple[tuple[float, ...], ...]:
-        """The same of X, Y and Z; walks are alike."""
+        """As :meth:`four`, for X, Y and Z; K is the same on all axes."""
         f = self.figures
         return self.accel_axes, (f.accel_K.value,) * 3, self.gyro_axes, (f.gyro_K.value,) * 3
 
 
 def _short(value: float) -> str:
-    """Four digits: intervals are wider than a per cent."""
+    """A number with four digits, which is finer than its interval."""
     return number(float(f"{value:.4g}"))
 
 
 def _rows(names: tuple[str, str, str, str], rate: str = "") -> Callable[[_Written], list[str]]:
-    """Densities and walks in SI, and the rate under its key where there is one."""
+    """Rows of densities and random walks in SI, and of the rate if ``rate`` is its key."""
     return lambda f: [*si_rows(f.figures, names), *([f"{rate}: {number(f.rate_hz)}"] if rate else [])]
 
 
@@ -74,7 +74,7 @@ def _gtsam(f: _Written) -> list[str]:
 
 
 def _robot_localization(f: _Written) -> list[str]:
-    """Diagonals of sensor_msgs/Imu, which its filters read from every message; biases are no states of theirs."""
+    """Covariances of sensor_msgs/Imu, which its filters read from every message; they have no bias states."""
     rows = []
     for key, axes in (("angular_velocity", f.gyro_axes), ("linear_acceleration", f.accel_axes)):
         x, y, z = (_short(one**2 * f.rate_hz) for one in axes)
@@ -87,7 +87,7 @@ def _robot_localization(f: _Written) -> list[str]:
 
 @dataclass(frozen=True)
 class _Target:
-    """Rows of a consumer's file, what comments begin with, and its first line where its reader demands one."""
+    """Function for the rows of a target's file, its comment character, and a first line if its reader requires one."""
 
     rows: Callable[[_Written], list[str]]
     comment: str = "#"
@@ -107,16 +107,16 @@ TARGETS: dict[str, _Target] = {
     "gtsam": _Target(_gtsam),
     "robot_localization": _Target(_robot_localization),
 }
-"""Consumers of noise alone. Keys and units are those of :mod:`trihedron.files.formats` with a calibration."""
+"""Targets of noise alone; keys and units are those of the same target in :mod:`trihedron.files.formats`."""
 
 
 def filter_noise_text(found: FilterNoise, target: str) -> str:
-    """The noise of both sensors as ``target`` reads it.
+    """The noise of both sensors in the format of ``target``.
 
     Raises
     ------
     ValueError
-        When there is no such target, or a sensor is not known: a missing key would be read as zero.
+        When the target is unknown, or a sensor was not estimated: the target reads a missing key as 0.
     """
     one = TARGETS.get(target)
     if one is None:
@@ -132,7 +132,7 @@ def filter_noise_text(found: FilterNoise, target: str) -> str:
     four = (_figure(accel.N), _figure(accel.K), _figure(gyro.N), _figure(gyro.K))
     rows = one.rows(_Written(Figures(*four, found.rate_hz), _of_axes(accel), _of_axes(gyro)))
     if not one.comment:
-        # JSON has no comments; its reader looks keys up by name and leaves others.
+        # JSON has no comments; the target's reader ignores other keys.
         said = ",\n".join(f'    "{line}"' for line in _beside(found))
         return "\n".join(["{", *rows[:-1], f'{rows[-1]},\n  "about": [', said, "  ]", "}", ""])
     lines = [one.first] if one.first else []
@@ -148,7 +148,7 @@ def _of_axes(sensor: SensorFilterNoise) -> tuple[float, ...]:
 
 
 def _beside(found: FilterNoise) -> Sequence[str]:
-    """Each sensor's values with their intervals, and the static ones."""
+    """Comments: each sensor's values with their intervals, and those of the static log."""
     out = []
     for one in found.sensors:
         units = (f"{one.unit}/sqrt(Hz)", f"{one.unit}/sqrt(s)")

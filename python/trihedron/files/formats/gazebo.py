@@ -1,8 +1,8 @@
-"""Gazebo: an SDF ``<imu>`` with its Gaussian noise and slow bias, axis by axis.
+"""Gazebo: an SDF ``<imu>`` with Gaussian noise and bias drift, axis by axis.
 
 Every sample adds ``N(mean, stddev)`` and a bias that follows ``b <- exp(-dt/tau) b + N(0, s)`` with
-``s² = σ² tau/2 (1 - exp(-2 dt/tau))``: for tau far beyond the run a random walk of strength σ = K. The bias of a unit
-is written as ``mean``, since the sign of ``bias_mean`` is drawn. By GaussianNoiseModel of gz-sensors and the noise
+``s² = σ² tau/2 (1 - exp(-2 dt/tau))``: for tau much longer than a run, a random walk with σ = K. The bias of a unit
+is written as ``mean``, because the sign of ``bias_mean`` is drawn. By GaussianNoiseModel of gz-sensors and the noise
 element of SDFormat (https://github.com/gazebosim/gz-sensors).
 """
 
@@ -16,7 +16,7 @@ from trihedron.files.formats.simulated import distortion, said_of
 from trihedron.records import Calibration
 
 CORRELATION_S = 1e6
-"""Eleven days: over any run the bias walks."""
+"""Eleven days, longer than any run, so that the bias is a random walk."""
 
 
 def to_gazebo(calibration: Calibration, options: ExportOptions) -> str:

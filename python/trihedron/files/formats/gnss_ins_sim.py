@@ -1,7 +1,7 @@
 """gnss-ins-sim: the dictionary of an IMU, in deg/h, deg/√h, m/s² and m/s/√h.
 
-Its bias follows ``b <- (1 - dt/tau) b + dt drift N(0, 1)`` a sample, so that a walk of strength K is a drift of
-``K √rate``: it holds at the rate of this file only. By pathgen and imu_model of https://github.com/Aceinna/gnss-ins-sim.
+Its bias follows ``b <- (1 - dt/tau) b + dt drift N(0, 1)`` per sample, so a random walk K needs ``drift = K √rate``:
+the value is valid only at the rate of this file. By pathgen and imu_model of https://github.com/Aceinna/gnss-ins-sim.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from trihedron.records import Calibration
 from trihedron.units import degrees_from_radians
 
 CORRELATION_S = 1e6
-"""Eleven days: over any run the bias walks."""
+"""Eleven days, longer than any run, so that the bias is a random walk."""
 
 
 def to_gnss_ins_sim(calibration: Calibration, options: ExportOptions) -> str:

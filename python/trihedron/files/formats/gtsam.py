@@ -1,4 +1,4 @@
-"""GTSAM's combined preintegration: covariances of continuous noise, N² and K²; S and b are applied before."""
+"""GTSAM's combined preintegration: covariances of continuous noise, N² and K²; S and b are applied before it."""
 
 from __future__ import annotations
 

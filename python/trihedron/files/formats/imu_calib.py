@@ -1,4 +1,4 @@
-"""The ROS package imu_calib: ``corrected = SM raw - bias`` of the accelerometer alone, SM row by row."""
+"""The ROS package imu_calib: ``corrected = SM raw - bias``, accelerometer only, SM row by row."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from trihedron.records import Calibration
 
 
 def to_imu_calib(calibration: Calibration, options: ExportOptions) -> str:
-    """``imu_calib.yaml``; the package measures the gyro's bias at start and has no scale of it."""
+    """``imu_calib.yaml``; the package measures the gyro bias at start and has no gyro scale."""
     known = of_si_readings(calibration, "imu_calib", options)
     lines = [f"# {line}" for line in heading(known, "corrected = SM raw - bias, SI, accelerometer only.")]
     if known.gyroscope is not None and has_matrix(known.gyroscope):

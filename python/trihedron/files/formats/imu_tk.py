@@ -1,7 +1,7 @@
-"""imu_tk's ``.calib``, one file a sensor: ``x = T K (raw - B)``, T with unit diagonal, K diagonal.
+"""imu_tk's ``.calib``, one file per sensor: ``x = T K (raw - B)``, T with unit diagonal, K diagonal.
 
-It reads 3 x 3, 3 x 3 and 3 x 1 numbers from the first character on and nothing behind them: what is to be said stands
-at the end.
+imu_tk reads 3 x 3, 3 x 3 and 3 x 1 numbers from the first character on and ignores the rest, so comments are at the
+end.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from trihedron.records import Calibration
 
 
 def to_imu_tk(calibration: Calibration, _options: ExportOptions) -> dict[str, str]:
-    """Both sensors in the frame in which T of the accelerometer is upper triangular."""
+    """Both sensors, rotated to the frame in which T of the accelerometer is upper triangular."""
     rotation, turned = upper_frame(calibration)
     said = heading(calibration, "x = T K (raw - B): raw to true.")
     said += ["T of the accelerometer is upper triangular here, so both sensors are turned by this rotation:"]
@@ -32,7 +32,7 @@ def to_imu_tk(calibration: Calibration, _options: ExportOptions) -> dict[str, st
 
 
 def from_imu_tk(text: str) -> Calibration | None:
-    """The accelerometer's file, and the gyro's where it lies beside it."""
+    """The accelerometer's file, and the gyro's if it is in the same folder."""
     sensors = {}
     for name, part in zip(("accelerometer", "gyroscope"), text.split("\f"), strict=False):
         try:

@@ -1,6 +1,6 @@
 """imucal's Ferraris calibration: ``a = (K_a R_a)⁻¹ (raw - b_a)``, ``ω = (K_g R_g)⁻¹ (raw - b_g - K_ga a)``.
 
-Its units are words in the file; the result is in m/s² and, as a rule, deg/s.
+Units are stated in the file; corrected values are in m/s² and usually deg/s.
 """
 
 from __future__ import annotations

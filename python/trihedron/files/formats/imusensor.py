@@ -1,7 +1,7 @@
 """MATLAB's ``imuSensor``: ``reading = AxesMisalignment/100 · truth + ConstantBias``, white noise, random walk.
 
-White noise is ``NoiseDensity √rate`` a sample and the walk ``RandomWalk/√rate`` a step, for the double-sided noise
-type. By the algorithms that MathWorks' page of imuSensor states.
+White noise is ``NoiseDensity √rate`` per sample and the walk ``RandomWalk/√rate`` per step, for the double-sided noise
+type. By the algorithms on MathWorks' page of imuSensor.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from trihedron.records import Calibration
 
 
 def to_imusensor(calibration: Calibration, options: ExportOptions) -> str:
-    """A MATLAB script that makes ``imu``."""
+    """A MATLAB script that creates the object ``imu``."""
     known, pairs, figures = distortion(calibration, options, "imuSensor")
     equation = "reading = AxesMisalignment/100 * truth + ConstantBias + noise, SI."
     lines = [f"% {line}" for line in said_of(known, options, equation, holds_matrix=True)]

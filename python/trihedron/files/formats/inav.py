@@ -1,6 +1,6 @@
 """INAV: ``corrected = (reading - acczero) accgain/4096`` per axis in counts, ``reading - gyro_zero`` of the gyro.
 
-Whole numbers, in the axes of the sensor, before the alignments. By applyAccelerationZero and gyroUpdateAndCalibrate of
+Integers, in the sensor's axes, before the alignments. By applyAccelerationZero and gyroUpdateAndCalibrate of
 https://github.com/iNavFlight/inav.
 """
 
@@ -19,16 +19,16 @@ from trihedron.units import acceleration_lsb_to_si, rate_lsb_to_si
 
 UNIT_GAIN = 4096
 LARGEST_GAIN, LARGEST_OFFSET = 8192, 32767
-"""Of the settings' ranges."""
+"""Limits of the settings."""
 
 
 def to_inav(calibration: Calibration, options: ExportOptions) -> str:
-    """Lines for its command line, of readings that nothing had corrected.
+    """Commands for INAV's command line, from a calibration of uncorrected readings.
 
     Raises
     ------
     ValueError
-        When the readings were not raw, the size of a count was not said, or a setting cannot hold what it must.
+        When the readings were not raw, the LSB is not given, or a value exceeds the range of a setting.
     """
     if calibration.accelerometer.raw_unit != "counts" and options.current_parameters.strip().lower() != "none":
         raise RefusedError(

@@ -1,7 +1,7 @@
 """Isaac Lab: observation terms of an IMU, ``reading = scale o (truth + N(mean, std))`` axis by axis.
 
-An observation's noise is added before its ``scale`` (``clip`` between them), and ``mean`` and ``std`` of a Gaussian
-noise may be tensors. By noise_model and ObservationManager of https://github.com/isaac-sim/IsaacLab.
+An observation's noise is added before its ``scale`` is applied (``clip`` is between them); ``mean`` and ``std`` of
+Gaussian noise may be tensors. By noise_model and ObservationManager of https://github.com/isaac-sim/IsaacLab.
 """
 
 from __future__ import annotations

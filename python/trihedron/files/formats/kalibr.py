@@ -1,6 +1,6 @@
 """Kalibr's ``imu.yaml``: ``a_m = M a + b``, ``w_m = M C_gyro_i w + A C_gyro_i a + b``, true → measured.
 
-M is lower triangular, C a rotation. Its results nest the same under ``imu0``; it stores no biases.
+M is lower triangular, C a rotation. Kalibr's results have the same keys under ``imu0``; it stores no biases.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ KEYS = (
 
 
 def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
-    """``imu.yaml`` with the six keys that its reader requires, and intrinsics as its results name them.
+    """``imu.yaml`` with the six keys that its reader requires, and intrinsics named as in Kalibr's results.
 
     Raises
     ------
     ValueError
-        When noise or rate are not known, which the reader requires.
+        When noise or rate, which the reader requires, are not given.
     """
     lower, M_a, b_a = in_lower(calibration, "Kalibr", options)
     figures = required(lower, options, "Kalibr")
@@ -66,7 +66,7 @@ def from_kalibr(text: str) -> Calibration | None:
     Raises
     ------
     ValueError
-        When it is the chain of cameras beside those results, which knows the IMU's pose alone.
+        When it is the camera chain written beside those results, which contains only the pose of the IMU.
     """
     document = yaml_of(text)
     if document is None or text.lstrip().startswith("%YAML:1.0"):
@@ -91,7 +91,7 @@ def from_kalibr(text: str) -> Calibration | None:
 
 
 def g_sensitivity(calibration: Calibration) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """(3, 3) rate read per specific force in the instrument frame; zero where the calibration does not have it."""
+    """(3, 3) gyro g-sensitivity [(rad/s)/(m/s²)] in the body frame; 0 where the calibration lacks it."""
     values = effect_parameters(calibration, "gyro-g-sensitivity")
     return np.array([[values.get(f"G_{i}{j}", 0.0) for j in AXES] for i in AXES])
 

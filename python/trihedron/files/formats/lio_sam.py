@@ -1,4 +1,4 @@
-"""LIO-SAM's noise of the IMU: continuous densities that it squares for GTSAM's preintegration; no place for S and b."""
+"""LIO-SAM's IMU noise: continuous densities, which it squares for GTSAM's preintegration; no fields for S and b."""
 
 from __future__ import annotations
 

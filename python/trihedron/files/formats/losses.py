@@ -1,4 +1,4 @@
-"""What a format cannot hold of a calibration, in words with sizes; what is below its own uncertainty is no loss."""
+"""Sentences, with sizes, on significant parts of a calibration that a format cannot represent."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from trihedron.records import Calibration, SensorCalibration
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 HALF_WIDTH = 1.96
-"""Standard errors to the end of a 95 % interval."""
+"""Half-width of a 95 % interval in standard uncertainties."""
 
 
 def exceeds(value: FloatArray, sigma: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    """Which values are outside the interval about zero that their uncertainty leaves them."""
+    """Which values differ from 0 by more than their 95 % interval (``sigma`` is the standard uncertainty)."""
     return np.asarray(np.abs(value) > np.maximum(HALF_WIDTH * sigma, ROUNDING))
 
 
 def has_matrix(sensor: SensorCalibration) -> bool:
-    """Whether scale or misalignment of SI readings are seen at all."""
+    """Whether scale or misalignment of SI readings is significant."""
     return bool(exceeds(sensor.S - np.eye(3), sensor.sigma_S).any())
 
 
 def has_bias(sensor: SensorCalibration) -> bool:
-    """Whether a bias is seen at all."""
+    """Whether the bias is significant."""
     return bool(exceeds(sensor.b, sensor.sigma_b).any())
 
 
 def size_of_bias(name: str, bias: FloatArray) -> str:
-    """The length of a bias (3,) in the unit that its sensor is spoken of."""
+    """The norm of a bias (3,), in SI, as text in deg/s or mm/s^2."""
     length = float(np.linalg.norm(bias))
     if name == "gyroscope":
         return f"{degrees_from_radians(length):.3g} deg/s"
@@ -37,11 +37,11 @@ def size_of_bias(name: str, bias: FloatArray) -> str:
 
 
 def lost_to_a_diagonal(calibration: Calibration) -> list[str]:
-    """What a model of scales and biases alone leaves of this calibration."""
+    """The misalignment that a model of scales and biases alone cannot represent."""
     said = []
     u, _, vt = np.linalg.svd(_unit_columns(calibration.accelerometer))
     for name, sensor in named_sensors(calibration):
-        # How the accelerometer's triad as a whole is turned is a choice of frame, which no pose knows.
+        # The rotation of the accelerometer's triad as a whole is a choice of frame and is removed.
         unit = (u @ vt).T @ _unit_columns(sensor)
         off = np.abs(unit - np.diag(np.diag(unit)))
         seen = off[exceeds(off, sensor.sigma_S * np.linalg.norm(np.linalg.inv(sensor.S), axis=1))]
@@ -57,20 +57,20 @@ def lost_to_a_diagonal(calibration: Calibration) -> list[str]:
 
 
 def _unit_columns(sensor: SensorCalibration) -> FloatArray:
-    """Columns at the length of one unit of truth: what is off the diagonal is the share of another axis."""
+    """S with column j times the sensitivity of axis j (raw per SI): off-diagonal elements are cross-axis fractions."""
     out: FloatArray = sensor.S * np.linalg.norm(np.linalg.inv(sensor.S), axis=1)
     return out
 
 
 def lost_gyro_scale(gyro: SensorCalibration, target: str) -> list[str]:
-    """What a target that has offsets of the gyro alone leaves of its scales."""
+    """The gyro scale error that a target with gyro offsets alone cannot represent."""
     scale = 1.0 / np.linalg.norm(np.linalg.inv(gyro.S), axis=1) - 1.0
     seen = np.abs(scale)[exceeds(scale, np.diag(gyro.sigma_S))]
     return [f"{target} has no gyro scale: up to {100.0 * seen.max():.2g} % of scale is lost."] if len(seen) else []
 
 
 def lost_without_intrinsics(calibration: Calibration) -> list[str]:
-    """What a file without S and b leaves to its reader."""
+    """The correction that the user of a file without S and b must apply."""
     sizes = []
     for name, sensor in named_sensors(calibration):
         if has_matrix(sensor):

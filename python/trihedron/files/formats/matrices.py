@@ -1,4 +1,4 @@
-"""Matrix factors in the conventions of other programs, and files that have none."""
+"""Matrix factors in the conventions of other programs, and comments for files without matrices."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from trihedron.sensor_model import in_frame, other_form
 def in_lower(
     calibration: Calibration, target: str, options: ExportOptions
 ) -> tuple[Calibration, FloatArray, FloatArray]:
-    """The calibration of SI readings in the lower-triangular frame, and the accelerometer's inverse form."""
+    """The calibration of SI readings in the lower-triangular frame, and M, b of ``reading = M force + b``."""
     lower = in_frame(calibration, "lower") if calibration.frame != "lower" else calibration
     lower = of_si_readings(lower, target, options)
     M, b = other_form(lower.accelerometer.S, lower.accelerometer.b)
@@ -26,12 +26,12 @@ def in_lower(
 def noise_alone(
     calibration: Calibration, options: ExportOptions, target: str, poses: str = ""
 ) -> tuple[Calibration, Figures, list[str]]:
-    """The calibration of readings in SI, the figures that the target demands, and the comments that head its file.
+    """The calibration of readings in SI, the noise figures that the target requires, and comments for its file.
 
     Raises
     ------
     ValueError
-        When noise or rate are not known: a missing key would be read as zero.
+        When noise or rate are not given: the target reads a missing key as 0.
     """
     known = of_si_readings(calibration, target, options)
     figures = required(known, options, target)
@@ -42,8 +42,8 @@ def noise_alone(
 def lower_orthogonal(A: FloatArray) -> tuple[FloatArray, FloatArray]:
     """``A = L Q`` with L lower triangular and Q a proper rotation, det Q = +1.
 
-    The diagonal of L is positive where A keeps the hand of its axes; a mirrored triad shows as one negative diagonal
-    entry of L, the one of A's most negative axis, never as a reflection in Q.
+    The diagonal of L is positive where det A > 0. For a mirrored triad one diagonal element of L is negative, in the
+    axis whose diagonal element of Q is smallest, so that Q contains no reflection.
     """
     q, r = np.linalg.qr(A.T)
     signs = np.where(np.diag(r) < 0.0, -1.0, 1.0)
@@ -56,11 +56,11 @@ def lower_orthogonal(A: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def upper_frame(calibration: Calibration) -> tuple[FloatArray, list[tuple[SensorCalibration, FloatArray, FloatArray]]]:
-    """Both sensors turned by R so that the accelerometer's S is upper triangular: R and (sensor, R S, R b)."""
+    """Both sensors rotated by R so that the accelerometer's S is upper triangular: R and (sensor, R S, R b)."""
     q, r = np.linalg.qr(calibration.accelerometer.S)
-    # The signs of the diagonal stay with S: a left-handed triad is not mended by a reflection of Mz.
+    # The diagonal keeps its signs: a left-handed triad is not corrected by a reflection of the body frame.
     rotation = (q * (np.sign(np.diag(r)) * np.sign(np.diag(calibration.accelerometer.S)))).T
     turned = [(sensor, rotation @ sensor.S, rotation @ sensor.b) for _, sensor in named_sensors(calibration)]
-    # Rounding below the diagonal is removed: the target does not expect it.
+    # Rounding errors below the diagonal are set to 0, as the target expects.
     turned[0] = (turned[0][0], np.triu(turned[0][1]), turned[0][2])
     return rotation, turned

@@ -1,4 +1,4 @@
-"""mvsim: an IMU of a vehicle, ``reading = truth + b + N(0, white)``, ``b <- b + N(0, walk² dt)``; no scale, no bias.
+"""mvsim: an IMU of a vehicle, ``reading = truth + b + N(0, white)``, ``b <- b + N(0, walk² dt)``; b starts at 0, no S.
 
 By the documentation of its sensors and its class IMU, https://github.com/MRPT/mvsim.
 """

@@ -1,4 +1,4 @@
-"""Noise as other programs name it: rows of figures, and the refusal where a target cannot do without them."""
+"""Noise under the keys of other programs: rows of figures, and the error where a target requires missing ones."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class Figures:
 
 
 def required(calibration: Calibration, options: ExportOptions, target: str) -> Figures:
-    """All that the target's reader demands.
+    """The noise and rate that the target's reader requires.
 
     Raises
     ------
     ValueError
-        When noise or rate are not known.
+        When noise or rate are not given.
     """
     accel, gyro = options.accelerometer_noise, options.gyroscope_noise
     if accel is None or (gyro is None and calibration.gyroscope is not None) or options.rate_hz is None:
@@ -39,7 +39,7 @@ def required(calibration: Calibration, options: ExportOptions, target: str) -> F
 
 
 def noise_row(name: str, figure: NoiseFigure, unit: str) -> list[str]:
-    """A comment with the unit, then ``name: value``."""
+    """A comment with the unit (and whether the figure is an upper limit), then ``name: value``."""
     said = f"# {unit}"
     if figure.is_limit:
         said = f"# {name} [{unit}] is an upper limit: none of it was seen"
@@ -47,7 +47,7 @@ def noise_row(name: str, figure: NoiseFigure, unit: str) -> list[str]:
 
 
 def si_rows(figures: Figures, names: tuple[str, str, str, str]) -> list[str]:
-    """Rows of densities and walks in SI, named in the order accelerometer N, K, gyro N, K."""
+    """Rows of densities and random walks in SI; ``names`` in the order accelerometer N, K, gyro N, K."""
     units = ("m/s^2/sqrt(Hz)", "m/s^2/sqrt(s)", "rad/s/sqrt(Hz)", "rad/s/sqrt(s)")
     figures4 = (figures.accel_N, figures.accel_K, figures.gyro_N, figures.gyro_K)
     return [
@@ -58,7 +58,7 @@ def si_rows(figures: Figures, names: tuple[str, str, str, str]) -> list[str]:
 
 
 def limits(options: ExportOptions) -> list[str]:
-    """Which figures are upper limits, in words."""
+    """A sentence for each figure that is an upper limit."""
     return [
         f"{name} {term} is an upper limit: it was not seen in the static log."
         for name, noise in (("accelerometer", options.accelerometer_noise), ("gyroscope", options.gyroscope_noise))

@@ -25,14 +25,14 @@ from trihedron.sensor_model import other_form
 
 
 def to_openvins(calibration: Calibration, options: ExportOptions) -> str:
-    """The chain's file for ``model: kalibr``.
+    """The IMU chain file for ``model: kalibr``.
 
-    Comments stand on lines of their own: OpenCV's reader takes a value with a comment behind it for a sequence.
+    Comments are on separate lines: OpenCV's reader takes a value followed by a comment for a sequence.
 
     Raises
     ------
     ValueError
-        When noise or rate are not known, which the reader requires.
+        When noise or rate, which the reader requires, are not given.
     """
     lower, M_a, b_a = in_lower(calibration, "OpenVINS", options)
     figures = required(lower, options, "OpenVINS")
@@ -57,7 +57,7 @@ def to_openvins(calibration: Calibration, options: ExportOptions) -> str:
 
 
 def from_openvins(text: str) -> Calibration | None:
-    """Intrinsics of the chain's file, of either of its models; biases where our own comments state them."""
+    """Intrinsics of the IMU chain file, for either model; biases from the comments that :func:`to_openvins` writes."""
     document = yaml_of(text)
     imu = None if document is None else document.get("imu0")
     if not isinstance(imu, dict) or not {"Ta", "Tw"} <= imu.keys():

@@ -1,4 +1,4 @@
-"""ORB-SLAM3's settings of an inertial sensor: densities in SI, rate; no place for S and b."""
+"""ORB-SLAM3's settings of an inertial sensor: densities in SI and rate; no fields for S and b."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Documents of other programs as plain values; what does not parse is of another kind."""
+"""Parsing of other programs' documents to plain values; a text that does not parse is of another format."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PAIR = re.compile(r"^( *)(?:- )?([\w.]+)\s*:\s*(.*)$")
 
 
 def json_of(text: str) -> dict[str, Any] | None:
-    """A JSON object; ``None`` where the text is none."""
+    """The text as a JSON object; ``None`` where it is not one."""
     try:
         document = json.loads(text)
     except ValueError:
@@ -25,7 +25,7 @@ def json_of(text: str) -> dict[str, Any] | None:
 
 
 def without_readings(what: str) -> RefusedError:
-    """The refusal of a file that states where an IMU sits and nothing of what it reads."""
+    """The error for a file that states the pose of an IMU but nothing about its readings."""
     return RefusedError(
         f"{what} states the pose of the IMU, and no scale, misalignment or bias of its readings: there is nothing here "
         "to judge or to apply."
@@ -33,12 +33,12 @@ def without_readings(what: str) -> RefusedError:
 
 
 def numbers_in(text: str) -> list[float]:
-    """Every number of a text, in its order."""
+    """All numbers in a text, in order."""
     return [float(word) for word in _NUMBER.findall(text)]
 
 
 def array_of(value: Any, shape: tuple[int, ...], default: FloatArray) -> FloatArray:
-    """Nested or flat numbers as an array of a shape; ``default`` where there are none or too few."""
+    """Nested or flat numbers as an array of ``shape``; ``default`` where there are none or another number of them."""
     if value is None:
         return default
     try:
@@ -49,10 +49,10 @@ def array_of(value: Any, shape: tuple[int, ...], default: FloatArray) -> FloatAr
 
 
 def yaml_of(text: str) -> dict[str, Any] | None:
-    """Mappings, numbers, words and lists of numbers of a YAML text, as calibrations are written; ``None`` of others.
+    """Mappings, numbers, words and lists of numbers of a YAML text, as in calibration files; ``None`` for other texts.
 
-    Block and flow lists of numbers both come flat: a matrix is told by its key. Nothing else of YAML is understood,
-    mappings in braces neither.
+    Block and flow lists of numbers are returned flat; the caller recognises a matrix by its key. Other YAML, such as
+    mappings in braces, is not supported.
     """
     root: dict[str, Any] = {}
     levels: list[tuple[int, dict[str, Any]]] = [(-1, root)]

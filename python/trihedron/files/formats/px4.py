@@ -1,6 +1,6 @@
 """Parameters of PX4: ``R ((reading - thermal(T) - OFF) o SCALE)`` per sensor, gyros without a scale.
 
-``thermal`` is ``X0 + X1 t + X2 t² + X3 t³`` of ``t = T - TREF``, T held between TMIN and TMAX. By sensor_calibration
+``thermal`` is ``X0 + X1 t + X2 t² + X3 t³`` of ``t = T - TREF``, T clamped to TMIN..TMAX. By sensor_calibration
 and temperature_compensation of PX4-Autopilot, https://github.com/PX4/PX4-Autopilot.
 """
 
@@ -28,11 +28,11 @@ from trihedron.records import Calibration, Onboard
 from trihedron.records.plain import as_plain
 
 _REAL, _INTEGER = 9, 6
-"""MAVLink's numbers of a float and a 32-bit integer in a file of parameters."""
+"""MAVLink's type numbers of a float and of a 32-bit integer in a parameter file."""
 
 
 def to_px4(calibration: Calibration, options: ExportOptions) -> str:
-    """What the board must hold, as a file of QGroundControl, composed with what the readings had been through."""
+    """Parameters for the board as a QGroundControl file, composed with the corrections of the log's readings."""
     board = board_of(calibration, options, "px4", "CAL_")
     own, sensors = composed(calibration, options, "PX4", lambda name: correction_of(board, name))
     has_scale = any(name.startswith("CAL_GYRO") and "SCALE" in name for name in board.parameters)
@@ -63,7 +63,7 @@ def to_px4(calibration: Calibration, options: ExportOptions) -> str:
 
 
 def from_px4(text: str) -> Calibration | None:
-    """The first IMU's parameters as a calibration of readings in the axes of the sensor."""
+    """The first IMU's parameters as a calibration of readings in the sensor's axes."""
     parameters = parameters_in(text)
     if not {"CAL_ACC0_XOFF", "CAL_ACC0_XSCALE"} <= parameters.keys():
         return None
@@ -76,14 +76,14 @@ def from_px4(text: str) -> Calibration | None:
 
 
 def against_log(held: Onboard, known: Onboard) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """S and b by sensor of what parameters make of readings that a board has logged."""
+    """S and b by sensor that convert logged readings to those of a board with the parameters ``held``."""
     turns = {name: value for name, value in known.parameters.items() if name.startswith("SENS_BOARD")}
     as_there = Onboard("px4", known.accel, known.gyro, known.stage, {**turns, **held.parameters})
     return relative(lambda name: correction_of(as_there, name), lambda name: correction_of(known, name))
 
 
 def correction_of(board: Onboard, name: str) -> AxisCorrection:
-    """What the board does to one sensor; nothing where its readings were logged raw."""
+    """The board's correction of one sensor; none where its readings were logged raw."""
     if board.stage == "raw":
         return AxisCorrection(np.zeros(3), np.ones(3), np.eye(3))
     root, _ = _names(board, name)
@@ -99,14 +99,14 @@ def correction_of(board: Onboard, name: str) -> AxisCorrection:
 
 
 def _names(board: Onboard, name: str) -> tuple[str, str]:
-    """Beginnings of the names of one sensor's parameters: of its calibration, of its temperature compensation."""
+    """Prefixes of one sensor's parameter names: of its calibration and of its temperature compensation."""
     if name == "accelerometer":
         return f"CAL_ACC{board.accel}", "TC_A"
     return f"CAL_GYRO{board.gyro}", "TC_G"
 
 
 def _group(board: Onboard, name: str) -> str:
-    """The group of temperature parameters that is this sensor's, by its id; of the same number where none is."""
+    """The sensor's group of temperature parameters, by device id; the one of the same number where no id matches."""
     root, letters = _names(board, name)
     device = board.parameters.get(f"{root}_ID", 0.0)
     own = next((i for i in range(4) if device and board.parameters.get(f"{letters}{i}_ID") == device), int(root[-1]))

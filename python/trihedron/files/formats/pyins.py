@@ -1,4 +1,4 @@
-"""pyins: ``x_out = T x + b``, true → measured, T full."""
+"""pyins: ``x_out = T x + b``, true → measured, T a full matrix."""
 
 from __future__ import annotations
 

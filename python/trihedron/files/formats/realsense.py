@@ -1,7 +1,7 @@
 """RealSense: ``corrected = Mᵀ raw - bias`` per sensor, M the nine numbers of ``scale_and_alignment`` row by row.
 
-The maker's script (tools/rs-imu-calibration of librealsense) solves ``raw · X - bias`` and writes X row by row; the
-camera is given its transpose.
+The manufacturer's script (tools/rs-imu-calibration of librealsense) solves ``raw · X - bias`` and writes X row by row;
+the camera stores its transpose.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def to_realsense(calibration: Calibration, options: ExportOptions) -> str:
 
 
 def from_realsense(text: str) -> Calibration | None:
-    """``calibration.json`` of the maker's script."""
+    """``calibration.json`` of the manufacturer's script."""
     imus = (json_of(text) or {}).get("imus")
     if not isinstance(imus, list) or not imus or not isinstance(imus[0], dict):
         return None

@@ -1,4 +1,4 @@
-"""Covariances of ROS' ``sensor_msgs/Imu``: N² times the rate, of one message, on the diagonal, row by row."""
+"""Covariances of ROS' ``sensor_msgs/Imu``: the variance of one message, N² times the rate, on the diagonal."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def to_ros(calibration: Calibration, options: ExportOptions) -> str:
     Raises
     ------
     ValueError
-        When noise or rate are missing: a covariance is made of both.
+        When noise or rate, from which the covariance is computed, are not given.
     """
     known = of_si_readings(calibration, "ROS", options)
     figures = required(known, options, "ROS")

@@ -1,4 +1,4 @@
-"""What simulators share: readings as they distort truth, and what their model of an IMU cannot hold."""
+"""Shared by simulators: the distortion of truth to readings, and what their IMU model cannot represent."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from trihedron.sensor_model import other_form
 def distortion(
     calibration: Calibration, options: ExportOptions, target: str
 ) -> tuple[Calibration, dict[str, tuple[FloatArray, FloatArray]], Figures]:
-    """``reading = A truth + b`` by sensor, (3, 3) and (3,) in SI, and its noise; an ideal gyro where there is none.
+    """``reading = A truth + b`` by sensor, (3, 3) and (3,) in SI, and the noise; an ideal gyro where there is none.
 
     Raises
     ------
     ValueError
-        When noise or rate are not known.
+        When noise or rate are not given.
     """
     known = of_si_readings(calibration, target, options)
     pairs = {name: other_form(sensor.S, sensor.b) for name, sensor in named_sensors(known)}
@@ -38,7 +38,7 @@ def said_of(
     lost_bias: tuple[str, ...] = (),
     lost: tuple[str, ...] = (),
 ) -> list[str]:
-    """Heading of a simulator's file, with what its model lacks and how large that is in this unit."""
+    """Heading of a simulator's file, with what its model cannot represent and the size of that for this unit."""
     lines = heading(calibration, equation)
     for name, sensor in named_sensors(calibration):
         A, b = other_form(sensor.S, sensor.b)

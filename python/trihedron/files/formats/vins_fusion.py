@@ -1,4 +1,4 @@
-"""Noise, topic and gravity for VINS-Fusion's configuration, which has no place for S and b."""
+"""Noise, topic and gravity for VINS-Fusion's configuration, which has no fields for S and b."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ _TO_SI = {"accelerometer": STANDARD_GRAVITY_M_S2, "gyroscope": 1.0 / degrees_fro
 
 
 def to_xio(calibration: Calibration, _options: ExportOptions) -> str:
-    """Arrays in C, as Fusion's functions take them."""
+    """Arrays in C for Fusion's functions."""
     equation = "corrected = misalignment * (sensitivity o (raw - offset)): raw to g and deg/s, as Fusion expects."
     lines = [f"// {line}" for line in heading(calibration, equation)]
     for name, sensor in named_sensors(calibration):
@@ -34,7 +34,7 @@ def to_xio(calibration: Calibration, _options: ExportOptions) -> str:
 
 
 def from_xio(text: str) -> Calibration | None:
-    """Arrays in C, or the same names as keys of a device's settings (``accelerometerMisalignment``: [...])."""
+    """Reads arrays in C, or the same names as keys of a device's settings (``accelerometerMisalignment``: [...])."""
     sensors = {}
     for name in ("accelerometer", "gyroscope"):
         parts = []

@@ -1,1 +1,1 @@
-"""The audit of every log: what is wrong with its clock and with its readings, each with place and number."""
+"""The audit of every log: findings on its clock and its readings, each with place and number."""

@@ -1,4 +1,4 @@
-"""Readings that are no measurements: not finite, stuck, repeated, clipped, or coarser than their noise."""
+"""Invalid readings: not finite, stuck, repeated, clipped, or with a resolution coarser than the noise."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from trihedron.units import (
 
 
 def short(sensor: str) -> str:
-    """The sensor's name in a sentence."""
+    """The sensor's name for messages."""
     return "gyro" if sensor == "gyroscope" else sensor
 
 
 def audit_clipping(sensor: str, walls: tuple[Limit, ...], place: Place) -> list[Finding]:
-    """One finding per sensor that names every wall."""
+    """One finding per sensor that lists every range limit (``walls``) with its clipped readings."""
     if not walls:
         return []
     first = min(int(w.runs[0, 0]) for w in walls)
@@ -49,13 +49,13 @@ def audit_clipping(sensor: str, walls: tuple[Limit, ...], place: Place) -> list[
 
 
 LOST_IN_NOISE = 0.01
-"""Steps below this part of the noise are not worth saying: a hundred of them are one deviation of a reading."""
+"""LSB over the noise of one reading, below which the LSB is not reported."""
 
 
 def audit_steps(
     sensor: str, facts: ChannelFacts, windows: Windows | None, unit: AccelerationUnit | RateUnit
 ) -> list[Finding]:
-    """A note on the steps (3,) of readings whose unit is not counts; nothing where they are lost in the noise."""
+    """A note on the LSB (3,) of readings whose unit is not counts; none where it is far below the noise."""
     noise = np.zeros(3) if windows is None else windows.quiet_noise(sensor)
     if unit.value == "counts" or not np.all(facts.step > LOST_IN_NOISE * noise):
         return []
@@ -82,7 +82,7 @@ def _is_decimal(step: float) -> bool:
 
 
 def _per_unit(step_si: float, sensor: str) -> float:
-    """Steps in one g, or in one degree per second."""
+    """Number of LSB in one g, or in one degree per second."""
     if sensor == "accelerometer":
         return STANDARD_GRAVITY_M_S2 / step_si
     return 1.0 / degrees_from_radians(step_si)
@@ -90,13 +90,13 @@ def _per_unit(step_si: float, sensor: str) -> float:
 
 Place = Callable[[int], str]
 MANY, LONG, HALF = 0.05, 0.1, 0.5
-"""Shares of a log without readings, frozen, or repeated beyond which what is left no longer speaks for it."""
+"""Shares of a log that are not finite, stuck, or repeated, from which on the finding is serious."""
 
 
 def audit_readings(
     sensor: str, readings: FloatArray, facts: ChannelFacts, windows: Windows | None, place: Place
 ) -> list[Finding]:
-    """Findings on one triad (n, 3). ``place(i)`` names sample i for people; one pass for the usual log."""
+    """Findings on one triad (n, 3). ``place(i)`` names sample i in messages; the usual log needs one pass."""
     repeats = Repeats(readings)
     findings = _non_finite(sensor, repeats, place)
     if len(readings) < 8:
@@ -106,7 +106,7 @@ def audit_readings(
     findings += audit_clipping(sensor, walls, place)
     for k in range(3):
         at_wall = any(w.axis == k and w.value == readings[repeats.longest_start[k], k] for w in walls)
-        # A stuck triad was reported as repeated rows, a value stuck at a wall as clipping.
+        # A stuck triad is reported as repeated rows, a value stuck at a range limit as clipping.
         findings += [] if at_wall else _stuck(sensor, k, repeats, readings, facts.step[k], windows, place)
     findings += _coarse(sensor, facts.step, windows)
     return findings
@@ -130,11 +130,11 @@ def _non_finite(sensor: str, repeats: Repeats, place: Place) -> list[Finding]:
 
 
 def _repeated(sensor: str, repeats: Repeats, place: Place) -> list[Finding]:
-    """Whole triads repeated more often than three independent axes would."""
+    """A finding where complete triads repeat more often than three independent axes would."""
     n = repeats.n - 1
     expected = float(np.prod(repeats.rates[:, :3], axis=1).mean())
     seen = repeats.count[3] / n
-    # Six deviations above the chance of three independent axes, and worth a sentence at all.
+    # Six standard deviations above the chance of three independent axes, and at least twice that chance.
     limit = expected + 6.0 * np.sqrt(max(expected, 1.0 / n) / n)
     if seen <= max(limit, 2.0 * expected) or repeats.count[3] < 5:
         return []
@@ -157,9 +157,9 @@ def _repeated(sensor: str, repeats: Repeats, place: Place) -> list[Finding]:
 def _stuck(
     sensor: str, k: int, repeats: Repeats, readings: FloatArray, step: float, windows: Windows | None, place: Place
 ) -> list[Finding]:
-    """One axis that holds a value far longer than chance while it should not.
+    """A finding where one axis keeps a value far longer than by chance.
 
-    Where the resolution hides the noise a value may well stay for a whole rest; there the other axes must move.
+    Where the LSB exceeds the noise, a value may be constant for a whole pose; then the other axes must move.
     """
     longest, start = int(repeats.longest[k]), int(repeats.longest_start[k])
     if longest <= max(longest_by_chance(repeats.n, repeats.chance(k)), 2.0 * repeats.longest[3]):
@@ -189,7 +189,7 @@ def _stuck(
 
 
 def _coarse(sensor: str, steps: FloatArray, windows: Windows | None) -> list[Finding]:
-    """Steps between possible readings that hide the noise."""
+    """A finding where the LSB is more than twice the noise."""
     if windows is None:
         return []
     noise = windows.quiet_noise(sensor)
@@ -210,16 +210,16 @@ def _coarse(sensor: str, steps: FloatArray, windows: Windows | None) -> list[Fin
     ]
 
 
-# Readings that equal the one before: how often, how long, and how long chance would make it.
+# Readings that equal the previous one: their number, the longest run, and the longest run expected by chance.
 
 CHUNK = 1 << 20
-"""Rows after which windows begin anew."""
+"""Rows after which windows restart."""
 WINDOW = 64
 """Rows of a window."""
 
 
 class Repeats:
-    """Where a reading equals the one before it: counts, longest runs and their chance, per axis and for the triad."""
+    """Readings that equal the previous one: counts, longest runs and their chance, per axis and for the triad."""
 
     def __init__(self, readings: FloatArray) -> None:
         self.n = len(readings)
@@ -227,20 +227,20 @@ class Repeats:
         self.count = np.array(count, dtype=np.int64)
         self.longest = np.array(longest, dtype=np.int64)
         self.longest_start = np.array(start, dtype=np.int64)
-        # Windows begin anew every 2²⁰ rows, and what is left over counts where it is all there is.
+        # Windows restart every 2²⁰ rows; an incomplete window is used only where it is the only one.
         left = (self.n - 1) % CHUNK
         of_left = windows[-1:] / max(left, 1) if 0 < left < WINDOW else np.zeros((0, 4))
         whole = windows[: (self.n - 1) // WINDOW] / float(WINDOW)
         self.rates = np.concatenate([whole, of_left]) if self.n > 1 else np.zeros((1, 4))
 
     def chance(self, k: int) -> float:
-        """Usual share of equal neighbours where they are frequent (ninth decile over windows of 64 rows)."""
+        """Share of equal neighbours on axis ``k`` where they are frequent (ninth decile over windows of 64 rows)."""
         rate = quantile(self.rates[:, k], 0.9)
         return float(rate)
 
 
 def longest_by_chance(n: int, probability: float) -> float:
-    """Longest run of equal neighbours that chance alone gives in n rows once in a thousand logs."""
+    """Run length of equal neighbours that occurs by chance in n rows in one of a thousand logs."""
     if probability <= 0.0:
         return 4.0
     if probability >= 1.0:

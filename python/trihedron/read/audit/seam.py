@@ -1,4 +1,4 @@
-"""Gravity that turns between two samples while the gyro rests: axes of both sensors that changed, or rows cut out."""
+"""Detects gravity that rotates between two samples without a gyro rate: both sensors' axes changed, or rows are cut."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from trihedron.records import Finding, FindingCode
 from trihedron.records.words import Words
 
 _LEAST_TURN = 0.35
-"""Of gravity, 20 degrees: what no bias hides."""
+"""Smallest change, as a fraction of gravity (20 degrees), which no bias can explain."""
 _CALM = 0.1
-"""Of gravity: how far readings of a side may lie from their mean, where a blow or a shake is none."""
+"""Largest deviation of readings on either side from their mean, as a fraction of gravity; a shock exceeds it."""
 _SEEN = 0.25
-"""Of the turn: what the gyro may tell of it, between the middles of both sides, and still have missed it."""
+"""Largest part of the rotation that the gyro may have measured, between the middles of both sides."""
 _SIDE_S, _FEWEST = 0.1, 5
 _SLOWEST_HZ = 20.0
-"""A hand turns a part by 20 degrees in a twentieth of a second at most."""
+"""Lowest rate at which it is tested: by hand a rotation of 20 degrees takes at least a twentieth of a second."""
 _GAP_STEPS = 1.5
 _BLOCK = 1 << 20
 
@@ -32,14 +32,14 @@ def audit_seam(
     turning: Turning,
     place: Callable[[int], Words],
 ) -> list[Finding]:
-    """A finding where gravity leaps between two neighbours, the part at rest before and after.
+    """A finding where gravity jumps between two consecutive samples, with the sensor static before and after.
 
     Parameters
     ----------
     time_s : array (n,) [s]
     accelerometer, gyroscope : array (n, 3), in any unit
     turning : Turning
-        The scale at which the gyro turns gravity in the rest of the log.
+        The gyro's scale from the rotation of gravity in the whole log.
     """
     step = usual_step(time_s[:_BLOCK])
     side = max(round(_SIDE_S / step), _FEWEST)
@@ -63,7 +63,7 @@ def audit_seam(
 
 
 def _leaps(readings: FloatArray, least: float) -> list[int]:
-    """Samples that differ from the one before by more than ``least``, in blocks that no long log makes large."""
+    """Samples that differ from the previous one by more than ``least``, computed in blocks to limit memory."""
     found: list[int] = []
     for first in range(0, len(readings) - 1, _BLOCK):
         change = np.diff(readings[first : first + _BLOCK + 1], axis=0)
@@ -72,8 +72,8 @@ def _leaps(readings: FloatArray, least: float) -> list[int]:
 
 
 def _is_unseen(gravity: FloatArray, turned_rad: FloatArray) -> bool:
-    """Whether both halves of readings (2 n, 3) of gravity are calm, and the steps (2 n, 3) of the gyro explain no good
-    part of what lies between."""
+    """Whether both halves of gravity (2 n, 3) are constant, and the gyro's rotation per sample (2 n, 3) [rad] explains
+    less than ``_SEEN`` of the change between them."""
     halves = np.split(gravity, 2)
     before, after = (half.mean(axis=0) for half in halves)
     is_calm = all(bool(np.all(np.linalg.norm(half - half.mean(axis=0), axis=1) < _CALM)) for half in halves)

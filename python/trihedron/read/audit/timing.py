@@ -1,4 +1,4 @@
-"""Rate, jitter, gaps, duplicate timestamps, lost packets."""
+"""Findings on timestamps: changes of rate, jitter, gaps, duplicates, lost packets."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from trihedron.records.sampling import UNJUDGED
 _PARTS = 40
 _FEWEST_ROWS = 50
 _ABRUPT = 8.0
-"""The change over the scatter of the parts on both sides; a rate that wanders has none that stands out so."""
+"""Smallest ratio of the change of rate to the scatter of the parts on both sides; a drifting rate stays below it."""
 _SMALLEST = 5e-4
-"""Relative change below which a quartz may have done it."""
+"""Smallest relative change of rate that is reported; a quartz oscillator may cause smaller ones."""
 _SURE, _SCALES_DIFFER = 4.0, 0.01
-"""Deviations, and how far the scale of an uncalibrated gyro differs from turn to turn because its axes' do."""
+"""Standard deviations of the test, and the scatter of an uncalibrated gyro's scale because its axes' scales differ."""
 
 
 def audit_pace(time_s: FloatArray, sensors: Sensors) -> list[Finding]:
-    """A finding where timestamps (n,) run at one rate up to a row and at another from there on, unless gravity turned
-    so."""
+    """A finding where the rate of timestamps (n,) changes at a row, unless the rotation of gravity confirms the
+    change."""
     accelerometer, gyroscope = sensors.accelerometer, sensors.gyroscope
     if gyroscope is None:
         return []
@@ -44,7 +44,7 @@ def audit_pace(time_s: FloatArray, sensors: Sensors) -> list[Finding]:
             sides.append(turning_of(accelerometer[part], gyroscope[part], rate))
         before, after = sides
         if before is not None and after is not None and before.is_clear and after.is_clear:
-            # Timestamps that lie change the scale at which gravity turns by their ratio; true ones leave it.
+            # Wrong timestamps change the gyro's scale from gravity by the ratio of the rates; true ones do not.
             change = math.log(after.scale / before.scale)
             sigma = math.hypot(before.sigma / before.scale, after.sigma / after.scale, _SCALES_DIFFER)
             may_be_true, may_lie = (abs(change + x) < _SURE * sigma for x in (0.0, math.log(ratio)))
@@ -59,13 +59,13 @@ def audit_pace(time_s: FloatArray, sensors: Sensors) -> list[Finding]:
 
 
 def usual_mean(time_s: FloatArray) -> float:
-    """Mean step [s] of timestamps (n,) but for gaps."""
+    """Mean step [s] of timestamps (n,), without gaps."""
     step = np.diff(time_s)
     return float(step[step < GAP_STEPS * usual_step(time_s)].mean())
 
 
 def _jump(time_s: FloatArray) -> tuple[int, float] | None:
-    """(first sample behind, ratio of the steps) of the one place where the step changes for good."""
+    """(first sample after it, ratio of the steps) of the place where the step changes permanently; None without one."""
     n = (len(time_s) - 1) // _PARTS
     if n < _FEWEST_ROWS:
         return None
@@ -76,7 +76,7 @@ def _jump(time_s: FloatArray) -> tuple[int, float] | None:
     pace = np.nanmean(step, axis=1)
     best: tuple[float, int] | None = None
     for k in range(4, _PARTS - 4):
-        # The part in which it happens belongs to neither side.
+        # The part with the change belongs to neither side.
         before, after = pace[: k - 1], pace[k + 1 :]
         scatter = math.sqrt(0.5 * (before.var() + after.var())) + 1e-9 * abs(float(pace.mean()))
         contrast = abs(float(after.mean() - before.mean())) / scatter
@@ -95,12 +95,12 @@ def _jump(time_s: FloatArray) -> tuple[int, float] | None:
 Place = Callable[[int], str]
 
 GAP_STEPS = 1.5
-"""A step this much longer than usual has lost at least half a sample."""
+"""A step longer than this multiple of the usual one is a gap."""
 JITTER_STEPS = 0.03
-"""Jitter below three per cent of a step is the clock's rounding, not worth a sentence."""
+"""Jitter, in steps, below which it is the clock's rounding and not reported."""
 SERIOUS_LOSS = 0.05
 MUCH_JITTER = 0.2
-"""Jitter of a fifth of a step moves the ends of a short turn by as much as a reading's noise does."""
+"""Jitter, in steps, above which it is a warning: it affects a short rotation as much as a reading's noise does."""
 
 
 def audit_timing(
@@ -111,10 +111,10 @@ def audit_timing(
     lost_behind: npt.NDArray[np.int64] | None = None,
     timestamps_s: FloatArray | None = None,
 ) -> list[Finding]:
-    """Findings on timestamps that were in the log. ``place(i)`` names sample i for people.
+    """Findings on the timestamps of a log. ``place(i)`` names sample i in messages.
 
-    ``lost_behind`` (n - 1,) are the samples lost behind each, where the clock tells them; else long steps count.
-    ``timestamps_s`` (n,) are the timestamps as logged where an even clock took their place.
+    ``lost_behind`` (n - 1,) are the samples lost after each, where the clock shows them; else long steps are gaps.
+    ``timestamps_s`` (n,) are the logged timestamps where an even clock replaced them.
     """
     if len(time_s) < 3:
         return []
@@ -129,7 +129,7 @@ def audit_timing(
     if lost_behind is not None:
         findings += _lost(np.diff(time_s), lost_behind, place) if lost_behind.any() else []
     elif sampling.kind in (TimestampKind.LATE, TimestampKind.SCATTERED):
-        pass  # a late timestamp looks like a loss: how many are lost is not told
+        pass  # a late timestamp looks like a loss: the number of lost samples is unknown
     else:
         batched = bool(findings) and steps_of(time_s).same > 0.2 * (len(time_s) - 1)
         gaps = _core.steps_above(time_s, (5.0 if batched else GAP_STEPS) * usual)
@@ -205,7 +205,7 @@ def _gap(step: FloatArray, gaps: npt.NDArray[np.intp], lost: npt.NDArray[np.int6
 
 
 def audit_counter(counter: FloatArray, label: str, place: Place) -> list[Finding]:
-    """Packets the log's own counter says are missing; a counter that wraps is continued."""
+    """Packets that are missing by the log's counter; a counter that wraps is continued."""
     if len(counter) < 3 or not np.all(np.isfinite(counter)):
         return []
     step = np.diff(counter)
@@ -216,7 +216,7 @@ def audit_counter(counter: FloatArray, label: str, place: Place) -> list[Finding
             break
     if np.any(step < 0):
         return []
-    # A counter that ticks with the sensor's inner rate, 3 and 4 in turn, loses nothing at 4: hence the upper quartile.
+    # The upper quartile, because a counter of the sensor's internal rate may step by 3 and 4 in turn without a loss.
     usual = float(np.percentile(step, 75.0))
     lost = np.flatnonzero(step > 1.5 * usual)
     if usual <= 0 or not len(lost):

@@ -1,1 +1,1 @@
-"""The time base of a log: its unit, its order, its rate, and whether its timestamps are when the samples were taken."""
+"""The time base of a log: unit, order, rate, and whether timestamps are the instants of sampling."""

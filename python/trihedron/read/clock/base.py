@@ -1,4 +1,4 @@
-"""The time base: unit, start, wraps, order."""
+"""Seconds from a time column: unit, start, wraps, order."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
 
 _SHORTEST_STEP_S = 1e-9
-"""Mean step of a log: no ADC takes a sample in a nanosecond."""
+"""Smallest mean step of a log [s]; no ADC samples faster."""
 _LONGEST_S = 3.2e9
-"""A century."""
+"""Longest duration of a log [s]: a century."""
 NOBODY = Witness()
 
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """``time_s`` (n,) from the first sample on, ``start_s`` the clock's reading there, ``rows`` (n,) the table rows."""
+    """``time_s`` (n,) [s] from the first sample on, ``start_s`` the clock's time there, ``rows`` (n,) of the table."""
 
     time_s: FloatArray
     start_s: float
@@ -43,8 +43,8 @@ def build_clock(
 ) -> Clock:
     """Seconds from a time column, or from whole seconds and a column of ``nanoseconds`` beside them.
 
-    ``witness`` holds readings that limit how long a row can have lasted, where nothing states the unit. The clock may
-    be ``in_place`` of the column where nobody asks for that again.
+    ``witness`` contains readings that limit the time between rows, for use where the unit is not stated. With
+    ``in_place`` the clock may overwrite the column, which must not be used afterwards.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def build_clock(
     raw = table.columns[column]
     base = 0.0
     if nanoseconds is not None:
-        # Relative to the first second, so that no digit of the nanoseconds is lost.
+        # Relative to the first second, so that nanoseconds keep all digits.
         base = float(raw[0]) if np.isfinite(raw[0]) else 0.0
         raw = (raw - base) + 1e-9 * table.columns[nanoseconds]
         named = "s"
@@ -96,7 +96,7 @@ def build_clock(
             f"{(raw[-1] - raw[0]) * scale:.3g} s, which no log does; give --time-unit, or name another time column."
         )
     first = float(raw[0])
-    # In its own place where it is a copy: a long log has no room for another.
+    # In place where the array is a copy, to save memory for a long log.
     is_own = order is not None or rows is not None or nanoseconds is not None or in_place
     time_s = np.subtract(raw, first, out=raw if is_own else None)
     if scale != 1.0:

@@ -1,4 +1,4 @@
-"""The even clock behind a log's timestamps, if any, and the samples lost on it (docs/reading.md, section 4)."""
+"""The even clock from which a log's timestamps deviate, if any, and the lost samples (docs/reading.md, section 4)."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from trihedron.read.clock.period import Period, find_period
 from trihedron.records.sampling import TimestampKind
 
 FEWEST_ROWS = 100
-"""Fewer timestamps tell no kind of clock."""
+"""Smallest number of timestamps from which a clock is determined."""
 UNSEEN = 0.02
-"""Part of a period by which timestamps may stray from an even clock before anybody asks how it grows."""
+"""Deviation from an even clock, in periods, below which neither its growth nor a drift of the rate is tested."""
 EXACT = 0.005
-"""Timestamps this part of a period about an even clock (rms) are even."""
+"""Rms deviation from an even clock, in periods, below which timestamps are exact."""
 GROWTH = 4.0
-"""Growth of the variance of a lag's elapsed time over sixteen times the lag, above which no even clock lies behind the
-timestamps: 16 for steps drawn anew, 1 for an even clock."""
+"""Ratio of the variances of elapsed-time errors over 16 m and over m rows, above which there is no even clock: 16 for
+independent steps, 1 for an even clock."""
 TAKEN_BACK = 0.02
-"""Share of blocks whose earliest timestamp may move back by a whole period: an even clock's never do."""
+"""Largest share of blocks whose earliest timestamp moves back by a whole period; with an even clock none does."""
 MOST_BLOCKS = 1 << 18
-"""Blocks of a stretch whose earliest timestamps the clock is laid under."""
+"""Largest number of blocks of a section to whose earliest timestamps the clock is fitted."""
 CLOSE_PIECES = 60
-"""Pieces of a log over which a wandering rate is followed: a thermal drift takes minutes."""
+"""Pieces of a log in which a drifting rate is followed; thermal drift takes minutes."""
 
 
 @dataclass(frozen=True, eq=False)
 class EvenClock:
-    """``tick`` (n,) number of each sample, lost ones counted; ``even_s`` (n,) when the even clock took it, relative to
-    the timestamps; ``kind``; ``counts_losses``: whether ``tick`` says what was lost."""
+    """``tick`` (n,): number of each sample, lost ones counted; ``even_s`` (n,): its instant on the even clock, in the
+    time of the timestamps [s]; ``kind`` of the timestamps; ``counts_losses``: whether ``tick`` counts lost samples."""
 
     kind: TimestampKind
     period_s: float
@@ -48,9 +48,9 @@ class EvenClock:
 
     @property
     def lost_behind(self) -> IntArray:
-        """(n - 1,) samples lost behind each row; those of pauses too, as far as the clock tells."""
+        """(n - 1,) samples lost after each row, those of pauses included as far as the clock shows them."""
         if int(self.tick[-1] - self.tick[0]) == len(self.tick) - 1:
-            # Ticks ascend: nothing is lost, and nothing is written down.
+            # Ticks increase, so nothing is lost and no array is needed.
             return np.broadcast_to(np.zeros(1, self.tick.dtype), len(self.tick) - 1)
         lost = np.diff(self.tick)
         lost -= 1
@@ -58,10 +58,10 @@ class EvenClock:
 
 
 def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> EvenClock | None:
-    """The even clock behind timestamps (n,) in order, or ``None`` for fewer than 100 rows.
+    """The even clock of timestamps (n,) in order, or ``None`` for fewer than 100 rows.
 
-    ``counter`` (n,) numbers the samples, lost ones too, from 0 (already continued where it wraps): then it tells the
-    losses and the timestamps only the rate.
+    ``counter`` (n,) numbers the samples, lost ones too, from 0 (already continued where it wraps): then losses are
+    from the counter, and only the rate is from the timestamps.
     """
     n = len(time_s)
     if n < FEWEST_ROWS or not time_s[-1] > time_s[0]:
@@ -76,9 +76,9 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
 
 
 def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> EvenClock:
-    """The clock of timestamps (n,) whose period was ``found``."""
+    """The clock of timestamps (n,) with the period ``found``."""
     n, period, sees = len(time_s), found.period_s, found.is_seen
-    # Lateness, clock and error one after the other: a long log has no room for two, and asking for it anew takes time.
+    # One buffer for lateness, clock and error in turn: a second one takes memory and time for a long log.
     room = _core.room(n, 1).reshape(-1)
     if counter is not None:
         tick, pauses, width, moved_back = (
@@ -95,7 +95,7 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
     even, mean_period, sigma, drifts = _lay(time_s, tick, period, pauses, width, False, room)
     error = _error(time_s, even)
     for _ in range(3 if counter is None and sees else 0):
-        # Followed loosely: a loss counted too early makes a dip that the clock must not follow.
+        # The fit is coarse here, because the clock must not follow the dip from a loss that is counted too early.
         moved = behind_late_rows(tick, error, period)
         if moved is tick:
             break
@@ -111,7 +111,7 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
         return EvenClock(TimestampKind.IRREGULAR, period, sigma, np.arange(n), time_s, 0.0, False)
     kind = _kind(error, period, found.grid_s)
     if kind is not TimestampKind.LATE:
-        # Two-sided errors have their middle, not their edge, on the clock.
+        # For two-sided errors the clock is at their middle, not at their edge.
         even, mean_period, sigma, _ = _lay(time_s, tick, period, pauses, width, True, room, CLOSE_PIECES)
         error = _error(time_s, even)
     rms = _core.errors_deviation(error)
@@ -120,13 +120,13 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
 
 
 def _error(time_s: FloatArray, even: FloatArray) -> FloatArray:
-    """``time_s - even`` in the place of ``even``, which is the timestamps less their error again when it is wanted."""
+    """``time_s - even``, written into ``even``; applied again it gives back the clock."""
     _core.timestamp_errors(time_s, even)
     return even
 
 
 def _long_run(time_s: FloatArray, tick: IntArray) -> float:
-    """Period from timestamps and their numbers: a line through the earliest of some hundred blocks, thrice."""
+    """Period [s] from timestamps and ticks: a line through the earliest timestamps of about 300 blocks, three times."""
     period = float((time_s[-1] - time_s[0]) / max(tick[-1] - tick[0], 1))
     width = max(len(time_s) // 300, 8)
     for _ in range(3):
@@ -147,18 +147,18 @@ def _lay(
     room: FloatArray,
     pieces: int = 12,
 ) -> tuple[FloatArray, float, float, bool]:
-    """The even clock (n,) under the earliest timestamps, or through the middle of all; its mean period over the
-    longest stretch and the standard error of that; whether its rate drifts, followed in so many ``pieces``.
+    """The even clock (n,) fitted to the earliest timestamps, or to the middle of all; its mean period over the longest
+    section and the standard error of that; whether its rate drifts, which is then followed in ``pieces``.
 
-    ``least`` rows make a block at least; ``room`` (n,) takes the clock."""
+    A block has at least ``least`` rows; the clock is written into ``room`` (n,)."""
     late = lateness(time_s, tick, period, room)
-    # Each stretch of the clock takes the place of the lateness that it was found from.
+    # Each section of the clock overwrites the lateness from which it is computed.
     even = late
     edges = np.concatenate([[0], pauses + 1, [len(late)]])
     sigma, longest, drifts, slope = np.inf, 0, False, 0.0
     for a, b in pairwise(edges):
         piece = late[a:b]
-        # A clock drifts over minutes: more blocks than this show no more of it and take room.
+        # A clock drifts over minutes: more blocks than this only take memory.
         width = max(least, (b - a) // MOST_BLOCKS)
         if b - a < 4 * width:
             even[a:b] = piece.min() + period * tick[a:b]
@@ -178,7 +178,7 @@ def _lay(
         noise = 1.4826 * median(np.abs(np.diff(each))) / np.sqrt(2.0) + 1e-3 * period
         size = min(max(len(y) // 12, 5), 401) | 1
         smooth = _core.running_median(left, size)
-        # Wander: the smoothed rest is far more than the blocks' own scatter leaves in it.
+        # The rate drifts if the smoothed residual is far larger than the scatter of the blocks explains.
         curved = float(np.std(smooth)) > max(8.0 * noise / np.sqrt(size), UNSEEN * period)
         course = None
         if curved and len(y) >= 24:
@@ -191,20 +191,20 @@ def _lay(
         if b - a > longest:
             longest, slope = b - a, line[0] / scale
             spread = float(np.std(left - smooth if curved else left))
-            # Neighbouring blocks share what delays them: four count as one.
+            # Delays of neighbouring blocks are correlated: four count as one.
             sigma = spread / scale / max(float(np.std(u)), 1e-9) / np.sqrt(max(len(y) / 4.0, 1.0))
     digits = float(np.spacing(max(abs(time_s[0]), abs(time_s[-1])))) / max(int(tick[-1] - tick[0]), 1)
     return even, period + slope, float(np.hypot(sigma, digits)), drifts
 
 
 def _parts(first: int, stop: int) -> Iterator[slice]:
-    """Rows in parts that need little room beside the log itself."""
+    """Yield slices of rows, in parts that need little memory."""
     for a in range(first, stop, 1 << 18):
         yield slice(a, min(a + (1 << 18), stop))
 
 
 def _growth(error: FloatArray, pauses: IntArray, unseen: float) -> float:
-    """Variance of the change of the timestamps' error over 16 m rows over that over m, m as long as the log allows."""
+    """Variance of the change of the timestamp error over 16 m rows divided by that over m rows, m <= 16."""
     edges = np.concatenate([[0], pauses + 1, [len(error)]])
     longest = int(np.argmax(np.diff(edges)))
     piece = error[edges[longest] : edges[longest + 1]][: 1 << 20]
@@ -219,13 +219,13 @@ def _growth(error: FloatArray, pauses: IntArray, unseen: float) -> float:
 
 
 def _range(error: FloatArray) -> float:
-    """Width that holds all but 2 % of the errors: those next to a loss may stand on its wrong side."""
+    """Width that contains all but 2 % of the errors, because rows next to a loss may be on its wrong side."""
     low, high = quantiles(error[:: max(len(error) // 100_000, 1), None], [0.01, 0.99])[:, 0]
     return float(high - low)
 
 
 def _kind(error: FloatArray, period: float, grid: float) -> TimestampKind:
-    """Kind of timestamps from their errors (n,) about the even clock."""
+    """Kind of timestamps from their errors (n,) [s] relative to the even clock."""
     probe = error[:: max(len(error) // 100_000, 1)]
     low, middle, high = quantiles(probe[:, None], [0.002, 0.5, 0.998])[:, 0]
     rms = float(np.std(probe))
@@ -233,30 +233,30 @@ def _kind(error: FloatArray, period: float, grid: float) -> TimestampKind:
         return TimestampKind.EXACT
     if 0.0 < grid < 1.3 * period and _range(error) < 1.3 * grid:
         return TimestampKind.ROUNDED
-    # One-sided: the early edge is sharp, the late one runs out; or samples come in packets.
+    # One-sided errors have a sharp early edge and a late tail; or samples arrive in packets.
     together = _core.errors_falls(error, 0.7 * period) / max(len(error) - 1, 1)
     if high - middle > 2.0 * (middle - low) or together > 0.02 or high - low > 1.0 * period:
         return TimestampKind.LATE
     return TimestampKind.SCATTERED
 
 
-# Samples numbered by their timestamps' own steps, where rounding to a grid is all that is wrong with them.
+# Samples numbered by the steps of their timestamps, where rounding to a grid is the only error.
 
 COARSEST = 1.0 / 3.0
-"""Of a period: on a grid this fine a step says how many samples it holds, both its ends rounded."""
+"""Coarsest grid, in periods, on which a step with both ends rounded determines its number of samples."""
 ROOM = 0.36
-"""Of a period, by which a step may miss whole periods: the coarsest grid, and a little that is not rounding."""
+"""Largest deviation of a step from whole periods, in periods: the coarsest grid, and a margin for other errors."""
 SINGLE = 1.5
-"""Of the median step: longer ones hold a lost sample."""
+"""Multiple of the median step above which a step contains a lost sample."""
 COUNTED = 5.5
-"""Periods of the longest steps that are looked at: those of pauses bear no clock's drift."""
+"""Longest steps checked, in periods: in a pause the drift of the clock is too large."""
 
 
 def numbers_of_rounded(time_s: FloatArray, grid_s: float) -> IntArray | None:
-    """(n,) numbers of the samples, lost ones counted, where every step is nearly whole periods; else ``None``.
+    """(n,) numbers of the samples, lost ones counted, where every step is close to whole periods; else ``None``.
 
-    With T = 9.996 ms on a grid of 1 ms one step in 250 is a millisecond short: no phase sum over a window tells that
-    pattern from a clock of another period with samples lost; the steps themselves do.
+    With T = 9.996 ms on a grid of 1 ms one step in 250 is a millisecond short: a phase sum over a window cannot
+    distinguish this pattern from a clock of another period with lost samples; the steps themselves can.
     """
     step = np.diff(time_s)
     middle = float(np.median(step))

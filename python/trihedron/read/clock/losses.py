@@ -1,4 +1,4 @@
-"""Samples lost on a clock of known period, by which the earliest timestamps shift (docs/reading.md, 4)."""
+"""Samples lost on a clock of known period, which shift the earliest timestamps by periods (docs/reading.md, 4)."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from trihedron.ranges import ranges_of
 from trihedron.read.clock.period import PAUSE_STEPS
 
 LOST = 0.6
-"""Part of a period by which the earliest timestamps must move, and stay moved, for a sample to be lost."""
+"""Permanent shift of the earliest timestamps, in periods, from which on a sample counts as lost."""
 MISS = 1e-2
-"""Chance that no timestamp of a whole log's blocks is nearly undelayed."""
+"""Probability that some block of a whole log has no timestamp that is nearly undelayed."""
 SETTLED_OVER = 5
-"""Blocks over which the level of the earliest timestamps is looked at on either side of a place."""
+"""Blocks on either side of a place from which the level of the earliest timestamps is estimated."""
 UNMOVED = LOST / (2.0 * SETTLED_OVER)
-"""Moves from block to block, in periods, of which so many together are no loss."""
+"""Shift from block to block, in periods, of which ``2 SETTLED_OVER`` together are still no loss."""
 STALL_STEPS = 120
-"""A link that stands still for longer than this has paused."""
+"""Longest stall of the link, in rows; a longer one is a pause."""
 
 
 def block_rows(time_s: FloatArray, period: float, coherence: float) -> int:
-    """Rows among which one is all but certainly timestamped without delay, 2 (θ/T) ln(n/α), and more than a packet."""
+    """Rows of a block, of which one is almost certainly undelayed: 2 (θ/T) ln(n/α), and more than a packet."""
     n = len(time_s)
     mean_delay = np.sqrt(float(np.clip(coherence, 0.05, 1.0)) ** -2 - 1.0) / (
         2.0 * np.pi
-    )  # of an exponential law, in periods
+    )  # of an exponential distribution, in periods
     width = 2.0 * mean_delay * np.log(n / MISS)
     probe = time_s[: 1 << 20]
     close = np.diff(probe) < 0.3 * period
@@ -45,13 +45,13 @@ def earliest(late: FloatArray, width: int) -> IntArray:
 
 
 def lateness(time_s: FloatArray, tick: IntArray | None, period: float, room: FloatArray) -> FloatArray:
-    """``time_s - period * tick`` in ``room`` (n,); without ticks each row is its own."""
+    """``time_s - period * tick``, written into ``room`` (n,); without ticks the row number is the tick."""
     _core.timestamp_lateness(time_s, tick, period, room)
     return room
 
 
 def ahead(values: FloatArray, reach: int) -> FloatArray:
-    """Minimum over each value and the ``reach`` that follow it."""
+    """Minimum of each value and the ``reach`` values after it."""
     out = values.copy()
     done = 0
     while done < reach:
@@ -64,10 +64,10 @@ def ahead(values: FloatArray, reach: int) -> FloatArray:
 def track(
     time_s: FloatArray, period: float, width: int, sees: bool, is_sharp: bool, room: FloatArray
 ) -> tuple[float, IntArray, IntArray, float]:
-    """Period, tick of every row, pauses, and the share of blocks that moved back by a period; works in ``room`` (n,).
+    """Period, tick of every row, pauses, and the share of blocks that moved back by a period; ``room`` (n,): buffer.
 
-    The earliest timestamp of every block, a stall of the link looked past, moves by whole periods where samples are
-    lost and by a little where the period is not quite right; a period not seen comes from first and last timestamp.
+    The earliest timestamp of every block, stalls of the link excluded, shifts by whole periods where samples are lost,
+    and slowly if the period is slightly wrong. Without ``sees`` the period is corrected from first and last blocks.
     """
     n = len(time_s)
     pauses = _core.steps_above(time_s, PAUSE_STEPS * period)
@@ -85,7 +85,7 @@ def track(
             period += float(np.average(slopes, weights=weights))
     late = lateness(time_s, None, period, room)
     late /= period
-    # Half the room where the ticks allow it, and the same numbers.
+    # 32-bit integers where the ticks allow it take half the memory.
     is_short = n + float(time_s[-1] - time_s[0]) / period < 0.5 * np.iinfo(np.int32).max
     lost = cast(IntArray, np.zeros(n, dtype=np.int32 if is_short else np.int64))
     back = blocks = 0
@@ -95,11 +95,11 @@ def track(
         moved_back, n_blocks = _count_losses(late[a:b], width, reach, is_sharp, lost[a:b])
         back, blocks = back + moved_back, blocks + n_blocks
     for k in pauses:
-        # How many a pause cost is told no better than its own length.
+        # The number of samples lost in a pause is only known from its length.
         lost[k + 1] += max(round(float(time_s[k + 1] - time_s[k]) / period) - 1, 0)
     if not lost.any():
         return period, np.arange(n, dtype=lost.dtype), pauses, back / max(blocks, 1)
-    # The ticks in the place of the losses: a log of 1e8 rows has no room for both.
+    # The ticks overwrite the losses, to save memory for a log of 1e8 rows.
     lost += np.int8(1)
     lost[0] -= 1
     tick = np.cumsum(lost, out=lost)
@@ -107,20 +107,20 @@ def track(
 
 
 def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost: IntArray) -> tuple[int, int]:
-    """Write the samples lost in front of each row of one stretch into ``lost``; ``late`` in periods.
+    """Write the number of samples lost before each row of one section into ``lost``; ``late`` is in periods.
 
-    Behind the last block a loss is counted only where every timestamp is nearly right (``is_sharp``).
+    After the earliest row of the last block losses are counted only where all timestamps are accurate (``is_sharp``).
 
-    Returns the number of blocks that moved back by a period, and of all blocks.
+    Returns the number of blocks that moved back by a period, and that of all blocks.
     """
     at = earliest(late, width)
     first = late[at]
     if _is_unmoved(first):
-        # Nor does any minimum over neighbours move further: nothing is lost, and no hidden loss is to be looked for.
+        # Minima over neighbours do not move further either, so nothing is lost.
         _behind_last(late, int(at[-1]), float(first[-1]), is_sharp, lost)
         return 0, len(at)
     first = ahead(first, reach)
-    # The level the clock itself drifts on: the part of the moves that is not whole periods.
+    # Moves of less than a loss are drift of the clock.
     moves = np.diff(first)
     count = np.floor(moves + (1.0 - LOST)).astype(np.int64)
     back = int(np.count_nonzero(moves < -LOST))
@@ -141,13 +141,13 @@ def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost
 
 
 def _is_unmoved(first: FloatArray) -> bool:
-    """Whether no earliest timestamp (m,), in periods, is further from the one before than noise is."""
+    """Whether all earliest timestamps (m,), in periods, are within ``UNMOVED`` of the previous one."""
     count, _, _, least, most = _core.inside_steps(first, -np.inf, np.inf)
     return 0 < count == len(first) - 1 and max(-least, most) <= UNMOVED
 
 
 def _behind_last(late: FloatArray, at: int, level: float, is_sharp: bool, lost: IntArray) -> None:
-    """Write the samples lost behind row ``at``, the earliest of the last block, into ``lost``."""
+    """Write the samples lost after row ``at``, the earliest of the last block, into ``lost``."""
     tail = late[at:] - level
     if is_sharp and len(tail) > 1:
         whole = np.floor(np.minimum.accumulate(tail[::-1])[::-1] + (1.0 - LOST)).astype(np.int64)
@@ -155,9 +155,9 @@ def _behind_last(late: FloatArray, at: int, level: float, is_sharp: bool, lost: 
 
 
 def _settle(first: FloatArray, count: IntArray) -> None:
-    """Correct ``count`` (m - 1,) where the level of the earliest timestamps (m,), losses removed, stays a period off.
+    """Correct ``count`` (m - 1,) where the earliest timestamps (m,), less the losses, stay shifted by a period.
 
-    A block without an early timestamp hides the move to the next level in two halves; a chance early one makes one up.
+    A block without an undelayed timestamp splits a shift into two parts; one that is early by chance makes a false one.
     """
     m = SETTLED_OVER
     for _ in range(3):
@@ -182,10 +182,10 @@ def _settle(first: FloatArray, count: IntArray) -> None:
 
 
 def behind_late_rows(tick: IntArray, error: FloatArray, period: float) -> IntArray:
-    """Ticks with every loss put behind the rows that it would have timestamped before they were taken.
+    """Ticks with each loss moved after the rows whose timestamps it would make earlier than their samples.
 
-    A row late by most of a period in front of a loss looks like one behind it; counted so its ``error`` (n,) about the
-    earliest timestamps is negative.
+    A row before a loss that is late by most of a period looks like a row after it; its ``error`` (n,) [s] relative to
+    the even clock is then negative.
     """
     parts = range(1, len(tick), 1 << 18)
     at = np.concatenate([a + np.flatnonzero(np.diff(tick[a - 1 : a + (1 << 18)]) > 1) for a in parts])

@@ -1,4 +1,4 @@
-"""Rows in the order they were taken: counters that wrap, packets that overtook each other."""
+"""Rows in the order of sampling: counters that wrap, packets that arrived out of order."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from trihedron.records import Finding, FindingCode
 from trihedron.records.words import Words
 
 MAX_DISPLACEMENT = 64
-"""Rows a packet may arrive late. Anything further is another recording, not another order."""
+"""Largest number of rows by which a packet may be late; a larger one means another recording."""
 PART = 1 << 20
-"""Rows of a long log that are looked at together."""
+"""Rows of a long log that are processed together."""
 _MODULI = (2.0**16, 2.0**24, 2.0**32)
 
 
@@ -27,7 +27,7 @@ def _place(table: Table, rows: npt.NDArray[np.signedinteger] | None, sample: int
 def unwrap(
     raw: FloatArray, table: Table, rows: npt.NDArray[np.signedinteger] | None, findings: list[Finding]
 ) -> tuple[FloatArray, bool]:
-    """A tick counter of 16, 24 or 32 bits that started again from zero, continued."""
+    """Timestamps from a tick counter of 16, 24 or 32 bits, continued where it wraps, and whether it wraps."""
     if len(raw) < 3:
         return raw, False
     step = np.diff(raw)
@@ -54,14 +54,14 @@ def unwrap(
 
 
 def in_order(values: FloatArray, rows: npt.NDArray[np.signedinteger], out: FloatArray) -> FloatArray:
-    """``values[rows]`` into ``out``; short numbers of rows are made long a part at a time."""
+    """Write ``values[rows]`` into ``out`` in parts, because indexing converts 32-bit row numbers to 64 bits."""
     for start in range(0, len(rows), PART):
         out[start : start + PART] = values[rows[start : start + PART]]
     return out
 
 
 def _overlapping(raw: FloatArray) -> Iterator[tuple[int, FloatArray]]:
-    """Parts of the timestamps, each with the first of the next one, and where they begin."""
+    """Yield parts of the timestamps, each with the first one of the next part, and the index at which each starts."""
     for start in range(0, max(len(raw) - 1, 1), PART):
         yield start, raw[start : start + PART + 1]
 
@@ -69,7 +69,7 @@ def _overlapping(raw: FloatArray) -> Iterator[tuple[int, FloatArray]]:
 def order_of_rows(
     raw: FloatArray, table: Table, column: int, rows: npt.NDArray[np.signedinteger] | None, findings: list[Finding]
 ) -> npt.NDArray[np.signedinteger] | None:
-    """Rows in order of their timestamps; ``None`` where they are.
+    """Row numbers in order of the timestamps; ``None`` where rows are in order already.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def order_of_rows(
         )
     order = np.argsort(raw, kind="stable")
     if len(raw) < np.iinfo(np.int32).max:
-        # Half the room, which long logs lack.
+        # Half the memory, for long logs.
         order = order.astype(np.int32)
     displaced = max(
         int(np.max(np.abs(order[a : a + PART] - np.arange(a, min(a + PART, len(order))))))

@@ -13,42 +13,42 @@ from trihedron.probability import chdtri
 from trihedron.quantiles import quantile
 
 WINDOW = 2048
-"""Rows of one phase sum: a rate that wanders by 10⁻⁴ within it turns the phase by a fifth of a period."""
+"""Rows of one phase sum: a rate that drifts by 10⁻⁴ within it changes the phase by a fifth of a period."""
 MOST_WINDOWS = 10
 LOWEST, HIGHEST = 0.8, 1.9
-"""Periods looked for, as parts of the rows' mean distance: up to 45 % of all samples may be lost."""
+"""Frequencies searched, per mean distance of rows: up to 45 % of all samples may be lost."""
 GRID_HIGHEST = 16.0
-"""A grid of timestamps finer than this part of a period is no matter."""
+"""Highest frequency of a grid of timestamps, per mean distance of rows; a finer grid has no effect."""
 LINE, LINE_HELD = 0.98, 0.9
-"""Power of a phase sum, and of that of its eighth multiple, above which all timestamps lie on multiples of one step."""
+"""Power of a phase sum, and of that of its eighth multiple, above which all timestamps are multiples of one step."""
 LEAST = 1e-4
-"""Power below which nothing is a peak."""
+"""Smallest power of a peak."""
 CHANCE = 1e-7
-"""Chance of noise to pass for a period at one frequency looked at (some 10⁴ of them). Steps drawn anew, without a clock
-behind them, leave a hump as high as a line, but wide: what a line is held against lies beside it."""
+"""Probability that noise passes as a period at one of the frequencies searched (some 10⁴). Independent steps, without
+an even clock, make a broad maximum as high as a line; a line is therefore compared with the power beside it."""
 SLOWER = 0.985
-"""A beat with fewer ticks than the log has rows is no period; there is room for the error of counting."""
+"""Frequencies below this have fewer ticks than the log has rows, so they are no period; with a margin for error."""
 ALIASED, COARSE_COHERENCE = 0.75, 0.15
-"""On a beat slower than the first, aliases of beat and period lie among the periods looked for, as high as the period
-itself if its phase sum is shorter than the second."""
+"""With a beat below the first frequency, aliases of beat and period are among the frequencies searched, and as high as
+the period itself if its coherence is below the second number."""
 MANY, PLAIN = 0.15, 0.25
-"""A period by which more than this share of samples is lost needs a power of its phase sum above the second."""
+"""A period with which more than the first share of samples is lost needs a power above the second number."""
 FEWEST_TIMESTAMPS = 100
-"""Distinct timestamps that a period needs."""
+"""Smallest number of distinct timestamps for a period."""
 WHOLE = 0.005
-"""A packet holds a whole number of samples if the rows come this near to it."""
+"""A packet contains a whole number of samples if rows per packet differ from one by less than this fraction."""
 POLLED = 0.55
-"""Slower beats than this may be packets of two and more samples, whose multiples hold the period."""
+"""Lowest frequency of a beat; slower ones may be packets of two or more samples, with the period at a multiple."""
 REGULAR = 0.12
-"""Share of samples that may be lost with regularity before a coarse grid is the likelier cause."""
+"""Share of samples lost at regular intervals above which a coarse grid is the more likely cause."""
 PAUSE_STEPS = 50.0
-"""A step longer than this many is a pause of the logger, not a loss to be counted."""
+"""Number of usual steps above which a step is a pause of the logger, not a loss to be counted."""
 
 
 @dataclass(frozen=True)
 class Period:
-    """``period_s``; ``coherence`` the length of its phase sum (1: timestamps exactly even, 0: none seen); ``grid_s``
-    the step on whose multiples all timestamps lie, or 0. ``is_seen``: the period stands out: losses can be counted."""
+    """``period_s``; ``coherence``: length of its phase sum (1: timestamps exactly even, 0: no period); ``grid_s``: step
+    of which all timestamps are multiples, or 0; ``is_seen``: the period is significant, so losses can be counted."""
 
     period_s: float
     coherence: float
@@ -59,9 +59,9 @@ class Period:
 def find_period(time_s: FloatArray) -> Period:
     """Period of timestamps (n,) in order; at least 64 rows.
 
-    ``|mean exp(2πi t/T)|²`` is averaged over windows of 2048 rows. Samples lost by whole periods leave its peak where
-    it is; a delay d lowers it to ``|E exp(2πi d/T)|²``. Where several periods explain the timestamps alike (batches,
-    coarse grids) the one that loses fewest samples is taken.
+    ``|mean exp(2πi t/T)|²`` is averaged over windows of 2048 rows. Lost samples, which are whole periods, do not move
+    its peak; a delay d lowers it to ``|E exp(2πi d/T)|²``. Where several periods explain the timestamps equally well
+    (batches, coarse grids) the one with the fewest lost samples is chosen.
     """
     windows, mean_step = _windows(time_s)
     cell = mean_step / (2.0 * GRID_HIGHEST)
@@ -71,7 +71,7 @@ def find_period(time_s: FloatArray) -> Period:
     spectrum = _Spectrum(power, mean_step / (length * cell), int(2 * length / size) + 1, threshold)
     line = _first_line(windows, mean_step, spectrum)
     grid = mean_step / line if line else 0.0
-    # A step that only one in 500 falls short of.
+    # Only one step in 500 is shorter.
     shortest = quantile(np.concatenate([np.diff(w) for w in windows]), 0.002)
     best = _choose(spectrum, line, shortest / mean_step)
     if best is None or sum(np.count_nonzero(np.diff(w) > 0.2 * mean_step) for w in windows) < FEWEST_TIMESTAMPS:
@@ -87,8 +87,8 @@ def find_period(time_s: FloatArray) -> Period:
 
 @dataclass(frozen=True, eq=False)
 class _Spectrum:
-    """``power`` on multiples of ``width`` periods per mean distance of rows; ``lobe`` half-width of a line in points;
-    ``threshold`` medians of what lies beside it that a line exceeds."""
+    """``power`` at multiples of ``width``, the frequency step per mean distance of rows; ``lobe``: half-width of a line
+    in points; ``threshold``: ratio of a line to the median power beside it that it must exceed."""
 
     power: FloatArray
     width: float
@@ -101,7 +101,7 @@ class _Spectrum:
         return np.asarray(self.width * np.arange(len(self.power)))
 
     def peaks(self) -> IntArray:
-        """Points inside the range of periods that stand out sharply from what is beside them."""
+        """Points in the search range that exceed the power beside them by ``threshold``."""
         a, b = int(LOWEST / self.width), min(int(HIGHEST / self.width) + 1, len(self.power) - 1)
         inside = self.power[a:b]
         is_peak = (inside > self.power[a - 1 : b - 1]) & (inside >= self.power[a + 1 : b + 1]) & (inside >= LEAST)
@@ -114,14 +114,14 @@ class _Spectrum:
 
 
 def _first_line(windows: list[FloatArray], mean_step: float, spectrum: _Spectrum) -> float:
-    """Lowest frequency (per mean distance of rows) on whose multiples all timestamps lie; 0 where there is none."""
+    """Lowest frequency (per mean distance of rows) of a grid on which all timestamps lie; 0 where there is none."""
     per_step = spectrum.per_step
     high = np.flatnonzero((spectrum.power > 0.9 * LINE) & (per_step >= 0.05) & (per_step <= GRID_HIGHEST))
     while len(high):
         group = high[: int(np.searchsorted(high, high[0] + 2 * spectrum.lobe))]
         k = int(group[np.argmax(spectrum.power[group])])
         f = _summit(spectrum.power, k) * spectrum.width
-        # The multiple of a rough frequency misses by as many times: its own neighbourhood is looked through.
+        # Multiples amplify the error of the frequency, so its neighbourhood is searched finely.
         fine = f + spectrum.width * np.linspace(-0.5, 0.5, 41)
         if _mean_power(windows, fine / mean_step).max() > LINE:
             eighth = _mean_power(windows, 8 * fine / mean_step)
@@ -145,10 +145,10 @@ def _direct(time_s: FloatArray, frequency_hz: FloatArray) -> FloatArray:
 
 
 def _windows(time_s: FloatArray) -> tuple[list[FloatArray], float]:
-    """Stretches of the log without a pause, each from its own bias, and the mean distance of rows."""
+    """Sections of the log without a pause, each starting at time 0, and the mean distance of rows [s]."""
     n = len(time_s)
     width = min(WINDOW, n)
-    # `np.unique` would load masked arrays.
+    # A set, because `np.unique` would import masked arrays.
     starts = sorted(set(np.linspace(0, n - width, min(max(n // width, 1), MOST_WINDOWS)).astype(np.int64).tolist()))
     usual = float(np.median([(time_s[s + width - 1] - time_s[s]) / (width - 1) for s in starts]))
     kept: list[FloatArray] = []
@@ -162,12 +162,12 @@ def _windows(time_s: FloatArray) -> tuple[list[FloatArray], float]:
     if not kept:
         kept = [time_s - time_s[0]]
     steps = [float(w[-1]) / (len(w) - 1) for w in kept]
-    # Losses lengthen it, a stall at an end shortens it: the lower quartile is near the window with the fewest.
+    # Losses lengthen it, a stall at an end shortens it: the lower quartile is close to a window with few losses.
     return kept, quantile(np.array(steps), 0.25)
 
 
 def _poll(spectrum: _Spectrum) -> float:
-    """Lowest frequency of a beat slower than the rows that most timestamps keep to; 0 where there is none."""
+    """Lowest frequency of a beat slower than the rows on which most timestamps lie; 0 where there is none."""
     a, b = int(POLLED / spectrum.width), int(SLOWER / spectrum.width) - spectrum.lobe
     inside = spectrum.power[int(SLOWER / spectrum.width) : int(HIGHEST / spectrum.width)]
     strong = np.flatnonzero(spectrum.power[a:b] > max(0.5, 0.9 * float(inside.max()))) if b > a else np.zeros(0)
@@ -179,10 +179,10 @@ def _poll(spectrum: _Spectrum) -> float:
 
 
 def _choose(spectrum: _Spectrum, line: float, shortest: float) -> float | None:
-    """The period's frequency per mean distance of rows, or ``None`` where none stands out."""
+    """The period's frequency per mean distance of rows, or ``None`` where none is significant."""
     peaks = spectrum.peaks()
     if line > 0.0:
-        # Rounding to a grid never makes a step shorter than the whole grid steps in a period: that tells an alias.
+        # Rounding to a grid never makes a step shorter than the whole grid steps in a period, which excludes aliases.
         in_period = np.floor(line / spectrum.per_step[peaks] + 0.02)
         peaks = peaks[(shortest * line > in_period - 0.5) | (in_period < 1)]
     power, per_step = spectrum.power[peaks], spectrum.per_step[peaks]
@@ -191,13 +191,13 @@ def _choose(spectrum: _Spectrum, line: float, shortest: float) -> float | None:
     is_line = (multiple > 0) & (np.abs(per_step - multiple * line) < near)
     poll = _poll(spectrum) if not line else 0.0
     if poll:
-        # A beat at which the log was written, too slow to be the sensor's: its multiples are not the period either.
+        # The log is written at this beat, which is too slow for the sensor; its multiples are not the period either.
         line = poll
         multiple = np.rint(per_step / poll)
         is_line = np.abs(per_step - multiple * poll) < 2.0 * near * multiple
     free, strength = per_step[~is_line], power[~is_line]
     chosen: float | None = None
-    # A period that leaves many samples lost must be plain.
+    # A period with many lost samples needs a high power.
     plain = (_cost(free) < MANY) | (strength > PLAIN)
     free, strength = free[plain], strength[plain]
     if len(free):
@@ -207,25 +207,25 @@ def _choose(spectrum: _Spectrum, line: float, shortest: float) -> float | None:
         return chosen
     of_line = line * max(round(1.0 / line), 1)
     if line < SLOWER:
-        # Packets of a whole number of samples; else a coarse grid, on which the period is a weaker peak or none.
+        # Packets with a whole number of samples; else a coarse grid, on which the period is a weaker peak or none.
         if not poll and _cost(np.array([of_line]))[0] < WHOLE:
             return of_line
         clear = chosen is not None and (line > ALIASED or strength[free == chosen].max() > COARSE_COHERENCE**2)
         return chosen if clear else None
-    # An exact log has its own line alone; on a grid about as wide as the period the period loses fewer samples. Every
-    # tenth sample lost and a grid of nine tenths of the period look alike: the loss is the commoner.
+    # An exact log has only its own line; on a grid close to the period, the period has fewer lost samples. A log with
+    # every tenth sample lost looks like one with a grid of nine tenths of the period: a loss is more common.
     loses_fewer = chosen is not None and _cost(np.array([of_line]))[0] > max(_cost(np.array([chosen]))[0], REGULAR)
     return chosen if loses_fewer else of_line
 
 
 def _cost(per_step: FloatArray) -> FloatArray:
-    """Share of samples lost at a period; rows too many for it weigh more, since nothing makes them."""
+    """Share of samples lost with a period; more rows than periods weigh 8 times, because nothing causes them."""
     excess = per_step - 1.0
     return np.where(excess >= 0.0, excess, 8.0 * np.maximum(-excess - 0.003, 0.0))
 
 
 def _summit(power: FloatArray, k: int) -> float:
-    """Peak of a parabola through three points."""
+    """Position (fractional index) of the maximum of a parabola through the points k - 1, k, k + 1."""
     if not 0 < k < len(power) - 1:
         return float(k)
     left, mid, right = power[k - 1], power[k], power[k + 1]

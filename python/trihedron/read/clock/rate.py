@@ -1,4 +1,4 @@
-"""Steps and rate of timestamps that nobody has judged yet."""
+"""Steps and rate of timestamps before their kind is determined."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from trihedron.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Steps:
-    """Numbers of steps ``back``, of zero (``same``) and ``forward``, and of timestamps that are not finite."""
+    """Numbers of negative (``back``), zero (``same``) and positive steps (``forward``), and of missing timestamps."""
 
     back: int
     same: int
@@ -26,16 +26,16 @@ def steps_of(time_s: FloatArray) -> Steps:
 
 
 def usual_step(time_s: FloatArray) -> float:
-    """Median of the steps forward of timestamps (n,); NaN where there is none."""
+    """Median of the positive steps of timestamps (n,); NaN where there is none."""
     return _core.usual_step(np.asarray(time_s, dtype=np.float64))
 
 
 def mean_rate_hz(time_s: FloatArray) -> float:
-    """Samples per second outside gaps: timestamps rounded to a millisecond or batched do not bias it."""
+    """Samples per second outside gaps [Hz]; unbiased for timestamps that are rounded or shared by batches."""
     usual = usual_step(time_s)
     if steps_of(time_s).same > 0.2 * (len(time_s) - 1):
         step = np.diff(time_s)
-        # Stamped in batches: samples before the last timestamp, over the time they took.
+        # Timestamps shared by batches: the number of samples before the last timestamp over their duration.
         before_last = int(np.searchsorted(time_s, time_s[-1]))
         return before_last / float(step[step <= 5.0 * usual].sum())
     count, total, *_ = _core.inside_steps(np.asarray(time_s, dtype=np.float64), -np.inf, 1.5 * usual)

@@ -1,4 +1,4 @@
-"""Which clock a recording gets: its timestamps, or the even clock behind them (docs/reading.md, section 4)."""
+"""Chooses the clock of a recording: its timestamps, or an even clock (docs/reading.md, section 4)."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from trihedron.records import Finding, FindingCode
 from trihedron.records.sampling import Sampling, TimestampKind
 
 CONTRAST = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0
-"""A sample against the cubic through its four neighbours, on an even grid."""
+"""Weights of a sample's deviation from the cubic through its four neighbours, on an even grid."""
 REACH = 3
-"""Samples on either side from which a slope is taken: (k x_{+k} - k x_{-k}) / 28 for k to 3."""
+"""Samples on either side for the slope: the sum over k = 1 to 3 of k (x_{+k} - x_{-k}), divided by 28."""
 CLEAR_SLOPE = 3.0
-"""Standard errors of a slope below which a reading tells nothing of time."""
+"""Smallest slope, in its standard errors, at which a reading is used to determine its time."""
 FARTHEST = 1.5
-"""Timestamps further off than this many steps: what a straight line through the motion says of them is no use."""
+"""Largest deviation of a timestamp from the even clock, in steps, for which motion is extrapolated linearly."""
 PART, PARTS = 1 << 17, 8
-"""The most active stretches of a long log are looked at."""
+"""Rows of a section, and number of sections with the most motion that are used of a long log."""
 BLOCK = 50
-"""Rows of a block: neighbouring misfits share samples and motion."""
+"""Rows of a block; deviations of neighbouring rows are correlated, so errors are estimated from blocks."""
 
 
 def followed(time_s: FloatArray, even_s: FloatArray, tick: IntArray, triads: list[FloatArray]) -> tuple[float, float]:
     """Share s of the timestamps' scatter about an even clock that the readings (n, 3) follow, and its standard error.
 
-    A sample taken δ late reads x' δ more, and stands out from the cubic through its neighbours by the contrast of that:
-    s is the slope of one against the other over all channels in motion. 1: samples were taken when timestamped; 0:
-    evenly. The error is that of blocks (infinite without motion).
+    The reading of a sample taken δ later is larger by x' δ, and deviates from the cubic through its neighbours by the
+    contrast of that; s is the slope of the measured on the predicted deviation over all channels in motion. s = 1 means
+    that samples were taken at their timestamps, s = 0 evenly. The error is from blocks, infinite without motion.
     """
     step_s = float((even_s[-1] - even_s[0]) / max(int(tick[-1] - tick[0]), 1))
     top = np.zeros(0)
@@ -58,14 +58,14 @@ def _active(triads: list[FloatArray], n: int) -> list[slice]:
 
 
 def _spread(x: FloatArray) -> float:
-    """Standard deviation over the rows (n, 3) without a missing reading, summed over the axes; 0 without such rows."""
+    """Standard deviation of the finite rows (n, 3), summed over the axes; 0 without such rows."""
     whole = x[np.isfinite(x).all(axis=1)]
     return float(whole.std(axis=0).sum()) if len(whole) else 0.0
 
 
 def _sums(late: FloatArray, step_s: float, tick: IntArray, triads: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Blocks' sums of misfit times prediction and of squared prediction."""
-    from scipy.ndimage import uniform_filter1d  # here: most logs have timestamps that need no such question
+    """Sums per block of deviation times prediction and of squared prediction."""
+    from scipy.ndimage import uniform_filter1d  # imported here because most logs do not need it
 
     n = len(late)
     margin = REACH + 2
@@ -95,7 +95,7 @@ def _sums(late: FloatArray, step_s: float, tick: IntArray, triads: list[FloatArr
             made = np.convolve(slope * late, CONTRAST, mode="same")[inner]
             good = whole & np.isfinite(left) & np.isfinite(made) & (np.abs(slope[inner]) > CLEAR_SLOPE / np.sqrt(28.0))
             left, made = np.where(good, left, 0.0), np.where(good, made, 0.0)
-            # Quick motion bends by itself: its rows weigh by what they leave around them.
+            # Rapid motion deviates from a cubic by itself: rows are weighted by the residuals around them.
             around = uniform_filter1d(left**2, 33, mode="nearest") / np.maximum(
                 uniform_filter1d(good.astype(np.float64), 33, mode="nearest"), 1.0 / 33.0
             )
@@ -107,22 +107,22 @@ def _sums(late: FloatArray, step_s: float, tick: IntArray, triads: list[FloatArr
 
 
 WORTH = 0.03
-"""Times this part of a step (rms) about an even clock are as good as even (those rounded to a tenth of a step are):
-a turn integrated over them errs by less than a thirtieth of what one sample adds."""
+"""Rms deviation from an even clock, in steps, below which timestamps need no correction (those rounded to a tenth of a
+step are below it): the error of a rotation integrated over them is less than 1/30 of one sample's contribution."""
 SHARED = 0.005
-"""Share of samples with the timestamp of the one before, above which timestamps cannot be when samples were taken."""
+"""Share of samples with the previous sample's timestamp above which timestamps cannot be the instants of sampling."""
 STANDARD_ERRORS, SYSTEMATIC = 4.0, 0.15
-"""A share of 0 or 1 is refused beyond four standard errors and what a filter, or a bent course, makes of it."""
+"""A share of 0 or 1 is rejected beyond four standard errors plus the bias that a filter or curved motion may cause."""
 VAGUE = 0.2
-"""Standard error of the share above which motion tells nothing."""
+"""Standard error of the share above which motion does not decide."""
 ONE_STEP = 0.9
-"""Part of the steps a sample counter makes that are its usual one; counters of inner ticks alternate."""
+"""Smallest share of a sample counter's steps that equal its usual step; counters of internal ticks alternate."""
 
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """``time_s`` (n,) from the first sample on and ``start_s``; the record; ``lost_behind`` (n - 1,) or ``None`` where
-    nothing tells; findings."""
+    """``time_s`` (n,) [s] from the first sample on, and ``start_s``; the ``sampling`` record; ``lost_behind`` (n - 1,),
+    or ``None`` where losses are unknown; findings."""
 
     time_s: FloatArray
     start_s: float
@@ -134,10 +134,10 @@ class Settled:
 def settle_clock(
     time_s: FloatArray, start_s: float, triads: list[FloatArray], counter: FloatArray | None = None
 ) -> Settled:
-    """The clock of samples with timestamps (n,) and readings (n, 3) in every one of ``triads``.
+    """The clock of samples with timestamps (n,) and readings (n, 3) in each of ``triads``.
 
-    Timestamps that two samples share, and those that are an even clock's but for rounding, give way to it; others if
-    motion says that the samples were taken evenly. A ``counter`` (n,) that counts samples tells which were lost.
+    Timestamps that samples share, and those of a rounded even clock, are replaced by the even clock unless the motion
+    follows them; others only if the motion shows that sampling was even. A ``counter`` (n,) of samples shows losses.
     """
     clock = find_even_clock(time_s)
     numbers = None if counter is None else sample_numbers(counter)
@@ -171,17 +171,17 @@ def settle_clock(
     start = float(clock.even_s[0])
     even = clock.even_s - start
     del clock
-    # In its own place: a long log has no room for a second.
+    # In place, to save memory for a long log.
     return Settled(np.maximum.accumulate(even, out=even), start_s + start, sampling, told, findings)
 
 
 def _worth(kind: TimestampKind) -> float:
-    # Rounding is the file's, not the sensor's, however small: left in the timestamps it would be found as jitter.
+    # Rounding is an error of the file, not of the sensor: even small rounding would otherwise be found as jitter.
     return EXACT if kind is TimestampKind.ROUNDED else WORTH
 
 
 def sample_numbers(counter: FloatArray) -> IntArray | None:
-    """(n,) numbers of samples from 0 on from a counter that counts them (continued where it wraps), or ``None``."""
+    """(n,) numbers of samples from 0 on, from a sample counter (continued where it wraps); ``None`` for others."""
     if len(counter) < 3 or not np.all(np.isfinite(counter)) or not np.all(counter == np.rint(counter)):
         return None
     step = np.diff(counter)

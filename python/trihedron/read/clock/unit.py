@@ -1,4 +1,4 @@
-"""The unit of a time column: said, named, or weighed from step, digits, length and readings."""
+"""The unit of a time column: given, named, or inferred from step, digits, length and readings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "100us": 1e-4}
 _CANDIDATES = ("s", "ms", "us", "ns")
 PLAUSIBLE_HZ = (0.02, 20000.0)
 _SLOW_TICKS = -1.0
-"""Whoever logs slower than 2 Hz writes seconds; a tick counter that slow is rarer than one 1000 times quicker."""
+"""Log odds of ticks below 2 Hz: such logs use seconds; a slow tick counter is rarer than one 1000 times faster."""
 _BANDS: tuple[tuple[float, float], ...] = (
     (0.2, -5.0),
     (0.7, -3.0),
@@ -32,29 +32,29 @@ _BANDS: tuple[tuple[float, float], ...] = (
 _BANDS += ((math.inf, -3.0),)
 """Log odds of a rate below each bound: loggers run between 10 Hz and 1 kHz, some at 1 Hz, hardly any below 0.2 Hz."""
 _FRACTIONS = {"s": 0.0, "ms": -1.5, "us": -4.0, "ns": -6.0}
-"""Log odds of digits behind the point: seconds need them, tick counts have none (some programs print ms with them)."""
+"""Log odds of decimal digits: seconds need them, tick counts have none (some programs print ms with them)."""
 _NANOSECONDS = -2.0
-"""Nanoseconds come as dates, which settle the unit, or with their name; seldom as a bare count."""
+"""Log odds of nanoseconds: they are logged as dates, which determine the unit, or named; seldom as a bare count."""
 _SHORTEST_S, _SHORT = 5.0, -2.5
-"""Nobody keeps a thousand rows of a log shorter than this."""
+"""Shortest usual duration of a log of more than 1000 rows; the log odds of a unit that makes it shorter."""
 _IMPOSSIBLE, _HASTY = -20.0, -4.0
 QUICKEST_TURN_S, HASTY_TURN_S = 0.03, 0.12
-"""20 degrees from rest to rest in the first take 1500 rad/s², more than a wrist flicks and a table bears; in the
-second 100 rad/s², a knock."""
+"""Rotation by 20 degrees from rest to rest in the first time needs 1500 rad/s², more than a wrist or a table reaches;
+in the second 100 rad/s², a shock."""
 USUAL_TURN_S, _TURN_SPREAD, _SLOWEST = 0.35, math.log(3.0), -3.0
-"""The quickest 20 degrees of a session, 90 degrees in a second and a half, and the spread of its logarithm; a drift in
-a chamber has no limit."""
+"""Usual time of a session's fastest 20 degrees (90 degrees in 1.5 s), the spread of its logarithm, and the lowest log
+odds, because slow rotation in a chamber has no limit."""
 FASTEST_KELVIN_S = 5.0
-"""A part in its case does not warm faster; a chamber runs at 0.1 K/s."""
+"""Fastest change of temperature [K/s] of a part in its case; a chamber reaches 0.1 K/s."""
 _TURN_DEG, _SIDE = 20.0, 5
 _NEARLY_ALL = 0.95
 _SURE = 3.9
-"""Odds of fifty to one."""
+"""Log odds at which a unit is certain: 50 to 1."""
 _OTHER_TICK = -4.6
-"""Log odds of whole numbers being ticks of another size (of 32768 Hz, 25 µs ...) where their name does not say ticks:
-one log in a hundred."""
+"""Log odds that whole numbers are ticks of another size (of 32768 Hz, 25 µs ...) without a name that says so: one log
+in a hundred."""
 TICKS = "tick"
-"""Stands for the unit of a column whose name says that it counts, and not what."""
+"""Unit of a column whose name says that it counts ticks without stating their size."""
 _TICK = re.compile(r"(1\s*/\s*)?(\d+(?:\.\d*)?(?:e[+-]?\d+)?)\s*(k?hz|s|ms|us|µs|ns)", re.IGNORECASE)
 _LONG = {"min": 60.0, "minutes": 60.0, "h": 3600.0, "hours": 3600.0}
 _MOST_ROWS = 200_000
@@ -62,14 +62,14 @@ _MOST_ROWS = 200_000
 
 @dataclass(frozen=True, eq=False)
 class Witness:
-    """Readings in the order of the rows that limit how long a row can have lasted: (n, 3) and (n,), or ``None``."""
+    """Readings in row order that limit the time between rows: (n, 3) and (n,), or ``None``."""
 
     accelerometer: FloatArray | None = None
     temperature: FloatArray | None = None
 
 
 def parse_time_unit(text: str) -> str:
-    """A user's unit word."""
+    """The time unit that a user's text names."""
     words = {"sec": "s", "seconds": "s", "millis": "ms", "micros": "us", "µs": "us", "nanos": "ns"}
     unit = words.get(text.strip().lower(), text.strip().lower())
     if unit not in SECONDS and not seconds_of(unit) > 0.0:
@@ -78,7 +78,7 @@ def parse_time_unit(text: str) -> str:
 
 
 def seconds_of(unit: str) -> float:
-    """Seconds of a unit (``ms``) or of a tick (``32768 Hz``, ``1/32768 s``, ``25 us``); NaN where it is neither."""
+    """Seconds per unit (``ms``) or per tick (``32768 Hz``, ``1/32768 s``, ``25 us``); NaN for other texts."""
     tick = _TICK.fullmatch(unit.strip())
     if tick is None:
         return SECONDS.get(unit, _LONG.get(unit, math.nan))
@@ -93,7 +93,7 @@ def seconds_of(unit: str) -> float:
 def time_unit(
     raw: FloatArray, named: str, given: str | None, wraps: bool, witness: Witness, findings: list[Finding]
 ) -> str:
-    """Unit of timestamps (n,) in order: given, named, by their date, or the likeliest; a doubt becomes a finding."""
+    """Unit of timestamps (n,) in order: given, named, from their date, or the most likely, stated as a finding."""
     if given is not None:
         return parse_time_unit(given)
     if named and named != TICKS:
@@ -101,13 +101,13 @@ def time_unit(
     n_steps, n_forward = len(raw) - 1, steps_of(raw).forward
     if not n_forward:
         return "s"
-    # Timestamps that several rows share: a row lasts the span over the rows, not the step between timestamps.
+    # Where rows share timestamps, the time per row is the span over the number of rows, not the step of timestamps.
     shared = n_forward < 0.8 * n_steps
     usual = float((raw[-1] - raw[0]) / n_steps) if shared else usual_step(raw)
     start = float(raw[0])
     shortest, longest = 1.0 / PLAUSIBLE_HZ[1], 1.0 / PLAUSIBLE_HZ[0]
     possible = [u for u in _CANDIDATES if shortest <= usual * SECONDS[u] <= longest]
-    # A date between 2001 and 2096 in the unit settles it; nothing else counts that high.
+    # A date between 2001 and 2096 determines the unit; nothing else counts that high.
     dated = [u for u in _CANDIDATES if 1e9 <= start * SECONDS[u] <= 4e9]
     is_date_throughout = len(dated) == 1 and not wraps and raw[-1] * SECONDS[dated[0]] <= 4e9
     dated = [u for u in dated if u in possible] or (dated if is_date_throughout else [])
@@ -130,7 +130,7 @@ def time_unit(
 
 
 def _scores(raw: FloatArray, usual: float, possible: list[str], witness: Witness) -> dict[str, float]:
-    """Log odds of every unit."""
+    """Log odds of every possible unit."""
     fractions = _has_fractions(raw)
     rest_to_rest, any_turn = _quickest_turns(witness.accelerometer)
     kelvin = _quickest_warming(witness.temperature)
@@ -158,19 +158,18 @@ def _has_fractions(raw: FloatArray) -> bool:
 
 
 def counts_rows(raw: FloatArray) -> bool:
-    """Whether numbers (n,) go up by one from row to row, but where rows are lost: a counter, or ticks of one row
-    each."""
+    """Whether numbers (n,) increase by 1 in nearly every row: a sample counter, or ticks of one row each."""
     return len(raw) > 2 and not _has_fractions(raw) and bool(np.mean(np.diff(raw[:_MOST_ROWS]) == 1.0) > _NEARLY_ALL)
 
 
 def was_weighed(finding: Finding) -> bool:
-    """Whether it tells whole-numbered timestamps whose unit nothing said."""
+    """Whether a finding states that the unit of whole-numbered timestamps was inferred."""
     return finding.code is FindingCode.TIME_UNIT_DETECTED and "weighed_tick_s" in finding.numbers
 
 
 def with_gyro(findings: list[Finding], is_confirmed: bool) -> list[Finding]:
-    """Findings in which a doubt about the time unit is serious, as a gyro's scale hangs on it, or none where
-    gravity settled it."""
+    """Findings with the warning of an uncertain time unit made serious, because the gyro's scale depends on it, or made
+    a note where the rotation of gravity confirms it."""
     severity = Severity.NOTE if is_confirmed else Severity.SERIOUS
     return [
         replace(f, severity=severity)
@@ -181,9 +180,9 @@ def with_gyro(findings: list[Finding], is_confirmed: bool) -> list[Finding]:
 
 
 def _quickest_turns(accelerometer: FloatArray | None) -> tuple[int | None, int | None]:
-    """Rows in which gravity at its quickest turned by 20 degrees: between two stretches at rest, and at all.
+    """Smallest number of rows in which gravity rotates by 20 degrees: between two static sections, and anywhere.
 
-    A stretch is five rows; at rest it turns ten times slower than between the two, so that no rate need be known.
+    A section is five rows; it is static if it rotates ten times slower than between the two, so no rate is needed.
     """
     if accelerometer is None:
         return None, None
@@ -191,7 +190,7 @@ def _quickest_turns(accelerometer: FloatArray | None) -> tuple[int | None, int |
 
 
 def _quickest_warming(temperature: FloatArray | None) -> float | None:
-    """Kelvin per row over the quickest fiftieth of the log (the noise of a thermometer averages out over it)."""
+    """Largest change of temperature [K/row] between fiftieths of the log, over which thermometer noise averages out."""
     if temperature is None or len(temperature) < 500:
         return None
     n = len(temperature) // 50

@@ -1,1 +1,1 @@
-"""Known motion beside a log: attitude, rate, position of a body on a clock of its own (docs/reference.md)."""
+"""Reference motion for a log: attitude, rate and position of a body on a separate clock (docs/reference.md)."""

@@ -1,4 +1,4 @@
-"""A reference from a file, or from the log of another unit."""
+"""A reference motion from a file, or from the log of another unit."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _UNITS = {
 
 @dataclass(frozen=True)
 class Role:
-    """A column's meaning: ``what`` (time, q, r, rot, w, p), its ``index`` (wxyz, row and column, axis), unit to SI."""
+    """A column's meaning: ``what`` (time, q, r, rot, rpy, w, p), its ``index`` (wxyz, row and column, axis), unit."""
 
     column: int
     what: str
@@ -55,7 +55,7 @@ class Role:
 
     @property
     def to_si(self) -> float:
-        """Factor to SI; 1 where the name says no unit."""
+        """Factor to SI; 1 where the name states no unit."""
         return _UNITS.get(self.unit, 1.0)
 
 
@@ -65,7 +65,7 @@ def roles_of(table: Table, said: str | None) -> list[Role]:
     Raises
     ------
     ReadError
-        When nothing tells what the columns are, or what was said does not fit the file.
+        When the columns have neither names nor a statement of the user, or the statement does not fit the file.
     """
     if said is None:
         if table.names is None:
@@ -110,7 +110,7 @@ def _role(column: int, name: str) -> Role | None:
 
 
 def _split(name: str) -> tuple[str, str]:
-    """Name in small letters and its unit, written ``[deg]``, ``(deg)`` or as the suffix ``_deg``."""
+    """Name in lower case and its unit, written ``[deg]``, ``(deg)`` or as the suffix ``_deg``."""
     word = name.strip().lower()
     if match := re.fullmatch(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]", word):
         return match[1].strip().replace(" ", "_"), match[2].replace("^-1", "").replace("s⁻¹", "/s")
@@ -122,20 +122,20 @@ def _split(name: str) -> tuple[str, str]:
 
 
 LONG_ROW_S = 0.5
-"""Rows of rate further apart than this are commands that hold until the next: no logger of a table is so slow."""
+"""Distance of rate rows [s] above which they are commands, valid until the next one; a table's log is not so slow."""
 SHORTEST_STEP = 0.1
-"""Rows nearer than a tenth of the usual step share an arrival: one of them is excluded."""
+"""Distance of rows, in median steps, below which they share an arrival and one of them is excluded."""
 
 
 def read_reference(path: str | os.PathLike[str], columns: str | None = None) -> ReferenceMotion:
     """Read a reference: text, npz, npy or Parquet of time and attitude, rate or pose (docs/reference.md).
 
-    ``columns`` says what the columns are in file order where their names do not.
+    ``columns`` names the columns in file order where the file does not.
 
     Raises
     ------
     ReadError
-        (a ``ValueError``) one sentence: which file, which row, what to do.
+        (a ``ValueError``) the message says in one sentence which file, which row and what to do.
     """
     table = read_tables(Path(path), Choice())[0]
     roles = roles_of(table, columns)
@@ -160,12 +160,12 @@ def read_reference(path: str | os.PathLike[str], columns: str | None = None) -> 
 
 
 def of_recording(recording: Recording) -> ReferenceMotion:
-    """The log of another unit that moved with this one, as a reference: its rate and specific force.
+    """A reference from the log of another unit that moved with this one: its rate and specific force.
 
     Raises
     ------
     ReadError
-        When its gyro reads counts, or it has none.
+        When its gyro reads counts, or it has no gyro.
     """
     recording = recording.with_distinct_timestamps()
     to_rate = rate_to_si(recording.gyroscope_unit)
@@ -208,10 +208,10 @@ def _settled(
     table: Table, time_s: FloatArray, start_s: float, attitude: FloatArray | None, rate: FloatArray | None,
     position: FloatArray | None, findings: tuple[Finding, ...],
 ) -> ReferenceMotion:  # fmt: skip
-    """With the even clock behind its timestamps, where there is one."""
+    """The reference on an even clock if its timestamps have one, without rows that share an arrival."""
     stepwise = rate is not None and float(np.median(np.diff(time_s))) > LONG_ROW_S
     if not stepwise:
-        # Rows of a matrix move as vectors do: two of them are witnesses of when a row was taken.
+        # Rows of the attitude matrix change with motion as readings do: two of them show when a row was taken.
         triads = [rate] if rate is not None else [attitude[:, 0], attitude[:, 1]]  # type: ignore[index]
         settled = settle_clock(time_s, start_s, [np.ascontiguousarray(t) for t in triads if t is not None])
         time_s, start_s = settled.time_s, settled.start_s
@@ -233,19 +233,19 @@ def _settled(
     return replace(motion, findings=said)
 
 
-# Columns of attitude as rotation matrices, body → world, with what cannot be a rotation refused.
+# Columns of attitude as rotation matrices, body → world; numbers that are not a rotation are refused.
 
 ROUNDING = 0.02
-"""Matrices and quaternions printed with three digits are off by less than this."""
+"""Largest error of a quaternion's norm, and a third of that of a matrix's orthonormality: three digits err less."""
 
 
 def attitude_of(table: Table, roles: list[Role], rows: npt.NDArray[np.int64]) -> FloatArray | None:
-    """(n, 3, 3) body → world; ``None`` where no column tells an attitude.
+    """(n, 3, 3) body → world; ``None`` where there are no columns of attitude.
 
     Raises
     ------
     ReadError
-        When a part is missing, a unit is not said, or the numbers are no rotation.
+        When a column is missing, a unit is ambiguous, or the numbers are not a rotation.
     """
     by = {what: [role for role in roles if role.what == what] for what in ("q", "r", "rot", "rpy")}
     if by["q"]:

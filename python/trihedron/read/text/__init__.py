@@ -1,1 +1,1 @@
-"""Text logs: what their lines look like, what their cells say, and which line each row came from."""
+"""Text logs: the layout of their lines, the meaning of their cells, and the line of each row."""

@@ -1,4 +1,4 @@
-"""The bytes of an uncompressed text log in blocks of whole lines, each read while the one before is parsed."""
+"""The bytes of an uncompressed text log in blocks of complete lines, each read while the previous one is parsed."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from trihedron.read.text.blocks import Cursor
 Bytes = npt.NDArray[np.uint8]
 
 _ROOM = 1 << 16
-"""In front of a block, for the line that the one before broke off in; longer ones take a copy."""
+"""Bytes before a block for the incomplete last line of the previous one; a longer line is copied."""
 _TAIL = 1 << 12
-"""Bytes among which a block's last line nearly always ends."""
+"""Bytes at the end of a block that nearly always contain a line end."""
 
 
 def blocks_ahead(path: Path, stream: FileIO, cursor: Cursor) -> Generator[Bytes, None, None]:
-    """Blocks (k,) of ``stream`` that end with a complete line, valid until the next is asked for.
+    """Blocks (k,) of ``stream`` that end with a complete line; each is valid until the next one is requested.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def _joined(rest: Bytes, buffer: Bytes, size: int) -> Bytes:
 
 
 def _behind_last_line(block: Bytes) -> int:
-    """Where the last complete line ends; 0 where there is none."""
+    """Index after the last line end; 0 where there is none."""
     near = max(len(block) - _TAIL, 0)
     found = block[near:].tobytes().rfind(b"\n")
     return near + found + 1 if found >= 0 else block.tobytes().rfind(b"\n") + 1

@@ -1,4 +1,4 @@
-"""The bytes of a text log: decompressed, in blocks of whole lines, as plain UTF-8."""
+"""The bytes of a text log: decompressed, in blocks of complete lines, as plain UTF-8."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.memory import check_ratio
 
 BLOCK_BYTES = 1 << 23
-"""Text parsed at a time: large enough for polars to use every core, small enough not to matter (a block takes some
-twelve times its size while it is parsed)."""
+"""Bytes parsed at a time: enough for polars to use every core, and little memory (parsing takes about twelve times the
+size of a block)."""
 
 _PIECE_BYTES = 1 << 18
 _COMPRESSED = {b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ": "xz"}
@@ -26,19 +26,19 @@ _COMPRESSED = {b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ": "xz"}
 
 @dataclass
 class Cursor:
-    """Where in the file the reader is: lines consumed so far, and whether this block is the last."""
+    """Position of the reader in the file: lines read so far, and whether this block is the last."""
 
     lines: int = 0
     is_last: bool = False
 
 
 def compression_of(magic: bytes) -> str | None:
-    """Name of the compression a file starts with."""
+    """Name of the compression, from a file's first bytes; None for an uncompressed file."""
     return next((name for start, name in _COMPRESSED.items() if magic.startswith(start)), None)
 
 
 def open_binary(path: Path, compression: str | None) -> io.BufferedIOBase:
-    """The (decompressed) bytes of a file."""
+    """A stream of the decompressed bytes of a file."""
     if compression == "gzip":
         return gzip.open(path, "rb")
     if compression == "bzip2":
@@ -51,7 +51,7 @@ def open_binary(path: Path, compression: str | None) -> io.BufferedIOBase:
 def blocks(
     path: Path, compression: str | None, cursor: Cursor, content: bytes | None = None
 ) -> Generator[bytes, None, None]:
-    """Blocks that end with a complete line; ``content`` stands for the file's bytes where it was unpacked already.
+    """Blocks that end with a complete line; ``content`` are the file's bytes if they are unpacked already.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def blocks(
             while True:
                 pieces = [rest]
                 size = 0
-                # Piecewise, so that a damaged archive can be said to break off after so many lines.
+                # In pieces, so that the line at which a damaged archive breaks off is known.
                 while size < BLOCK_BYTES and (piece := stream.read1(_PIECE_BYTES)):
                     pieces.append(piece)
                     size += len(piece)
@@ -108,18 +108,18 @@ def beginning(path: Path, compression: str | None, n: int, content: bytes | None
         with open_binary(path, compression) as stream:
             return stream.read(n)
     except (EOFError, zlib.error, lzma.LZMAError, OSError):
-        # Said with the line that the damage is behind.
+        # Raises the error with the line after which the damage is.
         with closing(blocks(path, compression, Cursor())) as parts:
             return next(parts, b"")[:n]
 
 
 _MINUS = "\u2212".encode()
-"""What typesetting programs and some spreadsheets write for ``-``."""
+"""The minus sign that typesetting programs and some spreadsheets write for ``-``."""
 _SEMICOLON = re.compile(rb"(?m)^;")
 
 
 def has_semicolon_remarks(data: bytes) -> bool:
-    """Whether lines that begin with ``;`` are remarks: the first one does, and no other line has a semicolon in it."""
+    """Whether lines that begin with ``;`` are remarks: the first one does, and other lines contain no semicolon."""
     if not data.startswith(b";"):
         return False
     rows = [line for line in data[: 1 << 16].split(b"\n")[:-1] if line.strip() and not line.startswith(b";")]
@@ -127,13 +127,13 @@ def has_semicolon_remarks(data: bytes) -> bool:
 
 
 def with_hash_remarks(data: bytes) -> bytes:
-    """Remarks of ``;`` as those of ``#``."""
+    """The text with remarks that begin with ``#`` instead of ``;``."""
     return _SEMICOLON.sub(b"#", data)
 
 
 def as_utf8(path: Path, data: bytes, first_line: int) -> bytes:
-    """Text with a byte order mark or in UTF-16 as plain UTF-8, minus signs as ``-``; junk refused by its first zero
-    byte."""
+    """Text with a byte order mark or in UTF-16 as plain UTF-8, with minus signs as ``-``; binary data, recognised by a
+    zero byte, is refused."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return data.decode("utf-16", errors="replace").encode().replace(_MINUS, b"-")
     data = data.removeprefix(b"\xef\xbb\xbf")

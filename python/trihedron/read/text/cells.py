@@ -1,4 +1,4 @@
-"""Cells of a block of text as numbers, dates or words; polars does the parsing."""
+"""Cells of a block of text as numbers, dates or words, parsed by polars."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from trihedron.read.text.layout import MISSING, Layout
 if TYPE_CHECKING:
     import polars as pl
 
-# Polars takes longer to import than a short log to read, and most have nothing in them that needs it.
+# polars is imported where it is used: the import takes longer than reading a short log, and most logs do not need it.
 
 _PLAIN = re.compile(r"-?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?").fullmatch
-"""A number under every convention."""
+"""A number in every convention."""
 MAX_WORDS = 64
-"""A column of words with more different ones is text, not a label that tells sensors or devices apart."""
+"""Largest number of distinct words of a column that may identify sensors or devices; with more it is text."""
 
 
 @dataclass
 class TextColumn:
-    """A column without numbers: ``form`` of its dates or "", and the different ``words`` met so far, in order."""
+    """A column without numbers: ``form`` of its dates or "", and the distinct ``words`` so far, in order."""
 
     example: str
     form: str = ""
@@ -39,7 +39,7 @@ class TextColumn:
     codes: list[npt.NDArray[np.int64]] = field(default_factory=list)
 
     def encode(self, cells: pl.Series) -> None:
-        """Remember which word stands in each row, unless there are too many to be labels."""
+        """Store the index of each row's word, unless there are too many words for labels."""
         import polars as pl
 
         if len(self.words) > MAX_WORDS:
@@ -55,7 +55,7 @@ class TextColumn:
 
 
 def find_text_columns(rows: list[list[str]], layout: Layout) -> dict[int, TextColumn]:
-    """Which columns hold words or dates instead of numbers, judged on the first rows."""
+    """Columns that contain words or dates instead of numbers, determined from the first rows."""
     columns = {i: [r[i] for r in rows] for i in range(layout.n_fields)}
     columns = {i: cells for i, cells in columns.items() if layout.decimal_comma or not all(map(_PLAIN, cells))}
     found: dict[int, TextColumn] = {}
@@ -80,7 +80,7 @@ def parse(
     Raises
     ------
     ReadError
-        When the block is no table.
+        When the block is not a table.
     """
     import polars as pl
 
@@ -113,12 +113,12 @@ def refuse_words(
     lines: npt.NDArray[np.int64],
     layout: Layout,
 ) -> None:
-    """Cells that are no numbers: words for "missing" become NaN, anything else is refused.
+    """Refuse cells that are neither numbers nor words for "missing", which are NaN.
 
     Raises
     ------
     ReadError
-        Naming line, column and cell of the first.
+        When there is such a cell; the message names line, column and content of the first.
     """
     first: tuple[int, int, str] | None = None
     for name in as_text.columns:
@@ -136,8 +136,8 @@ def refuse_words(
 
 
 def sparse_words(cells: pl.Series, name: str, n_before: int) -> TextColumn | None:
-    """Remarks here and there, behind ``n_before`` empty cells, in a column whose name means nothing known here: words,
-    and no damage. None where the cells (n,) are all empty, or stand where numbers are expected."""
+    """A column of occasional remarks after ``n_before`` empty cells, if its name has no known meaning. None where the
+    cells (n,) are all empty, or numbers are expected in them."""
     if not name or parse_name(name).role:
         return None
     words = cells.filter(_words(cells, False))
@@ -147,7 +147,7 @@ def sparse_words(cells: pl.Series, name: str, n_before: int) -> TextColumn | Non
 
 
 def numbers(series: pl.Series, column: TextColumn | None) -> FloatArray:
-    """A column as (n,) float64: numbers, seconds of dates, or nothing where it holds words."""
+    """A column as (n,) float64: numbers, or dates in seconds; empty where it contains words."""
     if column is None:
         return np.asarray(series.to_numpy(), dtype=np.float64)
     if column.form and column.form != "date":
@@ -157,7 +157,7 @@ def numbers(series: pl.Series, column: TextColumn | None) -> FloatArray:
 
 
 def _words(series: pl.Series, decimal_comma: bool) -> pl.Series:
-    """Which cells are neither a number nor a word for "missing"."""
+    """Mask of the cells that are neither a number nor a word for "missing"."""
     import polars as pl
 
     text = series.fill_null("").str.strip_chars()

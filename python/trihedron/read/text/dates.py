@@ -1,4 +1,4 @@
-"""Dates and times of day as loggers write them, in seconds."""
+"""Conversion of dates and times of day in usual formats to seconds."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _CLOCK = r"\d{1,2}:\d\d:\d\d(?:[.,:]\d{1,9})?"
 
 @dataclass(frozen=True)
 class _Form:
-    """``pattern`` of the whole cell, strptime format after :func:`_plain` made it regular."""
+    """``pattern`` of the whole cell, and its strptime format, both after :func:`_plain`."""
 
     pattern: str
     format: str
@@ -40,10 +40,10 @@ _DATE_ALONE = re.compile(r"^(\d{4}[-/.]\d\d?[-/.]\d\d?|\d\d?[-/.]\d\d?[-/.]\d{4}
 
 
 def _plain(cells: pl.Series) -> pl.Series:
-    """Cells with ``-`` in dates, one blank before the clock, ``:`` inside it and a point before its fraction."""
+    """Cells with ``-`` in dates, one blank before the time, ``:`` inside it and a point before its fraction."""
     text = cells.str.strip_chars(' "').str.replace_all("/", "-", literal=True)
     text = text.str.replace(r"^(\d{4}-\d\d-\d\d)[T_]", "${1} ")
-    # Day, month and year with points between, as in Central Europe: the day comes first.
+    # Day, month and year separated by points, as in Central Europe: the day is first.
     text = text.str.replace(r"^(\d\d?)\.(\d\d?)\.(\d{4})[ T]", "${1}-${2}-${3} ")
     # MetaBase writes 12.34.56.789, AndroSensor 12:34:56:789.
     text = text.str.replace(r"(\d\d?)\.(\d\d)\.(\d\d)([.,]\d+)", "${1}:${2}:${3}${4}")
@@ -51,7 +51,7 @@ def _plain(cells: pl.Series) -> pl.Series:
 
 
 def form_of(cells: pl.Series) -> str | None:
-    """The format that all cells (a sample of them) have: a strptime format, ``time-of-day``, ``date``; or None."""
+    """The format of all cells (a sample): a strptime format, ``time-of-day`` or ``date``; None where there is none."""
     text = _plain(cells.drop_nulls())
     if not len(text):
         return None
@@ -71,7 +71,7 @@ def form_of(cells: pl.Series) -> str | None:
 def seconds(cells: pl.Series, form: str) -> FloatArray:
     """Seconds of cells (n,), since 1970 or since midnight; NaN where a cell has another form.
 
-    Times of day go on after midnight. Zones are not applied: only differences matter, and the zone of a log is one.
+    Time zones are not applied: only differences matter, and a log has one zone.
     """
     import polars as pl
 
@@ -87,7 +87,7 @@ def seconds(cells: pl.Series, form: str) -> FloatArray:
 
 
 def past_midnight(time_of_day_s: FloatArray) -> FloatArray:
-    """Times of day continued over midnight: a step back by more than half a day is a new day."""
+    """Times of day [s] continued after midnight: a step back by more than half a day is a new day."""
     step = np.diff(time_of_day_s, prepend=time_of_day_s[:1])
     with np.errstate(invalid="ignore"):
         return np.asarray(time_of_day_s + _DAY_S * np.cumsum(step < -0.5 * _DAY_S), dtype=np.float64)

@@ -1,7 +1,7 @@
-"""Texts that are no tables yet: a monitor's timestamps before each line, and values behind their labels.
+"""Converts texts to tables: lines with a serial monitor's timestamp before them, and labelled values.
 
-A dialect is told by the first lines, and only where nearly all of them speak it. Lines that do not fit are left as they
-are, so that the reader of tables refuses them by their number.
+A dialect is recognised from the first lines, if nearly all of them follow it. Other lines are unchanged, so that the
+reader of tables refuses them with their line number.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Rewritten:
 
 
 def rewrite(text: str) -> Rewritten | None:
-    """The text without its dialect; None where it speaks none."""
+    """The text as a table; None where it has no known dialect."""
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     prefix = _prefix_of(lines)
     timestamps: list[str] | None = None
@@ -100,7 +100,7 @@ def _prefix_of(lines: list[str]) -> re.Pattern[str] | None:
 
 
 def _nearly_all(pattern: re.Pattern[str], lines: list[str]) -> bool:
-    """Nearly all lines begin so; a log of another kind is told by its first few."""
+    """Whether nearly all lines match; stops at the first few lines of a log that does not."""
     left = len(lines)
     for line in lines:
         left -= pattern.match(line) is None
@@ -113,8 +113,7 @@ def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[str], list[i
     """(remarks above, names, rows of values, line of each row) of lines such as ``ax: 0.1, ay: 0.2``, or of
     groups of such lines.
 
-    A row ends where a label comes again, so that lines may change their order, and one that is lost leaves its
-    cells empty.
+    A row ends where a label occurs again, so that lines may change their order, and a lost line leaves empty cells.
     """
     filled = [(i, line) for i, line in enumerate(lines, start=1) if line.strip()]
     sample = [line for _, line in filled[:_SAMPLE_LINES]]
@@ -145,8 +144,8 @@ def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[str], list[i
         pairs = _pairs(_expanded(line, has_timestamp), known)
         known_labels = names if line.startswith(COMMENT_STARTS) else counts
         if not pairs or any(label not in known_labels for label, _ in pairs):
-            # A greeting above the first row is no row, nor is a line drawn between rows; the reader
-            # refuses the rest by number.
+            # A start-up message above the first row is skipped, a separator line between rows becomes a remark; the
+            # reader refuses any other line with its number.
             end()
             if rows:
                 rows.append(line if any(map(str.isalnum, line)) else f"# {line}")
@@ -163,14 +162,14 @@ def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[str], list[i
 
 
 def _expanded(line: str, has_timestamp: bool) -> str:
-    """A line with a label before each of three values that share one (``Accel: 1, 2, 3``), and before a bare stamp."""
+    """The line with a label for each of three values that share one (``Accel: 1, 2, 3``), and for a bare timestamp."""
     if has_timestamp:
         line = _BARE_TIMESTAMP.sub(r"time: \1 ", line, count=1)
     return _THREE.sub(r"\1 x: \2 \1 y: \3 \1 z: \4", line)
 
 
 def _pairs(line: str, known: dict[str, list[str]]) -> list[tuple[str, str]]:
-    """Labels and values of a line; ``known`` keeps the labels of lines that differ in their values only."""
+    """Labels and values of a line; ``known`` caches the labels of lines that differ only in their values."""
     found = list(_PAIR.finditer(line))
     if not found:
         return []
@@ -182,7 +181,7 @@ def _pairs(line: str, known: dict[str, list[str]]) -> list[tuple[str, str]]:
 
 
 def _names(line: str) -> list[str]:
-    """Names of the values of one line: ``Acceleration X: 1, Y: 2, Z: 3 m/s^2`` and ``Acc: X=1 Y=2 Z=3`` name three."""
+    """Names of the values of one line, such as ``Acceleration X: 1, Y: 2, Z: 3 m/s^2`` or ``Acc: X=1 Y=2 Z=3``."""
     out: list[tuple[str, str]] = []
     group, end = "", 0
     for found in _PAIR.finditer(line):
@@ -197,7 +196,7 @@ def _names(line: str) -> list[str]:
             group = words[0] if len(words) == 2 and words[1].lower() in {"x", "y", "z"} else ""
         out.append((label, unit))
         end = found.end()
-    # A unit after the last of three stands for all three.
+    # A unit after the last of three values applies to all three.
     last = ""
     units = []
     for _, unit in reversed(out):

@@ -1,8 +1,7 @@
 """JSON logs as tables: one object per line, a list of objects, columns by name, or the packets of known programs.
 
-What nests is named by its path (``imu.acc.x``); arrays of objects inside a packet (Movesense) are its samples, spread
-evenly to the next
-packet's timestamp; ``sensors`` and ``values`` are Edge Impulse's.
+Nested values are named by their path (``imu.acc.x``); arrays of objects inside a packet (Movesense) are its samples,
+with timestamps spread evenly to the next packet's; ``sensors`` and ``values`` are the format of Edge Impulse.
 """
 
 from __future__ import annotations
@@ -23,20 +22,20 @@ _TIMESTAMPS = ("timestamp", "time", "t")
 
 
 def is_json(text: str) -> bool:
-    """A brace or bracket that opens a value; a monitor's ``[12:34:56.789]`` opens a stamp."""
+    """Whether a text begins as a JSON value; a serial monitor's ``[12:34:56.789]`` is a timestamp."""
     start = text.lstrip("\ufeff \t\r\n")
     rest = start[1:].lstrip()
     return rest[:1] in ('"', "}", "") if start[:1] == "{" else start[:1] == "[" and rest[:1] in ("{", "[", '"', "]")
 
 
 def of_json(path: Path, text: str) -> Rewritten:
-    """The readings of a JSON text as lines of comma-separated values, and the line of each (of a text that is one
-    value: its row).
+    """The readings of a JSON text as comma-separated lines, and the line of each (its row, where the text is one
+    value).
 
     Raises
     ------
     ReadError
-        When it is damaged, or holds no rows of readings.
+        When the text is damaged, or contains no rows of readings.
     """
     lines: list[int] | None
     try:
@@ -75,7 +74,7 @@ def _of_lines(path: Path, text: str) -> tuple[list[Row], list[int]]:
         try:
             packets.append((i + 1, json.loads(line)))
         except (ValueError, RecursionError) as error:
-            if i == last and packets:  # cut off in the middle: a row of which nothing is known
+            if i == last and packets:  # an incomplete last line becomes an empty row
                 packets.append((i + 1, {}))
                 continue
             raise ReadError(f"{path}: line {i + 1} is no JSON ({str(error)[:80]}); mend or delete it.") from None
@@ -86,7 +85,7 @@ def _of_lines(path: Path, text: str) -> tuple[list[Row], list[int]]:
 
 
 def _of_value(value: Any) -> list[Row]:
-    """Rows of a whole document."""
+    """Rows of a JSON document that is one value."""
     if isinstance(value, Mapping):
         inner = value.get("payload", value)
         if (
@@ -125,7 +124,7 @@ def _edge_impulse(payload: Mapping[str, Any]) -> list[Row]:
 
 
 def _spread(packets: list[Any]) -> list[list[Row]]:
-    """Rows of every packet; several samples in one have timestamps that run evenly to the next packet's."""
+    """Rows of every packet; timestamps of several samples in one are spread evenly to the next packet's."""
     flat = [_flat(packet) if isinstance(packet, Mapping) else {} for packet in packets]
     samples = [
         {k: v for k, v in row.items() if isinstance(v, list) and v and isinstance(v[0], Mapping)} for row in flat
@@ -154,7 +153,7 @@ def _spread(packets: list[Any]) -> list[list[Row]]:
 
 
 def _finite(value: Any) -> float | None:
-    """A number that a double holds: JSON's whole numbers have as many digits as anyone writes."""
+    """The value as a finite float; None for other values, and for integers that exceed a double's range."""
     try:
         return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
     except OverflowError:
@@ -166,7 +165,7 @@ def _are_numbers(values: Iterable[Any]) -> bool:
 
 
 def _flat(value: Mapping[str, Any], prefix: str = "") -> Row:
-    """Leaves by their path; three numbers are x, y, z."""
+    """Values by their path; lists of three numbers become x, y, z."""
     out: Row = {}
     for key, leaf in value.items():
         name = f"{prefix}{key}"

@@ -1,4 +1,4 @@
-"""How a text log is laid out: separator, decimal mark, preamble, header and first line of numbers."""
+"""The layout of a text log: separator, decimal mark, preamble, header and first line of numbers."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ COMMENT_STARTS = ("#", "%", "//")
 MISSING = frozenset({"", "na", "n/a", "null", "none", "nan", "-", "--", "?", "#n/a", "missing"})
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
 _NUMBER_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
-# Every digit in one place only: a cell that is no number must not make the others be tried in all their divisions.
+# Every digit matches in one place only, so that a cell that is not a number causes no exponential backtracking.
 _NUMBERS, _NUMBERS_COMMA = (
     re.compile(
         rf"(?:[+-]?(?:(?:\d+(?:{mark}\d*)?|{mark}\d+)(?:[eE][+-]?\d+)?|nan|inf|infinity)(?:\n|\Z))+\Z", re.IGNORECASE
     )
     for mark in (r"\.", ",")
 )
-"""The same of all fields of a line, ends of lines between."""
+"""Patterns of a line in which all fields, separated by line feeds, are numbers."""
 _UNIT_WORD = re.compile(
     r"[\[(]?(s|m?secs?|m?seconds?|m?s|us|µs|ns|utc|m?g|g0|gal|rpm|milli-g|c?m ?/ ?\(?s(?:ec)?(\^?2|²|/s)\)?"
     r"|c?m[. ]?s\^?-2|m?dps|dph|(deg|°) ?/ ?hr?|m?rads|rad[. ]s-1|rad|deg"
@@ -29,16 +29,16 @@ _UNIT_WORD = re.compile(
 )
 _QUALIFIERS = frozenset({"cal", "uncal", "raw", "calibrated", "uncalibrated"})
 _JUDGED = 200
-"""Lines that separators are judged by."""
+"""Lines from which the separator is determined."""
 MAX_STRAY_LINES = 20
-"""Lines of numbers above the table that a preamble (a matrix, a list of offsets) may hold; more are rows lost."""
+"""Largest number of lines of numbers in a preamble (a matrix, a list of offsets); more would be lost rows."""
 MAX_STRAY_ROWS = 2
-"""Of these, lines as wide as rows of a log (four numbers or more): two may be damaged, more are another layout."""
+"""Largest number of these with four or more numbers, as rows have: two may be damaged, more are another layout."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """What the first lines tell. ``separator`` " " stands for any run of blanks; lines are counted from 1."""
+    """The layout found in the first lines. ``separator`` " " means any number of blanks; lines are counted from 1."""
 
     separator: str
     decimal_comma: bool
@@ -56,12 +56,12 @@ class Layout:
 
 
 def is_comment(line: str) -> bool:
-    """A line that carries no numbers by convention."""
+    """Whether a line is a comment by convention."""
     return line.startswith(COMMENT_STARTS)
 
 
 def split(line: str, separator: str) -> list[str]:
-    """Fields without surrounding blanks and quotes."""
+    """Fields of a line, without surrounding blanks and quotes."""
     if '"' in line:
         fields = line.split() if separator == " " else line.split(separator)
         return [f.strip().strip('"').strip() for f in fields]
@@ -69,12 +69,12 @@ def split(line: str, separator: str) -> list[str]:
 
 
 def is_number(text: str, decimal_comma: bool) -> bool:
-    """The text of one number, missing-value words not included."""
+    """Whether a text is one number; words for missing values are not."""
     return bool((_NUMBER_COMMA if decimal_comma else _NUMBER).match(text))
 
 
 def _numeric_fraction(fields: list[str], decimal_comma: bool) -> float:
-    # Most lines hold nothing but numbers: one look at all of them together.
+    # Most lines contain only numbers, which one match of all fields together shows.
     if (_NUMBERS_COMMA if decimal_comma else _NUMBERS).match("\n".join(fields)):
         return 1.0
     filled = [f for f in fields if f.lower() not in MISSING or f.lower() == "nan"]
@@ -84,7 +84,7 @@ def _numeric_fraction(fields: list[str], decimal_comma: bool) -> float:
 
 
 def _judge(lines: list[str], separator: str, decimal_comma: bool) -> tuple[float, int]:
-    """(how well this separator explains the lines, its usual number of fields)."""
+    """(score of a separator from 0 to 1, usual number of fields with it)."""
     rows = [split(line, separator) for line in lines]
     judged = [(len(row), _numeric_fraction(row, decimal_comma)) for row in rows]
     judged = [(count, fraction) for count, fraction in judged if fraction >= 0.5]
@@ -94,7 +94,7 @@ def _judge(lines: list[str], separator: str, decimal_comma: bool) -> tuple[float
     usual = max(set(counts), key=lambda n: (counts.count(n), n))
     fitting = [fraction for count, fraction in judged if count == usual]
     fraction = sum(fitting) / len(fitting)
-    # One column explains anything: a real separator must always win over it.
+    # Any line is one column, so a real separator must always score higher.
     return fraction * len(fitting) / len(lines) * (1.0 if usual > 1 else 0.1), usual
 
 
@@ -103,10 +103,10 @@ def detect(text: str) -> Layout | None:
     lines = [line.strip("\r") for line in text.split("\n")] if "\r" in text else text.split("\n")
     tail = _from_the_end(lines)
     candidates = [(",", False), ("\t", False), (";", False), (" ", False), (";", True), ("\t", True), (" ", True)]
-    # Separators that no line holds all explain the lines alike.
+    # Separators that occur in no line all give the same score.
     found = {(sep, comma): sep if any(sep in line for line in tail) else "\0" for sep, comma in candidates}
     scores: dict[tuple[str, bool], tuple[float, int]] = {}
-    # Those that occur first: one that explains every line is beaten by none, and one that does not occur never does.
+    # Separators that occur are tried first: a score of 1 cannot be exceeded, and others cannot reach it.
     for key in sorted(dict.fromkeys((found[key], key[1]) for key in candidates), key=lambda key: key[0] == "\0"):
         scores[key] = _judge(tail, *key)
         if scores[key][0] == 1.0:
@@ -122,13 +122,13 @@ def detect(text: str) -> Layout | None:
     trailing = separator != " " and n_fields > 1 and all(line.rstrip(" ").endswith(separator) for line in tail)
     header = _header(lines[:first], separator, n_fields - trailing)
     if trailing and header.names is None:
-        # Not a mark behind the last cell but a last cell without a value, where it has a name.
+        # A separator at the line end precedes an empty last cell where the header has a name for it.
         with_last = _header(lines[:first], separator, n_fields)
         if with_last.names is not None:
             header, trailing = with_last, False
     n_kept = n_fields - trailing
     stray = () if rate else _stray(lines[:first], header, decimal_comma)
-    # Remarks count from the names on, fitting or not, or from the first line that may have been a row.
+    # Remarks count from the names on, even ignored ones, or from the first line that may be a row.
     named = [i for i in range(first) if header.ignored and lines[i].strip() == header.ignored]
     above = min(max(header.used, default=first), stray[0] - 1 if stray else first, *named)
     return Layout(
@@ -159,7 +159,7 @@ def _from_the_end(lines: list[str]) -> list[str]:
 
 
 def _past_start_and_rate(lines: list[str], first: int, separator: str) -> tuple[int, dict[str, str]]:
-    """Empatica's two lines above the rows: the start in seconds since 1970 and the rate, once for each column."""
+    """First row and metadata, past Empatica's two lines: start [s since 1970] and rate, repeated for each column."""
     if first != 0 or len(lines) < 4:
         return first, {}
     start, rate = (split(line, separator) for line in lines[:2])
@@ -173,7 +173,7 @@ def _past_start_and_rate(lines: list[str], first: int, separator: str) -> tuple[
 
 
 def _looks_like_row(line: str, decimal_comma: bool, at_least: int = 3) -> bool:
-    """So many numbers or more, under any separator, and nothing much else."""
+    """Whether a line has ``at_least`` numbers, with any separator, and at most as many other fields."""
     for separator in (",", "\t", ";", " "):
         fields = split(line, separator)
         if (
@@ -185,7 +185,7 @@ def _looks_like_row(line: str, decimal_comma: bool, at_least: int = 3) -> bool:
 
 
 def _stray(lines: list[str], header: _Header, decimal_comma: bool) -> tuple[int, ...]:
-    """Lines above the first row that are neither names nor units nor remarks, but may have been rows."""
+    """Lines (from 1) above the first row that are neither names nor units nor remarks, but may be rows."""
     found = []
     for i, raw in enumerate(lines):
         line = raw.strip(" \r")
@@ -227,7 +227,7 @@ def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
         if not line or line.strip('"').lower().startswith("sep="):
             continue
         plain = re.sub(r"^(#+|%+|//+)\s*", "", line) if is_comment(line) else line
-        # GCDC's loggers say so before the names.
+        # GCDC's loggers write "Headers" before the names.
         plain = re.sub(r"^headers\s*,\s*", "", plain, flags=re.IGNORECASE)
         fields = _header_fields(plain, separator, n_fields)
         fields = _numbered_on(fields) if fields is not None else None
@@ -244,7 +244,7 @@ def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
     units: list[str] = []
     qualifiers: list[str] = []
     used = [matching[-1][0]]
-    # Names, then CAL or RAW, then units, as Shimmer writes them; or names and units.
+    # Names, then CAL or RAW, then units, as Shimmer writes; or names and units.
     while len(matching) > 1:
         row = matching[-1][1]
         is_below_names = _names_sensors(matching[-2][1]) and not _names_sensors(row)
@@ -267,7 +267,7 @@ def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
 
 
 def _numbered_on(fields: list[str]) -> list[str]:
-    """Names with those of ``Accelerometer [m/s2], 1, 2`` written out, as GoPro's telemetry has them."""
+    """Names with GoPro's ``Accelerometer [m/s2], 1, 2`` expanded to three full names."""
     out = list(fields)
     for i, name in enumerate(fields[:-2]):
         if fields[i + 1 : i + 3] == ["1", "2"] and not is_number(name, False):
@@ -286,7 +286,7 @@ def _share(fields: list[str], test: re.Pattern[str] | frozenset[str]) -> float:
 
 
 def _header_fields(line: str, separator: str, n_fields: int) -> list[str] | None:
-    # Names of several words stand two blanks apart or more.
+    # Names of several words are separated by two or more blanks.
     aligned = re.split(r"\s{2,}", line.strip())
     for fields in (*(split(line, sep) for sep in (separator, ",", "\t", ";", " ")), aligned):
         while len(fields) > n_fields and not fields[-1]:
@@ -296,18 +296,18 @@ def _header_fields(line: str, separator: str, n_fields: int) -> list[str] | None
     return None
 
 
-# Units that the lines above a table state: ``# acceleration in g, angular rate in deg/h``.
+# Units stated in lines above a table: ``# acceleration in g, angular rate in deg/h``.
 
 _CLAUSE = re.compile(r"[;,]|\band\b")
 _STATEMENT = re.compile(r"^\W*(?P<what>[^:=\[(]+?)\s*(?:\bin\b|[:=\[(])\s*(?P<unit>[^\[\]()]+?)\s*[\])]?\s*$")
 
 
 def stated_units(lines: Iterable[str]) -> dict[str, str]:
-    """Unit of each sensor and of the time, under ``accelerometer unit``, ``gyroscope unit`` and ``time unit``, as
-    stated first.
+    """First stated units of each sensor and of the time, under ``accelerometer unit``, ``gyroscope unit`` and
+    ``time unit``.
 
-    A clause says what (a sensor and no more, perhaps the word unit) and its unit: ``accelerometer range: 4 g`` and
-    ``gyro bias: 0.1 deg/s`` state none of the readings.
+    A clause must name only the sensor (and perhaps the word unit) and a unit: ``accelerometer range: 4 g`` and
+    ``gyro bias: 0.1 deg/s`` do not state the unit of the readings.
     """
     found: dict[str, str] = {}
     for line in lines:

@@ -1,4 +1,4 @@
-"""Lines of a block made regular, counted and sorted into rows and remarks: passes over bytes, no loop over rows."""
+"""Lines of a block normalised, counted and separated into rows and remarks, without a Python loop over rows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Counts = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Rows of a block: ``number`` (n,) their lines, ``fields`` (n,) their fields; ``comments`` (k,) remarks."""
+    """Rows of a block: ``number`` (n,) lines, ``fields`` (n,) numbers of fields; ``comments`` (k,) lines of remarks."""
 
     number: Counts
     fields: Counts
@@ -22,11 +22,11 @@ class Lines:
     comments: Counts
     last: int
     unclosed: int = 0
-    """First line that opens a quote and does not close it; 0 where there is none."""
+    """First line with an unclosed quote; 0 where there is none."""
 
 
 class RowLines:
-    """The line of every row; one number is enough as long as no line is excluded."""
+    """The line of every row, stored as ranges while no line is excluded."""
 
     def __init__(self) -> None:
         self.first = 0
@@ -34,7 +34,7 @@ class RowLines:
         self._parts: list[Counts | range] = []
 
     def append(self, lines: Counts | range) -> None:
-        """The lines (k,) of the next rows."""
+        """Add the lines (k,) of the next rows."""
         start, stop = int(lines[0]), int(lines[-1]) + 1
         if not self._parts:
             self.first = start
@@ -46,14 +46,14 @@ class RowLines:
         self._next = stop
 
     def all(self) -> Counts | None:
-        """Lines (n,) of all rows; None where each follows the one before."""
+        """Lines (n,) of all rows; None where they are consecutive."""
         if len(self._parts) == 1 and isinstance(self._parts[0], range):
             return None
         return np.concatenate([np.asarray(part, dtype=np.int64) for part in self._parts])
 
 
 def regular(data: bytes, layout: Layout) -> bytes:
-    """One separator between fields, none around lines."""
+    """The text with one separator between fields, and no blanks or trailing separators around lines."""
     separator = layout.separator.encode()
     if layout.separator == " ":
         data = data.replace(b"\t", b" ")
@@ -70,7 +70,7 @@ def regular(data: bytes, layout: Layout) -> bytes:
 
 
 def offset_of_line(data: bytes, line: int) -> int:
-    """Byte where a line (from 1) starts."""
+    """Offset in bytes of the start of a line (from 1)."""
     offset = 0
     for _ in range(line - 1):
         offset = data.find(b"\n", offset) + 1
@@ -78,14 +78,14 @@ def offset_of_line(data: bytes, line: int) -> int:
 
 
 def data_lines(data: bytes, layout: Layout, lines_before: int) -> Lines:
-    """The rows of a block without blank lines and comments; quotes protect the separators between them."""
+    """The rows of a block without blank lines and comments; separators inside quotes do not count."""
     raw = np.frombuffer(data, dtype=np.uint8)
     ends = np.flatnonzero(raw == 10)
     starts = np.concatenate([np.zeros(1, dtype=ends.dtype), ends[:-1] + 1])
     numbers = np.arange(lines_before + 1, lines_before + 1 + len(starts), dtype=np.int64)
     first = raw[starts]
     is_blank = first == 10
-    # What a two-letter mark starts is judged by both letters: a lone '/' begins no comment.
+    # A comment mark of two letters needs both: a single '/' is not a comment.
     second = raw[np.minimum(starts + 1, len(raw) - 1)]
     is_comment = (first == ord("#")) | (first == ord("%")) | ((first == ord("/")) & (second == ord("/")))
     is_separator = raw == ord(layout.separator)
@@ -109,7 +109,7 @@ def data_lines(data: bytes, layout: Layout, lines_before: int) -> Lines:
 def _quoted(
     raw: npt.NDArray[np.uint8], starts: npt.NDArray[np.intp], ends: npt.NDArray[np.intp]
 ) -> npt.NDArray[np.bool_]:
-    """Bytes between quotes; every line starts outside, so that a quote never closed harms its own line only."""
+    """Mask of the bytes inside quotes; every line starts outside, so that an unclosed quote affects only its line."""
     opened = np.cumsum(raw == ord('"'))
     before = np.concatenate([np.zeros(1, dtype=opened.dtype), opened[starts[1:] - 1]])
     return np.asarray((opened - np.repeat(before, ends - starts + 1)) % 2 == 1)
@@ -118,7 +118,7 @@ def _quoted(
 def _fields_per_line(
     is_separator: npt.NDArray[np.bool_], starts: npt.NDArray[np.intp], ends: npt.NDArray[np.intp], expected: int
 ) -> Counts:
-    """Fields of each line; the usual case, that all lines have the expected number, is settled four times faster."""
+    """Number of fields of each line; four times faster in the usual case that all have the expected number."""
     if expected > 1:
         at = np.flatnonzero(is_separator)
         if len(at) == len(starts) * (expected - 1):

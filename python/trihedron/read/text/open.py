@@ -29,9 +29,9 @@ def read_text(
     content: bytes | None = None,
     sha256: str | None = None,
 ) -> tuple[Table, ...]:
-    """One table, or the accelerometer's and the gyro's where each line says whose it is.
+    """One table, or the accelerometer's and the gyro's where each line names its sensor.
 
-    ``content`` stands for the file's bytes where they were unpacked already (a member of a zip).
+    ``content`` are the file's bytes if they are unpacked already (a member of a zip).
 
     Raises
     ------
@@ -39,9 +39,9 @@ def read_text(
         As :class:`TextReader`.
     """
     refuse_after_fork(path)
-    # In UTF-16 a sample is twice as long.
+    # Twice the length, for UTF-16.
     first = beginning(path, compression, 2 * _SAMPLE_BYTES, content)
-    # A zero byte is complained about by the reader, with its line.
+    # The reader reports a zero byte, with its line.
     sample = first[:_SAMPLE_BYTES] if b"\x00" in first else as_utf8(path, first, 1)[:_SAMPLE_BYTES]
     head = sample.decode("utf-8", errors="replace")
     head = head[: head.rfind("\n") + 1] or head
@@ -61,7 +61,7 @@ def read_text(
 
 
 def _whole(path: Path, compression: str | None, size: int, content: bytes | None) -> str:
-    # Lines as Python strings take about ten times their bytes; counted as cells of 24.
+    # Lines as Python strings take about ten times their bytes; half the size as cells of 16 bytes is 8 times.
     check_memory(path, size // 2, 1)
     cursor = Cursor()
     with closing(blocks(path, compression, cursor, content)) as parts:

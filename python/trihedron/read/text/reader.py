@@ -1,4 +1,4 @@
-"""One text log, block by block, as a table: every line becomes a row or is accounted for in a finding."""
+"""One text log, read block by block to a table: every line becomes a row or is counted in a finding."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ from trihedron.records.progress import Progress
 
 _SAMPLE_BYTES = 1 << 18
 _ROWS_CHECKED = 1_000_000
-"""Rows after which the room left is looked at again; shorter logs are not asked for."""
+"""Rows between checks of the available memory; shorter logs are not checked."""
 
 
 class TextReader:
-    """Reads one text log block by block; complaints name file, line and column.
+    """Reads one text log block by block; error messages name file, line and column.
 
-    ``content`` stands for the bytes of the file where they were unpacked or rewritten already; ``lines`` (n,) then
-    gives the line in the file of each of its lines.
+    ``content`` are the bytes of the file if they are unpacked or rewritten already; ``lines`` (n,) is then the line in
+    the file of each of its lines.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class TextReader:
 
     def read(self) -> Table:
         """The whole file as a table."""
-        # Closed whatever is raised in between: a refusal must not leave the file open until the next collection.
+        # Closed even after an exception, so that the file does not stay open until the next garbage collection.
         if self.content is None and self.compression is None:
             with kept_open(self.path) as stream, closing(blocks_ahead(self.path, stream, self.cursor)) as ahead:
                 layout = self._read(ahead)
@@ -88,7 +88,7 @@ class TextReader:
     def _read(self, parts: Iterable[bytes] | Iterable[Bytes]) -> Layout:
         layout: Layout | None = None
         for part in parts:
-            # Nearly all blocks but the first are nothing but rows of numbers: those are not looked at any further.
+            # Nearly all blocks after the first contain only rows of numbers and need no further checks.
             if layout is None or self.semicolons or not self._plain(part, layout):
                 layout = self._odd_part(part if isinstance(part, bytes) else part.tobytes(), layout)
             self.n_bytes += len(part)
@@ -102,7 +102,7 @@ class TextReader:
     def _odd_part(self, raw: bytes, layout: Layout | None) -> Layout:
         data = as_utf8(self.path, raw, self.cursor.lines + 1)
         if b"\r" in data:
-            # Before the layout is judged: a lone carriage return ends a row for whoever counts rows afterwards.
+            # Before the layout is detected: a single carriage return also ends a row.
             data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         if layout is None:
             self.semicolons = has_semicolon_remarks(data)
@@ -119,7 +119,7 @@ class TextReader:
         return layout
 
     def line(self, number: int) -> int:
-        """Line of the file for a line of the content that is read."""
+        """Line in the file of a line of the content."""
         return int(self.true_lines[number - 1]) if self.true_lines is not None else number
 
     def _layout(self, data: bytes) -> Layout:
@@ -165,7 +165,7 @@ class TextReader:
             )
 
     def _first_block(self, data: bytes, layout: Layout) -> None:
-        """Which columns hold words instead of numbers (labels, dates), judged on the first lines."""
+        """Find the columns of words (labels, dates) from the first lines."""
         start = offset_of_line(data, layout.first_line)
         head = data[start : start + (1 << 16)].decode("utf-8", errors="replace")
         lines = (split(line, layout.separator) for line in head.split("\n")[:-1] or [head] if line.strip())
@@ -173,7 +173,7 @@ class TextReader:
         self.text_columns = find_text_columns(list(islice(rows, 200)), layout)
 
     def _block(self, data: bytes, layout: Layout) -> None:
-        # One odd block may be the last, cut off; where there are two, looking for more costs time for nothing.
+        # One irregular block may be the incomplete last one; after two, further blocks are not tested as plain.
         self.may_be_plain = self.n_odd_blocks == 0
         self.n_odd_blocks += 1
         ends_with_line_end = data.endswith(b"\n")
@@ -200,7 +200,7 @@ class TextReader:
             self._parse(text, lines, layout)
 
     def _plain(self, data: bytes | Bytes, layout: Layout) -> bool:
-        """Whether the block was nothing but rows of numbers, and is read: all but a few logs are."""
+        """Read a block that contains only rows of numbers, as in most logs; whether that succeeded."""
         if not self.may_be_plain or self.text_columns or layout.decimal_comma or self.true_lines is not None:
             return False
         text, separator = np.frombuffer(data, dtype=np.uint8), ord(layout.separator)
@@ -211,7 +211,7 @@ class TextReader:
         if not rows:
             return False
         expected = self._expected(rows, len(data), layout)
-        if rows > len(room[0]):  # it counted the lines and read none
+        if rows > len(room[0]):  # there was no room: the lines were counted but not read
             rows, is_read = _core.plain_table_into(text, separator, *self.store.lend(rows, expected))
         if is_read:
             self.store.keep(rows)
@@ -221,7 +221,7 @@ class TextReader:
         return is_read
 
     def _expected(self, n_new: int, n_bytes: int, layout: Layout) -> int:
-        """Rows of the whole log, as far as known; refused where they would not fit into memory."""
+        """Expected number of rows of the whole log; refused if they do not fit into memory."""
         rows = self.n_rows + n_new
         rows_per_byte = rows / max(self.n_bytes + n_bytes, 1)
         expected = int(self.size * rows_per_byte) if self.compression is None else rows
@@ -231,7 +231,7 @@ class TextReader:
         return max(expected, rows)
 
     def _take(self, columns: list[FloatArray], lines: npt.NDArray[np.int64], n_bytes: int, layout: Layout) -> None:
-        """Keep the rows of a block, unless those expected behind it would not fit into memory."""
+        """Store the rows of a block, unless the expected number of rows does not fit into memory."""
         if self.n_rows == 0:
             self.store = Store(layout.n_fields, self._triads(layout, columns))
         self.store.append(columns, self._expected(len(lines), n_bytes, layout))
@@ -241,7 +241,7 @@ class TextReader:
     def _incomplete(
         self, found: Lines, i: int, ends_with_line_end: bool, layout: Layout
     ) -> tuple[npt.NDArray[np.int64], bytes]:
-        """The block without its last line where that breaks off; any other odd line is refused."""
+        """The block without an incomplete last line of the file; any other irregular line is refused."""
         fields = int(found.fields[i])
         is_end = i == len(found.number) - 1 and self.cursor.is_last
         line = self.line(int(found.number[i]))
@@ -289,7 +289,7 @@ class TextReader:
         self._take(columns, lines, len(data), layout)
 
     def _triads(self, layout: Layout, columns: list[FloatArray]) -> tuple[tuple[int, int, int], ...]:
-        """Which columns will be wanted side by side; what is guessed wrong costs memory and nothing else."""
+        """Columns of each sensor, to be stored as one array (n, 3); a wrong guess only costs memory."""
         head = Table(self.path, layout.names, tuple(column[:1000] for column in columns), first_line=1)
         try:
             chosen = find_columns(head, None, None)
@@ -328,7 +328,7 @@ class TextReader:
                 if text.codes and len(text.words) <= MAX_WORDS:
                     labels[i] = (tuple(text.words), np.concatenate(text.codes))
             elif text is not None:
-                # A date is a time whatever its column is called, unless another one is called so.
+                # A date is the time whatever the column's name, unless another column is named as the time.
                 is_time = has_time or not name or parse_name(name).role == "time"
                 name = (f"{name} [s]" if is_time else f"{name} time [s]") if name else "time [s]"
                 values = past_midnight(values) if text.form == "time-of-day" else values

@@ -1,4 +1,4 @@
-"""One record type per line, told by its first word, as GnssLogger writes: taken apart into one table per sensor."""
+"""Texts with a record type as the first word of each line, as GnssLogger writes, split into one table per sensor."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _WORD = re.compile(r"\$?[^\W\d]\w*:?$")
 
 
 def split_records(text: str) -> tuple[dict[str, Rewritten], Counter[str]] | None:
-    """For ``accelerometer`` and ``gyroscope`` their lines under their own names; and lines by first word.
+    """The lines of ``accelerometer`` and ``gyroscope``, each with its header; and the number of lines by first word.
 
-    None where the first words do not tell the two sensors apart.
+    None where the first words do not identify both sensors.
     """
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     separator = _separator(lines[:_SAMPLE_LINES])
@@ -44,7 +44,7 @@ def split_records(text: str) -> tuple[dict[str, Rewritten], Counter[str]] | None
 
 
 def _separator(lines: list[str]) -> str | None:
-    """What follows the first word of lines of three numbers or more; None where most lines have no such word."""
+    """The separator of lines with a first word and three or more numbers; None where most lines are not such lines."""
     first = [line[:1] for line in lines]
     if sum(map(str.isalpha, first)) + sum(map(first.count, ("$", "_", ""))) < max(4.0, 0.3 * len(lines)):
         return None

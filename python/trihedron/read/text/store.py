@@ -1,4 +1,4 @@
-"""Where the numbers of a text log go while its blocks are parsed: each is kept once, where it will be used."""
+"""Storage of a text log's numbers while its blocks are parsed; each number is stored once, in its final place."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 
 _SPARE = 1.02
-"""Room made beyond the rows expected; memory that is never written to is never taken."""
+"""Factor of allocated to expected rows; memory that is never written to is not used."""
 _GROWTH = 1.5
 
 
 class Store:
-    """Columns (n,) that grow; three that form a triad lie side by side, so that (n, 3) is there without a copy.
+    """Columns (n,) that grow; the three of a triad are views of one array (n, 3), which then needs no copy.
 
-    ``triads`` name columns that belong together; a column belongs to one at most.
+    ``triads`` are the column numbers of each triad; a column belongs to at most one.
     """
 
     def __init__(self, n_columns: int, triads: Iterable[Sequence[int]] = ()) -> None:
@@ -29,7 +29,7 @@ class Store:
         self._is_numeric = [False] * n_columns
 
     def append(self, columns: Sequence[FloatArray], expected: int) -> None:
-        """The next rows (k,) of every column, empty where it holds words; ``expected`` rows in all, as far as known."""
+        """Add the next rows (k,) of every column, empty for words; ``expected`` is the expected number of all rows."""
         count = max(len(column) for column in columns)
         need = self.n_rows + count
         for b, block in enumerate(self._blocks):
@@ -42,26 +42,26 @@ class Store:
         self.n_rows = need
 
     def lend(self, count: int, expected: int) -> tuple[list[tuple[int, int]], list[FloatArray]]:
-        """Room for the next ``count`` rows: ``(block, place)`` of every column, and the blocks (rows, width)."""
+        """Memory for the next ``count`` rows: ``(block, place)`` of every column, and the blocks (rows, width)."""
         places = {i: (b, k) for b, block in enumerate(self._blocks) for k, i in enumerate(block)}
         need = self.n_rows + count
         blocks = [self._with_room(b, need, expected)[self.n_rows :] for b in range(len(self._blocks))]
         return [places[i] for i in range(self.n_columns)], blocks
 
     def keep(self, count: int) -> None:
-        """The next ``count`` rows were written to the blocks lent, a number in every column."""
+        """Record that ``count`` rows were written to the blocks from :meth:`lend`, with a number in every column."""
         self.n_rows += count
         self._is_numeric = [True] * self.n_columns
 
     def set_aside(self, column: int) -> bool:
-        """A column turns out to hold words: given up where no number was met in it yet."""
+        """Mark a column as words; False, without a change, if it contains a number already."""
         if np.isfinite(self.columns()[column]).any():
             return False
         self._is_numeric[column] = False
         return True
 
     def _with_room(self, b: int, need: int, expected: int) -> FloatArray:
-        """A block with room for ``need`` rows, for the ``expected`` ones if it has to be made anew."""
+        """A block with memory for ``need`` rows; if it must grow, for the ``expected`` rows."""
         array = self._arrays[b]
         if len(array) < need:
             grown = _core.room(max(need, int(expected * _SPARE), int(len(array) * _GROWTH)), array.shape[1])
@@ -70,7 +70,7 @@ class Store:
         return array
 
     def columns(self) -> list[FloatArray]:
-        """All columns (n,), empty where one poses words; those of a triad are views of one (n, 3)."""
+        """All columns (n,), empty where one contains words; those of a triad are views of one array (n, 3)."""
         out: list[FloatArray] = [np.empty(0)] * self.n_columns
         for block, array in zip(self._blocks, self._arrays, strict=True):
             for k, i in enumerate(block):
@@ -80,7 +80,7 @@ class Store:
 
 
 def side_by_side(columns: Sequence[FloatArray]) -> FloatArray | None:
-    """The (n, 3) array of which three columns are views, in this order; None where they lie elsewhere."""
+    """The array (n, 3) of which three columns are views, in this order; None where there is none."""
     first = columns[0]
     base = first.base
     if not isinstance(base, np.ndarray) or base.ndim != 2 or base.shape[1] != len(columns):

@@ -1,1 +1,1 @@
-"""A simulated board: a recording sent over a pseudo-terminal or a socket in a board's own protocol, with its faults."""
+"""A simulated board: a recording sent over a pseudo-terminal or a socket in a board's protocol, with its faults."""

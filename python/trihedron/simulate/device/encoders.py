@@ -1,4 +1,4 @@
-"""Frames as boards write them, from readings; written apart from the decoders, which know nothing of this file."""
+"""Frames of board protocols from readings; independent of the decoders, so that each tests the other."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Encoder = Callable[[int, float, Reading, Reading], bytes]
 
 @dataclass(frozen=True)
 class Scales:
-    """What one raw unit of the recording is: SI per unit of accelerometer and gyro (1 where it is counts)."""
+    """SI per raw unit of the recording: m/s² for the accelerometer, rad/s for the gyro; 1 by default."""
 
     to_m_s2: float = 1.0
     to_rad_s: float = 1.0
@@ -61,7 +61,7 @@ def _xio(scales: Scales, *, binary: bool) -> Encoder:
 
 def _sparkfun(_scales: Scales, *, binary: bool) -> Encoder:
     def encode(n: int, _t: float, accel: Reading, gyro: Reading) -> bytes:
-        # Pitch comes before roll: the gyro's y before its x.
+        # The protocol sends pitch before roll: the gyro's y before its x.
         numbers = [min(max(round(v), 0), 1023) for v in (*accel, gyro[1], gyro[0], gyro[2])]
         if binary:
             return b"A" + struct.pack(">7H", n % 32_768, *numbers) + b"Z"
@@ -157,19 +157,19 @@ ENCODERS: dict[str, Callable[[Scales], Encoder]] = {
     "vectornav": _vectornav,
     "sbg": _sbg,
 }
-"""What a simulated board can speak; a declared frame besides."""
+"""Protocols of a simulated board, besides a declared frame."""
 
 LINE_HEADERS = {"lines": "count,time [us],ax,ay,az,gx,gy,gz\r\n", "lines-space": "micros ax ay az gx gy gz\r\n"}
-"""What a board prints once when it starts."""
+"""Header line that a board prints once when it starts."""
 
 
 def encoder_for(protocol: str | FrameDeclaration, scales: Scales | None = None) -> Encoder:
-    """How a board of that protocol writes a frame.
+    """The encoder of frames in that protocol.
 
     Raises
     ------
     ValueError
-        When no board speaks it.
+        When no simulated board has that protocol.
     """
     if isinstance(protocol, FrameDeclaration):
         return declared(protocol)
@@ -179,7 +179,7 @@ def encoder_for(protocol: str | FrameDeclaration, scales: Scales | None = None) 
 
 
 def declared(frame: FrameDeclaration) -> Encoder:
-    """By the user's declaration; readings go to its values in order, the accelerometer's first."""
+    """Encoder of a frame that the user declared; readings fill its values in order, the accelerometer's first."""
     letters = {1: "b", 2: "h", 4: "i", 8: "q"}
     order = "<" if frame.little_endian else ">"
 
@@ -230,7 +230,7 @@ def _check(kind: str, data: bytes) -> tuple[int, int]:
 
 
 def _bitwise(data: bytes, width: int, polynomial: int, start: int, *, reflected: bool) -> int:
-    """Division of polynomials bit by bit, as the definition says."""
+    """CRC by polynomial division bit by bit, as it is defined."""
     register, top, mask = start, 1 << (width - 1), (1 << width) - 1
     if reflected:
         register = int(f"{register:0{width}b}"[::-1], 2)

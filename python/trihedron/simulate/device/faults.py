@@ -1,4 +1,4 @@
-"""What goes wrong on a line: bytes lost, doubled, flipped; frames cut, missing, sent twice; noise in between."""
+"""Faults of a serial line: bytes lost, doubled, flipped; frames cut, missing, sent twice; random bytes in between."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ KINDS = ("missing", "cut", "flipped", "garbage", "byte_lost", "byte_doubled", "t
 
 @dataclass(frozen=True)
 class Faults:
-    """Chances per frame of each fault, and when the board disconnects.
+    """Probability of each fault per frame, and instants at which the board disconnects.
 
-    ``missing``: the frame is never sent. ``cut``: only its beginning. ``flipped``: one bit turned over. ``garbage``: 1
-    to 40 random bytes before it. ``byte_lost``, ``byte_doubled``: one byte inside. ``twice``: sent again.
-    ``drift_ppm``: the board clock is fast by that. ``start_text``: lines printed first. ``disconnect_s``: instants at
-    which it goes away for ``away_s``. ``pause_s``: instants at which it sends nothing for ``paused_s``, and counts on.
-    ``clean_ends`` frames at either end stay whole: what is lost before the first
-    and after the last frame saved is nobody's to count.
+    ``missing``: the frame is not sent. ``cut``: only its beginning is sent. ``flipped``: one bit is inverted.
+    ``garbage``: 1 to 40 random bytes precede it. ``byte_lost``, ``byte_doubled``: one byte. ``twice``: sent twice.
+    ``drift_ppm``: the board clock runs fast by that. ``start_text``: lines printed first. ``disconnect_s``: instants at
+    which the board disconnects for ``away_s``. ``pause_s``: instants from which it sends nothing for ``paused_s`` while
+    its counter and clock run on. The first and last ``clean_ends`` frames have no faults: losses before the first and
+    after the last saved frame cannot be counted.
     """
 
     missing: float = 0.0
@@ -39,11 +39,11 @@ class Faults:
 
     @property
     def any_per_frame(self) -> bool:
-        """Whether frames are touched at all."""
+        """Whether any fault per frame has a probability above 0."""
         return any(getattr(self, kind) > 0.0 for kind in KINDS)
 
     def during(self, t: float) -> Faults:
-        """The faults that strike at ``t`` seconds: in a pause every frame is missing."""
+        """The faults at device time ``t`` [s]: in a pause every frame is missing."""
         is_paused = any(begin <= t < begin + self.paused_s for begin in self.pause_s)
         return Faults(missing=1.0) if is_paused else self
 
@@ -54,7 +54,7 @@ def parse_faults(text: str) -> Faults:
     Raises
     ------
     ValueError
-        When a fault is not known or its size is no number.
+        When a fault is unknown or its size is not a number.
     """
     chosen: dict[str, float | bool | tuple[float, ...]] = {}
     for part in (piece.strip() for piece in text.split(",") if piece.strip()):
@@ -99,7 +99,7 @@ def _size(text: str, whole: str) -> float:
 
 @dataclass
 class Sent:
-    """What the board did: frames it made (each is one reading), and how often each fault struck."""
+    """Counts of what the board sent: frames made (one reading each), bytes, and occurrences of each fault."""
 
     frames: int = 0
     bytes: int = 0
@@ -107,13 +107,13 @@ class Sent:
     untouched: list[int] = field(default_factory=list)
 
     def sentence(self) -> str:
-        """For people."""
+        """The counts as one sentence."""
         struck = ", ".join(f"{n} {kind.replace('_', ' ')}" for kind, n in self.faults.items() if n)
         return f"{self.frames} frames, {self.bytes} bytes sent" + (f"; faults: {struck}" if struck else "")
 
 
 def spoil(frame: bytes, number: int, faults: Faults, rng: random.Random, sent: Sent) -> bytes:
-    """The frame as it goes over the line."""
+    """The frame's bytes with random faults applied; counted in ``sent``."""
     sent.frames += 1
     if not faults.any_per_frame:
         sent.bytes += len(frame)

@@ -1,4 +1,4 @@
-"""A recording sent as a board would, over a pseudo-terminal or a TCP socket."""
+"""Sends a recording as a board does, over a pseudo-terminal or a TCP socket."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from trihedron.units import acceleration_to_si, rate_to_si
 _BOOT_TEXT = b"board v1.2 starting\r\nsensor found at 0x68\r\nranges: 4 g; 500 deg/s\r\nready\r\n"
 
 PIECE_S = 0.004
-"""Frames of this long are written together, as the buffers of USB adapters do."""
+"""Frames within this time [s] are written together, as the buffers of USB adapters do."""
 
 
 @dataclass(frozen=True)
 class Device:
-    """A recording on a board: protocol, faults, and how much faster than real time (0: as fast as the line takes).
+    """A recording that a simulated board sends: protocol, faults, and ``speed`` over real time (0: no waiting).
 
-    ``scales`` turn raw units into SI for protocols that speak SI.
+    ``scales`` convert raw units to SI for protocols in SI.
     """
 
     recording: Recording
@@ -43,7 +43,7 @@ class Device:
     scales: Scales | None = None
 
     def pieces(self, sent: Sent) -> Iterator[tuple[float, bytes]]:
-        """(device seconds, bytes) piece by piece."""
+        """Yield (device time [s], bytes) piece by piece."""
         recording, faults = self.recording, self.faults
         encode = encoder_for(self.protocol, self.scales or scales_of(recording))
         rng = random.Random(self.seed)
@@ -67,7 +67,7 @@ class Device:
 
 
 def scales_of(recording: Recording, truth: Truth | None = None) -> Scales:
-    """SI per raw unit: by the unit, or for counts by the truth's mean, as a data sheet would state it."""
+    """SI per raw unit: from the unit, or for counts from the mean column norm of the true S, as in a data sheet."""
     accel, gyro = acceleration_to_si(recording.accelerometer_unit), rate_to_si(recording.gyroscope_unit)
     if truth is not None:
         accel = accel or float(np.mean(np.linalg.norm(truth.accelerometer_S, axis=0)))
@@ -76,31 +76,31 @@ def scales_of(recording: Recording, truth: Truth | None = None) -> Scales:
 
 
 class Line(Protocol):
-    """Where the bytes go. ``name`` is what a reader opens."""
+    """A connection to which bytes are sent; a reader opens it by ``name``."""
 
     name: str
 
     def send(self, data: bytes) -> None:
-        """Write all of it; waits for a reader."""
+        """Write all bytes, waiting for a reader if there is none."""
         ...
 
     def disconnect(self) -> None:
-        """As a cable pulled out."""
+        """Break the connection, as when the cable is unplugged."""
         ...
 
     def connect(self) -> None:
-        """As a cable put in again."""
+        """Make the connection again, as when the cable is plugged in."""
         ...
 
     def close(self) -> None:
-        """The end: what was sent can still be read, then the line is gone."""
+        """Let the reader finish reading what was sent, then close the connection."""
         ...
 
 
 class PseudoTerminal:
-    """A serial port without a cable; ``link`` is a name that stays the same over disconnections.
+    """A pseudo-terminal as a serial port; ``link`` is a symbolic link whose name stays the same over disconnections.
 
-    A reader that set another baud than the board's receives garbage, as on a real line.
+    A reader that sets a baud rate other than the board's receives garbage, as on a real line.
     """
 
     def __init__(self, link: Path | None = None, baud: int = 0) -> None:
@@ -112,14 +112,14 @@ class PseudoTerminal:
         self.name = str(link) if link is not None else self._slave_name
 
     def connect(self) -> None:
-        """A fresh terminal under the same link."""
+        """Open a new terminal under the same link."""
         import pty
         import tty
 
         self._master, slave = pty.openpty()
         tty.setraw(slave)
         self._slave_name = os.ttyname(slave)
-        # The board holds its own end open until somebody reads: a terminal without any reader hangs up.
+        # The slave end is kept open here: a terminal without any reader hangs up.
         self._slave = slave
         if self._link is not None:
             temporary = self._link.with_name(self._link.name + ".new")
@@ -128,7 +128,7 @@ class PseudoTerminal:
             temporary.replace(self._link)
 
     def disconnect(self) -> None:
-        """The terminal vanishes under its readers."""
+        """Close the terminal while readers still have it open."""
         if self._link is not None:
             self._link.unlink(missing_ok=True)
         os.close(self._slave)
@@ -136,11 +136,11 @@ class PseudoTerminal:
         self._master = -1
 
     def send(self, data: bytes) -> None:
-        """Write; garbled where the reader listens at another baud."""
+        """Write the bytes; garbled where the reader has set another baud rate."""
         if self._baud and not self._is_heard():
             data = bytes((b * 37 + 129) & 0xFF | 0x80 for b in data[::2])
         while data:
-            # A reader that left would keep the board waiting for ever.
+            # Without a limit, a reader that left would keep the board waiting forever.
             _, ready, _ = select.select([], [self._master], [], 0.5)
             if not ready:
                 if _unread(self._slave) > 0 and time.monotonic() - self._wrote_s > self.patience_s:
@@ -158,8 +158,8 @@ class PseudoTerminal:
         return wanted is None or speed == wanted
 
     def close(self) -> None:
-        """Wait until what was sent has been read, then hang up."""
-        # The count leaves out what the system still has on its way: only half a second of silence is the end.
+        """Wait until what was sent has been read, then close the terminal."""
+        # The count excludes bytes in the kernel's buffers, so it must be 0 for half a second.
         until, quiet = time.monotonic() + 10.0, 0
         while time.monotonic() < until and quiet < 10 and self.patience_s > 0.0:
             quiet = quiet + 1 if _unread(self._slave) == 0 else 0
@@ -177,7 +177,7 @@ def _unread(handle: int) -> int:
 
 
 class TcpServer:
-    """One reader after another on 127.0.0.1."""
+    """A TCP server on 127.0.0.1 that accepts one reader after another."""
 
     def __init__(self, port: int = 0) -> None:
         self._server = socket.create_server(("127.0.0.1", port))
@@ -185,7 +185,7 @@ class TcpServer:
         self._reader: socket.socket | None = None
 
     def connect(self) -> None:
-        """Readers are taken when there is something to send."""
+        """Do nothing: ``send`` accepts readers when it has bytes to send."""
 
     def disconnect(self) -> None:
         """Close the connection under the reader."""
@@ -194,7 +194,7 @@ class TcpServer:
             self._reader = None
 
     def send(self, data: bytes) -> None:
-        """Write, waiting for a reader where there is none."""
+        """Write all bytes, waiting for a reader if there is none."""
         while True:
             if self._reader is None:
                 self._reader, _ = self._server.accept()
@@ -205,10 +205,10 @@ class TcpServer:
                 self.disconnect()
 
     def close(self) -> None:
-        """Nothing more will be sent."""
+        """End the stream, wait up to 5 s for the reader to finish, and close."""
         if self._reader is not None:
             self._reader.shutdown(socket.SHUT_WR)
-            # What is on its way is read before the connection goes.
+            # Bytes in transit are read before the connection closes.
             select.select([self._reader], [], [], 5.0)
         self.disconnect()
         self._server.close()
@@ -221,9 +221,9 @@ def serve(
     is_wanted: Callable[[], bool] = lambda: True,
     sent: Sent | None = None,
 ) -> Sent:
-    """Send the recording once, in real or faster time, with the device's faults; then hang up.
+    """Send the recording once, in real time or faster, with the device's faults; then close the line.
 
-    Ends before its time where ``is_wanted`` says no. ``sent`` counts along, for those who look on meanwhile.
+    Stops early where ``is_wanted`` returns False. ``sent`` is updated while frames are sent; ``said`` gets messages.
     """
     sent = Sent() if sent is None else sent
     away = sorted(device.faults.disconnect_s)

@@ -1,6 +1,6 @@
-"""The catalogue's effects switched on at the level of the mechanism, at a stated size, and read back as truth.
+"""Effects of the diagnosis catalogue, simulated by their mechanism at a stated size, and read back as truth.
 
-``with_effect(scenario, id, ...)`` returns a new scenario; sizes are SI. Nothing here is shared with an estimator.
+``with_effect(scenario, id, ...)`` returns a new scenario; sizes are SI. No formula is shared with an estimator.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ EFFECT_IDS: tuple[str, ...] = tuple(_EFFECTS)
 
 
 def with_effect(scenario: Scenario, effect_id: str, **size: Any) -> Scenario:
-    """The same scenario with one effect of the catalogue switched on at a stated size.
+    """The scenario with one effect of the catalogue added at a stated size.
 
     Raises
     ------
     ValueError
-        When the id is unknown or its parameters are not what the effect takes.
+        When the id is unknown, or a parameter is unknown, missing or invalid.
     """
     if effect_id not in _EFFECTS:
         raise RefusedError(

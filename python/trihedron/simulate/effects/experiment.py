@@ -1,4 +1,4 @@
-"""Effects of the clock, the place and the motion."""
+"""Effects of the clock, the environment and the motion."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def rectification(
     high_hz: float = 40.0,
     every: int = 2,
 ) -> Scenario:
-    """Every ``every``-th hold after the first stands on a machine that shakes."""
+    """Every ``every``-th pose, except the first, is on a vibrating support."""
     part = replace(getattr(scenario, checked(sensor)), rectification=triple(coefficient))
     steps: list[Step] = []
     count = 0
@@ -61,7 +61,7 @@ def rectification(
 
 
 def disturbed(scenario: Scenario, poses: Sequence[int], tilt_deg: float = 0.5, shift_m: float = 0.001) -> Scenario:
-    """The holds of these numbers (from 0) are pushed in their middle."""
+    """The poses of these numbers (from 0) are disturbed in their middle."""
     steps: list[Step] = []
     count = 0
     for step in scenario.motion.steps:

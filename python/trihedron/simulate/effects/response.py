@@ -1,4 +1,4 @@
-"""Suspension and bridge against the second and third order of a response (docs/simulation.md, eq. 3)."""
+"""Parameters of suspension and bridge from the second and third order of a response (docs/simulation.md, eq. 3)."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from trihedron.simulate.effects.sizes import triple
 from trihedron.simulate.readout import NONE, Triple
 
 
-# Second- and third-order response of a suspension (s2, s3) read through the bridge, per deflection d: the input
-# -referred output is a + K2 a² + K3 a³ + ... with K2 = -s2 d and K3 = d² (1/4 - s3 + 2 s2²).
+# A suspension (s2, s3) with deflection d per unit input, read through the bridge, has the input-referred output
+# a + K2 a² + K3 a³ + ... with K2 = -s2 d and K3 = d² (1/4 - s3 + 2 s2²).
 def suspension(deflection: float, k2: float, k3: float) -> tuple[float, float]:
     second = -k2 / deflection
     return second, 0.25 + 2.0 * second**2 - k3 / deflection**2
@@ -26,7 +26,7 @@ def with_response(mass: ProofMass, k2: Triple, k3: Triple) -> ProofMass:
     for k in range(3):
         omega2 = (2.0 * math.pi * mass.resonance_hz[k]) ** 2
         if k2[k] == 0.0 and k3[k] > 0.0:
-            # The bridge alone bends the response: a gap in which ξ = d a with d²/4 = K3.
+            # The bridge alone makes the cubic: the gap is chosen so that ξ = d a with d²/4 = K3.
             gap[k] = 1.0 / (omega2 * 2.0 * math.sqrt(k3[k]))
         else:
             second[k], third[k] = suspension(1.0 / (omega2 * gap[k]), k2[k], k3[k])

@@ -111,7 +111,7 @@ def g_sensitivity(scenario: Scenario, matrix: Sequence[Values]) -> Scenario:
 
 
 def gyro_nonlinearity(scenario: Scenario, c2: Values = 0.0, c3: Values = 0.0) -> Scenario:
-    # ω + c2 ω² + c3 ω³; a thousandth of the gap per rad/s unless the bridge alone makes the cubic.
+    # ω + c2 ω² + c3 ω³; the deflection is 1/1000 of the gap per rad/s unless the bridge alone makes the cubic.
     quadratic, cubic = triple(c2), triple(c3)
     deflection, second, third = [0.0] * 3, [0.0] * 3, [0.0] * 3
     for k in range(3):
@@ -155,7 +155,7 @@ def interference(scenario: Scenario, sensor: Sensor, frequency_hz: float, amplit
 def quantisation(
     scenario: Scenario, sensor: Sensor, lsb: float = 0.0, dead_band: float = 0.0, missing_every: int = 0
 ) -> Scenario:
-    """Raw units."""
+    """``lsb`` and ``dead_band`` are in raw units; ``lsb`` 0 keeps the ADC's own."""
     part = getattr(scenario, checked(sensor))
     adc: Adc = replace(part.adc, dead_band=dead_band, missing_every=missing_every, lsb=lsb or part.adc.lsb)
     return replace(scenario, **{sensor: replace(part, adc=adc)})
@@ -170,7 +170,7 @@ def supply(
 
 
 def handedness(scenario: Scenario, sensor: Sensor, axis: int) -> Scenario:
-    """``axis`` 1, 2 or 3 points against its documentation."""
+    """``axis`` 1, 2 or 3 (X, Y, Z) points opposite to its documentation."""
     if axis not in (1, 2, 3):
         raise RefusedError(f"axis is 1, 2 or 3 (X, Y, Z), got {axis}")
     part = getattr(scenario, checked(sensor))

@@ -1,4 +1,4 @@
-"""How sizes are given, and the fields that several effects change."""
+"""Sizes of effects as triples and matrices, and the electronics that several effects change."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Effects read back from a scenario."""
+"""Effects that a scenario contains, read from its parameters."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def effects_of(scenario: Scenario) -> MappingProxyType[str, MappingProxyType[str
         found.setdefault(effect_id, {}).update(parameters)
 
     k2, k3 = mass_response(accel.mass)
-    # Rounding of the conversion leaves 1e-20 where nothing was asked.
+    # Rounding of the conversion leaves 1e-20 where the coefficient is 0.
     if any(abs(v) > 1e-12 for v in k2):
         note("accel-quadratic", k2=k2)
     if any(abs(v) > 1e-12 for v in k3):
@@ -35,7 +35,7 @@ def effects_of(scenario: Scenario) -> MappingProxyType[str, MappingProxyType[str
         note("sensor-lag", sense_mode=(gyro.sense_mode.bandwidth_hz, gyro.sense_mode.quality))
     softer = (accel.mass.spring_per_k, accel.mass.gap_per_k)
     if any(map(any, softer)) and not place.temperature.is_constant_reference:
-        # Both lower the scale: the mechanism's share of the linear coefficient.
+        # Both reduce the scale; this is their contribution to the linear coefficient.
         note("accel-thermal-scale", mechanism_per_k=tuple(-a - b for a, b in zip(*softer, strict=True)))
     memory = accel.hysteresis
     if any(memory.offset_m_s2) or any(memory.creep_fraction):
@@ -57,7 +57,7 @@ def effects_of(scenario: Scenario) -> MappingProxyType[str, MappingProxyType[str
         _note_electronics(note, prefix, name, sensor.electronics, place.temperature)
         if any(sensor.rectification):
             note("vibration-rectification", **{name: sensor.rectification})
-        # A step matters when the noise of one sample does not smear it.
+        # Quantisation matters where the noise of one sample does not dither the LSB.
         smear = max(sensor.noise.N) * math.sqrt(clock.rate_hz)
         coarse = 0.5 * sensor.adc.lsb * float(np.linalg.norm(np.asarray(sensor.S), axis=0).max()) > smear
         if sensor.adc.dead_band or sensor.adc.missing_every or (coarse and sensor.adc.lsb > 0.0):

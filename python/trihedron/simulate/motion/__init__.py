@@ -1,1 +1,1 @@
-"""Motion: steps that people write, attitudes, and the plan that the kernel evaluates."""
+"""Motion: steps of a session, attitudes, and the plan that the Rust kernel evaluates."""

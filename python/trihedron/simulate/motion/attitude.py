@@ -1,4 +1,4 @@
-"""Attitudes as unit quaternions (w, x, y, z), body to level."""
+"""Attitudes as unit quaternions (w, x, y, z) from the body frame to the level frame."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from trihedron.simulate.motion.steps import LEVEL, Quaternion
 
 
 def quaternion_product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Hamilton product: first q, then p."""
+    """Hamilton product pq, normalised: the rotation q followed by p."""
     a, b, c, d = p
     e, f, g, h = q
     w = a * e - b * f - c * g - d * h
@@ -25,7 +25,7 @@ def quaternion_product(p: Quaternion, q: Quaternion) -> Quaternion:
 
 
 def quaternion_from_vector(v: npt.ArrayLike) -> Quaternion:
-    """Rotation by |v| about v."""
+    """Rotation by |v| [rad] about v (3,)."""
     x, y, z = (float(c) for c in np.asarray(v, dtype=np.float64))
     angle = math.sqrt(x * x + y * y + z * z)
     if angle == 0.0:
@@ -35,7 +35,7 @@ def quaternion_from_vector(v: npt.ArrayLike) -> Quaternion:
 
 
 def vector_from_quaternion(q: Quaternion) -> FloatArray:
-    """Rotation vector of angle at most π."""
+    """Rotation vector (3,) [rad], of angle at most π."""
     w, *xyz = q
     v = np.array(xyz)
     n = float(np.linalg.norm(v))
@@ -47,13 +47,13 @@ def vector_from_quaternion(q: Quaternion) -> FloatArray:
 
 
 def up_in_body(q: Quaternion) -> FloatArray:
-    """Direction of the vertical seen from the body: the third row of the body-to-level matrix."""
+    """Direction of the vertical in the body frame (3,): the third row of the body-to-level matrix."""
     w, x, y, z = q
     return np.array([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)])
 
 
 def attitude_with_up(up: npt.ArrayLike) -> Quaternion:
-    """Any attitude whose body direction ``up`` points to the zenith."""
+    """An attitude, by the shortest rotation from level, in which the body direction ``up`` (3,) points up."""
     return quaternion_product(LEVEL, quaternion_from_vector(shortest_turn(unit(up), np.array([0.0, 0.0, 1.0]))))
 
 
@@ -66,7 +66,7 @@ def unit(v: npt.ArrayLike) -> FloatArray:
 
 
 def shortest_turn(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Rotation vector that turns unit vector a into unit vector b."""
+    """Shortest rotation vector (3,) [rad] that rotates unit vector a to unit vector b."""
     cross = np.cross(a, b)
     sine, cosine = float(np.linalg.norm(cross)), float(a @ b)
     if sine < 1e-12:

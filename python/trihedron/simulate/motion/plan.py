@@ -1,4 +1,4 @@
-"""Steps laid end to end in time, as the tables that the kernel evaluates."""
+"""A motion as tables of consecutive steps in time, which the Rust kernel evaluates."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from trihedron.units import radians_from_degrees
 
 @dataclass(frozen=True, eq=False)
 class Label:
-    """One step on the motion's clock."""
+    """One step: its kind and name, start and stop [s], axis (body) and signed angle [rad]."""
 
     kind: SegmentKind
     name: str
@@ -49,7 +49,7 @@ class Label:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A motion laid out in time: the tables that the kernel evaluates, and the label of every step."""
+    """A motion as the tables that the Rust kernel evaluates, with the label of every step."""
 
     segments: FloatArray
     wobble: FloatArray
@@ -59,7 +59,7 @@ class Plan:
 
     @property
     def duration_s(self) -> float:
-        """End of the last step."""
+        """End of the last step [s]."""
         return float(self.segments[-1, 0] + self.segments[-1, 1])
 
     def evaluate(
@@ -67,7 +67,7 @@ class Plan:
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Attitude (n, 4), inertial rate (n, 3), its derivative (n, 3), specific force (n, 3) at the instants.
 
-        All in the body frame at its reference point, SI. Exact: closed forms with their derivatives.
+        Body frame, at its reference point, SI. Exact: closed forms and their derivatives.
         """
         return _core.simulate_motion(
             self.segments,
@@ -81,7 +81,7 @@ class Plan:
 
 
 class _Planner:
-    """Lays steps end to end, keeping the attitude."""
+    """Appends steps to the tables and tracks time and attitude."""
 
     def __init__(self, motion: Motion, rng: np.random.Generator) -> None:
         tilt = [radians_from_degrees(motion.table_tilt_deg[0]), radians_from_degrees(motion.table_tilt_deg[1]), 0.0]
@@ -138,7 +138,7 @@ class _Planner:
             creep = radians_from_degrees(step.creep_deg) * unit(step.creep_axis)
             self.add("pose", step.name, step.duration_s, creep if step.creep_deg else None, ramp=0.05)
         elif isinstance(step, MoveTo):
-            # Body vector v turns so that the new zenith is `up`: R' = R exp(v), exp(v) up = old zenith in the body.
+            # R' = R exp(v) has `up` vertical if exp(v) rotates `up` to the old vertical in the body frame.
             turn = quaternion_from_vector(shortest_turn(unit(step.up), up_in_body(self.attitude_above_table())))
             heading = quaternion_from_vector(radians_from_degrees(step.heading_deg) * unit(step.up))
             rotation = vector_from_quaternion(quaternion_product(turn, heading))
@@ -182,7 +182,7 @@ class _Planner:
                 self.shake.append([k, *shift, step.frequency_hz, self.rng.uniform(0.0, 2.0 * math.pi)])
 
     def end_of_replay(self, knots: FloatArray) -> Quaternion:
-        """Attitude after the last row, which is a replay."""
+        """Attitude at the end of the last row, which is a replay."""
         alone = knots.copy()
         alone[:, 0] = 0.0
         empty = np.zeros((0, 6))
@@ -192,18 +192,18 @@ class _Planner:
         return (w, x, y, z)
 
     def attitude_above_table(self) -> Quaternion:
-        """Attitude relative to the table, which is what a person aims at."""
+        """Attitude relative to the tilted table, to which the steps refer."""
         w, x, y, z = self.tilt
         return quaternion_product((w, -x, -y, -z), self.attitude)
 
 
 def plan_motion(motion: Motion, rng: np.random.Generator) -> Plan:
-    """Lay a motion out in time.
+    """Convert a motion to tables in time.
 
     Raises
     ------
     ValueError
-        Without steps, with a duration that is not positive, or a direction of zero length.
+        When there are no steps, a duration is not positive, or a direction has zero length.
     """
     if not motion.steps:
         raise RefusedError("a motion needs at least one step, for instance a Hold")

@@ -1,8 +1,8 @@
-"""What a person, a turntable or a shaker does with the instrument, step by step.
+"""Steps of a motion made by hand, by a turntable or by a shaker.
 
-A motion is a start attitude and a list of steps; each starts where the last one ended, at rest. Attitudes are
-quaternions (w, x, y, z) from the body frame Mz to a level frame whose z axis points up. Angles that people write are
-in degrees (``_deg``), everything else is SI.
+A motion is a start attitude and a list of steps; each starts static, in the attitude in which the previous one ended.
+Attitudes are quaternions (w, x, y, z) from the body frame to a level frame whose z axis points up. Angles with the
+suffix ``_deg`` are in degrees, everything else is SI.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Pose:
-    """Stand still. ``creep_deg`` turns slowly by that angle about ``creep_axis`` (body) over the whole pose."""
+    """Static pose. With ``creep_deg`` it settles by that angle about ``creep_axis`` (body) over the whole pose."""
 
     duration_s: float
     name: str = ""
@@ -34,11 +34,11 @@ class Pose:
 
 @dataclass(frozen=True)
 class MoveTo:
-    """Bring the body direction ``up`` to the vertical by the shortest way, with a turn of heading on the way.
+    """Rotate so that the body direction ``up`` points up, by the shortest rotation combined with a change of heading.
 
-    ``wobble_deg`` is the size of the hand's departure from the straight turn (smooth, gone at both ends),
-    ``travel_m`` how far the hand carries the case (level frame), ``arm_m`` the way from the pivot of the turn to the
-    body's reference point (body frame).
+    ``wobble_deg`` is the size of the hand's deviation from that rotation (smooth, zero at both ends), ``travel_m`` the
+    displacement of the case (level frame), ``arm_m`` the vector from the pivot of the rotation to the body's reference
+    point (body frame).
     """
 
     up: Vector
@@ -54,9 +54,9 @@ class MoveTo:
 
 @dataclass(frozen=True)
 class Turn:
-    """Turn by a known angle about a fixed body axis; speed rises and falls over the fraction ``ramp`` of the time.
+    """Turn by a stated angle about a fixed body axis; the rate rises and falls over the fraction ``ramp`` of the time.
 
-    ``error_deg`` is what the turn truly exceeds its stated angle by.
+    The true angle is ``angle_deg + error_deg``.
     """
 
     axis: Vector
@@ -86,10 +86,10 @@ class Oscillate:
 
 @dataclass(frozen=True)
 class Vibrate:
-    """Shake the standing body along a level-frame direction.
+    """Vibrate without rotation along a level-frame direction.
 
-    A line at ``low_hz`` when ``high_hz`` is 0, else a band: ``n_lines`` lines of random phase spread evenly over
-    ``[low_hz, high_hz]``, flat in acceleration. ``rms_m_s2`` is the acceleration's root mean square.
+    A sinusoid at ``low_hz`` when ``high_hz`` is 0, else a band: ``n_lines`` sinusoids of random phase spread evenly
+    over ``[low_hz, high_hz]``, flat in acceleration. ``rms_m_s2`` is the rms of the acceleration.
     """
 
     direction: Vector
@@ -104,7 +104,7 @@ class Vibrate:
 
 @dataclass(frozen=True)
 class Disturb:
-    """A push during a pose: a half-second rocking and shift that leaves the pose as it was."""
+    """A disturbance of a pose: rocking and displacement for about half a second; the attitude after it is as before."""
 
     duration_s: float = 0.6
     tilt_deg: float = 0.3
@@ -115,10 +115,10 @@ class Disturb:
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """A rate given at evenly spaced knots over the duration, straight lines between them: a rate table's profile, or
-    the moves of a real recording.
+    """Rate and acceleration at evenly spaced knots over the duration, linear between them: a rate table's profile, or
+    a move of a real recording.
 
-    ``rate_rad_s`` (m, 3) body frame, ``acceleration_m_s2`` (m, 3) of the reference point, level frame.
+    ``rate_rad_s`` (m, 3) in the body frame, ``acceleration_m_s2`` (m, 3) of the reference point in the level frame.
     """
 
     rate_rad_s: FloatArray
@@ -143,9 +143,9 @@ Step: TypeAlias = Pose | MoveTo | Turn | Oscillate | Vibrate | Disturb | Replay
 
 @dataclass(frozen=True)
 class Motion:
-    """Steps from a start attitude.
+    """A start attitude and the steps that follow.
 
-    ``table_tilt_deg`` leans the whole level frame about its x and y axes: what is called level is not.
+    ``table_tilt_deg`` tilts the table, to which all attitudes refer, about the level x and y axes.
     """
 
     steps: tuple[Step, ...]
@@ -154,5 +154,5 @@ class Motion:
 
     @property
     def duration_s(self) -> float:
-        """Sum of the steps."""
+        """Total duration of the steps [s]."""
         return float(sum(step.duration_s for step in self.steps))

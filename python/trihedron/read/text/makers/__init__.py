@@ -1,4 +1,4 @@
-"""Makers' texts that are no tables, one module each: its ``rewritten(text)`` is a table, or None of another text."""
+"""Manufacturers' text formats that are not tables, one module each; ``rewritten(text)`` is a table, or None."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ from trihedron.read.text.dialect import Rewritten
 
 @cache
 def makers() -> tuple[Callable[[str], Rewritten | None], ...]:
-    """Whatever stands in this folder."""
+    """The function ``rewritten`` of every module in this folder."""
     return tuple(module.rewritten for module in modules_of(__name__, __path__))

@@ -18,8 +18,8 @@ _HEADER = "tow [s],acc x [counts],acc y [counts],acc z [counts],gyro x [counts],
 
 
 def rewritten(text: str) -> Rewritten | None:
-    """A table of GPS seconds and counts per sample on X, Y, Z; the messages hold them as Z, -Y, X, and -Y is
-    turned round here.
+    """A table of GPS seconds and counts per sample on X, Y, Z; the messages contain Z, -Y, X, and the sign of Y is
+    changed here.
 
     Other messages become remarks, which the reader counts. None where there is no RAWIMU message.
     """
@@ -37,7 +37,7 @@ def rewritten(text: str) -> Rewritten | None:
             rows.append(f"{tow},{acc_x},{-acc_y},{acc_z},{gyro_x},{-gyro_y},{gyro_z}")
             n_messages += 1
         else:
-            # A damaged RAWIMU message stays as it is: the reader of tables names its line.
+            # A damaged RAWIMU message is unchanged, so that the reader of tables reports its line.
             rows.append(f"# {line}" if _ANY.match(line) and "RAWIMU" not in line else line.lstrip("#% "))
         numbers.append(number)
     if not n_messages:

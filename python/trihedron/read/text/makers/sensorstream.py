@@ -1,5 +1,4 @@
-"""Android's *Sensorstream IMU+GPS*: a time, then the number of a sensor and its three readings, of whichever sensors
-had any."""
+"""Android's *Sensorstream IMU+GPS*: a time, then number and three readings of each sensor that has new ones."""
 
 from __future__ import annotations
 
@@ -12,12 +11,12 @@ from trihedron.read.text.dialect import NEARLY_ALL, Rewritten
 _NUMBER = r"\s*[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?\s*"
 _LINE = re.compile(rf"{_NUMBER}(?:,\s*\d{{1,2}}\s*(?:,{_NUMBER}){{3}})+,?\s*")
 _SENSORS = {"3": "acc", "4": "gyro", "5": "mag"}
-"""Numbers of the sensors that are read; positions, orientations and the rest are others."""
+"""Numbers of the sensors that are read, without those of position, orientation and others."""
 _JUDGED = 200
 
 
 def rewritten(text: str) -> Rewritten | None:
-    """A table of time, accelerometer [m/s²], gyro [rad/s] and magnetometer [µT]; None where the text is another."""
+    """A table of time, accelerometer [m/s²], gyro [rad/s] and magnetometer [µT]; None for another format."""
     lines = text.replace("\r\n", "\n").split("\n")
     sample = [line for line in lines[:_JUDGED] if line.strip()]
     if not sample or not _LINE.fullmatch(sample[0]) or "3" not in {s.strip() for s in sample[0].split(",")[1::4]}:
@@ -32,7 +31,7 @@ def rewritten(text: str) -> Rewritten | None:
         held = {fields[k]: fields[k + 1 : k + 4] for k in range(1, len(fields) - 3, 4)}
         is_one = _LINE.fullmatch(line) is not None
         cells = [cell for sensor in _SENSORS for cell in held.get(sensor, ["", "", ""])]
-        # A damaged line stays as it is: the reader of tables names it.
+        # A damaged line is unchanged, so that the reader of tables reports it.
         rows.append(",".join([fields[0], *cells]) if is_one else line)
         numbers.append(number)
     return Rewritten(("\n".join(rows) + "\n").encode(), np.array([*numbers, numbers[-1] + 1], dtype=np.int64))
