@@ -87,7 +87,11 @@ fn one(p: &[f64], c: &[f64], m: usize, kind: Kind) -> (f64, usize, f64) {
         }
     };
     let step = if kind == Kind::NonOverlapping { m } else { 1 };
-    let order = if kind == Kind::Hadamard { 3 } else { 2 };
+    let (order, full) = if kind == Kind::Hadamard {
+        (3, 6.0)
+    } else {
+        (2, 2.0)
+    };
     let (mut sum, mut weight, mut terms) = (0.0, 0.0, 0);
     for k in (0..(n + 1).saturating_sub(order * m)).step_by(step) {
         let (c1, c2) = (count(k), count(k + m));
@@ -98,14 +102,12 @@ fn one(p: &[f64], c: &[f64], m: usize, kind: Kind) -> (f64, usize, f64) {
             difference = (mean(k + 2 * m, c3) - mean(k + m, c2)) - difference;
         }
         // An empty cluster makes the inverse infinite and the weight zero.
-        let full = if order == 3 { 6.0 } else { 2.0 };
         let w = full / (m as f64 * inverse);
         sum += w * difference * difference;
         weight += w;
         terms += usize::from(w > 0.0);
     }
-    let per_term = if order == 3 { 6.0 } else { 2.0 };
-    (sum / (per_term * weight), terms, weight)
+    (sum / (full * weight), terms, weight)
 }
 
 /// The overlapping variance by these weights: `w d² = 2 (S2 c1 − S1 c2)² / (m c1 c2 (c1 + c2))`, one division per term.

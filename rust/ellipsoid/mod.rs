@@ -273,7 +273,7 @@ pub fn missing_directions(u: &[Vector3<f64>]) -> String {
                 sign * from_centre[axis] > 0.57 * from_centre.norm()
             });
             if !seen {
-                missing.push(format!("axis {} {word}", axis + 1));
+                missing.push(format!("{} {word}", ["X", "Y", "Z"][axis]));
             }
         }
     }

@@ -200,6 +200,6 @@ pub(super) fn column_norms(matrix: &DMatrix<f64>) -> DVector<f64> {
     })
 }
 
-pub(super) fn positive_or_one(value: f64) -> f64 {
+pub fn positive_or_one(value: f64) -> f64 {
     if value > 0.0 { value } else { 1.0 }
 }

@@ -31,6 +31,7 @@ use nalgebra::DVector;
 use crate::error::{Error, Result};
 use crate::interrupt;
 pub use dense::{Problem, Solution, minimise, minimise_problem};
+pub(crate) use linear::positive_or_one;
 pub use linear::{Certainty, Linear, certainty};
 pub use loss::Loss;
 

@@ -11,7 +11,7 @@ use super::parameters::unpack_standardised;
 use super::sums::{self, At, Charged};
 use super::{N_PARAMETERS, problem};
 use crate::error::{Error, Result};
-use crate::gauss_newton::{Certainty, Descent, Linear, Local, Problem};
+use crate::gauss_newton::{Certainty, Descent, Linear, Local, Problem, positive_or_one};
 
 type Square = SMatrix<f64, N_PARAMETERS, N_PARAMETERS>;
 type Column = SVector<f64, N_PARAMETERS>;
@@ -226,8 +226,4 @@ impl Problem for Direct<'_> {
     fn cost(&self, x: &DVector<f64>) -> Result<f64> {
         Ok(self.cost_at(x.as_slice()))
     }
-}
-
-fn positive_or_one(value: f64) -> f64 {
-    if value > 0.0 { value } else { 1.0 }
 }

@@ -96,8 +96,8 @@ pub fn smoothed(blocks: &[Block], columns: &DMatrix<f64>, with: &Strengths) -> R
         bias_cov: vec![Matrix3::zeros(); blocks.len()],
         slow: [(); 2].map(|()| DMatrix::zeros(3 * blocks.len(), p)),
     };
-    let slow = Slow::both(with, block_length(blocks));
     let step_s = block_length(blocks);
+    let slow = Slow::both(with, step_s);
     let mut adjoint = Columns::zeros(p);
     let mut information = State::zeros();
     for (k, step) in steps.iter().enumerate().rev() {

@@ -114,7 +114,7 @@ impl Session {
     }
 }
 
-fn collapsed() -> Error {
+pub(super) fn collapsed() -> Error {
     Error::not_determined("a sensor's triad has collapsed: its S cannot be inverted")
 }
 

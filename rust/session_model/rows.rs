@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::chain::{Layout, Rows};
 use super::move_rows::{Effects, Passed, Weights};
 use super::moves::{Carried, N_MOVE, carry};
-use super::rest_rows::{rest_columns, weight_of};
+use super::rest_rows::{collapsed, rest_columns, weight_of};
 use super::{Distortion, N_MODEL, N_SCATTER, Session, State, Strengths};
 use crate::error::{Error, Result};
 
@@ -222,8 +222,6 @@ impl Session {
                 )));
             }
         }
-        let collapsed =
-            || Error::not_determined("a sensor's triad has collapsed: its S cannot be inverted");
         let force = state.force_scale.try_inverse().ok_or_else(collapsed)?;
         let rate = state.rate_scale.try_inverse().ok_or_else(collapsed)?;
         let one = |group: &Group| -> DMatrix<f64> {

@@ -95,7 +95,8 @@ pub fn phase_power(windows: &[&[f64]], cell: f64, length: usize) -> Result<Vec<f
         .collect();
     let mut power = vec![0.0; length / 2 + 1];
     for window in each {
-        let window = window.ok_or_else(|| Error::bad_input("a timestamp lies outside the cells"))?;
+        let window =
+            window.ok_or_else(|| Error::bad_input("a timestamp lies outside the cells"))?;
         for (sum, value) in power.iter_mut().zip(&window) {
             *sum += value;
         }

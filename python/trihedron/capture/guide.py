@@ -60,7 +60,6 @@ class Guide:
         self._target: FloatArray | None = None
         self._events = 0
         self._remark = ""
-        self._looked_s = 0.0
 
     @property
     def is_done(self) -> bool:

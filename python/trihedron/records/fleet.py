@@ -11,8 +11,8 @@ from trihedron.records.sessions import Change, Parameter, Repeated
 
 @dataclass(frozen=True, eq=False)
 class FleetLog:
-    """One log: ``status`` with its ``reason``, the diagnosis' ``verdict`` and effects, the codes of the ``serious``
-    findings, parameters ``numbers`` (9,) or (21,) with standard errors ``std``; ``None`` where it was not calibrated."""
+    """One log: ``status`` with its ``reason``, the diagnosis' ``verdict`` and effects, codes of ``serious``
+    findings, parameters ``numbers`` (9,) or (21,) with standard errors ``std``; ``None`` where not calibrated."""
 
     name: str
     serial: str

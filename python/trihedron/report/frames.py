@@ -124,7 +124,7 @@ def diagnosis_columns(diagnosis: Diagnosis) -> Columns:
     rows = [
         {"effect": effect.id, **parameter.to_dict()} for effect in diagnosis.effects for parameter in effect.parameters
     ]
-    names = list(rows[0]) if rows else ["effect", *(field.name for field in fields(EffectParameter))]
+    names = list(rows[0]) if rows else ["effect", "name", "value", "std", "unit"]
     return of_rows(rows, names)
 
 

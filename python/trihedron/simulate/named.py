@@ -127,7 +127,7 @@ _SCENARIOS: dict[str, tuple[str, Callable[[], Scenario]]] = {
     "rest-manual": (
         "Two hours at rest, the manual's unit with a finer ADC, for Allan curves.", _rest_manual,
     ),
-    "rest-industrial": ("Three hours at rest, industrial 14-bit part.", lambda: _of(ADIS, long_rest(10000.0))),
+    "rest-industrial": ("10,000 s at rest, industrial 14-bit part.", lambda: _of(ADIS, long_rest(10000.0))),
 }  # fmt: skip
 
 

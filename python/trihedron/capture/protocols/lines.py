@@ -67,12 +67,10 @@ class LinesDecoder:
         self.tick_s = 0.0
         self.corrupt = 0
         self.skipped_bytes = 0
-        self.said: list[str] = []
         self._name_columns = name_columns
         self._buffer = bytearray()
         self._first: list[str] = []
         self._n_first = 0
-        self._is_first = True
         self._labels: tuple[str, ...] | None = None
         self._separator: str | None = ","
         self._n = 0
@@ -123,9 +121,6 @@ class LinesDecoder:
                 self.skipped_bytes += len(raw) + 1
                 continue
             if self._n == 0:
-                if self._is_first:
-                    # A live stream usually starts in the middle of a line; a file does not.
-                    self._is_first = False
                 if line:
                     self._first.append(line)
                     self._n_first += line.replace("\t", " ").isprintable() and _fields_of_numbers(_unprefixed(line)) > 0
@@ -145,8 +140,6 @@ class LinesDecoder:
 
     def _reject(self, line: str) -> None:
         if not any(c.isdigit() for c in line) or line.startswith("#"):
-            if len(self.said) < 20 and line.isprintable():
-                self.said.append(line[:200])
             self.skipped_bytes += len(line) + 1
         else:
             self.corrupt += 1
@@ -188,7 +181,6 @@ class LinesDecoder:
             else:
                 # Before the first frame: an incomplete first line, a start-up message, or the names.
                 self.skipped_bytes += len(line) + 1
-                self.said += [line[:200]] if len(self.said) < 20 else []
         return out
 
     def _settle(self, columns: LineColumns, n: int, rows: list[list[str]]) -> None:

@@ -142,8 +142,8 @@ def _usable(curve: AllanCurve, channel: int) -> CurvePoints:
             chosen.append(i)
     if len(chosen) < FEWEST_POINTS:
         raise RefusedError(
-            f"{curve.names[channel]}: {len(chosen)} points about an octave apart are too few to separate noise terms "
-            f"apart; at least {FEWEST_POINTS} are needed"
+            f"{curve.names[channel]}: {len(chosen)} points about an octave apart are too few to separate noise terms; "
+            f"at least {FEWEST_POINTS} are needed"
         )
     return CurvePoints.of(
         curve.clusters[chosen].astype(np.float64), curve.variance[chosen, channel], curve.n_samples, curve.rate_hz

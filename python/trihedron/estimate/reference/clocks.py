@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
+from trihedron.estimate.reference.settled import running_mean
 from trihedron.estimate.reference.together import Grid, Reference
 
 LEAST_CORRELATION = 0.7
@@ -82,19 +83,10 @@ def _size_of_rate(grid: Grid) -> FloatArray:
 def _reference_size(reference: Reference, step: float) -> FloatArray:
     t = np.arange(reference.motion.time_s[0], reference.motion.time_s[-1], step)
     # The differentiated noise of a tracker exceeds the motion unless it is averaged.
-    rate = _averaged(reference.rate(t), max(1, round(0.1 / step)))
+    rate = running_mean(reference.rate(t), max(1, round(0.1 / step)))
     size = np.linalg.norm(rate, axis=1)
     size[~reference.covers(t)] = np.nan
     return np.asarray(size, dtype=np.float64)
-
-
-def _averaged(x: FloatArray, n: int) -> FloatArray:
-    if n <= 1 or len(x) <= n:
-        return x
-    total = np.cumsum(np.vstack([np.zeros((1, x.shape[1])), x]), axis=0)
-    at = np.arange(len(x))
-    low, high = np.maximum(at - n // 2, 0), np.minimum(at - n // 2 + n, len(x))
-    return np.asarray((total[high] - total[low]) / (high - low)[:, None])
 
 
 def _best_lag(a: FloatArray, b: FloatArray, step: float, stamped: float | None) -> tuple[float, float, bool]:
@@ -174,7 +166,7 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
             continue
         t = grid.time_s[start] + offset + grid.step_s * np.arange(-search, length + search)
         covered = reference.covers(t)
-        size = np.linalg.norm(_averaged(reference.rate(t), max(1, round(0.1 / grid.step_s))), axis=1)
+        size = np.linalg.norm(running_mean(reference.rate(t), max(1, round(0.1 / grid.step_s))), axis=1)
         size[~covered] = np.nan
         if covered.sum() < length:
             continue

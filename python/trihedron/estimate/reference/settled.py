@@ -39,6 +39,7 @@ def plateaus(grid: Grid, reference: Reference, time: FloatArray) -> Mask:
 
 
 def running_mean(x: FloatArray, n: int) -> FloatArray:
+    """Centred means (k, c) of ``n`` rows of ``x`` (k, c), of fewer at its ends."""
     total = np.cumsum(np.vstack([np.zeros((1, x.shape[1])), x]), axis=0)
     at = np.arange(len(x))
     low, high = np.maximum(at - n // 2, 0), np.minimum(at - n // 2 + n, len(x))

@@ -206,7 +206,7 @@ def plan_motion(motion: Motion, rng: np.random.Generator) -> Plan:
         When there are no steps, a duration is not positive, or a direction has zero length.
     """
     if not motion.steps:
-        raise RefusedError("a motion needs at least one step, for instance a Hold")
+        raise RefusedError("a motion needs at least one step, for instance a Pose")
     planner = _Planner(motion, rng)
     for step in motion.steps:
         planner.step(step)
