@@ -4,7 +4,6 @@ import http.client
 import json
 import re
 import shutil
-import subprocess
 from itertools import pairwise
 from urllib.parse import urlsplit
 
@@ -252,19 +251,22 @@ CHROMIUM = next((found for found in BROWSERS if found), "")
 def test_a_real_browser_shows_the_guide(led, tmp_path):
     from matplotlib.image import imread
 
+    sync_playwright = pytest.importorskip("playwright.sync_api").sync_playwright
     _, views, _, _ = led
     view = next(v for v in views if v.phase is Phase.MOVE and v.n_poses > 9)
     page = Page()
     page.show(view, lost=3)
-    options = ["--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1280,800"]
     shot = tmp_path / "page.png"
     try:
-        subprocess.run(
-            [CHROMIUM, *options, f"--user-data-dir={tmp_path}", "--timeout=4000", f"--screenshot={shot}", page.address],
-            check=True,
-            capture_output=True,
-            timeout=90,
-        )
+        with sync_playwright() as tool:
+            browser = tool.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+            screen = browser.new_page(viewport={"width": 1280, "height": 800})
+            screen.goto(page.address)
+            # The view comes by the stream of events, after the page.
+            screen.wait_for_function(f"document.getElementById('big').textContent.startsWith('{view.n_poses}')")
+            screen.wait_for_timeout(500)
+            screen.screenshot(path=shot)
+            browser.close()
     finally:
         page.close()
     image = imread(shot)[..., :3]
