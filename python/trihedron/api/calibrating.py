@@ -209,13 +209,13 @@ def _require_poses(recording: Recording, segments: Segments) -> None:
             "or name its columns with --columns."
         )
     if segments.n_poses < 3:
-        found = f"poses found: {segments.n_poses}"
-        grave = next((one for one in segments.findings if one.severity is not Severity.NOTE), None)
-        why = f"{found[0].upper()}{found[1:]}." if grave is None else grave.seen
-        if grave is not None and grave.code not in COUNTS_OF_POSES:
-            why = f"{found}. {why}"
+        of_log = [one for one in recording.findings if one.severity is Severity.SERIOUS]
+        grave = next((one for one in (*of_log, *segments.findings) if one.severity is not Severity.NOTE), None)
+        is_count = grave is not None and grave.code in COUNTS_OF_POSES
+        why = "" if is_count else f"Poses found: {segments.n_poses}. "
+        why += "" if grave is None else f"{grave.seen} {grave.action if of_log else ''}".strip()
         raise RefusedError(
-            f"{recording.source}: {why} Hold the sensor still for 3 to 5 seconds in each of 18 or more "
+            f"{recording.source}: {why.strip()} Hold the sensor still for 3 to 5 seconds in each of 18 or more "
             "different poses; `trihedron segment LOG` shows what was seen."
         )
 

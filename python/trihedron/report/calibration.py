@@ -132,7 +132,7 @@ def _result(calibration: Calibration, segments: Segments | None, recording: Reco
 def before_in_words(calibration: Calibration, segments: Segments) -> list[tuple[str, str]]:
     """The gravity error of the same poses without this calibration."""
     means = segments.accelerometer_mean
-    if means is None:
+    if means is None or len(means) == 0:
         return []
     rms = float(np.sqrt(np.nanmean(uncalibrated_error(calibration, means) ** 2)))
     return [("  before calibration", f"{in_mm_s2(rms)} rms, {before_words(calibration)}")]

@@ -94,7 +94,7 @@ _TIMESTAMPS = (
         WARNING,
         "The time is in {unit}, by its steps of {step:.6g}{has_others:?; {others:&, } would be possible too|}.",
         "The step alone does not determine the unit; every rate and every noise density depends on it.",
-        "Give --time-unit s, ms, us or ns if this is wrong.",
+        "Give --time-unit s, ms, us or ns if this is wrong, or --rate HZ if the column counts rows.",
         numbers=("rate_hz",),
     ),
     Entry(
