@@ -196,7 +196,7 @@ def trial(pair: Pair) -> dict[str, Any]:
 
 def left_open(effects: list[tuple[str, str, list[str]]]) -> set[str]:
     """Groups whose level is a convention once one of these effects stands (the temperature that a zero is of)."""
-    by_id = {effect.id: effect.leaves_open for effect in catalogue()}
+    by_id = {effect.id: effect.confounded_with for effect in catalogue()}
     return {group for _, name, _ in effects for group in by_id.get(name, ())}
 
 

@@ -25,7 +25,7 @@ from trihedron.api.referring import motion_of
 from trihedron.estimate.filter_noise.angle import angle_stretches
 from trihedron.estimate.filter_noise.beside_reference import (
     ANGLE,
-    Asked,
+    Request,
     beside_reference,
     consistency,
     halves,
@@ -52,7 +52,7 @@ def one(seed, kind, seconds):
     motion = ReferenceMotion(
         one.truth_t - one.truth_t[0], attitude=one.truth, position=one.position, source="truth"
     )  # fmt: skip
-    asked = Asked(HORIZONS, 25.0, G, known(one.gyroscope), known(one.accelerometer))
+    asked = Request(HORIZONS, 25.0, G, known(one.gyroscope), known(one.accelerometer))
     return {found.sensor: beside(found, getattr(one, found.sensor)) for found in beside_reference(log, motion, asked)}
 
 
@@ -107,7 +107,7 @@ def told(sensor, runs):
 def flights(folder, is_backwards):
     for path in sorted(Path(folder).glob("*.log.csv.gz")):
         motion = motion_of(str(path).replace(".log.", ".truth."))
-        asked = Asked((1.0, 10.0, 30.0), 25.0, 9.807, ADIS16448, ADIS16448_FORCE)
+        asked = Request((1.0, 10.0, 30.0), 25.0, 9.807, ADIS16448, ADIS16448_FORCE)
         if is_backwards:
             backwards(path, motion, asked)
             continue

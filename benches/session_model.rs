@@ -14,7 +14,7 @@ use trihedron::session_model::chain::Chain;
 use trihedron::session_model::fit::gradient;
 use trihedron::session_model::move_rows::Weights;
 use trihedron::session_model::moves::{Move, MoveNoise};
-use trihedron::session_model::{AtRest, Distortion, Session, State, Strengths};
+use trihedron::session_model::{Distortion, Session, State, StaticMeans, Strengths};
 
 const GRAVITY: f64 = 9.81;
 const SAMPLES_PER_MOVE: usize = 200;
@@ -57,7 +57,7 @@ fn session(n_poses: usize) -> (Session, State) {
     }
     let at_rest = |mean: Vec<Vector3<f64>>, sigma: f64| {
         let axes = vec![Vector3::repeat(sigma); mean.len()];
-        AtRest::of(mean, axes, Vector3::repeat(2.0 * sigma), None).expect("one error a pose")
+        StaticMeans::of(mean, axes, Vector3::repeat(2.0 * sigma), None).expect("one error a pose")
     };
     let zeros = vec![Vector3::zeros(); n_poses];
     let session = Session {

@@ -36,7 +36,7 @@ pub struct Blocks<'a> {
 
 /// Options of the search.
 #[derive(Debug, Clone, Copy)]
-pub struct Question {
+pub struct Search {
     /// Blocks in a window.
     pub width: usize,
     /// Least number of windows taken as static at the start.
@@ -83,11 +83,11 @@ struct Channel {
 /// The floor of a channel is the median over the quiet windows, so that axes of different noise and a few disturbed
 /// windows do not matter; the limit is [`still_limit`].
 #[must_use]
-pub fn noise_floor(blocks: &Blocks, asked: &Question) -> Floor {
+pub fn noise_floor(blocks: &Blocks, search: &Search) -> Floor {
     let m = blocks.is_valid.len();
-    let whole = whole_windows(blocks.is_valid, asked.width);
+    let whole = whole_windows(blocks.is_valid, search.width);
     let found: Vec<Option<Channel>> = (0..blocks.channels)
-        .map(|c| channel(blocks, asked.width, &whole, c))
+        .map(|c| channel(blocks, search.width, &whole, c))
         .collect();
     let mut floor = Floor {
         fast: vec![0.0; m],
@@ -106,14 +106,14 @@ pub fn noise_floor(blocks: &Blocks, asked: &Question) -> Floor {
         return floor;
     }
     let total = total_power(&alive, &whole);
-    floor.is_quiet = seed(&total, &whole, asked.seed);
+    floor.is_quiet = seed(&total, &whole, search.seed);
     floor.fast.clone_from(&total);
     floor.slow = total;
-    grow(&mut floor, &alive, &whole, blocks.length, asked);
+    grow(&mut floor, &alive, &whole, blocks.length, search);
     for (c, one) in found.iter().enumerate() {
         if let Some(one) = one {
             floor.white[c] = one.median_of(&one.inside, &floor.is_quiet);
-            floor.wander[c] = one.median_of(&one.between, &floor.is_quiet) / asked.median_ratio;
+            floor.wander[c] = one.median_of(&one.between, &floor.is_quiet) / search.median_ratio;
         }
     }
     floor
@@ -275,9 +275,12 @@ fn seed(total: &[f64], whole: &[bool], least: usize) -> Vec<bool> {
 }
 
 /// Repeated until nothing changes: every window below both limits is quiet.
-fn grow(floor: &mut Floor, alive: &[&Channel], whole: &[bool], length: usize, asked: &Question) {
+fn grow(floor: &mut Floor, alive: &[&Channel], whole: &[bool], length: usize, search: &Search) {
     let (m, n) = (whole.len(), alive.len());
-    let freedom = [asked.width * (length - 1) * n, (asked.width.max(2) - 1) * n];
+    let freedom = [
+        search.width * (length - 1) * n,
+        (search.width.max(2) - 1) * n,
+    ];
     let above = |part: fn(&Channel) -> &[f64], quiet: &[bool]| -> Vec<f64> {
         let relative = |one: &&Channel| -> Vec<f64> {
             let level = one.median_of(part(one), quiet);
@@ -294,12 +297,12 @@ fn grow(floor: &mut Floor, alive: &[&Channel], whole: &[bool], length: usize, as
             still_limit(
                 &mut chosen(&floor.fast, &floor.is_quiet),
                 freedom[0],
-                &asked.tails,
+                &search.tails,
             ),
             still_limit(
                 &mut chosen(&floor.slow, &floor.is_quiet),
                 freedom[1],
-                &asked.tails,
+                &search.tails,
             ),
         ];
         let is_still = |i: usize| {

@@ -14,7 +14,7 @@ import pytest
 
 import trihedron
 from trihedron.cli import main
-from trihedron.diagnose import take_off
+from trihedron.diagnose import compensate
 from trihedron.diagnose.effects import catalogue
 from trihedron.files.diagnosis import complaint_about, read_diagnosis, schema
 from trihedron.files.log import write_recording
@@ -156,7 +156,7 @@ def test_an_effect_taken_off_sample_by_sample_leaves_the_motion(effect_id):
     variant, values = MODELS[effect_id]
     effect = {"id": effect_id, "model": {"variant": variant, "values": list(values(size))}}
     identity = (np.eye(3), np.zeros(3))
-    done = take_off(recording, [effect], {"temperature_degc": 25.0}, identity, identity)
+    done = compensate(recording, [effect], {"temperature_degc": 25.0}, identity, identity)
     assert done.applied == (effect_id,)
     sensor, true = (
         ("gyroscope", truth.angular_rate_rad_s) if "gyro" in effect_id else ("accelerometer", truth.specific_force_m_s2)

@@ -9,6 +9,7 @@ import trihedron
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.residuals.goodness_of_fit import judge_rows
 from trihedron.diagnose.residuals.settling import settling, with_settling
+from trihedron.diagnose.search import threshold
 from trihedron.diagnose.session.observations import _turned_at_ends, observe
 from trihedron.diagnose.session.solve import tune_noise
 from trihedron.diagnose.session.starting_point import start_state
@@ -18,6 +19,8 @@ from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.named import _of
 from trihedron.simulate.profiles import profile_by_name
+
+NAMED = threshold(0.01)
 
 
 @cache
@@ -51,28 +54,18 @@ def session(seed, lean_rad, scatter_rad_s):
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.slow) for s in (2, 3))])
 def test_supports_that_give_are_told_from_zeros_that_scatter(seed):
+    # The accelerometer hardly sees a milliradian; the shape in time and what it does see say the same.
     for lean_rad in (0.006, 0.001):
-        assert settling(session(seed, lean_rad, 0.0)).is_motion
+        assert settling(session(seed, lean_rad, 0.0)).score > NAMED
     # Scatter alone, and scatter that a support beneath it would hide from gravity.
-    for lean_rad in (0.0, 0.003, 0.006):
-        assert not settling(session(seed, lean_rad, 1e-3)).is_motion
-
-
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_scatter_under_supports_that_give_is_still_found_and_creep_alone_is_none(seed):
-    gives = settling(session(seed, 0.001, 0.0))
-    # The accelerometer hardly sees so little; the shape in time and what it does see say the same.
-    assert gives.is_motion
-    assert gives.settling - gives.scatter > 9.0
-    assert not settling(session(seed, 0.0, 1e-3)).is_motion
-    assert not settling(session(seed, 0.006, 1e-3)).is_motion
+    for lean_rad, scatter in ((0.0, 0.0), (0.0, 1e-3), (0.006, 1e-3)):
+        assert settling(session(seed, lean_rad, scatter)).score < NAMED
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_moves_allow_for_poses_that_settle_and_rates_at_rest_still_disagree(seed):
     context = session(seed, 0.006, 0.0)
     found = settling(context)
-    assert found.is_seen
     # Drawn with 0.006 rad about each axis, gone in 2 s; the fit has a grid of factors of two for that time.
     assert 0.5 < found.rate_rad_s * found.tau_s / 0.006 < 2.0
     before, after = (
@@ -85,8 +78,6 @@ def test_moves_allow_for_poses_that_settle_and_rates_at_rest_still_disagree(seed
     assert before["moves"].disagrees
     assert not after["moves"].disagrees
     assert after["static-gyro"].disagrees
-    for lean_rad, scatter in ((0.0, 0.0), (0.0, 1e-3)):
-        assert not settling(session(seed, lean_rad, scatter)).is_seen
 
 
 def test_a_pose_that_was_not_still_is_turned_at_its_ends_and_a_noisy_session_is_not():

@@ -283,11 +283,11 @@ def turned_between_intervals(scale):
 def test_most_of_what_looks_like_noise_in_a_recorded_flight_is_its_truth():
     static = StaticNoise(Bounded(1.7e-4, 1.55e-4, 1.87e-4), Bounded(1.94e-5, 1.94e-5, 1.94e-5))
     from trihedron.api.referring import motion_of
-    from trihedron.estimate.filter_noise.beside_reference import Asked, beside_reference
+    from trihedron.estimate.filter_noise.beside_reference import Request, beside_reference
 
     log = trihedron.read(EUROC / "V1_02_medium.log.csv.gz")
     gyro, accelerometer = beside_reference(
-        log, motion_of(EUROC / "V1_02_medium.truth.csv.gz"), Asked((10.0,), 50.0, 9.807, static)
+        log, motion_of(EUROC / "V1_02_medium.truth.csv.gz"), Request((10.0,), 50.0, 9.807, static)
     )
     (one,) = gyro.consistency
     assert one.nees < 7.0

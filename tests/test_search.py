@@ -54,7 +54,7 @@ def test_the_evidence_of_columns_is_that_of_the_linear_problem_written_out(effec
     core = model.fitted.line.core
     columns = (contiguous(one.distortion.force), contiguous(one.distortion.rate))
     asked = [(*columns, one.sizes.tolist())]
-    ((seen, _, _),) = core.looks(asked, [1.0], [core.strengths])
+    ((seen, _, _),) = core.candidate_gains(asked, [1.0], [core.strengths])
     # What the fit's unknowns imitate is projected out; the rest is a Gaussian with a prior of the sizes.
     projected = core.project(np.ascontiguousarray(core.columns(*columns))) * one.sizes
     normal, gradient = projected.T @ projected, projected.T @ core.residual
@@ -63,7 +63,7 @@ def test_the_evidence_of_columns_is_that_of_the_linear_problem_written_out(effec
     assert seen[0, 0] == pytest.approx(gain, abs=1e-4 * max(abs(gain), 1.0))
     # The strengths found with it, and what a look there says beside the plain session at the same strengths.
     ((tuned, strengths, value, covariance),) = core.evidence(asked, [core.strengths], ANYTHING)
-    ((looked, at, spread),) = core.looks(asked, [1.0], [strengths])
+    ((looked, at, spread),) = core.candidate_gains(asked, [1.0], [strengths])
     plain = refitted(model, strengths).log_marginal
     assert tuned - plain == pytest.approx(looked[0, 0], abs=0.05)  # moves are carried anew: second order
     np.testing.assert_allclose(at, value, atol=0.02 * np.sqrt(np.diag(covariance)).max())

@@ -11,7 +11,7 @@ import trihedron
 from diagnosed_session import simulated
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.hypothesis import Asked, Term
+from trihedron.diagnose.hypothesis import AddedTerms, Term
 from trihedron.diagnose.session.state import Distortion
 from trihedron.diagnose.shared import Information, agreement, together
 
@@ -27,7 +27,7 @@ def answered(A, y, size):
     of = stats.multivariate_normal
     gain = of.logpdf(y, cov=spread) - of.logpdf(y, cov=np.eye(len(y)))
     term = Term(catalogue()[0], Variant(Distortion(None, None), (), ()), np.full(A.shape[1], size))
-    return Information.of(Asked(gain, STRENGTHS, covariance @ A.T @ y, covariance), term, term.sizes, 0.0)
+    return Information.of(AddedTerms(gain, STRENGTHS, covariance @ A.T @ y, covariance), term, term.sizes, 0.0)
 
 
 def test_evidence_of_recordings_together_is_that_of_all_their_rows():

@@ -10,7 +10,7 @@ from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import hand
 from trihedron import calibrate
-from trihedron.estimate.session.fit import DEAF, DYNAMICS, MOVES, far_moves
+from trihedron.estimate.session.fit import DYNAMICS, MOVES, NO_WEIGHT, far_moves
 from trihedron.records import Recording
 from trihedron.session.aliasing import unresolved_variance
 
@@ -39,7 +39,7 @@ def test_a_velocity_that_is_not_heard_says_nothing_by_way_of_its_noise(seed, sol
     result = calibrate(recording_of(f, w, np.arange(len(f)) / rate, rate), gravity_m_s2=G)
     solution = solved[-1]
     assert solution.inflation[0] > 10.0
-    assert solution.inflation[1] == pytest.approx(DEAF)
+    assert solution.inflation[1] == pytest.approx(NO_WEIGHT)
     domain, leverage = solution.core.labels[:, 0], solution.core.leverage()
     # Widened along with gravity, as one error common to both, velocities told six of the gyro's nine numbers.
     assert leverage[domain == DYNAMICS].sum() < 0.1
@@ -96,7 +96,7 @@ def test_a_move_far_from_the_others_is_left_out_and_all_that_miss_alike_are_not(
     def found(rows):
         inflation = np.sqrt(np.mean(rows**2))
         core = SimpleNamespace(labels=labels, residual=rows.ravel() / inflation)
-        return far_moves(SimpleNamespace(core=core, inflation=(inflation, DEAF), moves_dof=2.0 * n - 9.0), n)
+        return far_moves(SimpleNamespace(core=core, inflation=(inflation, NO_WEIGHT), moves_dof=2.0 * n - 9.0), n)
 
     assert not np.any(found(rows))
     rows[4] = [far, 0.0]

@@ -150,7 +150,7 @@ __all__ = [
     "write_calibration",
 ]
 
-_OF_ROOM = {
+_PUBLIC = {
     "api.applying": "apply write_calibration",
     "api.calibrating": "calibrate",
     "api.capturing": "capture ports",
@@ -184,7 +184,7 @@ _OF_ROOM = {
     "records.truth": "Truth",
     "report.presenting": "plot report",
 }
-_HOME = {name: f"trihedron.{room}" for room, names in _OF_ROOM.items() for name in names.split()}
+_HOME = {name: f"trihedron.{module}" for module, names in _PUBLIC.items() for name in names.split()}
 """The module of each public name."""
 
 

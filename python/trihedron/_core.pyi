@@ -191,7 +191,7 @@ def integrate_raw_rate(
 
 # text
 def plain_table(text: bytes, separator: int, n_columns: int) -> FloatArray | None: ...
-def room(rows: int, width: int) -> FloatArray: ...
+def new_array(rows: int, width: int) -> FloatArray: ...
 def plain_table_into(
     text: npt.NDArray[np.uint8], separator: int, places: list[tuple[int, int]], blocks: list[FloatArray]
 ) -> tuple[int, bool]: ...
@@ -238,7 +238,7 @@ def noise_floor(
     tells: BoolArray,
     rounding: FloatArray,
     length: int,
-    asked: tuple[int, int, float],
+    search: tuple[int, int, float],
     tails: tuple[float, float],
 ) -> tuple[FloatArray, FloatArray, list[float], BoolArray, FloatArray, FloatArray]: ...
 def still_limit(activity: FloatArray, freedom: int, tails: tuple[float, float]) -> float: ...
@@ -570,7 +570,7 @@ class SessionFit:
     def evidence(
         self, hypotheses: Sequence[_Asked], strengths: Sequence[_Strengths], within: tuple[_Pair, _Pair, _Pair]
     ) -> list[tuple[float, _Strengths, FloatArray, FloatArray]]: ...
-    def looks(
+    def candidate_gains(
         self,
         candidates: Sequence[_Asked],
         scales: Sequence[float],

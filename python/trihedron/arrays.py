@@ -9,7 +9,7 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
-CORE_MEMORY = type(_core.room(1, 1).base)
+CORE_MEMORY = type(_core.new_array(1, 1).base)
 """Type of the object that owns the memory of an array made by the core; it gives no write access to the values."""
 AXES = ("x", "y", "z")
 """The axes of a triad: columns of every (n, 3) array."""

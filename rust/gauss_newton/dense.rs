@@ -197,7 +197,7 @@ struct Rows<L, R> {
 
 impl<L, R> Rows<L, R> {
     /// Cost of the residuals, and √ρ' of each block.
-    fn charge(&self, residuals: &DVector<f64>) -> Result<(f64, Vec<f64>)> {
+    fn cost_and_roots(&self, residuals: &DVector<f64>) -> Result<(f64, Vec<f64>)> {
         let block = self.options.block;
         if block == 0 || !residuals.len().is_multiple_of(block) {
             return Err(Error::bad_input(format!(
@@ -235,7 +235,7 @@ where
             )));
         }
         let chi2 = residuals.norm_squared();
-        let (cost, roots) = self.charge(&residuals)?;
+        let (cost, roots) = self.cost_and_roots(&residuals)?;
         if self.options.loss != Loss::Linear {
             for (i, residual) in residuals.iter_mut().enumerate() {
                 let root = roots[i / self.options.block];
@@ -248,6 +248,6 @@ where
 
     fn cost(&self, x: &DVector<f64>) -> Result<f64> {
         let residuals = (self.residuals)(x)?;
-        Ok(self.charge(&residuals)?.0)
+        Ok(self.cost_and_roots(&residuals)?.0)
     }
 }

@@ -8,7 +8,7 @@ use std::cell::RefCell;
 use nalgebra::{Cholesky, Const, DMatrix, DVector, SMatrix, SVector};
 
 use super::parameters::unpack_standardised;
-use super::sums::{self, At, Charged};
+use super::sums::{self, At, WithNoise};
 use super::{N_PARAMETERS, problem};
 use crate::error::{Error, Result};
 use crate::gauss_newton::{Certainty, Descent, Linear, Local, Problem, positive_or_one};
@@ -22,7 +22,7 @@ const SMALLEST_PIVOT: f64 = 1e-5;
 
 /// Readings weighted by their noise; the cost is infinite where `S` collapses.
 pub(super) struct Direct<'a> {
-    pub charged: Charged<'a>,
+    pub with_noise: WithNoise<'a>,
     pub at: At,
     /// `|det S|` of the start, in standardised readings.
     pub volume: f64,
@@ -39,7 +39,7 @@ impl Direct<'_> {
     }
 
     fn normal(&self, x: &[f64]) -> Result<sums::Normal> {
-        sums::normal(&self.charged, &self.at(x))
+        sums::normal(&self.with_noise, &self.at(x))
             .ok_or_else(|| Error::bad_input("there are no static poses to fit"))
     }
 
@@ -52,7 +52,7 @@ impl Direct<'_> {
         if self.is_collapsed(&at) {
             return f64::INFINITY;
         }
-        sums::cost(&self.charged, &at)
+        sums::cost(&self.with_noise, &at)
     }
 
     /// The normal equations at a point.
@@ -80,7 +80,7 @@ impl Direct<'_> {
         Ok(Equations {
             size: scale.component_mul(x).norm(),
             normal,
-            n: self.charged.values.len(),
+            n: self.with_noise.values.len(),
             norms,
             scale,
             scaled,
@@ -219,7 +219,7 @@ impl Problem for Direct<'_> {
             &DVector::from_column_slice(normal.slope.as_slice()),
             normal.cost,
             normal.chi2,
-            self.charged.values.len(),
+            self.with_noise.values.len(),
         ))
     }
 

@@ -4,7 +4,7 @@ use nalgebra::{DVector, Vector3};
 
 use super::near::Near;
 use super::parameters::{in_frame, pack, unpack};
-use super::problem::{self, Frozen, PoseProblem};
+use super::problem::{self, FixedNoise, PoseProblem};
 use super::settled::{SMALLEST_SPREAD, WORTHLESS, finish, settle, spread};
 use super::start::{self, Share, Starts};
 use super::{Fit, Model, N_PARAMETERS, ROWS_KEPT, Readings, Settings};
@@ -69,10 +69,10 @@ fn fit_from(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -
         Some(model) => in_frame(&model, settings.frame)?,
         None => starts.sphere(settings)?,
     };
-    let mut frozen = Frozen::at(readings, settings, &nominal);
+    let mut fixed = FixedNoise::at(readings, settings, &nominal);
     // What a share of the readings determines, all of them do.
     let is_anchored =
-        shown.is_none() && problem::is_weak(&frozen.charge(readings), settings, &nominal);
+        shown.is_none() && problem::is_weak(&fixed.with_noise(readings), settings, &nominal);
     let begin = if is_anchored || start.is_some() || shown.is_some() {
         nominal
     } else {
@@ -92,7 +92,7 @@ fn fit_from(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -
             standard,
             volume,
         };
-        if let Some(fit) = near.finished(&mut frozen, theta)? {
+        if let Some(fit) = near.finished(&mut fixed, theta)? {
             return Ok(fit);
         }
     }
@@ -101,14 +101,14 @@ fn fit_from(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -
     for renewal in 0.. {
         let model = unpack(&theta, settings.frame, &standard);
         if renewal > 0 || begin != nominal {
-            frozen.renew(readings, settings, &model);
+            fixed.renew(readings, settings, &model);
         }
-        frozen.widening = widening;
+        fixed.widening = widening;
         let problem = PoseProblem {
             readings,
             settings,
             standard,
-            frozen: &frozen,
+            fixed: &fixed,
             volume,
             anchor: anchor.clone(),
         };
@@ -126,7 +126,7 @@ fn fit_from(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -
         // σ moves with the parameters at first order only through S: 1e-7 in S is 1e-7 in σ, far below its own error.
         if change < 1e-7 || renewal >= RENEWALS {
             let mut fit = finish(&problem, &settled, iterations)?;
-            fit.sigmas = frozen.sigma;
+            fit.sigmas = fixed.sigma;
             return Ok(fit);
         }
     }

@@ -1,7 +1,7 @@
 //! The last steps of a fit to very many readings, from the result for a share of them.
 
 use super::parameters::unpack;
-use super::problem::{Frozen, PoseProblem};
+use super::problem::{FixedNoise, PoseProblem};
 use super::settled::{Found, Settled, direct, finish};
 use super::{Fit, Parameters, Readings, Settings};
 use crate::ellipsoid::Standardisation;
@@ -26,11 +26,15 @@ const NEAR_SHRINKS: f64 = 0.1;
 
 impl Near<'_> {
     /// The fit, σ renewed at every step; `None` where steps do not shrink and the damped solver is needed.
-    pub(super) fn finished(&self, frozen: &mut Frozen, start: Parameters) -> Result<Option<Fit>> {
+    pub(super) fn finished(
+        &self,
+        fixed: &mut FixedNoise,
+        start: Parameters,
+    ) -> Result<Option<Fit>> {
         let mut theta = start;
         let (mut before, mut equations) = (f64::INFINITY, None);
         for iterations in 1..=NEAR_STEPS {
-            let problem = self.problem(frozen);
+            let problem = self.problem(fixed);
             let direct = direct(&problem, &theta);
             let Ok(found) = direct.equations(&theta, equations.as_ref()) else {
                 return Ok(None);
@@ -50,22 +54,22 @@ impl Near<'_> {
                     found: Found::Direct(Box::new(found)),
                 };
                 let mut fit = finish(&problem, &settled, iterations)?;
-                fit.sigmas = std::mem::take(&mut frozen.sigma);
+                fit.sigmas = std::mem::take(&mut fixed.sigma);
                 return Ok(Some(fit));
             }
             (before, equations) = (length, Some(found));
             let model = unpack(&theta, self.settings.frame, &self.standard);
-            frozen.renew(self.readings, self.settings, &model);
+            fixed.renew(self.readings, self.settings, &model);
         }
         Ok(None)
     }
 
-    fn problem<'b>(&'b self, frozen: &'b Frozen) -> PoseProblem<'b> {
+    fn problem<'b>(&'b self, fixed: &'b FixedNoise) -> PoseProblem<'b> {
         PoseProblem {
             readings: self.readings,
             settings: self.settings,
             standard: self.standard,
-            frozen,
+            fixed,
             volume: self.volume,
             anchor: None,
         }

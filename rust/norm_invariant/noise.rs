@@ -24,7 +24,7 @@ fn load_noise(readings: &Readings<'_>, first: usize, n: usize, out: &mut [Row; 9
     }
 }
 
-/// Standard error and expected excess of the residual of each reading (see [`super::problem::Frozen`]).
+/// Standard error and expected excess of the residual of each reading (see [`super::problem::FixedNoise`]).
 pub(super) fn predict(readings: &Readings<'_>, at: &At, sigma: &mut [f64], excess: &mut [f64]) {
     let instructions = Instructions::detect();
     let write = |((k, sigma), excess): ((usize, &mut [f64]), &mut [f64])| {
@@ -170,7 +170,7 @@ fn add_noise_lanes<const FUSED: bool>(
         let here = first + chunk * LANES;
         let n = LANES.min(first + sigma.len() - here);
         load(values.at(chunk), &at.standard, &mut u);
-        let charge = sigmas.at(chunk);
+        let sigmas = sigmas.at(chunk);
         if chunk == 0 || !is_common {
             load_noise(readings, here, n, &mut noise);
         }
@@ -197,7 +197,7 @@ fn add_noise_lanes<const FUSED: bool>(
             let reading = [u[0][l], u[1][l], u[2][l]];
             let first = columns::<FUSED>(up, shared, mirrored);
             let second = columns::<FUSED>(across, reading, mirrored);
-            let sigma = charge[l] * at.widening;
+            let sigma = sigmas[l] * at.widening;
             let weight = 1.0 / (sigma * sigma);
             for k in 0..N_PARAMETERS {
                 let mean = second[k] + if k < 6 { first[k] } else { 0.0 };

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, SVector, Vector3};
 
 use super::noise;
 use super::parameters::unpack_standardised;
-use super::sums::{self, At, Charged};
+use super::sums::{self, At, WithNoise};
 use super::{
     ANCHOR, Frame, Model, N_PARAMETERS, Objective, Parameters, Readings, Settings, UNKNOWN,
 };
@@ -14,7 +14,7 @@ use crate::ellipsoid::Standardisation;
 pub(super) const SMALLEST_VOLUME: f64 = 1e-2;
 
 /// Predictions of the noise for each residual at a given model, fixed while the solver runs.
-pub(super) struct Frozen {
+pub(super) struct FixedNoise {
     /// Standard error of the residual, m/s².
     pub sigma: Vec<f64>,
     /// Factor on every sigma in the fit: above one where an anchored fit finds more scatter than the noise explains.
@@ -23,14 +23,14 @@ pub(super) struct Frozen {
     pub excess: Vec<f64>,
 }
 
-impl Frozen {
-    fn charged(&self, i: usize) -> f64 {
+impl FixedNoise {
+    fn sigma_of(&self, i: usize) -> f64 {
         self.sigma[i] * self.widening
     }
 
     /// The readings with their predicted noise.
-    pub(super) fn charge<'a>(&'a self, readings: Readings<'a>) -> Charged<'a> {
-        Charged {
+    pub(super) fn with_noise<'a>(&'a self, readings: Readings<'a>) -> WithNoise<'a> {
+        WithNoise {
             values: readings.values,
             sigma: &self.sigma,
             excess: &self.excess,
@@ -80,7 +80,7 @@ pub(super) struct PoseProblem<'a> {
     pub readings: Readings<'a>,
     pub settings: &'a Settings,
     pub standard: Standardisation,
-    pub frozen: &'a Frozen,
+    pub fixed: &'a FixedNoise,
     /// `|det S|` of the start, in standardised readings.
     pub volume: f64,
     /// Values to which the parameters are tied, to `ANCHOR` of |g| each, when the poses leave some undetermined.
@@ -94,7 +94,7 @@ impl PoseProblem<'_> {
         let f = model.correct(&u);
         let residual = self.misfit(&f, i);
         let slope = residual_gradient(&f, &u, self.settings);
-        let sigma = self.frozen.charged(i);
+        let sigma = self.fixed.sigma_of(i);
         (residual / sigma, slope / sigma)
     }
 
@@ -104,7 +104,7 @@ impl PoseProblem<'_> {
             Objective::Norm => f.norm() - g,
             Objective::SquaredNorm => (f.norm_squared() - g * g) / (2.0 * g),
         };
-        raw - self.frozen.excess[i]
+        raw - self.fixed.excess[i]
     }
 
     fn collapses(&self, model: &Model) -> bool {
@@ -157,7 +157,7 @@ impl PoseProblem<'_> {
         }
         for i in 0..n {
             let f = model.correct(&self.standard.apply(&self.readings.values[i]));
-            residuals[i] = self.misfit(&f, i) / self.frozen.charged(i);
+            residuals[i] = self.misfit(&f, i) / self.fixed.sigma_of(i);
         }
         if let Some(anchor) = &self.anchor {
             let held = (x - anchor) / (ANCHOR * self.settings.gravity);
@@ -167,8 +167,8 @@ impl PoseProblem<'_> {
     }
 
     /// The readings with their predicted noise.
-    pub(super) fn charged(&self) -> Charged<'_> {
-        self.frozen.charge(self.readings)
+    pub(super) fn with_noise(&self) -> WithNoise<'_> {
+        self.fixed.with_noise(self.readings)
     }
 
     /// `E[Jᵀr]` at the truth, see [`noise::noise_in_gradient`].
@@ -177,14 +177,14 @@ impl PoseProblem<'_> {
             model: unpack_standardised(x, self.settings.frame),
             standard: self.standard,
             settings: *self.settings,
-            widening: self.frozen.widening,
+            widening: self.fixed.widening,
         };
-        noise::noise_in_gradient(&self.readings, &self.frozen.sigma, &at)
+        noise::noise_in_gradient(&self.readings, &self.fixed.sigma, &at)
     }
 
     /// Norm residuals in m/s² of a model in raw units.
     pub(super) fn in_m_s2(&self, model: &Model) -> Vec<f64> {
-        sums::misfits(&self.charged(), &At::raw(*model, *self.settings))
+        sums::misfits(&self.with_noise(), &At::raw(*model, *self.settings))
     }
 }
 
@@ -192,8 +192,8 @@ impl PoseProblem<'_> {
 ///
 /// In true coordinates `δf = M f + z`, a pose measures `uᵀδf = |g| Σ M_jk u_j u_k + zᵀu`: the information on the nine
 /// parameters depends on directions and noise alone.
-pub(super) fn is_weak(charged: &Charged<'_>, settings: &Settings, model: &Model) -> bool {
-    let information = sums::information(charged, &At::raw(*model, *settings));
+pub(super) fn is_weak(with_noise: &WithNoise<'_>, settings: &Settings, model: &Model) -> bool {
+    let information = sums::information(with_noise, &At::raw(*model, *settings));
     information
         .cholesky()
         .is_none_or(|factor| factor.inverse().diagonal().max() > UNKNOWN * UNKNOWN)

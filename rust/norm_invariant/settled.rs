@@ -16,12 +16,12 @@ use crate::gauss_newton::{self, Certainty, Loss, Options, Stop};
 
 pub(super) fn direct<'a>(problem: &'a PoseProblem<'_>, theta: &Parameters) -> Direct<'a> {
     Direct {
-        charged: problem.charged(),
+        with_noise: problem.with_noise(),
         at: At {
             model: unpack_standardised(theta.as_slice(), problem.settings.frame),
             standard: problem.standard,
             settings: *problem.settings,
-            widening: problem.frozen.widening,
+            widening: problem.fixed.widening,
         },
         volume: problem.volume,
         tried: RefCell::new(None),
@@ -122,7 +122,7 @@ pub(super) fn finish(
     let map = map_to_entries(settings.frame, &problem.standard);
     let covariance = map * fixed(&certainty.covariance) * map.transpose();
     let residuals = problem.in_m_s2(&model);
-    let sigmas = &problem.frozen.sigma;
+    let sigmas = &problem.fixed.sigma;
     let squares = || residuals.iter().zip(sigmas).map(|(r, s)| (r / s).powi(2));
     let chi2 = sum_of_squares(&residuals, sigmas);
     let (weights, robust_chi2) = if settings.loss == Loss::Linear {

@@ -53,13 +53,13 @@ impl At {
 
 /// Readings with the predicted noise of each.
 #[derive(Clone, Copy)]
-pub(super) struct Charged<'a> {
+pub(super) struct WithNoise<'a> {
     pub values: &'a [Vector3<f64>],
     pub sigma: &'a [f64],
     pub excess: &'a [f64],
 }
 
-impl Charged<'_> {
+impl WithNoise<'_> {
     fn share(&self, k: usize) -> Self {
         let range = k * SHARE..((k + 1) * SHARE).min(self.values.len());
         Self {
@@ -131,13 +131,13 @@ pub(super) fn by_share<T: Send>(
 }
 
 /// The normal equations at a point; `None` without readings.
-pub(super) fn normal(charged: &Charged<'_>, at: &At) -> Option<Normal> {
+pub(super) fn normal(with_noise: &WithNoise<'_>, at: &At) -> Option<Normal> {
     let instructions = Instructions::detect();
     by_share(
-        charged.values.len(),
+        with_noise.values.len(),
         |k| {
             let mut lanes = Lanes::zero();
-            add_rows(instructions, &charged.share(k), at, &mut lanes);
+            add_rows(instructions, &with_noise.share(k), at, &mut lanes);
             lanes.total()
         },
         |a, b| Normal {
@@ -152,15 +152,15 @@ pub(super) fn normal(charged: &Charged<'_>, at: &At) -> Option<Normal> {
 /// Information of the directions of gravity on the nine parameters: in true coordinates `δf = M f + z`, a pose measures
 /// `uᵀδf = |g| Σ M_jk u_j u_k + zᵀu`.
 pub(super) fn information(
-    charged: &Charged<'_>,
+    with_noise: &WithNoise<'_>,
     at: &At,
 ) -> SMatrix<f64, N_PARAMETERS, N_PARAMETERS> {
     let instructions = Instructions::detect();
     by_share(
-        charged.values.len(),
+        with_noise.values.len(),
         |k| {
             let mut lanes = Lanes::zero();
-            add_directions(instructions, &charged.share(k), at, &mut lanes);
+            add_directions(instructions, &with_noise.share(k), at, &mut lanes);
             lanes.total().gram
         },
         |a, b| a + b,
@@ -169,13 +169,13 @@ pub(super) fn information(
 }
 
 /// F of the readings at a point.
-pub(super) fn cost(charged: &Charged<'_>, at: &At) -> f64 {
+pub(super) fn cost(with_noise: &WithNoise<'_>, at: &At) -> f64 {
     let instructions = Instructions::detect();
     by_share(
-        charged.values.len(),
+        with_noise.values.len(),
         |k| {
             let mut sum = ZERO;
-            add_costs(instructions, &charged.share(k), at, &mut sum);
+            add_costs(instructions, &with_noise.share(k), at, &mut sum);
             sum.iter().sum::<f64>()
         },
         |a, b| a + b,
@@ -184,11 +184,11 @@ pub(super) fn cost(charged: &Charged<'_>, at: &At) -> f64 {
 }
 
 /// `|S a' + b| - |g|` of each reading, less its expected excess.
-pub(super) fn misfits(charged: &Charged<'_>, at: &At) -> Vec<f64> {
-    let mut out = vec![0.0; charged.values.len()];
+pub(super) fn misfits(with_noise: &WithNoise<'_>, at: &At) -> Vec<f64> {
+    let mut out = vec![0.0; with_noise.values.len()];
     let instructions = Instructions::detect();
     let write = |(k, out): (usize, &mut [f64])| {
-        write_misfits(instructions, &charged.share(k), at, out);
+        write_misfits(instructions, &with_noise.share(k), at, out);
     };
     if out.len() <= SHARE {
         write((0, &mut out));
@@ -199,32 +199,32 @@ pub(super) fn misfits(charged: &Charged<'_>, at: &At) -> Vec<f64> {
 }
 
 for_each_instruction_set! {
-    fn add_rows(charged: &Charged<'_>, at: &At, sums: &mut Lanes) = add_rows_lanes
+    fn add_rows(with_noise: &WithNoise<'_>, at: &At, sums: &mut Lanes) = add_rows_lanes
 }
 
 #[inline(always)]
-fn add_rows_lanes<const FUSED: bool>(charged: &Charged<'_>, at: &At, sums: &mut Lanes) {
+fn add_rows_lanes<const FUSED: bool>(with_noise: &WithNoise<'_>, at: &At, sums: &mut Lanes) {
     let settings = &at.settings;
     let mirrored = mirrored(settings.frame);
     let mut u = [ZERO; 3];
     let (mut rows, mut residual, mut weight) = ([ZERO; N_PARAMETERS], ZERO, [1.0; LANES]);
-    let values = Eights::of(charged.values, filler(charged.values));
-    let sigmas = Eights::of(charged.sigma, f64::INFINITY);
-    let excesses = Eights::of(charged.excess, 0.0);
-    for i in 0..charged.values.len().div_ceil(LANES) {
+    let values = Eights::of(with_noise.values, filler(with_noise.values));
+    let sigmas = Eights::of(with_noise.sigma, f64::INFINITY);
+    let excesses = Eights::of(with_noise.excess, 0.0);
+    for i in 0..with_noise.values.len().div_ceil(LANES) {
         load(values.at(i), &at.standard, &mut u);
         let (sigma, excess) = (sigmas.at(i), excesses.at(i));
         for l in 0..LANES {
             let f = force::<FUSED>(&at.model, &u, l);
             let (value, length) = misfit::<FUSED>(f, excess[l], settings);
             // One division for both: divisions cost more than all the products.
-            let charge = 1.0 / (length * sigma[l] * at.widening);
+            let weight = 1.0 / (length * sigma[l] * at.widening);
             let row =
-                columns::<FUSED>(f.map(|c| c * charge), [u[0][l], u[1][l], u[2][l]], mirrored);
+                columns::<FUSED>(f.map(|c| c * weight), [u[0][l], u[1][l], u[2][l]], mirrored);
             for k in 0..N_PARAMETERS {
                 rows[k][l] = row[k];
             }
-            residual[l] = value * (length * charge);
+            residual[l] = value * (length * weight);
             let square = residual[l] * residual[l];
             sums.chi2[l] += square;
             sums.cost[l] = fma::<FUSED>(0.5, square, sums.cost[l]);
@@ -267,16 +267,16 @@ fn add_products<const FUSED: bool>(
 }
 
 for_each_instruction_set! {
-    fn add_directions(charged: &Charged<'_>, at: &At, sums: &mut Lanes) = add_directions_lanes
+    fn add_directions(with_noise: &WithNoise<'_>, at: &At, sums: &mut Lanes) = add_directions_lanes
 }
 
 #[inline(always)]
-fn add_directions_lanes<const FUSED: bool>(charged: &Charged<'_>, at: &At, sums: &mut Lanes) {
+fn add_directions_lanes<const FUSED: bool>(with_noise: &WithNoise<'_>, at: &At, sums: &mut Lanes) {
     let mut u = [ZERO; 3];
     let mut rows = [ZERO; N_PARAMETERS];
-    let values = Eights::of(charged.values, filler(charged.values));
-    let sigmas = Eights::of(charged.sigma, f64::INFINITY);
-    for i in 0..charged.values.len().div_ceil(LANES) {
+    let values = Eights::of(with_noise.values, filler(with_noise.values));
+    let sigmas = Eights::of(with_noise.sigma, f64::INFINITY);
+    for i in 0..with_noise.values.len().div_ceil(LANES) {
         load(values.at(i), &at.standard, &mut u);
         let sigma = sigmas.at(i);
         for l in 0..LANES {
@@ -293,16 +293,16 @@ fn add_directions_lanes<const FUSED: bool>(charged: &Charged<'_>, at: &At, sums:
 }
 
 for_each_instruction_set! {
-    fn add_costs(charged: &Charged<'_>, at: &At, sum: &mut Row) = add_costs_lanes
+    fn add_costs(with_noise: &WithNoise<'_>, at: &At, sum: &mut Row) = add_costs_lanes
 }
 
 #[inline(always)]
-fn add_costs_lanes<const FUSED: bool>(charged: &Charged<'_>, at: &At, sum: &mut Row) {
+fn add_costs_lanes<const FUSED: bool>(with_noise: &WithNoise<'_>, at: &At, sum: &mut Row) {
     let (mut u, mut square) = ([ZERO; 3], ZERO);
-    let values = Eights::of(charged.values, filler(charged.values));
-    let sigmas = Eights::of(charged.sigma, f64::INFINITY);
-    let excesses = Eights::of(charged.excess, 0.0);
-    for i in 0..charged.values.len().div_ceil(LANES) {
+    let values = Eights::of(with_noise.values, filler(with_noise.values));
+    let sigmas = Eights::of(with_noise.sigma, f64::INFINITY);
+    let excesses = Eights::of(with_noise.excess, 0.0);
+    for i in 0..with_noise.values.len().div_ceil(LANES) {
         load(values.at(i), &at.standard, &mut u);
         let (sigma, excess) = (sigmas.at(i), excesses.at(i));
         for l in 0..LANES {
@@ -324,14 +324,14 @@ fn add_costs_lanes<const FUSED: bool>(charged: &Charged<'_>, at: &At, sum: &mut 
 }
 
 for_each_instruction_set! {
-    fn write_misfits(charged: &Charged<'_>, at: &At, out: &mut [f64]) = write_misfits_lanes
+    fn write_misfits(with_noise: &WithNoise<'_>, at: &At, out: &mut [f64]) = write_misfits_lanes
 }
 
 #[inline(always)]
-fn write_misfits_lanes<const FUSED: bool>(charged: &Charged<'_>, at: &At, out: &mut [f64]) {
+fn write_misfits_lanes<const FUSED: bool>(with_noise: &WithNoise<'_>, at: &At, out: &mut [f64]) {
     let (mut u, mut found) = ([ZERO; 3], ZERO);
-    let values = Eights::of(charged.values, filler(charged.values));
-    let excesses = Eights::of(charged.excess, 0.0);
+    let values = Eights::of(with_noise.values, filler(with_noise.values));
+    let excesses = Eights::of(with_noise.excess, 0.0);
     for (i, out) in out.chunks_mut(LANES).enumerate() {
         load(values.at(i), &at.standard, &mut u);
         let excess = excesses.at(i);

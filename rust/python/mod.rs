@@ -14,9 +14,9 @@ mod arrays;
 mod attitude;
 mod audit;
 mod bias_process;
+mod binding;
 mod block_motion;
 mod chi_square;
-mod doorway;
 mod first_look;
 mod joints;
 mod kalman;
@@ -38,14 +38,14 @@ mod spectral_likelihood;
 mod stillness;
 mod timestamps;
 
-pub(crate) use doorway::{run, run_long};
+pub(crate) use binding::{run, run_long};
 
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    doorway::keep_panics_quiet();
+    binding::keep_panics_quiet();
     module.add(
         "RefusedError",
-        module.py().get_type::<doorway::RefusedError>(),
+        module.py().get_type::<binding::RefusedError>(),
     )?;
     allan::register(module)?;
     attitude::register(module)?;

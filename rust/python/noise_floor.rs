@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{flat1, flat2, rows};
-use crate::noise_floor::{self as kernel, Blocks, Question, Tails};
+use crate::noise_floor::{self as kernel, Blocks, Search, Tails};
 use crate::running;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -26,7 +26,7 @@ type FloorArrays<'py> = (
 );
 
 /// Activities `(m,)` inside blocks and between them, their limits, quiet windows `(m,)`, and the floors `(c,)`, of
-/// blocks `(m, c)` of `length` readings: `asked` is blocks per window, windows of the seed, median of a window's
+/// blocks `(m, c)` of `length` readings: `search` is blocks per window, windows of the seed, median of a window's
 /// variance over the variance; `tails` the part of windows a deviation below the median, and the limit above.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "blocks by name")]
@@ -38,7 +38,7 @@ fn noise_floor<'py>(
     tells: PyReadonlyArray2<'py, bool>,
     rounding: PyReadonlyArray1<'py, f64>,
     length: usize,
-    asked: (usize, usize, f64),
+    search: (usize, usize, f64),
     tails: (f64, f64),
 ) -> PyResult<FloorArrays<'py>> {
     let (m, channels) = (mean.shape()[0], mean.shape()[1]);
@@ -63,16 +63,16 @@ fn noise_floor<'py>(
             tells: &tells,
             rounding: &rounding,
         };
-        let asked = Question {
-            width: asked.0,
-            seed: asked.1,
-            median_ratio: asked.2,
+        let search = Search {
+            width: search.0,
+            seed: search.1,
+            median_ratio: search.2,
             tails: Tails {
                 lower: tails.0,
                 deviations: tails.1,
             },
         };
-        Ok(kernel::noise_floor(&blocks, &asked))
+        Ok(kernel::noise_floor(&blocks, &search))
     })?;
     Ok((
         PyArray1::from_vec(py, floor.fast),

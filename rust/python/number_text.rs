@@ -12,7 +12,7 @@ use crate::number_text::{self, Block};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(plain_table, module)?)?;
-    module.add_function(wrap_pyfunction!(room, module)?)?;
+    module.add_function(wrap_pyfunction!(new_array, module)?)?;
     module.add_function(wrap_pyfunction!(plain_table_into, module)?)
 }
 
@@ -56,8 +56,9 @@ fn plain_table<'py>(
 /// `NumPy`'s own arrays request huge pages, which a shared machine may first have to free: that took half of the time
 /// of reading a long log.
 #[pyfunction]
-fn room(py: Python<'_>, rows: usize, width: usize) -> PyResult<Bound<'_, PyArray2<f64>>> {
-    let refused = || PyMemoryError::new_err(format!("no room for {rows} rows of {width} numbers"));
+fn new_array(py: Python<'_>, rows: usize, width: usize) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    let refused =
+        || PyMemoryError::new_err(format!("no memory for {rows} rows of {width} numbers"));
     let count = rows.checked_mul(width).ok_or_else(refused)?;
     let layout = Layout::array::<f64>(count).map_err(|_| refused())?;
     let flat = if count == 0 {

@@ -14,7 +14,7 @@ use crate::simulate::Sample;
 use crate::simulate::mechanism::{self, Bridge};
 use crate::simulate::motion::{self, Harmonic, Place, Replay, Segment};
 use crate::simulate::noise::{self, Keys, Terms};
-use crate::simulate::sampling::{self, Converter};
+use crate::simulate::sampling::{self, Adc};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simulate_motion, module)?)?;
@@ -337,7 +337,7 @@ fn simulate_convert<'py>(
     bias: Sample,
     missing_every: u32,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let converter = Converter {
+    let adc = Adc {
         lsb,
         low,
         high,
@@ -345,5 +345,5 @@ fn simulate_convert<'py>(
         bias,
         missing_every,
     };
-    stage(py, &signal, |s| converter.convert(s))
+    stage(py, &signal, |s| adc.convert(s))
 }

@@ -3,7 +3,7 @@
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::spectral_likelihood::{self as likelihood, Bins, Question, Statement};
+use crate::spectral_likelihood::{self as likelihood, Bins, Statement, Terms};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<SpectralBins>()?;
@@ -76,8 +76,8 @@ impl SpectralBins {
     /// Fit the strengths of the active terms.
     fn fit(&self, py: Python<'_>, active: Vec<usize>, has_line: bool) -> PyResult<SpectralFit> {
         self.know(&active)?;
-        let question = Question { active, has_line };
-        let fit = super::run_long(py, || likelihood::fit(&self.bins, &question))?;
+        let terms = Terms { active, has_line };
+        let fit = super::run_long(py, || likelihood::fit(&self.bins, &terms))?;
         Ok(SpectralFit {
             strength: fit.strength,
             slope: fit.slope,

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use super::chain::{Chain, Layout};
 use super::factor::Factor;
-use super::held::Held;
+use super::fixed_weights::FixedWeights;
 use super::move_rows::{Passed, Weights};
 use super::moves::Move;
 use super::rows::Group;
@@ -156,7 +156,7 @@ pub(super) fn fit_from(
             (STEP_TOLERANCE * spread, MOST_ITERATIONS)
         };
         let weights = Weights::of(&passed, &strengths)?;
-        let held = Held {
+        let problem = FixedWeights {
             session,
             distortion,
             strengths,
@@ -164,7 +164,7 @@ pub(super) fn fit_from(
             first: RefCell::new(Some(passed)),
             tried: RefCell::new(None),
         };
-        let ended = descend(&held, state, &options)?;
+        let ended = descend(&problem, state, &options)?;
         iterations += ended.iterations;
         state = ended.point;
         let local = ended.local;

@@ -145,7 +145,7 @@ impl Hypothesis {
     }
 
     /// All rows but those of the bias processes, at some strengths, and the logarithm of their normalisation.
-    pub(super) fn heard(&self, strengths: &Strengths) -> Option<(Part, f64)> {
+    pub(super) fn weighted_rows(&self, strengths: &Strengths) -> Option<(Part, f64)> {
         let mut weight = self.fixed_weight;
         let mut chain = self.fixed.chain.clone();
         let mut side = self.fixed.side.clone();
@@ -186,9 +186,9 @@ impl Hypothesis {
         })
     }
 
-    /// Log-evidence at some strengths; `heard` are the rows outside the processes at them.
-    pub(super) fn beside(&self, strengths: &Strengths, heard: &(Part, f64)) -> f64 {
-        let (part, mut weight) = (&heard.0, heard.1);
+    /// Log-evidence at some strengths; `weighted_rows` are the rows outside the processes at them.
+    pub(super) fn beside(&self, strengths: &Strengths, weighted_rows: &(Part, f64)) -> f64 {
+        let (part, mut weight) = (&weighted_rows.0, weighted_rows.1);
         let mut side = part.side.clone();
         let mut sum = part.sum;
         let mut weighed = Vec::with_capacity(N_PROCESSES);
@@ -211,8 +211,10 @@ impl Hypothesis {
     /// Log-evidence at each of some strengths.
     fn at_each(&self, strengths: &[Strengths]) -> Vec<f64> {
         let one = |s: &Strengths| {
-            let heard = self.heard(s);
-            heard.map_or(f64::NEG_INFINITY, |heard| self.beside(s, &heard))
+            let weighted_rows = self.weighted_rows(s);
+            weighted_rows.map_or(f64::NEG_INFINITY, |weighted_rows| {
+                self.beside(s, &weighted_rows)
+            })
         };
         strengths.iter().map(one).collect()
     }
@@ -240,7 +242,7 @@ impl Hypothesis {
     /// When a move has no noise.
     pub(super) fn system(&self, strengths: &Strengths) -> Result<(Chain, DMatrix<f64>)> {
         let (part, _) = self
-            .heard(strengths)
+            .weighted_rows(strengths)
             .ok_or_else(|| Error::not_determined("a move has no noise"))?;
         let (mut chain, mut side) = (part.chain, part.side);
         for (process, factor) in self.process.iter().zip(self.factors(strengths)) {

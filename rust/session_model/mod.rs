@@ -7,17 +7,17 @@
 
 mod bias_rows;
 mod blocks;
+pub mod candidate_gains;
 pub mod chain;
 mod elimination;
 mod ends;
 pub mod factor;
 pub mod fit;
+mod fixed_weights;
 mod gaps;
-mod held;
 pub mod held_out;
 pub mod hypothesis;
 mod lanes;
-pub mod looks;
 pub mod move_rows;
 pub mod moves;
 mod possible;
@@ -53,7 +53,7 @@ pub const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), 
 
 /// Means of one sensor over the static poses, raw and centred.
 #[derive(Debug, Clone)]
-pub struct AtRest {
+pub struct StaticMeans {
     /// Mean reading of each pose.
     pub mean: Vec<Vector3<f64>>,
     /// Standard error of each mean.
@@ -64,7 +64,7 @@ pub struct AtRest {
     pub density: Vector3<f64>,
 }
 
-impl AtRest {
+impl StaticMeans {
     /// Means with standard errors along the sensor's axes and, where `along` is given, another error along one
     /// direction (a unit vector and its standard error, not finite where unknown).
     ///
@@ -136,9 +136,9 @@ pub struct Session {
     /// Middle of each pose, s.
     pub time_s: Vec<f64>,
     /// Accelerometer in static poses.
-    pub force: AtRest,
+    pub force: StaticMeans,
     /// Gyro in static poses.
-    pub rate: Option<AtRest>,
+    pub rate: Option<StaticMeans>,
     /// Moves between neighbouring poses.
     pub moves: Arc<Vec<Move>>,
     /// Noise of the moves' samples.

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Matrix3x2, SMatrix, Vector3};
 use rayon::prelude::*;
 
 use super::chain::{Layout, Rows};
-use super::moves::{Carried, MoveCovariance, N_MOVE, Sees, carry};
+use super::moves::{Carried, MoveCovariance, MoveModel, N_MOVE, carry};
 use super::response::{Response, Sums, effect_columns, loosened, respond, sums, widen};
 use super::rows::{Domain, Group, Kind};
 use super::{Distortion, LOWER, N_MODEL, N_SCATTER, Session, State, Strengths, tangent_plane};
@@ -84,20 +84,20 @@ impl Passed {
 }
 
 impl Session {
-    pub(super) fn sees<'a>(
+    pub(super) fn move_model<'a>(
         &self,
         state: &State,
         index: usize,
         plane: Matrix3x2<f64>,
         effects: &'a Effects,
-    ) -> Sees<'a> {
+    ) -> MoveModel<'a> {
         let one = &self.moves[index];
         let (i, j) = (one.before, one.before + 1);
         let first = self.n_poses() + one.first_point;
         let part = |values: Option<&'a Vec<Vector3<f64>>>| -> Option<&'a [Vector3<f64>]> {
             values.map(|v| &v[first..first + one.n_samples()])
         };
-        Sees {
+        MoveModel {
             gravity: self.gravity,
             force_scale: state.force_scale,
             force_bias: state.force_bias,
@@ -143,14 +143,14 @@ impl Session {
             .enumerate()
             .map(|(m, known)| {
                 let one = &self.moves[m];
-                let sees = self.sees(state, m, planes[m], &effects);
-                let carried = known.unwrap_or_else(|| carry(one, &sees));
-                let response = respond(one, &sees, &carried, &self.noise);
-                let sums = sums(one, &sees, &response, &LOWER);
+                let move_model = self.move_model(state, m, planes[m], &effects);
+                let carried = known.unwrap_or_else(|| carry(one, &move_model));
+                let response = respond(one, &move_model, &carried, &self.noise);
+                let sums = sums(one, &move_model, &response, &LOWER);
                 let loose = self
                     .scatter
                     .as_ref()
-                    .map(|scatter| loosened(one, &sees, &response, scatter));
+                    .map(|scatter| loosened(one, &move_model, &response, scatter));
                 Passed {
                     carried: Arc::new(carried),
                     response: Arc::new(response),

@@ -106,7 +106,7 @@ impl Move {
 
 /// Model values that a move needs: both sensors, biases of its two poses, verticals, distortion of each sample.
 #[derive(Debug)]
-pub struct Sees<'a> {
+pub struct MoveModel<'a> {
     /// |g|.
     pub gravity: f64,
     /// Accelerometer `S`.
@@ -168,21 +168,21 @@ pub struct Carried {
 
 /// Integrates a move (11.3, 11.4).
 #[must_use]
-pub fn carry(one: &Move, sees: &Sees<'_>) -> Carried {
+pub fn carry(one: &Move, move_model: &MoveModel<'_>) -> Carried {
     let n = one.n_samples();
     let mut rate = Vec::with_capacity(n);
     let mut force = Vec::with_capacity(n);
     for k in 0..n {
         let x = one.fraction[k];
-        let bias = sees.pose_rate_bias[0] * (1.0 - x) + sees.pose_rate_bias[1] * x;
-        let mut w = sees.rate_scale * (one.rate[k] - bias);
-        if let Some(effect) = sees.rate_effect {
+        let bias = move_model.pose_rate_bias[0] * (1.0 - x) + move_model.pose_rate_bias[1] * x;
+        let mut w = move_model.rate_scale * (one.rate[k] - bias);
+        if let Some(effect) = move_model.rate_effect {
             w -= effect[k];
         }
         rate.push(w);
-        let bias = sees.pose_force_bias[0] * (1.0 - x) + sees.pose_force_bias[1] * x;
-        let mut f = sees.force_scale * (one.force[k] - bias) + sees.force_bias;
-        if let Some(effect) = sees.force_effect {
+        let bias = move_model.pose_force_bias[0] * (1.0 - x) + move_model.pose_force_bias[1] * x;
+        let mut f = move_model.force_scale * (one.force[k] - bias) + move_model.force_bias;
+        if let Some(effect) = move_model.force_effect {
             f -= effect[k];
         }
         force.push(f);
@@ -210,9 +210,11 @@ pub fn carry(one: &Move, sees: &Sees<'_>) -> Carried {
     for k in done + 1..n {
         attitude[k] = attitude[done];
     }
-    let gravity = sees.gravity;
-    let across = sees.plane.transpose() * (attitude[done] * sees.up[0] - sees.up[1]) * gravity;
-    let gained = velocity - sees.up[0] * (gravity * one.duration_s);
+    let gravity = move_model.gravity;
+    let across = move_model.plane.transpose()
+        * (attitude[done] * move_model.up[0] - move_model.up[1])
+        * gravity;
+    let gained = velocity - move_model.up[0] * (gravity * one.duration_s);
     let mut residual = SVector::<f64, N_MOVE>::zeros();
     residual.fixed_rows_mut::<2>(0).copy_from(&across);
     residual.fixed_rows_mut::<3>(2).copy_from(&gained);

@@ -72,12 +72,12 @@ pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Poss
         .map(|&(scatter, prior)| {
             let mut at = fit.strengths;
             at.scatter[0] = scatter;
-            let Some(heard) = hypothesis.heard(&at) else {
+            let Some(weighted_rows) = hypothesis.weighted_rows(&at) else {
                 return Vec::new();
             };
             let each = corners.iter().map(|corner| {
                 at.corner_s[0] = *corner;
-                (hypothesis.beside(&at, &heard) + prior, at)
+                (hypothesis.beside(&at, &weighted_rows) + prior, at)
             });
             each.collect()
         })

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, Vector3};
 
 use super::N_SCATTER;
 use super::gaps::GAP;
-use super::moves::{Carried, Move, MoveCovariance, MoveNoise, N_MOVE, Sees};
+use super::moves::{Carried, Move, MoveCovariance, MoveModel, MoveNoise, N_MOVE};
 use crate::rotation::skew;
 
 /// Derivatives of the five residuals by rate and force at each sample.
@@ -23,10 +23,16 @@ pub struct Response {
 
 /// Derivatives of the residuals by every sample, and their covariance (11.5, 11.6).
 #[must_use]
-pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise) -> Response {
+pub fn respond(
+    one: &Move,
+    move_model: &MoveModel<'_>,
+    carried: &Carried,
+    noise: &MoveNoise,
+) -> Response {
     let n = one.n_samples();
     let last = one.steps.last().map_or(0, |step| step.to);
-    let lever: Matrix2x3<f64> = sees.plane.transpose() * carried.attitude[last] * sees.gravity;
+    let lever: Matrix2x3<f64> =
+        move_model.plane.transpose() * carried.attitude[last] * move_model.gravity;
     let mut by_rate = vec![SMatrix::<f64, N_MOVE, 3>::zeros(); n];
     let mut by_force = vec![Matrix3::zeros(); n];
     for k in 0..n {
@@ -37,7 +43,7 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
     let mut to_turn = SMatrix::<f64, N_MOVE, 3>::zeros();
     to_turn
         .fixed_rows_mut::<2>(0)
-        .copy_from(&(lever * skew(&sees.up[0])));
+        .copy_from(&(lever * skew(&move_model.up[0])));
     let var_jitter = noise.jitter_s * noise.jitter_s;
     let mut still_to_come = Vector3::zeros();
     let mut gaps = one.gaps.iter().rev().peekable();
@@ -62,10 +68,10 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
             let spread = |scale: &Matrix3<f64>, v: &Vector3<f64>| {
                 scale * Matrix3::from_diagonal(v) * scale.transpose()
             };
-            covariance += zeroth * spread(&sees.rate_scale, of_rate) * zeroth.transpose();
+            covariance += zeroth * spread(&move_model.rate_scale, of_rate) * zeroth.transpose();
             let turned = carried.attitude[step.from].transpose();
             let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
-            velocity += turned * spread(&sees.force_scale, of_force) * turned.transpose();
+            velocity += turned * spread(&move_model.force_scale, of_force) * turned.transpose();
         }
         // Where the move does not determine it, the rate of a lost sample is uniform between its neighbours: h²/12.
         let is_unknown = missed.is_none() && step.h > GAP * noise.nominal_step_s;
@@ -84,7 +90,7 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
             velocity.ger(var, &jump, &jump, 1.0);
         }
     }
-    add_white(one, sees, noise, &by_rate, &by_force, &mut covariance);
+    add_white(one, move_model, noise, &by_rate, &by_force, &mut covariance);
     Response {
         by_rate,
         by_force,
@@ -125,7 +131,7 @@ fn add_square<const N: usize>(
 
 fn add_white(
     one: &Move,
-    sees: &Sees<'_>,
+    move_model: &MoveModel<'_>,
     noise: &MoveNoise,
     by_rate: &[SMatrix<f64, N_MOVE, 3>],
     by_force: &[Matrix3<f64>],
@@ -138,8 +144,16 @@ fn add_white(
         let extra = (scale.component_mul(scale) * fast).mean() / (one.duration_s * one.step_s);
         white + Matrix3::identity() * extra
     };
-    let rate = spread(&sees.rate_scale, &noise.rate_density, &one.unresolved[1]);
-    let force = spread(&sees.force_scale, &noise.force_density, &one.unresolved[0]);
+    let rate = spread(
+        &move_model.rate_scale,
+        &noise.rate_density,
+        &one.unresolved[1],
+    );
+    let force = spread(
+        &move_model.force_scale,
+        &noise.force_density,
+        &one.unresolved[0],
+    );
     let mut of_velocity = Matrix3::zeros();
     let mut of_all = MoveCovariance::zeros();
     for (r, f) in by_rate.iter().zip(by_force) {
@@ -168,7 +182,12 @@ pub struct Sums {
 
 /// Sums of the response over the samples.
 #[must_use]
-pub fn sums(one: &Move, sees: &Sees<'_>, response: &Response, lower: &[(usize, usize); 6]) -> Sums {
+pub fn sums(
+    one: &Move,
+    move_model: &MoveModel<'_>,
+    response: &Response,
+    lower: &[(usize, usize); 6],
+) -> Sums {
     let mut force_model = SMatrix::<f64, N_MOVE, 9>::zeros();
     let mut rate_model = SMatrix::<f64, N_MOVE, 9>::zeros();
     let mut rates = [SMatrix::<f64, N_MOVE, 3>::zeros(); 2];
@@ -176,8 +195,10 @@ pub fn sums(one: &Move, sees: &Sees<'_>, response: &Response, lower: &[(usize, u
     for k in 0..one.n_samples() {
         let x = one.fraction[k];
         let (r, f) = (&response.by_rate[k], &response.by_force[k]);
-        let w = one.rate[k] - (sees.pose_rate_bias[0] * (1.0 - x) + sees.pose_rate_bias[1] * x);
-        let a = one.force[k] - (sees.pose_force_bias[0] * (1.0 - x) + sees.pose_force_bias[1] * x);
+        let w = one.rate[k]
+            - (move_model.pose_rate_bias[0] * (1.0 - x) + move_model.pose_rate_bias[1] * x);
+        let a = one.force[k]
+            - (move_model.pose_force_bias[0] * (1.0 - x) + move_model.pose_force_bias[1] * x);
         for i in 0..3 {
             for j in 0..3 {
                 rate_model
@@ -199,13 +220,13 @@ pub fn sums(one: &Move, sees: &Sees<'_>, response: &Response, lower: &[(usize, u
     let of_velocity = |part: Matrix3<f64>| {
         let mut out = SMatrix::<f64, N_MOVE, 3>::zeros();
         out.fixed_view_mut::<3, 3>(2, 0)
-            .copy_from(&(-part * sees.force_scale));
+            .copy_from(&(-part * move_model.force_scale));
         out
     };
     Sums {
         force_model,
         rate_model,
-        pose_rate_bias: rates.map(|part| -part * sees.rate_scale),
+        pose_rate_bias: rates.map(|part| -part * move_model.rate_scale),
         pose_force_bias: forces.map(of_velocity),
     }
 }
@@ -218,7 +239,7 @@ pub fn sums(one: &Move, sees: &Sees<'_>, response: &Response, lower: &[(usize, u
 #[must_use]
 pub fn loosened(
     one: &Move,
-    sees: &Sees<'_>,
+    move_model: &MoveModel<'_>,
     response: &Response,
     scatter: &[Vector3<f64>; 2],
 ) -> [MoveCovariance; N_SCATTER] {
@@ -234,11 +255,11 @@ pub fn loosened(
     }
     let mut out = [MoveCovariance::zeros(); N_SCATTER];
     for end in 0..2 {
-        let rate = rates[end] * sees.rate_scale * Matrix3::from_diagonal(&scatter[1]);
+        let rate = rates[end] * move_model.rate_scale * Matrix3::from_diagonal(&scatter[1]);
         for axis in 0..3 {
             out[1 + axis] += rate.column(axis) * rate.column(axis).transpose();
         }
-        let force = forces[end] * sees.force_scale * Matrix3::from_diagonal(&scatter[0]);
+        let force = forces[end] * move_model.force_scale * Matrix3::from_diagonal(&scatter[0]);
         let mut velocity = out[0].fixed_view_mut::<3, 3>(2, 2);
         velocity += force * force.transpose();
     }

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::chain::Layout;
 use super::rows::{Domain, Group, Kind};
-use super::{AtRest, Distortion, LOWER, N_MODEL, Session, State, tangent_plane};
+use super::{Distortion, LOWER, N_MODEL, Session, State, StaticMeans, tangent_plane};
 use crate::error::{Error, Result};
 
 impl Session {
@@ -118,11 +118,11 @@ pub(super) fn collapsed() -> Error {
     Error::not_determined("a sensor's triad has collapsed: its S cannot be inverted")
 }
 
-pub(super) fn weight_of(sensor: &AtRest, pose: usize) -> Matrix3<f64> {
+pub(super) fn weight_of(sensor: &StaticMeans, pose: usize) -> Matrix3<f64> {
     sensor.white[pose]
 }
 
-fn at_rest(sensor: &AtRest, pose: usize, read: &Vector3<f64>, layout: Layout) -> Group {
+fn at_rest(sensor: &StaticMeans, pose: usize, read: &Vector3<f64>, layout: Layout) -> Group {
     let residual = weight_of(sensor, pose) * (sensor.mean[pose] - read);
     Group::of(
         DVector::from_column_slice(residual.as_slice()),

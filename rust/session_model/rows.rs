@@ -126,8 +126,8 @@ impl Session {
         let carried: Vec<Carried> = (0..self.moves.len())
             .into_par_iter()
             .map(|m| {
-                let sees = self.sees(state, m, weights.plane[m], &effects);
-                carry(&self.moves[m], &sees)
+                let move_model = self.move_model(state, m, weights.plane[m], &effects);
+                carry(&self.moves[m], &move_model)
             })
             .collect();
         let moves: f64 = carried

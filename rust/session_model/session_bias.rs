@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::fit::Fit;
-use super::{AtRest, Session};
+use super::{Session, StaticMeans};
 
 /// One bias for the session, raw and centred.
 #[derive(Debug, Clone)]
@@ -37,7 +37,7 @@ impl Fit {
     }
 
     /// Raw mean of every pose less the effects there.
-    fn read_biases(&self, rate: &AtRest) -> Vec<Vector3<f64>> {
+    fn read_biases(&self, rate: &StaticMeans) -> Vec<Vector3<f64>> {
         let effects = super::Distortion::at(
             self.distortion.rate.as_ref(),
             self.distortion.k,
@@ -59,7 +59,7 @@ impl Fit {
 const BEYOND_CHANCE: f64 = 4.0;
 
 /// Random-effects weights of biases and the variance between them (`DerSimonian` and Laird 1986), axis by axis.
-fn pooled(rate: &AtRest, biases: &[Vector3<f64>]) -> (Vec<Vector3<f64>>, Vector3<f64>) {
+fn pooled(rate: &StaticMeans, biases: &[Vector3<f64>]) -> (Vec<Vector3<f64>>, Vector3<f64>) {
     let n = biases.len();
     let mut weights = vec![Vector3::zeros(); n];
     let mut spread = Vector3::zeros();

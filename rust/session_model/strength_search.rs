@@ -40,7 +40,7 @@ const SCATTER: (f64, f64) = (-6.9, 9.2);
 const BETWEEN: (f64, f64) = (-3.0, 0.2);
 const EXCESS: (f64, f64) = (0.0, 9.2);
 /// Rows with this excess have no weight, and keep none: a search leaves it as given.
-const UNHEARD: f64 = 6.9;
+const NO_WEIGHT: f64 = 6.9;
 /// Scatter, or excess of moves, at which a search from nothing begins: near nothing the evidence is flat.
 const FROM_NOTHING: [f64; 2] = [1.0, 6.0];
 /// Corner time and scatter by which a walk and a scatter are exchanged for one another: a drifting bias may be either,
@@ -100,7 +100,7 @@ pub(super) struct Search<'a> {
     x: Point,
     value: f64,
     /// The rows outside the bias processes at the strengths evaluated last, and those strengths.
-    heard: Option<([u64; N_STRENGTHS - SCATTER_AT], (Part, f64))>,
+    weighted_rows: Option<([u64; N_STRENGTHS - SCATTER_AT], (Part, f64))>,
 }
 
 impl<'a> Search<'a> {
@@ -120,7 +120,7 @@ impl<'a> Search<'a> {
             bounds,
             x,
             value: 0.0,
-            heard: None,
+            weighted_rows: None,
         };
         search.value = search.at(&x);
         search
@@ -137,16 +137,20 @@ impl<'a> Search<'a> {
     fn at(&mut self, x: &Point) -> f64 {
         let strengths = strengths_of(x);
         let key = std::array::from_fn(|i| x[SCATTER_AT + i].to_bits());
-        if self.heard.as_ref().is_none_or(|(known, _)| *known != key) {
-            let Some(heard) = self.hypothesis.heard(&strengths) else {
+        if self
+            .weighted_rows
+            .as_ref()
+            .is_none_or(|(known, _)| *known != key)
+        {
+            let Some(weighted_rows) = self.hypothesis.weighted_rows(&strengths) else {
                 return f64::NEG_INFINITY;
             };
-            self.heard = Some((key, heard));
+            self.weighted_rows = Some((key, weighted_rows));
         }
-        let Some((_, heard)) = &self.heard else {
+        let Some((_, weighted_rows)) = &self.weighted_rows else {
             return f64::NEG_INFINITY;
         };
-        self.hypothesis.beside(&strengths, heard)
+        self.hypothesis.beside(&strengths, weighted_rows)
     }
 
     fn is_free(&self, i: usize) -> bool {
@@ -158,7 +162,7 @@ impl<'a> Search<'a> {
                 let mut scatters = self.x[SCATTER_OF[i - BETWEEN_AT].clone()].iter();
                 has_moves && scatters.any(|x| *x > LEAST_SCATTER.ln())
             }
-            _ => has_moves && self.bounds[i].0 < self.bounds[i].1 && self.x[i] < UNHEARD,
+            _ => has_moves && self.bounds[i].0 < self.bounds[i].1 && self.x[i] < NO_WEIGHT,
         }
     }
 

@@ -45,9 +45,9 @@ pub fn resample(signal: &[Sample], start: f64, dt: f64, times: &[f64]) -> Result
         .collect()
 }
 
-/// Analog-to-digital converter, raw units.
+/// Analog-to-digital adc, raw units.
 #[derive(Debug, Clone)]
-pub struct Converter {
+pub struct Adc {
     /// Resolution (LSB); 0 leaves the value as it is.
     pub lsb: f64,
     /// Lowest code.
@@ -62,7 +62,7 @@ pub struct Converter {
     pub missing_every: u32,
 }
 
-impl Converter {
+impl Adc {
     /// Convert in place: dead band, range, rounding to the nearest code, missing codes.
     ///
     /// # Errors

@@ -36,7 +36,7 @@ pub struct Bins {
 
 /// Model whose strengths are fitted.
 #[derive(Debug, Clone, Default)]
-pub struct Question {
+pub struct Terms {
     /// Terms in the model, as indices of `Bins::basis`.
     pub active: Vec<usize>,
     /// Whether a straight line in time is fitted.
@@ -134,26 +134,26 @@ impl Bins {
 ///
 /// # Errors
 /// As [`Bins::check`].
-pub fn fit(bins: &Bins, question: &Question) -> Result<Fit> {
+pub fn fit(bins: &Bins, terms: &Terms) -> Result<Fit> {
     bins.check()?;
-    let free = question.active.clone();
+    let free = terms.active.clone();
     let mut strength = vec![0.0; bins.basis.len()];
     for &k in &free {
         strength[k] = first_guess(bins, k);
     }
     for _ in 0..12 {
-        multiply(bins, &free, question.has_line, &mut strength);
+        multiply(bins, &free, terms.has_line, &mut strength);
     }
-    let is_converged = score(bins, &free, question.has_line, &mut strength);
+    let is_converged = score(bins, &free, terms.has_line, &mut strength);
     let v = bins.expectation(&strength);
-    let (slope, sigma_slope) = if question.has_line {
+    let (slope, sigma_slope) = if terms.has_line {
         bins.line(&v)
     } else {
         (0.0, 0.0)
     };
     let information = information(bins, &free, &strength, &v);
     let covariance = information.try_inverse();
-    let sigma_log = question
+    let sigma_log = terms
         .active
         .iter()
         .map(|k| match (&covariance, free.iter().position(|f| f == k)) {

@@ -151,7 +151,7 @@ def without_effects(calibration: Calibration, recording: Recording) -> tuple[Rec
     if not effects:
         return recording, ()
     # Imported here: a linear calibration does not need it.
-    from trihedron.diagnose import take_off
+    from trihedron.diagnose import compensate
 
     references = calibration.extensions.get("references", {})
     if not isinstance(effects, list | tuple) or not isinstance(references, dict | MappingProxyType):
@@ -159,7 +159,7 @@ def without_effects(calibration: Calibration, recording: Recording) -> tuple[Rec
             "the calibration's extensions are not those of a diagnosis: calibrate with --extended again."
         )
     gyroscope = calibration.gyroscope
-    done = take_off(
+    done = compensate(
         recording,
         effects,
         references,

@@ -13,7 +13,7 @@ from trihedron.api.identifying import allan
 from trihedron.api.reading import AnyRecording, read, recording_of, segment
 from trihedron.api.referring import AnyReference, motion_of
 from trihedron.errors import REFUSALS, RefusedError
-from trihedron.estimate.filter_noise.beside_reference import Asked, beside_reference
+from trihedron.estimate.filter_noise.beside_reference import Request, beside_reference
 from trihedron.estimate.filter_noise.static_intervals import at_rest, between_intervals, tilt_over_moves, unlike_axes
 from trihedron.files.formats.contract import NoiseFigure
 from trihedron.files.noise import read_noise
@@ -103,7 +103,7 @@ def filter_noise(
     tilt, intervals, source = None, None, ""
     if reference is not None:
         motion = motion_of(reference, reference_columns)
-        asked = Asked(horizons, band, gravity, known.get("gyroscope"), known.get("accelerometer"))
+        asked = Request(horizons, band, gravity, known.get("gyroscope"), known.get("accelerometer"))
         sensors = beside_reference(recording, motion, asked)
         source, findings = motion.source, (*findings, *motion.findings, *_noticed(sensors))
     else:

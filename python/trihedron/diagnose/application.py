@@ -102,7 +102,7 @@ class SampleContext(Context):
 
 
 @dataclass(frozen=True, eq=False)
-class TakenOff:
+class Compensated:
     """Raw readings (n, 3) with effects compensated, or ``None``; ``applied`` ids; ``left_out`` id → reason."""
 
     accelerometer: FloatArray | None
@@ -111,13 +111,13 @@ class TakenOff:
     left_out: MappingProxyType[str, str]
 
 
-def take_off(
+def compensate(
     recording: Recording,
     effects: Sequence[Mapping[str, Any]],
     references: Mapping[str, float],
     accelerometer: tuple[FloatArray, FloatArray],
     gyroscope: tuple[FloatArray, FloatArray] | None,
-) -> TakenOff:
+) -> Compensated:
     """Compensate accepted effects in raw readings: ``a' − S⁻¹ D(f) p``, with f the motion without them (eq. 11.3).
 
     ``effects`` and ``references`` are those of a diagnosis (``Diagnosis.to_dict``), ``accelerometer`` and
@@ -154,7 +154,7 @@ def take_off(
             if variant.distortion.rate is not None:
                 rate = rate - variant.distortion.rate @ values
     ids = tuple(str(entry["id"]) for entry in effects)
-    return TakenOff(
+    return Compensated(
         None if raw_f is None else raw_f + np.linalg.solve(S_f, (force - read_f).T).T,
         recording.gyroscope if raw_w is None else raw_w + np.linalg.solve(S_w, (rate - read_w).T).T,
         tuple(i for i in ids if i not in left_out),

@@ -104,9 +104,9 @@ def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
     # Noise strengths are in every hypothesis, so no selection penalty applies. Each axis beyond the first is one more
     # fitted strength, with a relative uncertainty of 1/sqrt(2n), and has the penalty of a parameter.
     n_strengths = 3 if effect.sensor == 1 and not effect.walks else 1
-    paid = (n_strengths - 1) * float(np.log(2.0 * max(model.obs.n_poses, 1)))
+    cost = (n_strengths - 1) * float(np.log(2.0 * max(model.obs.n_poses, 1)))
     price = price_of_choice(other.unavailable(model.context) for other in catalogue())
-    return BiasStrength(effect, gain, gain - paid, size, std, parameters, statement, without, price, is_large)
+    return BiasStrength(effect, gain, gain - cost, size, std, parameters, statement, without, price, is_large)
 
 
 def _flicker(model: Hypothesis) -> FloatArray:
@@ -164,9 +164,9 @@ def explain_as_much(one: BiasStrength, model: Hypothesis, tried: Iterable[Tried]
 
     # Bounds can only lower the evidence: only candidates that are near without them are evaluated.
     near = [other for other in tried if acts(other) and other.score + one.price > -NEAR]
-    asked = model.asked([other.term for other in near], bounds_without(model, one.effect)) if near else []
+    asked = model.with_added([other.term for other in near], bounds_without(model, one.effect)) if near else []
     found = [
-        replace(other, score=2.0 * (bounded.log_evidence - model.log_evidence) - other.term.paid, asked=bounded)
+        replace(other, score=2.0 * (bounded.log_evidence - model.log_evidence) - other.term.cost, asked=bounded)
         for other, bounded in zip(near, asked, strict=True)
     ]
     return sorted((other for other in found if other.score + one.price > -NEAR), key=lambda other: -other.score)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.hypothesis import Asked, Hypothesis, Look, Term
+from trihedron.diagnose.hypothesis import AddedTerms, AtStrengths, Hypothesis, Term
 
 PRIOR_SCALES = (1.0, 0.3, 0.1)
 """Prior widths tried, as factors on the data-sheet size of an effect: parts of a kind differ tenfold."""
@@ -34,7 +34,7 @@ class Tried:
 
     term: Term
     score: float
-    asked: Asked
+    asked: AddedTerms
 
     @property
     def p_value(self) -> float:
@@ -47,9 +47,9 @@ class Tried:
 def all_beside(model: Hypothesis) -> tuple[list[Tried], dict[str, str]]:
     """Every effect added to the hypothesis at its noise strengths; and the reasons why others do not apply."""
     terms, missing = terms_beside(model, ())
-    looks = model.looked_at(terms, PRIOR_SCALES) if terms else []
+    looks = model.gains(terms, PRIOR_SCALES) if terms else []
     asked = [
-        Asked(model.log_evidence + float(look.gain[:, 0].max()), model.strengths, look.value, look.covariance)
+        AddedTerms(model.log_evidence + float(look.gain[:, 0].max()), model.strengths, look.value, look.covariance)
         for look in looks
     ]
     return _best_of_each(terms, asked, model.log_evidence), missing
@@ -61,29 +61,29 @@ def candidates_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list
     if not terms:
         return [], missing
     leading = _leaders(model, terms)
-    asked = model.asked(leading)
+    asked = model.with_added(leading)
     # Columns that depend on the size (a delay) are computed again for the fitted size.
     sized = {
         k: replace(term, variant=made)
         for k, (term, one) in enumerate(zip(leading, asked, strict=True))
         if (made := term.effect.rescaled(model.context, term.variant, one.value)) is not None
     }
-    for k, one in zip(sized, model.asked(list(sized.values())), strict=True):
+    for k, one in zip(sized, model.with_added(list(sized.values())), strict=True):
         leading[k], asked[k] = sized[k], one
     plain = model.plain([one.strengths for one in asked])
     best = _best_of_each(leading, asked, plain)
     # The screening at fixed noise strengths may have chosen a prior width that is too small or too large.
     first = [one.term for one in best[:N_RESIZED]]
     other = [replace(t, sizes=t.sizes * scale) for t in first for scale in RESCALED]
-    found = _best_of_each([*leading, *other], [*asked, *(model.asked(other) if other else [])], plain)
+    found = _best_of_each([*leading, *other], [*asked, *(model.with_added(other) if other else [])], plain)
     return found, missing
 
 
-def _best_of_each(terms: Sequence[Term], asked: Sequence[Asked], plain: float) -> list[Tried]:
+def _best_of_each(terms: Sequence[Term], asked: Sequence[AddedTerms], plain: float) -> list[Tried]:
     """The best shape with a plausible size of every effect, best effect first."""
     best: dict[str, Tried] = {}
     for term, one in zip(terms, asked, strict=True):
-        score = 2.0 * (one.log_evidence - plain) - term.paid
+        score = 2.0 * (one.log_evidence - plain) - term.cost
         known = best.get(term.effect.id)
         if (known is None or score > known.score) and _is_possible(term, one):
             best[term.effect.id] = Tried(term, score, one)
@@ -102,9 +102,9 @@ def terms_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term
         if effect.id in held or reasons[effect.id] is not None:
             continue
         variants = [v for v in effect.variants(context) if (effect.id, v.label) not in places]
-        paid = price + 2.0 * float(np.log(max(len(variants), 1) * len(PRIOR_SCALES)))
+        cost = price + 2.0 * float(np.log(max(len(variants), 1) * len(PRIOR_SCALES)))
         # A shape that represents a family, a filter of any order, has an extra penalty.
-        terms += [Term(effect, v, effect.sizes(context, v), paid + FAMILY * v.stands_for_many) for v in variants]
+        terms += [Term(effect, v, effect.sizes(context, v), cost + FAMILY * v.is_family) for v in variants]
     return terms, missing
 
 
@@ -116,7 +116,7 @@ def price_of_choice(reasons: Iterable[str | None]) -> float:
 
 def _leaders(model: Hypothesis, terms: list[Term]) -> list[Term]:
     """Candidates that gain most one linear step from the fit, at its noise strengths and others, at their best size."""
-    looks = model.looked_at(terms, PRIOR_SCALES)
+    looks = model.gains(terms, PRIOR_SCALES)
     gains = np.stack([look.gain for look in looks], axis=1)
     possible = [_can_be(model, term, look) for term, look in zip(terms, looks, strict=True)]
     kept: dict[int, int] = {}
@@ -133,12 +133,12 @@ def _leaders(model: Hypothesis, terms: list[Term]) -> list[Term]:
     return [replace(terms[k], sizes=terms[k].sizes * PRIOR_SCALES[scale]) for k, scale in kept.items()]
 
 
-def _can_be(model: Hypothesis, term: Term, look: Look) -> bool:
+def _can_be(model: Hypothesis, term: Term, look: AtStrengths) -> bool:
     """Whether the size found in a look is plausible, or columns can be computed anew for that size."""
     effect = term.effect
     is_plausible = effect.is_plausible_variant(term.variant, look.value, look.covariance)
     return is_plausible or effect.rescaled(model.context, term.variant, look.value) is not None
 
 
-def _is_possible(term: Term, asked: Asked) -> bool:
+def _is_possible(term: Term, asked: AddedTerms) -> bool:
     return term.effect.is_plausible_variant(term.variant, asked.value, asked.covariance)

@@ -23,7 +23,7 @@ from trihedron.diagnose.residuals.goodness_of_fit import hidden_biases, judge_ro
 from trihedron.diagnose.residuals.settling import settling, with_settling
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
 from trihedron.diagnose.sample_evidence import Observed, look
-from trihedron.diagnose.search import Found, search
+from trihedron.diagnose.search import Found, search, threshold
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_state
@@ -192,7 +192,7 @@ class _Run:
 
 def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, tell: Progress) -> _Run:
     tell(0.05, "fitting the session")
-    predicted = _with_settling(tune_noise(obs, start, NO_DISTORTION, prior), start, prior)
+    predicted = _with_settling(tune_noise(obs, start, NO_DISTORTION, prior), start, prior, alpha)
     context = Context(predicted.line.obs, predicted)
     tell(0.2, "looking at the samples")
     observed, known = look(Observed(predicted.line.obs, predicted), context, alpha, start, prior)
@@ -230,18 +230,13 @@ def _searched(observed: Observed, prior: Prior | None, alpha: float) -> tuple[Hy
     return bare, search(bare, alpha)
 
 
-def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None) -> Fit:
-    """The fit, with the noise of static rates and moves widened where settling of poses is detected (eq. 8.7f)."""
-    rates = [one for one in judge_rows(predicted, CREEP_ALPHA) if one.domain == "static-gyro"]
-    if not any(one.disagrees for one in rates):
-        return predicted
+def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None, alpha: float) -> Fit:
+    """The fit, with the noise of static rates and moves widened where poses settle (eq. 8.7f)."""
     context = Context(predicted.line.obs, predicted)
     found = settling(context)
-    return tune_noise(with_settling(context, found), start, NO_DISTORTION, prior) if found.is_seen else predicted
-
-
-CREEP_ALPHA = 0.01
-"""False-alarm rate of the test of static rates that triggers the test for settling."""
+    if found.score < threshold(alpha):
+        return predicted
+    return tune_noise(with_settling(context, found), start, NO_DISTORTION, prior)
 
 
 def _all_domains(context: Context, alpha: float, refused: Collection[str] = ()) -> tuple[DomainTest, ...]:

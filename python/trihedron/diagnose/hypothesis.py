@@ -38,13 +38,13 @@ ELSEWHERE: tuple[Strengths, ...] = (
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """One effect of a hypothesis: its columns, the prior σ of each parameter, and ``paid``, the correction for its
+    """One effect of a hypothesis: its columns, the prior σ of each parameter, and ``cost``, the correction for its
     choice among shapes and effects, in twice a log-likelihood."""
 
     effect: Effect
     variant: Variant
     sizes: FloatArray
-    paid: float = 0.0
+    cost: float = 0.0
 
     @property
     def distortion(self) -> Distortion:
@@ -53,7 +53,7 @@ class Term:
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class AddedTerms:
     """Result of adding columns to a hypothesis, one linear step from its fit, noise strengths refitted.
 
     ``log_evidence`` with everything but the strengths integrated out, at the ``strengths`` that make it largest;
@@ -67,7 +67,7 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class AtStrengths:
     """Result of adding columns at fixed noise strengths: ``gain`` (prior scales, strengths) in log-evidence; ``value``
     (k,) and ``covariance`` (k, k) at the first strengths and their best scale."""
 
@@ -106,21 +106,23 @@ class Hypothesis:
         """Blocks of poses and moves, each predicted from all others."""
         return predict_held_out(self.fitted, folds_of(self.fitted))
 
-    def asked(self, terms: Sequence[Term], within: Bounds | None = None) -> list[Asked]:
+    def with_added(self, terms: Sequence[Term], within: Bounds | None = None) -> list[AddedTerms]:
         """Evidence of the hypothesis with each of some terms added, noise strengths refitted ``within`` bounds."""
         bounds = self.within if within is None else within
         found = self.fitted.line.core.evidence(_columns(terms), [self.strengths, *ELSEWHERE], bounds)
-        return [Asked(*one) for one in found]
+        return [AddedTerms(*one) for one in found]
 
-    def looked_at(
+    def gains(
         self, terms: Sequence[Term], scales: Sequence[float], parts: Sequence[Sequence[int]] | None = None
-    ) -> list[Look]:
+    ) -> list[AtStrengths]:
         """Gain of each of some terms at the strengths found and at ``ELSEWHERE``, prior sizes times each of ``scales``.
 
         With ``parts``, lists of column numbers, the gain of each of these subsets.
         """
-        found = self.fitted.line.core.looks(_columns(terms), list(scales), [self.strengths, *ELSEWHERE], parts)
-        return [Look(*one) for one in found]
+        found = self.fitted.line.core.candidate_gains(
+            _columns(terms), list(scales), [self.strengths, *ELSEWHERE], parts
+        )
+        return [AtStrengths(*one) for one in found]
 
     def plain(self, strengths: Sequence[Strengths]) -> float:
         """Log-evidence without another term, noise strengths refitted from each of ``strengths``."""

@@ -64,7 +64,7 @@ class Found:
     @property
     def scores(self) -> tuple[float, ...]:
         """Gain of every term less its penalty for the choice among shapes and effects."""
-        return tuple(gain - term.paid for gain, term in zip(self.gains, self.model.terms, strict=True))
+        return tuple(gain - term.cost for gain, term in zip(self.gains, self.model.terms, strict=True))
 
 
 def threshold(alpha: float) -> float:
@@ -112,8 +112,8 @@ def _instead_of_a_process(found: Found, alpha: float) -> _State | None:
         bounded = again(larger, larger.terms, bounds_without(larger, process.effect))
         judged = _Judged(bounded, without_each(bounded))
         least = judged.without[-1]
-        is_likelier = 2.0 * (bounded.log_evidence - model.log_evidence) - chosen.paid > -process.price
-        gained = 2.0 * (bounded.log_evidence - least.log_evidence) - chosen.paid
+        is_likelier = 2.0 * (bounded.log_evidence - model.log_evidence) - chosen.cost > -process.price
+        gained = 2.0 * (bounded.log_evidence - least.log_evidence) - chosen.cost
         if is_likelier and gained > threshold(alpha) and _is_shown(bounded, least, len(bounded.terms) - 1):
             curve = found.tried.get(process.effect.id)
             return _State(judged, rivals={} if curve is None else {chosen.effect.id: [curve]})
@@ -176,7 +176,7 @@ def _beside_relations(judged: _Judged, limit: float) -> tuple[_Judged, Related]:
     for k, fewer in enumerate(judged.without):
         # An effect that scores beside the relations too is kept.
         without = again(best.model, [t for j, t in enumerate(best.model.terms) if j != k])
-        gained = 2.0 * (best.model.log_evidence - without.log_evidence) - judged.model.terms[k].paid
+        gained = 2.0 * (best.model.log_evidence - without.log_evidence) - judged.model.terms[k].cost
         if gained > limit:
             continue
         other = related(fewer, limit)
@@ -214,7 +214,7 @@ def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Te
         value, covariance = larger.value(len(larger.terms) - 1)
         if not term.effect.is_plausible_variant(term.variant, value, covariance):
             continue
-        score = 2.0 * larger.log_evidence - term.paid
+        score = 2.0 * larger.log_evidence - term.cost
         if best is None or score > best[0]:
             best = score, larger, term
     return (model, None) if best is None else best[1:]
@@ -233,7 +233,7 @@ def _pruned(model: Hypothesis, limit: float) -> _Judged:
     while True:
         without = without_each(model)
         scores = [
-            2.0 * (model.log_evidence - one.log_evidence) - term.paid if _is_shown(model, one, k) else -np.inf
+            2.0 * (model.log_evidence - one.log_evidence) - term.cost if _is_shown(model, one, k) else -np.inf
             for k, (term, one) in enumerate(zip(model.terms, without, strict=True))
         ]
         if not scores or min(scores) > limit:
@@ -263,12 +263,12 @@ def _swapped(judged: _Judged, rivals: dict[str, list[Tried]]) -> tuple[Hypothesi
     named: dict[str, list[str]] = {}
     for k, without in enumerate(judged.without):
         term = model.terms[k]
-        scored = [(2.0 * model.log_evidence - term.paid, model, term)]
+        scored = [(2.0 * model.log_evidence - term.cost, model, term)]
         for other in _others(rivals.get(term.effect.id, []), {t.effect.id for t in model.terms}):
             fitted = as_fits_best(without, other)
             swapped = again(model, [*model.terms[:k], fitted, *model.terms[k + 1 :]])
             if fitted.effect.is_plausible_variant(fitted.variant, *swapped.value(k)):
-                scored.append((2.0 * swapped.log_evidence - fitted.paid, swapped, fitted))
+                scored.append((2.0 * swapped.log_evidence - fitted.cost, swapped, fitted))
         _, model, chosen = max(scored, key=lambda one: one[0])
         least = model.log_evidence - 0.5 * NEAR
         named[chosen.effect.id] = [

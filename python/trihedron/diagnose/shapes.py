@@ -28,7 +28,7 @@ def as_fits_best(model: Hypothesis, tried: Tried) -> Term:
         if made is None:
             break
         term = replace(term, variant=made)
-        asked = model.asked([term])[0]
+        asked = model.with_added([term])[0]
     return _reshaped(model, term)
 
 
@@ -43,7 +43,7 @@ def _reshaped(model: Hypothesis, term: Term) -> Term:
     for _ in range(N_RESHAPED):
         steps = spread * SHAPE_STEPS
         made = [term.effect.reshaped(model.context, term.variant, value * float(np.exp(step))) for step in steps]
-        asked = model.asked([replace(term, variant=v) for v in made if v is not None])
+        asked = model.with_added([replace(term, variant=v) for v in made if v is not None])
         gain = np.array([one.log_evidence for one in asked])
         a, b, _ = np.polyfit(steps, gain, 2)
         if a < 0.0:

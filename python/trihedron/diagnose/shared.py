@@ -18,7 +18,7 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.effects.direct import DirectEffect
-from trihedron.diagnose.hypothesis import Asked, Hypothesis, Term, again
+from trihedron.diagnose.hypothesis import AddedTerms, Hypothesis, Term, again
 from trihedron.diagnose.search import MOST_EFFECTS, threshold
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.shared_effects import SharedCandidate, SharedEffect
@@ -39,7 +39,7 @@ class Information:
     precision: FloatArray
 
     @classmethod
-    def of(cls, asked: Asked, term: Term, unit: FloatArray, plain: float) -> Information:
+    def of(cls, asked: AddedTerms, term: Term, unit: FloatArray, plain: float) -> Information:
         """From the posterior under a prior of standard deviations ``term.sizes``; ``unit`` is the unit of ``q``."""
         posterior = np.linalg.inv(asked.covariance / np.outer(unit, unit))
         prior = np.diag((unit / term.sizes) ** 2)
@@ -129,12 +129,12 @@ class _Held:
 
     models: tuple[Hypothesis, ...]
     n_added: int
-    paid: tuple[float, ...]
+    cost: tuple[float, ...]
 
     def without(self, k: int) -> _Held:
         """Without the shared effect ``k``."""
         fewer = tuple(again(m, [t for j, t in enumerate(m.terms) if j != self._at(m, k)]) for m in self.models)
-        return _Held(fewer, self.n_added - 1, tuple(p for j, p in enumerate(self.paid) if j != k))
+        return _Held(fewer, self.n_added - 1, tuple(p for j, p in enumerate(self.cost) if j != k))
 
     def _at(self, model: Hypothesis, k: int) -> int:
         return len(model.terms) - self.n_added + k
@@ -157,7 +157,7 @@ def _added(models: list[Hypothesis], limit: float) -> tuple[_Held, list[_Joint]]
             again(m, [*m.terms, replace(t, sizes=t.sizes * best.scale)])
             for m, t in zip(held.models, best.terms, strict=True)
         )
-        held = _Held(larger, held.n_added + 1, (*held.paid, best.terms[0].paid))
+        held = _Held(larger, held.n_added + 1, (*held.cost, best.terms[0].cost))
 
 
 def _judged(held: _Held, k: int, alpha: float) -> tuple[float, SharedEffect]:
@@ -175,7 +175,7 @@ def _judged(held: _Held, k: int, alpha: float) -> tuple[float, SharedEffect]:
         id=term.effect.id,
         score=joint.score,
         parameters=parameters(joint.value, joint.covariance),
-        scores=tuple(2.0 * gain - term.paid for gain, *_ in alone),
+        scores=tuple(2.0 * gain - term.cost for gain, *_ in alone),
         each=tuple(parameters(value, covariance) for _, value, covariance in alone),
         p_agree=(p_agree := agreement(joint.parts)),
         is_of_instrument=p_agree > alpha,
@@ -190,11 +190,11 @@ def _tried(models: Sequence[Hypothesis], exclude: Collection[str]) -> list[_Join
     if not common:
         return []
     terms = {key: tuple(one[key] for one in found) for key in common}
-    looks = [m.looked_at([terms[key][i] for key in common], (1.0,)) for i, m in enumerate(models)]
+    looks = [m.gains([terms[key][i] for key in common], (1.0,)) for i, m in enumerate(models)]
     glanced = []
     for j, key in enumerate(common):
         asked = [
-            Asked(m.log_evidence + float(look[j].gain[0, 0]), m.strengths, look[j].value, look[j].covariance)
+            AddedTerms(m.log_evidence + float(look[j].gain[0, 0]), m.strengths, look[j].value, look[j].covariance)
             for m, look in zip(models, looks, strict=True)
         ]
         glanced.append(_joint(terms[key], asked, [m.log_evidence for m in models]))
@@ -216,15 +216,15 @@ def _best_of_each(all_of: Sequence[_Joint]) -> list[_Joint]:
 
 def _full(models: Sequence[Hypothesis], terms: tuple[Term, ...]) -> _Joint:
     """A candidate evaluated with the noise strengths of every recording refitted."""
-    asked = [m.asked([t])[0] for m, t in zip(models, terms, strict=True)]
+    asked = [m.with_added([t])[0] for m, t in zip(models, terms, strict=True)]
     return _joint(terms, asked, [m.plain([a.strengths]) for m, a in zip(models, asked, strict=True)])
 
 
-def _joint(terms: tuple[Term, ...], asked: Sequence[Asked], plain: Sequence[float]) -> _Joint:
+def _joint(terms: tuple[Term, ...], asked: Sequence[AddedTerms], plain: Sequence[float]) -> _Joint:
     unit = terms[0].sizes
     # The columns of recordings may have different scales to the reported unit.
     units = [unit * terms[0].variant.scale / t.variant.scale for t in terms]
     parts = tuple(Information.of(a, t, u, p) for a, t, u, p in zip(asked, terms, units, plain, strict=True))
     made = [(scale, *together(parts, scale)) for scale in PRIOR_SCALES]
     scale, gain, value, covariance = max(made, key=lambda one: one[1])
-    return _Joint(terms, parts, scale, 2.0 * gain - max(t.paid for t in terms), value, covariance)
+    return _Joint(terms, parts, scale, 2.0 * gain - max(t.cost for t in terms), value, covariance)

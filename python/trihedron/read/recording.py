@@ -205,7 +205,7 @@ def audited(
         onboard=sensors.table.onboard,
         rows_in_file=sensors.rows_in_file,
         rows_read=sensors.rows_read,
-    ).knowing(facts)
+    ).with_facts(facts)
 
 
 def _judged_gyro(

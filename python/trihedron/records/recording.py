@@ -170,7 +170,7 @@ class Recording(Presented):
         distinct = spread_timestamps(self.time_s, 1.0 / self.rate_hz)
         return self if distinct is self.time_s else self.with_same_readings(time_s=distinct)
 
-    def knowing(self, facts: RecordingFacts) -> Recording:
+    def with_facts(self, facts: RecordingFacts) -> Recording:
         """This recording with the channel properties that its reader has measured."""
         self.__dict__["facts"] = facts
         return self
@@ -178,7 +178,7 @@ class Recording(Presented):
     def with_same_readings(self, **changes: Any) -> Recording:
         """This recording with fields other than the readings changed; measured channel properties are kept."""
         changed = replace(self, **changes)
-        return changed.knowing(self.facts) if "facts" in self.__dict__ else changed
+        return changed.with_facts(self.facts) if "facts" in self.__dict__ else changed
 
     @classmethod
     def from_arrays(

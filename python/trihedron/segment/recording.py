@@ -36,7 +36,7 @@ from trihedron.segment.runs import (
     widen,
     without_approaches,
 )
-from trihedron.segment.shaken import find_shaken
+from trihedron.segment.shaken import find_vibrating
 from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks, turning_blocks
 from trihedron.units import AccelerationUnit, rate_to_si
 
@@ -110,7 +110,7 @@ def segment_blocks(
         )
     loose = loose_blocks(activity, channels.is_valid) & ~turning
     found = _find_runs(recording, channels, quiet, loose)
-    found = find_shaken(recording, channels, activity, found, ~turning, (gravity, scale))
+    found = find_vibrating(recording, channels, activity, found, ~turning, (gravity, scale))
     found.sort(key=lambda run: run.first)
     runs, said = without_cut(recording, channels, found, ends)
     report(0.7, "means and their errors")

@@ -51,7 +51,7 @@ ABOVE_NOISE = 2.0
 """Power over that of the noise from which a sensor shows vibration."""
 
 
-def find_shaken(
+def find_vibrating(
     recording: Recording,
     channels: Channels,
     activity: Activity,

@@ -11,14 +11,14 @@ use super::{AllStrengths, Bounds, all_strengths, distortion, sizes_fit, strength
 use crate::error::Result;
 use crate::python::arrays::matrix;
 use crate::python::run_long;
+use crate::session_model::candidate_gains::CandidateGains;
 use crate::session_model::fit::Fit;
 use crate::session_model::hypothesis::Hypothesis;
-use crate::session_model::looks::Looks;
 use crate::session_model::{Distortion, Session, Strengths};
 
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
 /// Columns of force and rate of further effects, and their prior sizes.
-pub(super) type Asked<'py> = (Option<Array3<'py>>, Option<Array3<'py>>, Vec<f64>);
+pub(super) type Candidate<'py> = (Option<Array3<'py>>, Option<Array3<'py>>, Vec<f64>);
 /// Log-evidence, strengths, parameters and their covariance.
 pub(super) type Answer<'py> = (
     f64,
@@ -38,7 +38,7 @@ pub(super) type Glance<'py> = (
 pub(super) fn tuned<'py>(
     of: (&Arc<Session>, &Arc<Fit>),
     py: Python<'py>,
-    hypotheses: &[Asked<'py>],
+    hypotheses: &[Candidate<'py>],
     strengths: Vec<AllStrengths>,
     within: Bounds,
 ) -> PyResult<Vec<Answer<'py>>> {
@@ -60,13 +60,13 @@ pub(super) fn tuned<'py>(
 pub(super) fn seen<'py>(
     of: (&Arc<Session>, &Arc<Fit>),
     py: Python<'py>,
-    candidates: &[Asked<'py>],
+    candidates: &[Candidate<'py>],
     scales: Vec<f64>,
     strengths: Vec<AllStrengths>,
     parts: Option<Vec<Vec<usize>>>,
 ) -> PyResult<Vec<Glance<'py>>> {
     let at: Vec<Strengths> = strengths.into_iter().map(strengths_of).collect();
-    let asked = asked_of(of.0, candidates)?;
+    let asked = columns_of(of.0, candidates)?;
     if let Some(parts) = &parts {
         let k = asked.iter().map(|(_, sizes)| sizes.len()).min();
         if parts.iter().flatten().any(|&i| k.is_none_or(|k| i >= k)) {
@@ -77,12 +77,12 @@ pub(super) fn seen<'py>(
     }
     let (session, fit) = (Arc::clone(of.0), Arc::clone(of.1));
     let found = run_long(py, || {
-        let looks = Looks::of(&fit, &at)?;
+        let gains = CandidateGains::of(&fit, &at)?;
         let each = asked.par_iter().map(|(effects, sizes)| {
             let columns =
                 session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, effects)?;
             let whole = || vec![(0..sizes.len()).collect()];
-            looks.seen(
+            gains.of_candidates(
                 &columns,
                 sizes,
                 &scales,
@@ -101,7 +101,10 @@ pub(super) fn seen<'py>(
     lent.collect()
 }
 
-fn asked_of(session: &Session, hypotheses: &[Asked<'_>]) -> PyResult<Vec<(Distortion, Vec<f64>)>> {
+fn columns_of(
+    session: &Session,
+    hypotheses: &[Candidate<'_>],
+) -> PyResult<Vec<(Distortion, Vec<f64>)>> {
     let each = hypotheses.iter().map(|(force, rate, sizes)| {
         let effects = distortion(force.as_ref(), rate.as_ref(), session.n_points())?;
         sizes_fit(sizes, effects.k)?;
@@ -114,10 +117,10 @@ fn asked_of(session: &Session, hypotheses: &[Asked<'_>]) -> PyResult<Vec<(Distor
 fn each<T: Send + 'static>(
     of: (&Arc<Session>, &Arc<Fit>),
     py: Python<'_>,
-    hypotheses: &[Asked<'_>],
+    hypotheses: &[Candidate<'_>],
     ask: impl Fn(&Hypothesis) -> Result<T> + Send + Sync + 'static,
 ) -> PyResult<Vec<T>> {
-    let asked = asked_of(of.0, hypotheses)?;
+    let asked = columns_of(of.0, hypotheses)?;
     let (session, fit) = (Arc::clone(of.0), Arc::clone(of.1));
     run_long(py, || {
         let each = asked.par_iter().map(|(effects, sizes)| {

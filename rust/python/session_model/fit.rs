@@ -10,7 +10,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use super::evidence::{Answer, Asked, Glance, seen, tuned};
+use super::evidence::{Answer, Candidate, Glance, seen, tuned};
 use super::read_out::{Blocks, Rows, flagged, labels, moves, path, stacked};
 use super::{AllStrengths, Bounds, all_strengths, distortion};
 use crate::error::Result;
@@ -221,7 +221,7 @@ impl SessionFit {
     fn evidence<'py>(
         &self,
         py: Python<'py>,
-        hypotheses: Vec<Asked<'py>>,
+        hypotheses: Vec<Candidate<'py>>,
         strengths: Vec<AllStrengths>,
         within: Bounds,
     ) -> PyResult<Vec<Answer<'py>>> {
@@ -238,10 +238,10 @@ impl SessionFit {
     /// `(scales, strengths)`; its parameters and their covariance at the first strengths and their best scale. With
     /// `parts` (indices of columns), the gain of each part instead, candidate after candidate.
     #[pyo3(signature = (candidates, scales, strengths, parts=None))]
-    fn looks<'py>(
+    fn candidate_gains<'py>(
         &self,
         py: Python<'py>,
-        candidates: Vec<Asked<'py>>,
+        candidates: Vec<Candidate<'py>>,
         scales: Vec<f64>,
         strengths: Vec<AllStrengths>,
         parts: Option<Vec<Vec<usize>>>,

@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 
 use crate::python::arrays::{matrix3, rows3, samples, stack3, vector3};
 use crate::session_model::moves::Move;
-use crate::session_model::{AtRest, State};
+use crate::session_model::{State, StaticMeans};
 
 type Array1<'py> = PyReadonlyArray1<'py, f64>;
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
@@ -21,8 +21,8 @@ type Array3<'py> = PyReadonlyArray3<'py, f64>;
 #[pyclass(frozen, module = "trihedron._core")]
 pub(super) struct SessionPoses {
     pub time_s: Vec<f64>,
-    pub force: AtRest,
-    pub rate: Option<AtRest>,
+    pub force: StaticMeans,
+    pub rate: Option<StaticMeans>,
 }
 
 #[pymethods]
@@ -46,7 +46,7 @@ impl SessionPoses {
         let at_rest =
             |mean: &Array2<'_>, sigma: &Array2<'_>, density: &Array1<'_>, along: Along<'_>| {
                 let (mean, sigma) = (rows3("pose means", mean)?, rows3("pose sigmas", sigma)?);
-                AtRest::of(mean, sigma, vector3("density", density)?, along)
+                StaticMeans::of(mean, sigma, vector3("density", density)?, along)
                     .map_err(|error| PyValueError::new_err(error.to_string()))
             };
         let along = force_along

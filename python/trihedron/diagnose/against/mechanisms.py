@@ -46,7 +46,7 @@ def left_open_by(effects: Iterable[AcceptedEffect], span_k: float | None = None)
     (the cosines of a curve can add up at its start); infinite where it is not known. An effect that both sides have
     counts once, with its larger size.
     """
-    named = {effect.id: effect.leaves_open for effect in catalogue()}
+    named = {effect.id: effect.confounded_with for effect in catalogue()}
     by_effect: dict[tuple[str, str], float] = {}
     for effect in effects:
         for number in named.get(effect.id, ()):

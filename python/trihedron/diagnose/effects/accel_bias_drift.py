@@ -19,7 +19,7 @@ class AccelBiasDrift(BiasDrift):
     """Accelerometer bias drift: seen in the norm of gravity from pose to pose."""
 
     id = "accel-bias-drift"
-    leaves_open = ("accel-bias",)
+    confounded_with = ("accel-bias",)
     sensor, unit, domain = 0, "m/s^2", "static-accel"
     typical = 0.05
 

@@ -32,7 +32,7 @@ class Variant:
 
     ``shape`` are nonlinear parameters (time constants, widths) chosen from a grid; the score corrects for their number.
     ``scale`` converts a linear parameter to the reported unit. ``given`` holds known values of the session (gravity)
-    that limit the possible parameters. ``stands_for_many`` marks a shape that represents a family (a filter of any
+    that limit the possible parameters. ``is_family`` marks a shape that represents a family (a filter of any
     order and damping): a plain mechanism that explains as much is preferred.
     """
 
@@ -44,7 +44,7 @@ class Variant:
     shape_sigma: float = 0.0
     scale: float = 1.0
     given: dict[str, float] = field(default_factory=dict)
-    stands_for_many: bool = False
+    is_family: bool = False
 
 
 class Effect(ABC):
@@ -73,7 +73,7 @@ class Effect(ABC):
     """Whether it belongs to the motion of one session (the arm to the centre of rotation)."""
     is_of_samples: ClassVar[bool] = False
     """Whether its stated share is one of the variance inside poses (a line)."""
-    leaves_open: ClassVar[tuple[str, ...]] = ()
+    confounded_with: ClassVar[tuple[str, ...]] = ()
     """Ids of parameters whose value depends on the reference point of the effect: the bias at the session's mean
     temperature is not the bias at 25 °C."""
     drifts_as: ClassVar[str] = ""

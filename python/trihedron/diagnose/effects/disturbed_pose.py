@@ -156,7 +156,7 @@ class DisturbedPose(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         obs = context.obs
-        seen = {span: _bump(obs, span) for span in obs.bumped_s}
+        seen = {span: _bump(obs, span) for span in obs.disturbed_s}
         bumps = {
             span: bump
             for span, bump in seen.items()
@@ -180,7 +180,7 @@ class DisturbedPose(DirectEffect):
         strength = 10.0 * (len(bumped) + len(restless))
         names = list(dict.fromkeys(obs.pose_names(restless)))
         told = self.told(
-            "not-still", is_bumped=bool(bumped), bumped_s=[(0.5 * (a + b),) for a, b in bumped[:MOST_NAMED]],
+            "not-still", is_bumped=bool(bumped), disturbed_s=[(0.5 * (a + b),) for a, b in bumped[:MOST_NAMED]],
             is_restless=bool(restless), restless=names[:MOST_NAMED], are_both=bool(bumped and restless),
         )  # fmt: skip
         parameters = tuple(EffectParameter("pose_at", 0.5 * (a + b), 0.5 * max(b - a, 0.1), "s") for a, b in spans[:6])

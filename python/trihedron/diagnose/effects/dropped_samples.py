@@ -227,7 +227,7 @@ def insert_samples(recording: Recording, segments: Segments, losses: dict[int, i
         temperature_degc=bridged(recording.temperature_degc),
         supply_v=bridged(recording.supply_v),
         auxiliary=type(recording.auxiliary)({}),
-    ).knowing(recording.facts.moved(new_index))
+    ).with_facts(recording.facts.moved(new_index))
 
     def at(index: int) -> int:
         return int(new_index[index]) if index < n_old else total

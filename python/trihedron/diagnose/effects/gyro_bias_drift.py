@@ -15,7 +15,7 @@ class GyroBiasDrift(BiasDrift):
     """Gyro bias drift: seen in the static rates from pose to pose."""
 
     id = "gyro-bias-drift"
-    leaves_open = ("gyro-bias",)
+    confounded_with = ("gyro-bias",)
     sensor, unit, domain = 1, "rad/s", "static-gyro"
     typical = 4e-3
 

@@ -63,7 +63,7 @@ def _second_order(context: Context, name: str, time_s: float, label: str) -> Var
     is_accelerometer = name == "accelerometer"
     columns = by_low_pass(context, context.force if is_accelerometer else context.rate, time_s)[:, :, None]
     only = force_only if is_accelerometer else rate_only
-    return Variant(only(columns), (f"{name}_lag",), ("s",), label=label, scale=time_s, stands_for_many=True)
+    return Variant(only(columns), (f"{name}_lag",), ("s",), label=label, scale=time_s, is_family=True)
 
 
 FIRST_ORDER_S = 0.01

@@ -47,7 +47,7 @@ class AccelThermalScale(ThermalScale):
     """Accelerometer scale."""
 
     id = "accel-thermal-scale"
-    leaves_open = ("accel-bias", "accel-scale")
+    confounded_with = ("accel-bias", "accel-scale")
     drifts_as = "accel-bias-drift"
 
 
@@ -56,7 +56,7 @@ class GyroThermalScale(ThermalScale):
 
     id = "gyro-thermal-scale"
     is_gyro = True
-    leaves_open = ("gyro-bias", "gyro-scale")
+    confounded_with = ("gyro-bias", "gyro-scale")
     drifts_as = "gyro-bias-drift"
 
 
@@ -80,7 +80,7 @@ class AccelThermalBias(ThermalBias):
     """Accelerometer bias: half a mg per kelvin."""
 
     id = "accel-thermal-bias"
-    leaves_open = ("accel-bias",)
+    confounded_with = ("accel-bias",)
     drifts_as = "accel-bias-drift"
     per_kelvin = 0.005
 
@@ -90,6 +90,6 @@ class GyroThermalBias(ThermalBias):
 
     id = "gyro-thermal-bias"
     is_gyro = True
-    leaves_open = ("gyro-bias",)
+    confounded_with = ("gyro-bias",)
     drifts_as = "gyro-bias-drift"
     per_kelvin = 4e-4

@@ -142,7 +142,7 @@ class TimingJitter(DirectEffect):
                 move_ranges=obs.move_ranges,
                 move_poses=obs.move_poses,
                 jitter_s=obs.jitter_s,
-                bumped_s=obs.bumped_s,
+                disturbed_s=obs.disturbed_s,
             )
 
         return Evidence(

@@ -62,7 +62,7 @@ class Related:
     @property
     def score(self) -> float:
         """Twice the log-evidence of the whole, less the penalties of its terms."""
-        return 2.0 * self.model.log_evidence - sum(term.paid for term in self.model.terms)
+        return 2.0 * self.model.log_evidence - sum(term.cost for term in self.model.terms)
 
 
 def related(model: Hypothesis, limit: float) -> Related:
@@ -74,7 +74,7 @@ def related(model: Hypothesis, limit: float) -> Related:
         if best is None:
             break
         larger = again(model, [*model.terms, best.term])
-        if 2.0 * (larger.log_evidence - model.log_evidence) - best.term.paid <= limit:
+        if 2.0 * (larger.log_evidence - model.log_evidence) - best.term.cost <= limit:
             break
         found.append(best)
         steps.append(model)
@@ -93,18 +93,18 @@ def _best(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> 
         ways = [way for way in _ways(signal) if (signal.sensor, tuple(signal.names[k] for k in way[0])) not in known]
         m = len(signal.names)
         parts = [[a * m + k for a in axes for k in names] for names, axes in ways]
-        looks = model.looked_at([whole.term], PRIOR_SCALES, parts)
+        looks = model.gains([whole.term], PRIOR_SCALES, parts)
         n_tried += len(ways)
         leading = _led(leading, signal, ways, [look.gain for look in looks])
-    paid = 2.0 * float(np.log(max(n_tried, 1) * len(PRIOR_SCALES)))
+    cost = 2.0 * float(np.log(max(n_tried, 1) * len(PRIOR_SCALES)))
     # The same relation may lead at several strengths: the one with the largest gain, the last, is kept.
     ahead = {(id(one[1]), one[2]): one for one in sorted(chain(*leading), key=lambda one: one[0])}.values()
-    each = [_part(context, signal, way, scale, paid) for gain, signal, way, scale in ahead if 2.0 * gain > paid]
+    each = [_part(context, signal, way, scale, cost) for gain, signal, way, scale in ahead if 2.0 * gain > cost]
     if not each:
         return None
-    asked = model.asked([one.term for one in each])
+    asked = model.with_added([one.term for one in each])
     plain = model.plain([one.strengths for one in asked])
-    scores = [2.0 * (one.log_evidence - plain) - paid for one in asked]
+    scores = [2.0 * (one.log_evidence - plain) - cost for one in asked]
     best = int(np.argmax(scores))
     return each[best] if scores[best] > 0.0 else None
 
@@ -156,7 +156,7 @@ def _families(context: Context) -> Iterator[Follows]:
     yield from _room(context)
 
 
-def _part(context: Context, whole: Signal, way: Way, scale: float, paid: float) -> Follows:
+def _part(context: Context, whole: Signal, way: Way, scale: float, cost: float) -> Follows:
     """Some variables of a family with their prior scale, and the penalty of the choice."""
     names, axes = way
     signal = replace(
@@ -164,7 +164,7 @@ def _part(context: Context, whole: Signal, way: Way, scale: float, paid: float) 
         values=whole.values[:, names],
     )  # fmt: skip
     one = _follows(context, signal, axes)
-    return replace(one, term=replace(one.term, sizes=scale * one.term.sizes, paid=paid))
+    return replace(one, term=replace(one.term, sizes=scale * one.term.sizes, cost=cost))
 
 
 def _follows(context: Context, signal: Signal, axes: tuple[int, ...]) -> Follows:

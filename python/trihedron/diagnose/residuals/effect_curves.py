@@ -205,7 +205,7 @@ def _driven(context: Context, known: Sequence[Driver], column: FloatArray, k: in
     direction = rows[0] * np.sign(rows[0][np.abs(rows[0]).argmax()])
     g = column @ direction
     for driver in known:
-        if _is_told(context, driver, g):
+        if _is_determined(context, driver, g):
             return _Column(k, g, direction, driver, False)
     axis = int(np.abs(direction).argmax())
     for motion in (context.axis_force[:, axis], context.axis_rate[:, axis]):
@@ -213,7 +213,7 @@ def _driven(context: Context, known: Sequence[Driver], column: FloatArray, k: in
             np.abs(motion) > LEAST_PART * np.abs(motion).max(), g / np.where(motion == 0.0, 1.0, motion), np.nan
         )
         for driver in known:
-            if driver.name not in ("force", "rate") and _is_told(context, driver, part):
+            if driver.name not in ("force", "rate") and _is_determined(context, driver, part):
                 return _Column(k, part, direction, driver, True)
     return None
 
@@ -240,7 +240,7 @@ def _means(place: IntArray, count: IntArray, values: FloatArray) -> FloatArray:
     return np.asarray(np.bincount(place[inside], values[inside], N_BINS) / np.maximum(count, 1))
 
 
-def _is_told(context: Context, driver: Driver, g: FloatArray) -> bool:
+def _is_determined(context: Context, driver: Driver, g: FloatArray) -> bool:
     """Whether a column is a function of a variable: almost none of its variance is within bins."""
     place, count = _bins(context, driver, g)
     inside = place >= 0

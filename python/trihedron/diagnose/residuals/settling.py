@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
@@ -21,37 +21,24 @@ SIZES = np.concatenate([[0.0], np.logspace(-1.0, 4.0, 31)])
 """Values tried for scatter and settling, in rms error of the readings: a quarter of an LSB is 10 %."""
 LEVEL = 0.5
 """Cosine to the vertical that separates the level axes (0) from it (1)."""
-CERTAIN = 20.0
-"""Twice the log-likelihood that settling must gain beside scatter: p = 10⁻⁵ of chi-square with one degree of freedom,
-for four time constants."""
-STILL_SCATTERS = 0.01
-"""p-value of a scatter beside settling, below which the scatter is kept."""
 
 
 @dataclass(frozen=True)
 class Settling:
-    """Gain in twice the log-likelihood of static rates by settling alone, by scatter alone, and by both.
+    """Gain in twice the log-likelihood of static rates by scatter alone, and by settling with it.
 
     ``rate_rad_s`` is the standard deviation of the settling rate at the start of poses, ``tau_s`` its time constant.
     """
 
-    settling: float
     scatter: float
     both: float
     rate_rad_s: float = 0.0
     tau_s: float = SETTLES_S[0]
 
     @property
-    def is_motion(self) -> bool:
-        """Whether settling describes the rates at least as well as scatter and leaves no significant scatter."""
-        beside = max(self.both - self.settling, 0.0)
-        p = 0.5 * float(chdtrc(1.0, beside)) if beside > 0.0 else 1.0
-        return self.settling > self.scatter and p > STILL_SCATTERS
-
-    @property
-    def is_seen(self) -> bool:
-        """Whether settling is certain, with or without scatter beside it."""
-        return self.both - self.scatter > CERTAIN
+    def score(self) -> float:
+        """Twice the log-likelihood that settling gains beside scatter, less the cost of the time constants tried."""
+        return self.both - self.scatter - 2.0 * math.log(len(SETTLES_S))
 
 
 def settling(context: Context) -> Settling:
@@ -63,19 +50,18 @@ def settling(context: Context) -> Settling:
     directions = _directions(context)
     tables = [table for tau in SETTLES_S if (table := _table(directions, tau)) is not None]
     if not tables:
-        return Settling(0.0, 0.0, 0.0)
+        return Settling(0.0, 0.0)
     scale = tables[0].unit
     none = tables[0].log_likelihood(np.zeros(1), np.zeros(1))[0]
     scatter = float(tables[0].log_likelihood((scale * SIZES) ** 2, np.zeros(len(SIZES))).max())
     a, b = ((scale * g.ravel()) ** 2 for g in np.meshgrid(SIZES, SIZES, indexing="ij"))
-    alone, both = [], []
+    both = []
     for table, tau in zip(tables, SETTLES_S, strict=False):
         values = table.log_likelihood(a, b)
-        alone.append(float(values[a == 0.0].max()))
         best = int(values.argmax())
         both.append((float(values[best]), float(np.sqrt(b[best])), tau))
     most, rate, tau = max(both)
-    return Settling(2.0 * (max(alone) - none), 2.0 * (scatter - none), 2.0 * (most - none), rate, tau)
+    return Settling(2.0 * (scatter - none), 2.0 * (most - none), rate, tau)
 
 
 def with_settling(context: Context, found: Settling) -> Observations:

@@ -35,7 +35,7 @@ class Observations:
     half-open sample ranges that include the last sample of the pose before and the first of the pose after, so that
     static samples bracket the whole motion; ``move_poses`` (m, 2) their poses. ``force_density`` and ``rate_density``
     (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sampling instants about their timestamps,
-    once a diagnosis has found it; ``bumped_s`` are disturbed intervals of poses, s.
+    once a diagnosis has found it; ``disturbed_s`` are disturbed intervals of poses, s.
     ``unresolved`` maps a move's two poses to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
     by motion faster than the samples, by noise slower than a move and by vibration at the end of a pose.
     ``pose_settling`` (h, 3), where detected: error of the mean rate by settling (one sigma, raw units), included in
@@ -63,7 +63,7 @@ class Observations:
     force_density: FloatArray
     rate_density: FloatArray | None
     jitter_s: float = 0.0
-    bumped_s: tuple[tuple[float, float], ...] = ()
+    disturbed_s: tuple[tuple[float, float], ...] = ()
     unresolved: Mapping[tuple[int, int], FloatArray] = field(default_factory=dict)
     pose_settling: FloatArray | None = None
     force_up: Along | None = None
@@ -226,7 +226,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         move_poses=np.array(poses if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
         force_density=noise.force_density,
         rate_density=noise.rate_density,
-        bumped_s=bumped,
+        disturbed_s=bumped,
         force_up=noise.force_up,
         force_scatter=noise.force_scatter,
         rate_scatter=noise.rate_scatter,

@@ -64,7 +64,7 @@ PREDICTING = 20
 
 
 @dataclass(frozen=True)
-class Asked:
+class Request:
     """Options: ``horizons_s``, ``band_hz`` above which power is vibration, ``gravity_m_s2``, and the static noise of
     each sensor, where known."""
 
@@ -75,7 +75,7 @@ class Asked:
     accelerometer: StaticNoise | None = None
 
 
-def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Asked) -> tuple[SensorFilterNoise, ...]:
+def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Request) -> tuple[SensorFilterNoise, ...]:
     """Filter noise of the gyro, and with a reference position of the accelerometer, beside a reference attitude.
 
     Raises
@@ -149,7 +149,7 @@ def _refuse_short(stretches: Sequence[Stretch], motion: ReferenceMotion) -> None
 
 
 def _sensor(
-    learnt: Learnt, asked: Asked, static: StaticNoise | None, left: Left, white_rad: float = 0.0
+    learnt: Learnt, asked: Request, static: StaticNoise | None, left: Left, white_rad: float = 0.0
 ) -> SensorFilterNoise:
     stretches, taught, (found, follows) = learnt.stretches, learnt.taught[0], learnt.found
     is_gyro = stretches[0].tilts is None

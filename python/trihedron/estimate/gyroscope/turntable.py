@@ -25,8 +25,8 @@ from trihedron.records.segments import Segments
 from trihedron.session.rounding import undithered_axes
 
 
-def with_own_residuals(calibration: Calibration, recording: Recording, segments: Segments, paid: float) -> Calibration:
-    """The calibration with residuals of poses and moves at its S and b; ``paid`` is the increase of the moves' χ².
+def with_own_residuals(calibration: Calibration, recording: Recording, segments: Segments, cost: float) -> Calibration:
+    """The calibration with residuals of poses and moves at its S and b; ``cost`` is the increase of the moves' χ².
 
     Held-out residuals belong to the fit without the table and are removed.
     """
@@ -36,7 +36,7 @@ def with_own_residuals(calibration: Calibration, recording: Recording, segments:
         accelerometer = replace(accelerometer, quality=found)
     if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:
         found = _of_moves(calibration, gyroscope, gyroscope.quality, recording, segments)
-        gyroscope = replace(gyroscope, quality=replace(found, chi2=found.chi2 + paid))
+        gyroscope = replace(gyroscope, quality=replace(found, chi2=found.chi2 + cost))
     return replace(calibration, accelerometer=accelerometer, gyroscope=gyroscope)
 
 
@@ -196,7 +196,7 @@ def on_turntable(
     accelerometer = calibration.accelerometer
     values = np.concatenate([accelerometer.S.ravel(), accelerometer.b]) + shift[:12]
     # The shift from the optimum of poses and moves increases their χ² by this, to first order.
-    paid = float(shift @ np.linalg.pinv(calibration.covariance, hermitian=True) @ shift)
+    cost = float(shift @ np.linalg.pinv(calibration.covariance, hermitian=True) @ shift)
     said = _said(scatter, misfit / W, float(np.sqrt(np.mean((_model(mean, theta)[0] / W - 1.0) ** 2))), relative_sigma)
     after = replace(
         calibration,
@@ -207,7 +207,7 @@ def on_turntable(
         covariance=posterior,
         findings=(*calibration.findings, said),
     )  # fmt: skip
-    return with_own_residuals(after, recording, segments, paid)
+    return with_own_residuals(after, recording, segments, cost)
 
 
 def _speeds(found: Plateaus, speeds_deg_s: Sequence[float], rate_hz: float) -> FloatArray:

@@ -51,7 +51,7 @@ class SlowError:
         both = CubicSpline(self.time_s, np.hstack([self.world, self.body]))(inside)
         return both[:, :3], both[:, 3:]
 
-    def taken_off(self, time: FloatArray, attitude: FloatArray) -> FloatArray:
+    def compensated(self, time: FloatArray, attitude: FloatArray) -> FloatArray:
         """Attitudes (n, 3, 3) with the slow error removed."""
         world, body = (Rotation.from_rotvec(-one).as_matrix() for one in self.at(time))
         return np.ascontiguousarray(world @ attitude @ body)
@@ -205,7 +205,7 @@ class Beside:
         motion = self.reference.motion
         if motion.attitude is not None:
             time, attitude = (motion.time_s - point.offset_s) / (1.0 + point.rate), motion.attitude @ point.mounting
-            return time, attitude if point.slow is None else point.slow.taken_off(time, attitude)
+            return time, attitude if point.slow is None else point.slow.compensated(time, attitude)
         if motion.is_stepwise:
             time = self.grid.time_s
             rate = self.reference.rate(time * (1.0 + point.rate) + point.offset_s)

@@ -28,7 +28,7 @@ EFFECTS = {"gyro-g-sensitivity": ("gyro-g-sensitivity",), "gyro-scale-nonlineari
 WIDER = (0.3, 1.0, 3.0, 10.0, 30.0)
 """Factors on the data-sheet prior σ of an effect that are tried."""
 MARGIN = 2.0
-PAID = 2.0 * np.log(len(WIDER) * len(EFFECTS))
+SEARCH_COST = 2.0 * np.log(len(WIDER) * len(EFFECTS))
 """Correction of a score for multiple testing."""
 LARGEST = 100.0
 """Largest size of an effect of a working part, in data-sheet sizes."""
@@ -150,7 +150,7 @@ class Scored:
 
         def short(size: float) -> float:
             gain = told * size**2
-            return float(np.sum(gain - np.log1p(gain)) - PAID - NAMED_FROM)
+            return float(np.sum(gain - np.log1p(gain)) - SEARCH_COST - NAMED_FROM)
 
         return float(brentq(short, 0.0, LARGEST)) if short(LARGEST) > 0.0 else float("inf")
 
@@ -171,7 +171,7 @@ def scores(found: MotionFit) -> list[Scored]:
             if len(tried) > 1 and tried[-1].fitted.evidence < tried[-2].fitted.evidence - MARGIN:
                 break
         best = int(np.argmax([one.fitted.evidence for one in tried]))
-        score = float(2.0 * (tried[best].fitted.evidence - without.fitted.evidence) - PAID)
+        score = float(2.0 * (tried[best].fitted.evidence - without.fitted.evidence) - SEARCH_COST)
         out.append(Scored(ident, score, WIDER[best], tried[best], without))
     return sorted(out, key=lambda one: -one.score)
 

@@ -78,7 +78,7 @@ def without_slow_error(found: MotionFit, k: int) -> Reference:
         return side.reference
     slow = slow_error(problem, found.fitted.strengths[k], posterior(found, found.fitted.strengths).mean)
     time = (motion.time_s - point.offset_s) / (1.0 + point.rate)
-    own = slow.taken_off(time, motion.attitude @ point.mounting) @ point.mounting.T
+    own = slow.compensated(time, motion.attitude @ point.mounting) @ point.mounting.T
     return Reference(replace(motion, attitude=np.ascontiguousarray(own)))
 
 

@@ -20,7 +20,7 @@ FALSE_ALARM = 1e-3
 """Probability that moves of a sound session are found to exceed the noise of their samples."""
 NOISE_DOF = 100.0
 """Degrees of freedom of the predicted noise, which is measured in the recording to about 7 %."""
-DEAF = 1e3
+NO_WEIGHT = 1e3
 """Factor on a row's standard error at which it has no weight beside the others."""
 LOOSE = 100.0
 """Factor on the moves' standard errors, to some degrees, for a start with tilt errors of tens of degrees: the gyro's
@@ -86,17 +86,17 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     cause (arms between the accelerometers) follows the motion and is no noise. Even with their variance widened to
     their size they biased a real accelerometer by five standard errors.
     """
-    core = _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (1.0, DEAF)), ANYTHING)
+    core = _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (1.0, NO_WEIGHT)), ANYTHING)
     corner, scatter, between, (gravity, _) = core.strengths
-    heard = _again(observed, core, (corner, scatter, between, (gravity, 1.0)))
-    chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in _misfits(heard))
+    weighted = _again(observed, core, (corner, scatter, between, (gravity, 1.0)))
+    chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in _misfits(weighted))
     is_expected = dof < 1.0 or fdtrc(dof, NOISE_DOF, chi2 / dof) >= FALSE_ALARM
-    return _solution(observed, heard if is_expected else core)
+    return _solution(observed, weighted if is_expected else core)
 
 
 def approached(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray) -> _core.SessionFit:
     """The fit from an initial scale that may be far off: moves have little weight beside the poses."""
-    return _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (LOOSE, DEAF)), None)
+    return _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (LOOSE, NO_WEIGHT)), None)
 
 
 def refitted(observed: Observed, solution: SessionSolution) -> SessionSolution:

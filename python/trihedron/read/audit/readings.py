@@ -28,20 +28,20 @@ def short(sensor: str) -> str:
     return "gyro" if sensor == "gyroscope" else sensor
 
 
-def audit_clipping(sensor: str, walls: tuple[Limit, ...], place: Place) -> list[Finding]:
-    """One finding per sensor that lists every range limit (``walls``) with its clipped readings."""
-    if not walls:
+def audit_clipping(sensor: str, limits: tuple[Limit, ...], place: Place) -> list[Finding]:
+    """One finding per sensor that lists every range limit (``limits``) with its clipped readings."""
+    if not limits:
         return []
-    first = min(int(w.runs[0, 0]) for w in walls)
-    numbers = {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_count": float(w.count) for w in walls}
-    numbers |= {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_value": w.value for w in walls}
+    first = min(int(w.runs[0, 0]) for w in limits)
+    numbers = {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_count": float(w.count) for w in limits}
+    numbers |= {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_value": w.value for w in limits}
     return [
         Finding.of(
             FindingCode.CLIPPING,
             sensor=short(sensor),
-            walls=[(AXES[w.axis], w.value, w.count, len(w.runs)) for w in walls],
+            limits=[(AXES[w.axis], w.value, w.count, len(w.runs)) for w in limits],
             where=place(first),
-            count=sum(w.count for w in walls),
+            count=sum(w.count for w in limits),
             sample=first,
             numbers=numbers,
         )
@@ -102,10 +102,10 @@ def audit_readings(
     if len(readings) < 8:
         return findings
     findings += _repeated(sensor, repeats, place)
-    walls = facts.limits
-    findings += audit_clipping(sensor, walls, place)
+    limits = facts.limits
+    findings += audit_clipping(sensor, limits, place)
     for k in range(3):
-        at_wall = any(w.axis == k and w.value == readings[repeats.longest_start[k], k] for w in walls)
+        at_wall = any(w.axis == k and w.value == readings[repeats.longest_start[k], k] for w in limits)
         # A stuck triad is reported as repeated rows, a value stuck at a range limit as clipping.
         findings += [] if at_wall else _stuck(sensor, k, repeats, readings, facts.step[k], windows, place)
     findings += _coarse(sensor, facts.step, windows)

@@ -77,9 +77,9 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
 
 def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> EvenClock:
     """The clock of timestamps (n,) with the period ``found``."""
-    n, period, sees = len(time_s), found.period_s, found.is_seen
+    n, period, is_seen = len(time_s), found.period_s, found.is_seen
     # One buffer for lateness, clock and error in turn: a second one takes memory and time for a long log.
-    room = _core.room(n, 1).reshape(-1)
+    room = _core.new_array(n, 1).reshape(-1)
     if counter is not None:
         tick, pauses, width, moved_back = (
             counter,
@@ -87,14 +87,14 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
             block_rows(time_s, period, found.coherence),
             0.0,
         )
-        sees = True
+        is_seen = True
         period = _long_run(time_s, counter)
     else:
         width = block_rows(time_s, period, found.coherence)
-        period, tick, pauses, moved_back = track(time_s, period, width, sees, found.coherence > 0.9, room)
+        period, tick, pauses, moved_back = track(time_s, period, width, is_seen, found.coherence > 0.9, room)
     even, mean_period, sigma, drifts = _lay(time_s, tick, period, pauses, width, False, room)
     error = _error(time_s, even)
-    for _ in range(3 if counter is None and sees else 0):
+    for _ in range(3 if counter is None and is_seen else 0):
         # The fit is coarse here, because the clock must not follow the dip from a loss that is counted too early.
         moved = behind_late_rows(tick, error, period)
         if moved is tick:
@@ -107,7 +107,7 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
         error = _error(time_s, even)
     on_grid = 0.0 < found.grid_s < 1.3 * period and _range(error) < 1.3 * found.grid_s
     growth = 0.0 if on_grid else _growth(error, pauses, UNSEEN * period)
-    if moved_back > TAKEN_BACK or growth > GROWTH or (not sees and growth > 0.5 * GROWTH):
+    if moved_back > TAKEN_BACK or growth > GROWTH or (not is_seen and growth > 0.5 * GROWTH):
         return EvenClock(TimestampKind.IRREGULAR, period, sigma, np.arange(n), time_s, 0.0, False)
     kind = _kind(error, period, found.grid_s)
     if kind is not TimestampKind.LATE:
@@ -116,7 +116,7 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
         error = _error(time_s, even)
     rms = _core.errors_deviation(error)
     even = _error(time_s, error)
-    return EvenClock(kind, mean_period, sigma, tick, even, rms, sees, found.grid_s)
+    return EvenClock(kind, mean_period, sigma, tick, even, rms, is_seen, found.grid_s)
 
 
 def _error(time_s: FloatArray, even: FloatArray) -> FloatArray:

@@ -62,18 +62,18 @@ def ahead(values: FloatArray, reach: int) -> FloatArray:
 
 
 def track(
-    time_s: FloatArray, period: float, width: int, sees: bool, is_sharp: bool, room: FloatArray
+    time_s: FloatArray, period: float, width: int, is_seen: bool, is_sharp: bool, room: FloatArray
 ) -> tuple[float, IntArray, IntArray, float]:
     """Period, tick of every row, pauses, and the share of blocks that moved back by a period; ``room`` (n,): buffer.
 
     The earliest timestamp of every block, stalls of the link excluded, shifts by whole periods where samples are lost,
-    and slowly if the period is slightly wrong. Without ``sees`` the period is corrected from first and last blocks.
+    and slowly if the period is slightly wrong. Without ``is_seen`` the period is corrected from first and last blocks.
     """
     n = len(time_s)
     pauses = _core.steps_above(time_s, PAUSE_STEPS * period)
     edges = np.concatenate([[0], pauses + 1, [n]])
     reach = STALL_STEPS // width + 1
-    for _ in range(0 if sees else 3):
+    for _ in range(0 if is_seen else 3):
         late = lateness(time_s, None, period, room)
         slopes, weights = [], []
         for a, b in pairwise(edges):
@@ -90,7 +90,7 @@ def track(
     lost = cast(IntArray, np.zeros(n, dtype=np.int32 if is_short else np.int64))
     back = blocks = 0
     for a, b in pairwise(edges):
-        if not sees or b - a < 2 * width:
+        if not is_seen or b - a < 2 * width:
             continue
         moved_back, n_blocks = _count_losses(late[a:b], width, reach, is_sharp, lost[a:b])
         back, blocks = back + moved_back, blocks + n_blocks

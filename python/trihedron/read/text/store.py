@@ -64,7 +64,7 @@ class Store:
         """A block with memory for ``need`` rows; if it must grow, for the ``expected`` rows."""
         array = self._arrays[b]
         if len(array) < need:
-            grown = _core.room(max(need, int(expected * _SPARE), int(len(array) * _GROWTH)), array.shape[1])
+            grown = _core.new_array(max(need, int(expected * _SPARE), int(len(array) * _GROWTH)), array.shape[1])
             grown[: self.n_rows] = array[: self.n_rows]
             self._arrays[b] = array = grown
         return array

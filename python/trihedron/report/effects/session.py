@@ -89,11 +89,11 @@ ENTRIES = (
         MappingProxyType(
             {
                 "pushed": "Pose {pose:.0f} was disturbed: its mean is off by {off:.2g} m/s²; repeat it or exclude it.",
-                "not-still": "Disturbed poses ({is_bumped:?at {bumped_s:each}|}{are_both:?; |}"
+                "not-still": "Disturbed poses ({is_bumped:?at {disturbed_s:each}|}{are_both:?; |}"
                 "{is_restless:?not still: {restless:&, }|}).",
             }
         ),
-        lines=MappingProxyType({"bumped_s": "{v0:.2f} s"}),
+        lines=MappingProxyType({"disturbed_s": "{v0:.2f} s"}),
     ),
     EffectWords(
         "turn-angle-error",

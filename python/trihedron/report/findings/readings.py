@@ -84,11 +84,11 @@ ENTRIES = (
         Code.CLIPPING,
         "",
         WARNING,
-        "The {sensor} is clipped: {walls:each}; first at {where}.",
+        "The {sensor} is clipped: {limits:each}; first at {where}.",
         "The motion left the measuring range.",
         "Turn more slowly, or set a wider range; angles integrated over clipped moves are too small.",
         numbers=("count", "sample"),
-        lines=MappingProxyType({"walls": "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# stretch})"}),
+        lines=MappingProxyType({"limits": "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# stretch})"}),
     ),
     Entry(
         Code.RAW_STEP,

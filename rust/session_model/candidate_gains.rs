@@ -22,7 +22,7 @@ struct Look {
 }
 
 /// A fit at several strengths.
-pub struct Looks<'a> {
+pub struct CandidateGains<'a> {
     fit: &'a Fit,
     each: Vec<Look>,
 }
@@ -38,7 +38,7 @@ pub struct Seen {
     pub covariance: DMatrix<f64>,
 }
 
-impl<'a> Looks<'a> {
+impl<'a> CandidateGains<'a> {
     /// # Errors
     /// When nothing determines the session at some of the strengths.
     pub fn of(fit: &'a Fit, strengths: &[Strengths]) -> Result<Self> {
@@ -83,7 +83,7 @@ impl<'a> Looks<'a> {
     ///
     /// # Errors
     /// When columns are not finite, or there are no strengths or scales.
-    pub fn seen(
+    pub fn of_candidates(
         &self,
         columns: &[DMatrix<f64>],
         sizes: &[f64],

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::gauss_newton::{Descent, Local};
 
 /// A session with fixed weights: the problem of one descent.
-pub(super) struct Held<'a> {
+pub(super) struct FixedWeights<'a> {
     pub session: &'a Session,
     pub distortion: &'a Distortion,
     pub strengths: Strengths,
@@ -38,7 +38,7 @@ pub(super) struct Here {
     n: usize,
 }
 
-impl Descent for Held<'_> {
+impl Descent for FixedWeights<'_> {
     type Point = State;
     type Local = Here;
 
