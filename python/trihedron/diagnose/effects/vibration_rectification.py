@@ -9,8 +9,8 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
 from trihedron.records.words import why_not
 
-ACCEL_PER_POWER, GYRO_PER_POWER = 2e-3, 1e-3
-"""1/(m/s²), 20 mg/g², and (rad/s)/(m/s²)²: prior sigma for vibrating consumer parts."""
+ACCEL_PER_POWER, GYRO_PER_POWER = 0.02, 1e-3
+"""1/(m/s²), 200 mg/g², and (rad/s)/(m/s²)²: prior sigma for vibrating consumer parts; a tenth of it is tried too."""
 STANDS_OUT = 1.5
 """Power of a pose over the median pose: the variance of 300 white readings has an uncertainty of 8 %; at most 1.13 in
 48 healthy sessions."""
