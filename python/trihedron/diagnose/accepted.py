@@ -28,6 +28,7 @@ HEADLINE = 0.5
 """Share of the misfit below which an effect of single samples or poses (a faint line, one disturbed pose) is listed
 after the effects that explain poses and moves."""
 LEAST_P = 1e-300
+NORMAL_95 = 1.96
 """Smallest p-value that a double holds with full precision."""
 
 
@@ -238,7 +239,7 @@ def candidates(answer: Answer, known: dict[str, Candidate], asked: dict[str, Bia
         out[key] = _candidate(one, found.against.get(key))
     for key, bias in asked.items():
         if key not in out or bias.score > (out[key].score or -np.inf):
-            limit = bias.size + 2.0 * bias.std
+            limit = bias.size + NORMAL_95 * bias.std
             size = tuple(EffectParameter(p.name, p.value, p.std, p.unit) for p in bias.parameters)
             p = min(1.0, float(np.exp(-0.5 * max(bias.gain, 0.0))))
             out[key] = Candidate(key, p, True, "", bias.score, size, float(np.max(limit)))
@@ -256,5 +257,5 @@ def _candidate(one: Tried, against: str | None) -> Candidate:
     size = term.effect.parameters(term.variant, asked.value, asked.covariance)
     # A parameter reported in another unit (an angle for a direction) has no upper limit here.
     linear = [p for p in size if p.name in term.variant.names and p.unit == size[0].unit]
-    limit = max((abs(p.value) + 1.96 * p.std for p in linear), default=None)
+    limit = max((abs(p.value) + NORMAL_95 * p.std for p in linear), default=None)
     return Candidate(term.effect.id, one.p_value, True, "", one.score, size, limit, against)
