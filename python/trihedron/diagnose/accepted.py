@@ -28,8 +28,8 @@ HEADLINE = 0.5
 """Share of the misfit below which an effect of single samples or poses (a faint line, one disturbed pose) is listed
 after the effects that explain poses and moves."""
 LEAST_P = 1e-300
-NORMAL_95 = 1.96
 """Smallest p-value that a double holds with full precision."""
+NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True, eq=False)
