@@ -241,7 +241,7 @@ def differing_headline(diagnosis: Diagnosis) -> tuple[Headline, ...]:
 def headlines_of(diagnosis: Diagnosis) -> tuple[Headline, ...]:
     """Share of the misfit of every effect, and the cross-validated gain of the strongest; else the worst domain."""
     shares = tuple(
-        Headline(f"{effect.id} explains", plain_number(100.0 * effect.share, 2), "%", "of the misfit")
+        Headline(f"{effect.id} explains", plain_number(100.0 * effect.share, 2), "%", "of the misfit by itself")
         for effect in diagnosis.effects
         if effect.share is not None and effect.share > LEAST_SHARE
     )

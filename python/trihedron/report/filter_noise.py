@@ -47,8 +47,8 @@ def filter_noise_report(found: FilterNoise) -> Document:
     chart = partial(horizon_chart, found)
     picture = Picture(
         "horizon",
-        "Error of a filter without updates over a horizon, that of the reference with it: predicted by N, K and the "
-        "reference's own error, and actual; cross-validated.",
+        "Error by the gyro (velocity: the accelerometer) alone after each horizon, the reference's own error with it: "
+        "predicted from N and K, and actual; cross-validated.",
         chart,
     )
     is_trustworthy = not any(f.severity.value == "serious" for f in found.findings)

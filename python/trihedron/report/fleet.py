@@ -65,6 +65,8 @@ def fleet_report(summary: FleetSummary) -> Document:
         verdict += f" The diagnosis of {how_many(n_open, 'log')} finds more than the model."
     strays = list(dict.fromkeys(one.serial for one in summary.outliers))
     moved = list(dict.fromkeys(change.group for change in summary.changes if change.significant))
+    if summary.repeated and len(devices) > 1 and not strays:
+        verdict += " No device stands out."
     if strays:
         verdict += f" {_named(strays)} outside the others."
     if moved:

@@ -89,7 +89,7 @@ def _headlines(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Headline]:
         if best:
             low, high = (plain_number(t, 2) for t in (min(best), max(best)))
             words = low if low == high else f"{low} to {high}"
-            beside = "where the Allan deviation is least" + ("" if low == high else ", axis by axis")
+            beside = "minimum of the fitted terms" + ("" if low == high else ", axis by axis")
             out.append(Headline(f"{name}, best averaging time", words, "s", beside))
     return out
 
@@ -316,8 +316,8 @@ def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
 
 
 def _lead(noise: Noise, groups: list[tuple[str, list[NoiseAxis]]]) -> Picture:
-    caption = "Allan deviation of both sensors with its 95 % interval; orange: the averaging time at which a "
-    caption += "mean is best. The terms, each with its part of the curve, stand below."
+    caption = "Allan deviation of both sensors with its 95 % interval; orange: the minimum of the fitted terms, "
+    caption += "beyond which the curve only scatters. The terms, each with its part of the curve, stand below."
     chart = partial(sensors_chart, noise.curve, groups)
     return Picture("sensors", caption, chart)
 

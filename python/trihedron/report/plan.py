@@ -33,8 +33,8 @@ def plan_report(plan: ExperimentPlan) -> Document:
         verdict=f"Turns of {angles} in {turns.duration_s:g} s about each axis give the gyro's scale to "
         f"{_percent(turns.scale)}."
         if best is None
-        else f"{best.name} are enough for the accelerometer (scale {_percent(best.scale)}, 1 σ): no single pose is "
-        "indispensable.",
+        else f"{best.name}: all {ALL_NUMBERS} parameters of the accelerometer even if any one pose is lost (scale "
+        f"{_percent(best.scale)}, 1 σ).",
         is_trustworthy=True,
         headlines=tuple(_headlines(plan, best)),
         lead=_picture(plan.poses),

@@ -6,6 +6,8 @@ import math
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from trihedron.records.sessions import Change, Repeated, Session, SessionsModel, Spread, ThermalModel
 from trihedron.report.axes import BIAS, axis_in_print
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
@@ -65,20 +67,19 @@ def sessions_report(model: SessionsModel) -> Document:
 
 
 def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
-    """Uncertainty of the common parameters on the worst axis, and their repeatability."""
+    """Uncertainty of the next recording's parameters on the worst axis: of the common value, with repeatability."""
     out = []
     for name, words in HEADLINES.items():
         axes = [one for one in model.repeated if one.parameter.id == name]
         if not axes:
             continue
         factor, unit = shown(axes[0].parameter.unit)
-        repeats = [one.within.sd * factor for one in axes if one.within is not None]
-        beside = "1 σ, worst axis"
-        if repeats:
-            spread = f"session to session {plain_number(max(repeats), 2)} {unit}"
-            beside += f"; {spread}" if max(repeats) > 0.0 else "; no change between sessions beyond it"
-        worst = max(one.std * factor for one in axes)
-        out.append(Headline(f"{words} uncertainty", plain_number(worst, 2), unit, beside))
+        spread = [0.0 if one.within is None else one.within.sd for one in axes]
+        ahead = [factor * math.hypot(one.std, sd) for one, sd in zip(axes, spread, strict=True)]
+        k = int(np.argmax(ahead))
+        common, repeats = (plain_number(factor * value, 2) for value in (axes[k].std, spread[k]))
+        beside = f"1 σ, worst axis: common value {common}, session to session {repeats} {unit}"
+        out.append(Headline(f"{words} in the next recording", f"± {plain_number(ahead[k], 2)}", unit, beside))
     return tuple(out)
 
 
