@@ -92,10 +92,3 @@ def test_a_relation_is_written_out_as_an_effect_that_runs(tmp_path):
     assert done.stdout.split() == ["True", "1.0"]
     past = Relation("gyroscope", ("previous u_x",), "", (EffectParameter("x: previous u_x", 1.0, 0.1, ""),), 0.5, None)
     assert effect_file(past) is None
-
-
-def test_a_healthy_session_has_neither_scatter_nor_relation():
-    log, truth, _, _ = session(1)
-    result = diagnose(log, gravity_m_s2=truth.gravity_m_s2)
-    assert result.verdict == "consistent"
-    assert not result.relations
