@@ -79,7 +79,7 @@ def test_the_held_out_figure_at_rest_is_that_of_the_saved_model_refitted_without
 
 
 def test_a_zero_that_drifts_is_named_and_the_table_shows_what_the_calibration_leaves():
-    scenario = replace(scenario_by_name("hand-session"), motion=hand_session(18, layout=131))
+    scenario = replace(scenario_by_name("hand-session"), motion=hand_session(24, layout=131))
     drifting = with_effect(scenario, "accel-bias-drift", amplitude=(0.03, -0.02, 0.025), tau_s=60.0)
     recording, truth = simulate(drifting, 131)
     result = calibrate(recording, gravity_m_s2=truth.gravity_m_s2)
