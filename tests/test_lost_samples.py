@@ -19,7 +19,10 @@ def diagnosed(flaw, seed, tmp_path):
     [
         (87100100214, "20 Hz, one sample a gap: a join of six samples spans half the move"),
         (87100100614, "50 Hz, two samples a gap, moves that do not join at all"),
-        (86200100214, "1000 Hz, gaps of 73 samples: longer than any join of samples tells by itself"),
+        pytest.param(
+            *(86200100214, "1000 Hz, gaps of 73 samples: longer than any join of samples tells by itself"),
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed, what):
