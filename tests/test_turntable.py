@@ -124,7 +124,7 @@ def test_another_number_of_speeds_is_refused_with_the_turns_that_were_found(tabl
 
 def test_steady_turns_of_a_table_are_no_end_of_the_gyros_range():
     # Every turn has another arm: rest after it is contradicted, gravity is not.
-    recording, _ = on_a_table(3, [45.0, 90.0, 180.0] * 4, arm_m=0.05)
+    recording, _ = on_a_table(3, [45.0, 90.0, 180.0] * 2, arm_m=0.05)
     result = diagnose(recording, gravity_m_s2=G)
     assert "gyro-saturation" not in [effect.id for effect in result.effects]
 
