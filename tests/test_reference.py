@@ -18,7 +18,7 @@ from trihedron.simulate import hand_session, scenario_by_name
 
 @pytest.fixture(scope="module")
 def posed():
-    return tracked(3, seconds=30, has_path=True)
+    return tracked(3, seconds=20, has_path=True)
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +102,7 @@ def test_the_earths_rate_that_is_not_there_is_not_put_in():
 
 
 def test_an_earths_rate_that_the_log_cannot_tell_is_in_the_uncertainty_of_the_bias(found):
-    # Half a minute under a tracker of 0.05°.
+    # Twenty seconds under a tracker of 0.05°.
     assert found.earth_rate is None
     # One component of a vector of any direction; attitudes that turn about average part of it away.
     assert np.all(np.array(found.gyroscope.sigmas()["sigma_b"]) > 0.1 * EARTH_RAD_S)
@@ -245,7 +245,7 @@ def test_no_part_of_a_sound_reference_is_called_elsewhere_however_noisy(seed):
 
 def test_a_reference_of_another_motion_is_refused(posed):
     with pytest.raises(ValueError, match="share no motion"):
-        fit_reference(posed.log, tracked(999, seconds=30).motion, G)
+        fit_reference(posed.log, tracked(999, seconds=20).motion, G)
 
 
 @pytest.mark.parametrize("seed", [4, pytest.param(5, marks=pytest.mark.slow)])
@@ -299,8 +299,8 @@ def test_a_rates_own_clock_does_not_stretch_the_scale():
 
 
 def test_two_recordings_of_one_unit_share_the_scale_and_have_biases_of_their_own(posed, found):
-    # The unit of this seed again, for half as long: by itself it tells less than the first.
-    more = tracked(3, seconds=15)
+    # The unit of this seed again, for twelve seconds: by itself it tells less than the first.
+    more = tracked(3, seconds=12)
     result = trihedron.calibrate_references(
         [posed.log, more.log], [posed.motion, more.motion], gravity_m_s2=G, frame="case"
     )
