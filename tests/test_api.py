@@ -11,6 +11,7 @@ import re
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import polars as pl
@@ -19,11 +20,13 @@ from matplotlib.figure import Figure
 
 import trihedron
 from trihedron.records import Calibration, Severity
+from trihedron.simulate import hand_session, scenario_by_name
 
 
 @pytest.fixture(scope="module")
 def recording():
-    return trihedron.simulate("hand-session", 3)[0]
+    motion = hand_session(n_poses=14, pose_s=2.0, first_pose_s=4.0)
+    return trihedron.simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)[0]
 
 
 @pytest.fixture(scope="module")
@@ -69,8 +72,6 @@ def test_results_are_plain_types_frames_figures_and_pieces_of_html(results):
 
 
 def test_names_from_a_file_are_escaped_in_html(recording):
-    from dataclasses import replace
-
     page = replace(recording, source="<script>alert(1)</script>.csv")._repr_html_()
     assert "<script>" not in page
 
@@ -106,8 +107,6 @@ def test_a_series_gives_arrays_of_one_dimension_and_channels_of_two():
 
 
 def with_sensor(result, **changes):
-    from dataclasses import replace
-
     return replace(result.calibration, accelerometer=replace(result.calibration.accelerometer, **changes))
 
 
@@ -143,8 +142,6 @@ def test_a_gyro_that_maps_degrees_as_radians_is_refused():
 
 
 def test_what_is_applied_says_that_its_calibration_was_not_to_be_trusted(result, recording):
-    from dataclasses import replace
-
     from trihedron.records import Finding, FindingCode
 
     grave = Finding(FindingCode.NOT_CONVERGED, Severity.SERIOUS, "The fit did not converge.")
@@ -193,8 +190,10 @@ def test_a_figure_is_drawn_where_it_is_asked_for(result):
         result.plot("residuals", ax=[above, below, above])
 
 
-def test_verbs_say_what_they_return_and_their_examples_run(recording, result):
+def test_verbs_say_what_they_return_and_their_examples_run():
     """Examples name a recording and its calibration as a reader has them."""
+    recording = trihedron.simulate("hand-session", 3)[0]
+    result = trihedron.calibrate(recording, latitude_deg=60.0)
     run = doctest.DocTestRunner()
     for name in trihedron.__all__:
         verb = getattr(trihedron, name)

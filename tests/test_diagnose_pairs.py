@@ -39,7 +39,7 @@ def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(7)
     gyro = replace(gyro, S=tuple(tuple(2.0 * v for v in row) for row in gyro.S))
-    motion = hand_session(26, pose_s=4.0, layout=5)
+    motion = hand_session(20, pose_s=4.0, layout=5)
     plain = Scenario(motion, "unit", accel, gyro, profile.clock)
     # Half of what the biases do is the scatter: without it in the noise, a drift does not remove half of their misfit.
     size = np.radians(0.1)

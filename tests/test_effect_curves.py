@@ -9,7 +9,7 @@ G = 9.80665
 
 
 def accepted(effect_id, **size):
-    found = diagnosed(effect_id, n_poses=26, **size)
+    found = diagnosed(effect_id, n_poses=18, **size)
     return next(effect for effect in found.effects if effect.id == effect_id)
 
 

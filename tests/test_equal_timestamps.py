@@ -15,7 +15,7 @@ from trihedron.simulate.profiles import profile_by_name
 
 @pytest.fixture(scope="module")
 def session():
-    scenario = _of(profile_by_name("mpu"), hand_session(14, layout=3), "session", 3)
+    scenario = _of(profile_by_name("mpu"), hand_session(10, pose_s=2.0, first_pose_s=4.0, layout=3), "session", 3)
     return simulate(scenario, 3)[0]
 
 

@@ -23,7 +23,7 @@ from trihedron.simulate.noise import NoiseTerms
 from trihedron.simulate.scenario import Clock
 from trihedron.units import RateUnit
 
-RATE, SECONDS, G = 100.0, 2000, 9.81
+RATE, SECONDS, G = 100.0, 1000, 9.81
 WHITE, WALK = {"accelerometer": 2e-3, "gyroscope": 1e-4}, {"accelerometer": 4e-4, "gyroscope": 2e-5}
 OPTIONS = ExportOptions(
     *(SensorNoise(NoiseFigure(WHITE[s]), NoiseFigure(WALK[s])) for s in ("accelerometer", "gyroscope")), rate_hz=RATE
@@ -145,7 +145,7 @@ def test_the_simulators_own_law_gives_the_noise_of_the_unit(target):
     for axis in noise.axes:
         name = "accelerometer" if axis.unit == "m/s^2" else "gyroscope"
         terms = axis.terms
-        # 200 000 samples know N to 0.2 %, 2000 s know K to 10 to 20 %.
+        # 100 000 samples know N to 0.3 %, 1000 s know K to 15 to 25 %.
         assert terms["N"].value == pytest.approx(WHITE[name], rel=0.02), (target, axis)
         if target == "isaac":
             assert f"The walk of the {name}'s bias cannot be held" in text

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from functools import cache
 
 import numpy as np
 import pytest
@@ -32,6 +33,7 @@ print(json.dumps(np.concatenate([np.ravel(part) for part in out]).tolist()))
 """
 
 
+@cache
 def answers(instructions: str) -> np.ndarray:
     environment = os.environ | {"TRIHEDRON_INSTRUCTIONS": instructions}
     done = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=True)

@@ -19,7 +19,10 @@ def diagnosed(flaw, seed, tmp_path):
     [
         (87100100214, "20 Hz, one sample a gap: a join of six samples spans half the move"),
         (87100100614, "50 Hz, two samples a gap, moves that do not join at all"),
-        (86200100214, "1000 Hz, gaps of 73 samples: longer than any join of samples tells by itself"),
+        pytest.param(
+            *(86200100214, "1000 Hz, gaps of 73 samples: longer than any join of samples tells by itself"),
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed, what):
@@ -30,8 +33,8 @@ def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed,
     assert lost.value == pytest.approx(answer["values"]["lost"][0], rel=0.1), what
 
 
+@pytest.mark.parametrize("seed", [11, pytest.param(12, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("flaw", ["gyro-saturation", "sensor-lag", "gyro-g-sensitivity"])
-def test_moves_that_contradict_for_another_reason_lost_nothing(tmp_path, flaw):
-    for seed in (11, 12):
-        found, _ = diagnosed(flaw, seed, tmp_path)
-        assert "dropped-samples" not in [effect.id for effect in found.effects]
+def test_moves_that_contradict_for_another_reason_lost_nothing(tmp_path, flaw, seed):
+    found, _ = diagnosed(flaw, seed, tmp_path)
+    assert "dropped-samples" not in [effect.id for effect in found.effects]

@@ -19,11 +19,13 @@ from trihedron.simulate.profiles import profile_by_name
 DEG = np.pi / 180.0
 
 
-def session(seed):
+def session(seed, n_poses=30):
     """A healthy session: log, truth, (n,) number of the pose that a sample is nearest to, and how many there are."""
     profile = profile_by_name("adis")
     accelerometer, gyroscope = profile.unit(seed)
-    log, truth = simulate(Scenario(hand_session(30, layout=seed), "", accelerometer, gyroscope, profile.clock), seed)
+    log, truth = simulate(
+        Scenario(hand_session(n_poses, layout=seed), "", accelerometer, gyroscope, profile.clock), seed
+    )
     poses = [(p.start, p.stop) for p in truth.segments if p.kind != "move"]
     middles = [(a[1] + b[0]) / 2 for a, b in pairwise(poses)]
     return log, truth, np.searchsorted(middles, np.arange(log.n_samples)), len(poses)
@@ -35,7 +37,7 @@ def added(log, truth, of_rate):
 
 
 def test_a_field_in_the_room_is_unexplained_with_its_inclination_not_scatter():
-    log, truth, _, _ = session(4)
+    log, truth, _, _ = session(4, 22)
     vector = Rotation.from_quat(np.roll(truth.attitude, -1, axis=1)).inv().apply([0.8, 0.3, -0.5])
     log = added(log, truth, 0.05 * DEG * vector @ np.array([[1.0, 0.2, 0], [0, -0.8, 0.5], [0.3, 0, 0.9]]))
     result = diagnose(log, gravity_m_s2=truth.gravity_m_s2)
@@ -92,10 +94,3 @@ def test_a_relation_is_written_out_as_an_effect_that_runs(tmp_path):
     assert done.stdout.split() == ["True", "1.0"]
     past = Relation("gyroscope", ("previous u_x",), "", (EffectParameter("x: previous u_x", 1.0, 0.1, ""),), 0.5, None)
     assert effect_file(past) is None
-
-
-def test_a_healthy_session_has_neither_scatter_nor_relation():
-    log, truth, _, _ = session(1)
-    result = diagnose(log, gravity_m_s2=truth.gravity_m_s2)
-    assert result.verdict == "consistent"
-    assert not result.relations

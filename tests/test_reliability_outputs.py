@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from small_session import G, copied, leftovers, made_once, run, started
+from small_session import G, copied, leftovers, made_once, quietly, run, started
 from trihedron.cli import COMMANDS, main
 from trihedron.files.output import MARK, OutputError, check_free, write_whole
 
@@ -221,7 +221,7 @@ def test_what_a_killed_run_left_is_cleared_by_the_next_and_a_live_one_is_not_har
 
 def test_kill_9_at_any_instant_leaves_the_old_output_or_the_new_one(session):
     target = session / "out.csv"
-    run("convert", session / "log.csv", "-o", target)
+    quietly("convert", str(session / "log.csv"), "-o", str(target))
     whole = target.read_bytes()
     for after_s in (0.2, 0.45):
         process = started("convert", session / "log.csv", "-o", target, "--force")
@@ -229,14 +229,14 @@ def test_kill_9_at_any_instant_leaves_the_old_output_or_the_new_one(session):
         process.kill()
         process.communicate()
         assert target.read_bytes() == whole
-    assert run("convert", session / "log.csv", "-o", target, "--force")[0] == 0
+    assert quietly("convert", str(session / "log.csv"), "-o", str(target), "--force") == 0
     assert leftovers(session) == []
 
 
 def test_a_small_disk_that_fills_up_leaves_the_old_output(session):
     # A limit on the size of files stands for the disk: no permission to mount one is needed.
     target = session / "out.csv"
-    run("convert", session / "log.csv", "-o", target)
+    quietly("convert", str(session / "log.csv"), "-o", str(target))
     whole = target.read_bytes()
     import resource
 

@@ -13,7 +13,7 @@ def codes(segments):
     return {finding.code for finding in segments.findings}
 
 
-@pytest.mark.parametrize("session", [3, 5])
+@pytest.mark.parametrize("session", [3, pytest.param(5, marks=pytest.mark.slow)])
 def test_mimu4444_poses_are_found_and_violent_rotation_gives_none(real_data, session):
     for device in (1, 8):
         recording = read_recording(real_data / "mimu4444" / f"exp_{session}.npz", device=device)

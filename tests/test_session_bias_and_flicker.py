@@ -22,7 +22,7 @@ def test_the_zero_of_a_session_is_that_of_its_middle():
     # A zero that drifts by 60 mm/s² over the session: the first pose's is 30 mm/s² from that of the middle.
     drift = 0.06
     away = []
-    for seed in range(6):
+    for seed in range(3):
         recording, truth = simulate(
             Scenario(
                 motion=hand_session(20, pose_s=2.0, first_pose_s=3.0),

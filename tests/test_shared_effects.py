@@ -67,7 +67,7 @@ def sessions(*strengths):
     made = []
     for k, g in enumerate(strengths):
         size = {"matrix": [[0.0, g, 0.0], [0.0, 0.0, g], [-g, 0.0, 0.0]]}
-        made.append(simulated("gyro-g-sensitivity" if g else "", 11 + k, 18, **(size if g else {}))[0])
+        made.append(simulated("gyro-g-sensitivity" if g else "", 11 + k, 14, **(size if g else {}))[0])
     return trihedron.diagnose_sessions(made, gravity_m_s2=9.81)
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from small_session import made_once
 from trihedron.api.reading import read
 from trihedron.cli import main
 from trihedron.files.log import write_recording
@@ -182,10 +183,10 @@ def test_what_a_scenario_lacks_or_has_in_the_wrong_place_is_named(tmp_path, text
         read_scenario(tmp_path / "s.toml")
 
 
+@pytest.mark.usefixtures("few_simulations")
 def test_the_scenario_to_begin_with_is_made_one_of_the_users_own_unit(tmp_path, capsys):
-    begun, better, log = tmp_path / "sensor.toml", tmp_path / "better.toml", tmp_path / "log.csv"
+    begun, better, log = tmp_path / "sensor.toml", tmp_path / "better.toml", made_once() / "log.csv"
     assert main(["simulate", "--template", str(begun)]) == 0
-    assert main(["simulate", "hand-session", "-o", str(log), "--seed", "5"]) == 0
     asked = ["diagnose", str(log), "--gravity", "9.80665", "--against", str(begun), "--improved", str(better)]
     assert main(asked) == 0
     capsys.readouterr()

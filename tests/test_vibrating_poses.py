@@ -73,7 +73,7 @@ def session(seed, shaken_share, gain, rate_line):
 
     The truth's own poses are shaken from end to end, at a frequency that is no whole number of cycles of any.
     """
-    recording, truth = simulate(_of(profile_by_name("tactical"), hand_session(24, layout=seed), "session", seed), seed)
+    recording, truth = simulate(_of(profile_by_name("tactical"), hand_session(18, layout=seed), "session", seed), seed)
     rng = np.random.default_rng(seed)
     force, rate, t = recording.accelerometer.copy(), recording.gyroscope.copy(), recording.time_s
     rests = [part for part in truth.segments if part.kind == "pose"]

@@ -3,7 +3,6 @@
 import contextlib
 import io
 import re
-import runpy
 import shlex
 from pathlib import Path
 
@@ -44,10 +43,26 @@ def test_the_commands_of_the_worked_example_end_in_a_scenario_that_passes(tmp_pa
     assert Path("extended.json").is_file()
 
 
-@pytest.fixture(scope="module")
-def names(tmp_path_factory):
-    with contextlib.chdir(tmp_path_factory.mktemp("tutorial")), contextlib.redirect_stdout(io.StringIO()):
-        return runpy.run_path(str(DOCS / "tutorials" / "simulation_against_recording.py"))
+SHORTER = "n_poses = 12\\npose_s = 4\\n"
+
+
+@pytest.fixture(scope="module", params=[SHORTER, pytest.param("", marks=pytest.mark.slow)], ids=["shorter", "printed"])
+def names(request, tmp_path_factory):
+    """What the script leaves, its sessions as they are printed or shorter."""
+    script = (DOCS / "tutorials" / "simulation_against_recording.py").read_text(encoding="utf-8")
+    session = 'kind = "hand"\\n'
+    assert script.count(session) == 2
+    script = script.replace(session, session + request.param)
+    left = {}
+    with (
+        contextlib.chdir(tmp_path_factory.mktemp("tutorial")),
+        contextlib.redirect_stdout(io.StringIO()),
+        pytest.MonkeyPatch.context() as patch,
+    ):
+        if request.param:  # improved scenarios are aimed by two simulations and not by eight
+            patch.setattr("trihedron.api.driving.N_SEEDS", 2)
+        exec(compile(script, "simulation_against_recording.py", "exec"), left)
+    return left
 
 
 def test_the_same_in_python_ends_the_same_way(names):
