@@ -19,7 +19,7 @@ from trihedron.simulate import (
 WARMING = Environment(temperature=Temperature(warm_up_k=12.0, warm_up_tau_s=120.0, logged=True))
 
 
-def session(grade="mpu", seed=1, n_poses=20, pose_s=3.5, move_s=2.0):
+def session(grade="mpu", seed=1, n_poses=14, pose_s=3.5, move_s=2.0):
     profile = profile_by_name(grade)
     accelerometer, gyroscope = profile.unit(seed)
     if grade == "mpu":
