@@ -208,7 +208,7 @@ def test_options_that_belong_to_one_log_are_refused_for_several(tmp_path, capsys
     assert "there is no such file" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("n", "trials"), [(2, 10), *(pytest.param(n, 60, marks=pytest.mark.slow) for n in (2, 3, 6))])
+@pytest.mark.parametrize(("n", "trials"), [(2, 20), *(pytest.param(n, 60, marks=pytest.mark.slow) for n in (2, 3, 6))])
 def test_the_covariance_of_the_next_recording_holds_it_however_few_there_were(n, trials):
     rng = np.random.default_rng(n)
     before, now = [], []
