@@ -88,7 +88,7 @@ def test_every_candidate_says_why_it_was_not_taken():
 
 
 def test_a_drift_among_biases_that_scatter_is_named():
-    scenario = _of(profile_by_name("mpu"), hand_session(20, layout=7), "session", 7)
+    scenario = _of(profile_by_name("mpu"), hand_session(32, layout=7), "session", 7)
     scenario = with_effect(scenario, "accel-bias-drift", amplitude=(0.15, -0.12, 0.13), tau_s=80.0)
     recording, truth = simulate(with_effect(scenario, "accel-bias-repeatability", sigma=(0.003,) * 3), 7)
     found = trihedron.diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
