@@ -80,18 +80,18 @@ def test_poses_on_edges_are_left_out_and_counted():
     assert "poses 6, 7" in note.seen
 
 
-def test_a_level_table_raises_no_alarm_and_half_a_degree_always_does():
+@pytest.mark.parametrize(("n", "chance"), [(25, 3), pytest.param(100, 5, marks=pytest.mark.slow)])
+def test_a_level_table_raises_no_alarm_and_half_a_degree_always_does(n, chance):
     # 6 degrees of freedom against 1 mg of noise; half a degree is 86 mm/s², eight standard errors.
     false_alarms = caught = 0
-    n = 100
     for seed in range(n):
         _, level = calibrate_faces(face_readings(SIX, 1e-2, seed), 1e-2, G, raw_unit="m/s^2")
         _, tilted = calibrate_faces(face_readings(SIX, 1e-2, seed, tilt_deg=0.5), 1e-2, G, raw_unit="m/s^2")
         false_alarms += FindingCode.TABLE_TILT in codes(level)
         caught += FindingCode.TABLE_TILT in codes(tilted)
-    # Tested at 1 %: binomial(100, 0.01) exceeds 5 once in two thousand. A tilt pattern that all six degrees of freedom
-    # miss is rare: eight standard errors leave less than 1 %.
-    assert false_alarms <= 5
+    # Tested at 1 %: binomial(100, 0.01) exceeds 5, binomial(25, 0.01) 3 less than once in a thousand. A tilt pattern
+    # that all six degrees of freedom miss is rare: eight standard errors leave less than 1 %.
+    assert false_alarms <= chance
     assert caught >= 0.99 * n
 
 
@@ -101,15 +101,16 @@ def test_faces_that_lean_beyond_what_a_face_may_are_not_to_be_trusted():
     assert next(f for f in findings if f.code is FindingCode.TABLE_TILT).severity is Severity.SERIOUS
 
 
-def test_the_error_bars_of_tilted_faces_cover_the_truth():
-    n, inside = 100, 0
+@pytest.mark.parametrize("n", [40, pytest.param(100, marks=pytest.mark.slow)])
+def test_the_error_bars_of_tilted_faces_cover_the_truth(n):
+    inside = 0
     for seed in range(n):
         sensor, _ = calibrate_faces(face_readings(SIX, 1e-3, seed, tilt_deg=1.0), 1e-3, G, raw_unit="m/s^2")
         truth = np.linalg.inv(S_A)
         off = ~np.eye(3, dtype=bool)
         inside += np.mean(np.abs(sensor.S - truth)[off] < 2.45 * sensor.sigma_S[off])
     # The tilt is estimated from six degrees of freedom: Student's t with 6 has 95 % within 2.45. Six entries per seed
-    # share one estimate; the spread of the mean over 100 seeds is below 0.03.
+    # share one estimate; the spread of the mean over 100 seeds is below 0.03, over 40 below 0.05.
     assert 0.89 < inside / n < 1.0
 
 

@@ -87,7 +87,7 @@ def unit():
 
 
 def log(profile, accel, gyro, layout, seed, effect=None, **size):
-    scenario = Scenario(hand_session(18, pose_s=2.5, layout=layout), "pair", accel, gyro, profile.clock)
+    scenario = Scenario(hand_session(12, pose_s=2.5, layout=layout), "pair", accel, gyro, profile.clock)
     return simulate(scenario if effect is None else with_effect(scenario, effect, **size), seed)[0]
 
 

@@ -1,6 +1,7 @@
 """Mistakes that simulators have made in noise and sampling, each told by its numbers."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -28,19 +29,20 @@ def numbers(accel_bias=(0.0, 0.0, 0.0), gyro_bias=(0.0, 0.0, 0.0)):
     )  # fmt: skip
 
 
+@cache
 def log(
     seed, *, axes=(1.0, 1.1, 1.25), uniform=False, size=1.0, step=STEP, tau_s=None, jitter_s=0.0, one=False, timed=True
 ):
-    """Readings at rest; ``tau_s``: a Gauss-Markov process of twice the noise's size beside it, per sensor."""
+    """Readings at rest; ``tau_s``: a Gauss-Markov process of twice the noise's size beside it, one a sensor."""
     rng = np.random.default_rng(seed)
     n = EVERY * N_POSES
     readings = {}
-    for sensor, noise in SENSORS.items():
+    for k, (sensor, noise) in enumerate(SENSORS.items()):
         x = rng.uniform(-np.sqrt(3.0), np.sqrt(3.0), (n, 3)) if uniform else rng.standard_normal((n, 3))
         x = x[:, :1] if one else x
         x = size * noise * x * np.array(axes)
         if tau_s:
-            keep = np.exp(-1.0 / (RATE_HZ * tau_s[sensor]))
+            keep = np.exp(-1.0 / (RATE_HZ * tau_s[k]))
             x = x + lfilter([2.0 * noise * np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal((n, 3)), axis=0)
         lsb = step * noise / SENSORS["gyroscope"]
         readings[sensor] = lsb * np.round(x / lsb) if lsb else x
@@ -129,14 +131,14 @@ def test_a_perfect_clock_is_named_where_the_recordings_scatters():
 
 
 def test_one_time_constant_for_both_sensors_is_named_with_all_four_times():
-    real = log(11, tau_s={"accelerometer": 0.15, "gyroscope": 0.03})
-    shared = log(12, tau_s={"accelerometer": 0.03, "gyroscope": 0.03})
+    real = log(11, tau_s=(0.15, 0.03))
+    shared = log(12, tau_s=(0.03, 0.03))
     found = said(shared, real)
     assert "one time constant was used for both" in found["accelerometer", "correlation-time"]
     assert ("gyroscope", "correlation-time") not in found
     # Sensors that do forget alike, and two units of one kind, are no mistake.
-    assert ("accelerometer", "correlation-time") not in said(shared, log(13, tau_s=dict.fromkeys(SENSORS, 0.03)))
-    again = log(14, tau_s={"accelerometer": 0.15, "gyroscope": 0.03})
+    assert ("accelerometer", "correlation-time") not in said(shared, log(13, tau_s=(0.03, 0.03)))
+    again = log(14, tau_s=(0.15, 0.03))
     assert not any(term == "correlation-time" for _, term in said(again, real))
     # White noise forgets at once: nothing to compare.
     assert not any(n.term == "correlation-time" for n in correlation_times(log(2), real, alpha=0.01))

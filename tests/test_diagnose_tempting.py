@@ -95,7 +95,7 @@ def test_it_is(name):
     ],
 )
 def test_play_and_creep_are_told_apart(variant, size):
-    scenario = with_effect(session(pose_s=6.0), "accel-hysteresis", **size)
+    scenario = with_effect(session(n_poses=14, pose_s=6.0), "accel-hysteresis", **size)
     first = diagnosed(scenario).effects[0]
     assert first.id == "accel-hysteresis"
     assert first.model["variant"] == variant
@@ -112,7 +112,7 @@ def test_a_wrong_scale_is_not_lost_samples():
 
 
 def test_one_bad_pose_is_one_bad_pose():
-    scenario = session()
+    scenario = session(n_poses=14)
     recording, truth = simulate(scenario, 1)
     pose = [s for s in truth.segments if s.kind == "pose"][9]
     # A steady push in one pose, eight times the noise of its mean, seen by no gyro.

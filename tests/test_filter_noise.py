@@ -286,6 +286,10 @@ def test_most_of_what_looks_like_noise_in_a_recorded_flight_is_its_truth():
     from trihedron.estimate.filter_noise.beside_reference import Request, beside_reference
 
     log = trihedron.read(EUROC / "V1_02_medium.log.csv.gz")
+    minute = log.time_s < 60.0
+    log = replace(
+        log, time_s=log.time_s[minute], accelerometer=log.accelerometer[minute], gyroscope=log.gyroscope[minute]
+    )
     gyro, accelerometer = beside_reference(
         log, motion_of(EUROC / "V1_02_medium.truth.csv.gz"), Request((10.0,), 50.0, 9.807, static)
     )

@@ -79,6 +79,7 @@ def test_what_a_scenario_said_of_its_old_values_is_not_kept_and_a_stated_bias_of
     assert not any(p.remark for p in found.parameters if p.id.endswith("bias"))
 
 
+@pytest.mark.usefixtures("few_simulations")
 def test_a_scenario_with_the_recordings_range_lacks_no_saturation(clipped, improved):
     _, recording = clipped
     again = trihedron.diagnose(recording, against=improved[1], gravity_m_s2=G)

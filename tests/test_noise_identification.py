@@ -48,7 +48,7 @@ def test_an_absent_term_has_a_limit_and_no_value(published_setting):
                 assert 0.0 < term.limit < np.inf
 
 
-@pytest.mark.parametrize("runs", [25, pytest.param(120, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [12, pytest.param(120, marks=pytest.mark.slow)])
 def test_intervals_cover_the_truth(runs):
     rng = np.random.default_rng(22)
     hits = []

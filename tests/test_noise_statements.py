@@ -76,19 +76,19 @@ def test_the_inverted_likelihood_is_that_of_a_slow_search(small_bins):
     assert found.rise_without_pair == pytest.approx(pair, abs=2e-3)
 
 
-def test_intervals_hold_whatever_is_named():
+@pytest.mark.parametrize(("runs", "least"), [(20, 16), pytest.param(30, 24, marks=pytest.mark.slow)])
+def test_intervals_hold_whatever_is_named(runs, least):
     rng = np.random.default_rng(62)
     truth = {"N": 1e-2, "B": 3e-3, "K": 6e-4}
     inside = dict.fromkeys("QNBKR", 0)
-    runs = 30
     for _ in range(runs):
         axis = identify_noise(in_time(rng, 1 << 15, 100.0, **truth), 100.0).axes[0]
         for s in inside:
             term = axis.terms[TermName(s)]
             assert term.limit == term.upper
             inside[s] += term.lower <= truth.get(s, 0.0) <= term.upper
-    # Of 30 intervals of 95 %: 24 or more with probability 0.999.
-    assert min(inside.values()) >= 24, inside
+    # Of 30 intervals of 95 %: 24 or more with probability 0.999; of 20, 16 or more with 0.997.
+    assert min(inside.values()) >= least, inside
 
 
 @pytest.mark.slow

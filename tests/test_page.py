@@ -25,8 +25,8 @@ pytestmark = [
     pytest.mark.filterwarnings("default"),
 ]
 KINDS = ("calibrate", "verify", "segment", "check", "allan", "kalman", "diagnose", "simulate", "plan")
-# Pages share one sheet of styles: these hold all parts that it gives a colour to.
-IN_THE_DARK = ("calibrate", "allan", "diagnose")
+# Pages share one sheet of styles: these hold all parts that it gives a colour to, and a verdict with its figure.
+WITH_A_FIGURE = ("calibrate", "allan", "diagnose")
 
 
 @pytest.fixture(scope="module")
@@ -124,13 +124,17 @@ def test_a_report_fits_a_phone_and_the_paper_and_has_no_barrier(folder, browser,
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_report_says_on_its_first_screen_what_to_do_and_is_read_in_the_dark(folder, browser, axe, kind):
+def test_a_report_has_result_and_remedy_on_its_first_screen_and_is_read_in_the_dark(folder, browser, axe, kind):
     page = Visit(browser, folder / f"{kind}.html", 1280, "dark").page
     told = [box for part in (".foremost", ".next") if (box := page.query_selector(part)) is not None]
     assert told or kind == "simulate"
     assert all(0 < box.bounding_box()["y"] < 400 for box in told)
     assert any("→" in box.inner_text() for box in told) or kind == "simulate"
-    if kind in IN_THE_DARK:
+    if kind in WITH_A_FIGURE:
+        for part in (".verdict", ".number .value", "header .plot"):
+            box = page.query_selector(part).bounding_box()
+            assert 0 < box["y"] < 800
+            assert box["height"] > 10
         assert barriers_of(page, axe) == []
     assert width_of(page) <= 1280
     page.close()
@@ -145,16 +149,6 @@ def test_tools_of_a_figure_hide_no_mark_on_a_phone(folder, browser, kind):
     page.close()
 
 
-@pytest.mark.parametrize("kind", ["calibrate", "allan", "diagnose"])
-def test_the_verdict_the_number_and_its_figure_are_on_the_first_screen(folder, browser, kind):
-    visit = Visit(browser, folder / f"{kind}.html", 1280, "light")
-    for part in (".verdict", ".number .value", "header .plot"):
-        box = visit.page.query_selector(part).bounding_box()
-        assert 0 < box["y"] < 800
-        assert box["height"] > 10
-    visit.page.close()
-
-
 def point_at_the_first_dot(page, figure):
     """The dots of a group are one path of places in ten thousandths of the panel."""
     plot = page.query_selector(f"{figure} .plot")
@@ -162,28 +156,6 @@ def point_at_the_first_dot(page, figure):
     x, y = re.match(r"M(\d+) (\d+)", plot.query_selector(".dot").get_attribute("d")).groups()
     box = plot.query_selector("svg").bounding_box()
     page.mouse.move(box["x"] + box["width"] * int(x) / 1e4, box["y"] + box["height"] * int(y) / 1e4)
-
-
-def test_one_cursor_runs_over_all_axes_of_time_and_over_no_other(folder, browser):
-    page = Visit(browser, folder / "calibrate.html", 1280, "light").page
-    signals = page.query_selector("#signals .plot")
-    signals.scroll_into_view_if_needed()
-    box = signals.bounding_box()
-    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
-    time = "(p) => p.querySelector('.xlabel').textContent === 'time [s]'"
-    panels = page.query_selector_all(".panel")
-    of_time = [panel for panel in panels if page.evaluate(time, panel)]
-    # Residuals of poses and of moves, and the signals of both sensors.
-    assert len(of_time) == 4
-    for panel in panels:
-        cursor = panel.query_selector(".cursor")
-        assert (cursor is not None) == (panel in of_time)
-    shares = [float(re.search(r"left: ([\d.]+)%", panel.query_selector(".cursor").get_attribute("style"))[1])
-              for panel in of_time if panel.query_selector(".cursor").is_visible()]  # fmt: skip
-    # All run over the same seconds; the panel that is pointed at shows no second cursor.
-    assert len(shares) == 3
-    assert all(abs(share - 50.0) < 0.5 for share in shares)
-    page.close()
 
 
 def test_a_bar_and_a_cell_of_correlations_tell_their_value(folder, browser):
@@ -218,11 +190,28 @@ def test_findings_of_the_first_screen_are_told_in_words_and_six_faces_their_meth
     page.close()
 
 
-def test_tools_of_every_figure_are_seen_and_named_apart(folder, browser):
+def test_one_cursor_runs_over_all_axes_of_time_and_tools_are_seen_and_named_apart(folder, browser):
     page = Visit(browser, folder / "calibrate.html", 1280, "dark").page
     names = [button.get_attribute("aria-label") for button in page.query_selector_all(".tools button")]
     assert len(set(names)) == len(names)
     assert page.evaluate("getComputedStyle(document.querySelector('.tools')).opacity") == "1"
+    signals = page.query_selector("#signals .plot")
+    signals.scroll_into_view_if_needed()
+    box = signals.bounding_box()
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    time = "(p) => p.querySelector('.xlabel').textContent === 'time [s]'"
+    panels = page.query_selector_all(".panel")
+    of_time = [panel for panel in panels if page.evaluate(time, panel)]
+    # Residuals of poses and of moves, and the signals of both sensors.
+    assert len(of_time) == 4
+    for panel in panels:
+        cursor = panel.query_selector(".cursor")
+        assert (cursor is not None) == (panel in of_time)
+    shares = [float(re.search(r"left: ([\d.]+)%", panel.query_selector(".cursor").get_attribute("style"))[1])
+              for panel in of_time if panel.query_selector(".cursor").is_visible()]  # fmt: skip
+    # All run over the same seconds; the panel that is pointed at shows no second cursor.
+    assert len(shares) == 3
+    assert all(abs(share - 50.0) < 0.5 for share in shares)
     page.close()
 
 

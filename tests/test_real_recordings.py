@@ -253,18 +253,23 @@ def test_ctu_turns_give_one_scale_consistent_with_the_reference_angles(real_data
         assert abs((found.S @ seen)[turn.axis] - turn.angle_rad) < math.radians(0.5)
 
 
-def test_a_rotation_beyond_the_gyros_range_is_not_in_the_figure_of_a_verification(real_data):
+@pytest.fixture(scope="module")
+def mimu(real_data):
+    """Device 7 calibrated on one session, and another session of it."""
     first, other = (trihedron.read(real_data / f"mimu4444/exp_{n}.npz", device=7) for n in (2, 3))
-    judged = trihedron.verify(trihedron.calibrate(first, gravity_m_s2=9.8184), other).verification
+    return trihedron.calibrate(first, gravity_m_s2=9.8184).calibration, other
+
+
+def test_a_rotation_beyond_the_gyros_range_is_not_in_the_figure_of_a_verification(mimu):
+    judged = trihedron.verify(*mimu).verification
     # Seventeen seconds of violent rotation by hand, 3.5 s of them at 32767: 10.5° rms with it.
     assert judged.moves_left_out == (19,)
     assert 19 not in judged.moves
     assert judged.angle_rms_deg < 0.6
 
 
-def test_a_scale_off_by_a_twentieth_or_a_bias_by_5_degrees_a_second_fails_on_another_session(real_data):
-    first, other = (trihedron.read(real_data / f"mimu4444/exp_{n}.npz", device=5) for n in (2, 3))
-    right = trihedron.calibrate(first, gravity_m_s2=9.8184).calibration
+def test_a_scale_off_by_a_twentieth_or_a_bias_by_5_degrees_a_second_fails_on_another_session(mimu):
+    right, other = mimu
     gyro, accelerometer = right.gyroscope, right.accelerometer
     scaled = replace(
         right,

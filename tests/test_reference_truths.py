@@ -31,7 +31,7 @@ def test_a_sound_truth_is_not_refused_for_the_filters_rounding(seed, more):
 
 def test_a_drone_under_a_tracker_of_attitudes_has_the_g_sensitivity_that_it_has():
     # It leans into its acceleration: its accelerometer's numbers are not told, and what its gyro feels still is.
-    trial = truth(4, "drone", has_g_sensitivity=True)
+    trial = truth(4, "drone", seconds=60, has_g_sensitivity=True, size_deg=0.1)
     found = fit_reference(trial.log, trial.motion, G)
     one = found.effects["gyro-g-sensitivity"]
     assert one.score > NAMED_FROM
@@ -42,7 +42,7 @@ def test_a_drone_under_a_tracker_of_attitudes_has_the_g_sensitivity_that_it_has(
 def test_what_a_reference_is_too_poor_to_show_is_said_with_the_size_from_which_it_would():
     fine, poor = (
         fit_reference(trial.log, trial.motion, G).effects["gyro-g-sensitivity"]
-        for trial in (truth(2, "robot", seconds=60, size_deg=size, lasting_s=6.0) for size in (0.03, 2.0))
+        for trial in (truth(2, "robot", seconds=30, size_deg=size, lasting_s=6.0) for size in (0.03, 2.0))
     )
     # Λ of the numbers falls with the square of the truth's error, which is seventy times as large.
     assert 3.0 * fine.shown_from < poor.shown_from
@@ -59,12 +59,12 @@ def test_two_places_of_the_clock_are_both_said_and_refused():
 
 
 def test_a_stretch_in_which_the_truth_is_wrong_is_said_and_the_rest_is_used():
-    trial = truth(8, "robot", seconds=60, size_deg=0.05, lasting_s=6.0)
-    wrong = (trial.motion.time_s > 30.0) & (trial.motion.time_s < 35.0)
+    trial = truth(8, "robot", seconds=40, size_deg=0.05, lasting_s=6.0)
+    wrong = (trial.motion.time_s > 20.0) & (trial.motion.time_s < 25.0)
     attitude = trial.motion.attitude.copy()
     attitude[wrong] = turn(0, np.radians([6.0]))[0] @ attitude[wrong]
     found = fit_reference(trial.log, replace(trial.motion, attitude=attitude), G)
-    assert any(start < 31.5 and end > 28.5 for start, end in found.error.apart_s)
+    assert any(start < 21.5 and end > 18.5 for start, end in found.error.apart_s)
     assert np.abs(z_of_bias(found, trial)).max() < 4.5
 
 

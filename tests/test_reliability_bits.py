@@ -58,7 +58,7 @@ def long_logs(tmp_path_factory):
     recording = simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)[0]
     assert recording.n_samples > THREADED_ROWS
     rows = np.column_stack([recording.time_s, recording.accelerometer, recording.gyroscope])
-    rest = np.column_stack([np.arange(60_000) / 100.0, rng.normal([0, 0, 9.8, 0, 0, 0], 0.01, (60_000, 6))])
+    rest = np.column_stack([np.arange(30_000) / 100.0, rng.normal([0, 0, 9.8, 0, 0, 0], 0.01, (30_000, 6))])
     for name, table in (("log", rows), ("rest", rest)):
         np.savetxt(folder / f"{name}.csv", table, "%.10g", ",", header="time_s,ax,ay,az,gx,gy,gz", comments="")
     return folder

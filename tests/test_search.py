@@ -25,7 +25,7 @@ from trihedron.simulate.profiles import profile_by_name
 
 
 @cache
-def fitted(effect_id="", seed=3, n_poses=20, **size):
+def fitted(effect_id="", seed=3, n_poses=14, **size):
     """A session's hypothesis without effects, all strengths of its noise free."""
     recording, truth = simulated(effect_id, seed, n_poses, **size)
     segments = segment_recording(recording)
@@ -71,14 +71,14 @@ def test_the_evidence_of_columns_is_that_of_the_linear_problem_written_out(effec
 
 
 def test_every_candidate_says_why_it_was_not_taken():
-    model = fitted("accel-quadratic", 4, 24, k2=(6e-4, -6e-4, 6e-4))
+    model = fitted("accel-quadratic", 4, 14, k2=(6e-4, -6e-4, 6e-4))
     found = search(model, 0.01)
     assert [t.effect.id for t in found.model.terms] == ["accel-quadratic"]
     assert found.scores[0] > threshold(0.01)
     # What bends axes as well would stand without it, and is needless beside it.
     assert found.against.get("accel-scale-asymmetry") == "accel-quadratic"
     assert found.tried["accel-scale-asymmetry"].score < threshold(0.01)
-    said = diagnosed("accel-quadratic", 4, k2=(6e-4, -6e-4, 6e-4)).to_dict()
+    said = diagnosed("accel-quadratic", 4, 14, k2=(6e-4, -6e-4, 6e-4)).to_dict()
     rows = {row["id"]: row for row in said["candidates"] if row["applicable"] and row["score"] is not None}
     assert rows["accel-scale-asymmetry"]["superseded_by"] == "accel-quadratic"
     for row in rows.values():
@@ -97,7 +97,7 @@ def test_a_drift_among_biases_that_scatter_is_named():
 
 @pytest.mark.parametrize("delay_s", [0.04, pytest.param(-0.025, marks=pytest.mark.slow)])
 def test_a_long_delay_is_a_delay_of_that_length(delay_s):
-    d = diagnosed("accel-gyro-time-offset", 4, 20, offset_s=delay_s)
+    d = diagnosed("accel-gyro-time-offset", 4, 14, offset_s=delay_s)
     first = d.effects[0]
     assert first.id == "accel-gyro-time-offset"
     # 40 ms were called 26 ms and a lag of -14 ms; half a millisecond is a twentieth of a sample.
@@ -126,7 +126,7 @@ def test_white_noise_has_no_colour_and_a_zero_that_jumps_in_some_poses_is_bounde
 
 def scattering(effect_id, seed, gyro_deg_s, **size):
     """A session with an effect whose gyro's zero is another in every pose, and gravity there."""
-    recording, truth = simulated(effect_id, seed, **size)
+    recording, truth = simulated(effect_id, seed, 16, **size)
     rng, zero = np.random.default_rng(seed), np.zeros_like(recording.gyroscope)
     starts = [part.start for part in truth.segments if part.kind == "pose"]
     for start, stop in zip(starts, [*starts[1:], len(zero)], strict=True):
