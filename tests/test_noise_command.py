@@ -102,6 +102,12 @@ def test_the_size_of_a_count_gives_a_log_in_counts_its_units(tmp_path, capsys):
     assert "→ State the size of a count, for terms in SI: --gyro-lsb" in capsys.readouterr().out
     assert main(["allan", str(path), *said[:-1], "3.33"]) == 1
     assert "number and a unit" in capsys.readouterr().err
+    # Readings in SI were multiplied, and N was a thousandth.
+    in_si = tmp_path / "si.csv"
+    header = ",".join([f"g{axis} [rad/s]" for axis in "xyz"] + [f"a{axis} [m/s^2]" for axis in "xyz"])
+    np.savetxt(in_si, 1e-3 * counts[:2000], "%.6g", ",", header=header, comments="")
+    assert main(["allan", str(in_si), "--rate", "100", *said[4:]]) == 1
+    assert "not in counts" in capsys.readouterr().err
 
 
 def test_lost_rows_become_missing_readings_not_shorter_time():

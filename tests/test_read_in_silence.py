@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import trihedron
 from formats.layout import G
 from formats.written import session
 from trihedron.read import ReadError, read_recording
@@ -318,3 +319,10 @@ def test_a_counter_of_a_byte_says_that_its_loss_is_the_least(tmp_path):
     log = written(tmp_path / "log.csv", *table(t[kept], force[kept], rate[kept])[1:], count, header=f"{HEADER[2:]},seq")
     (lost,) = [f for f in read_recording(log, rate_hz=100.0).findings if f.code is FindingCode.SAMPLES_LOST]
     assert "at least 60 samples" in lost.seen
+
+
+def test_a_log_whose_time_counts_rows_says_so_where_its_calibration_is_refused(tmp_path):
+    t, force, rate = motion(n_poses=12)
+    log = written(tmp_path / "log.csv", *table(range(len(t)), force, rate), header=HEADER.replace("t,", "time,"))
+    with pytest.raises(ValueError, match=r"Poses found: \d\. The time is in ms.*or rate_hz if the column counts rows"):
+        trihedron.calibrate(str(log), gravity_m_s2=G)

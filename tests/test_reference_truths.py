@@ -8,7 +8,7 @@ import pytest
 import trihedron
 from reference_rig import G, turn
 from reference_truths import truth
-from trihedron.estimate.reference.fit import fit_reference
+from trihedron.estimate.reference.fit import fit_reference, laid_beside
 from trihedron.records.reference import NAMED_FROM, ReferenceMotion
 
 
@@ -86,3 +86,8 @@ def test_a_truth_that_wanders_in_the_body_leaves_the_accelerometer_within_its_un
     # A turn of all axes is not known to half a degree, and scales are to some 1e-4.
     assert np.degrees(np.sqrt(np.trace(found.frame_covariance))) > 0.3
     assert np.abs(np.diag(off @ trial.unit.N)).max() < 1e-3
+
+
+def test_poses_that_a_robot_repeats_are_no_jump_of_the_clock():
+    trial = truth(2, "robot", seconds=40, size_deg=0.03, lasting_s=6.0)
+    assert laid_beside(trial.log, trial.motion, G).grid is not None

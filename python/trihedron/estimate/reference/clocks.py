@@ -187,11 +187,11 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
     for k in np.flatnonzero(np.abs(step) > JUMP_S).tolist():
         before, after = np.median(found[max(0, k - 2) : k + 1]), np.median(found[k + 1 : k + 4])
         steady = np.median(np.abs(np.delete(step, k))) if len(step) > 1 else 0.0
-        is_borne_out = min(k + 1, len(found) - k - 1) >= FEWEST_BEYOND
-        if not is_borne_out:
-            lone, others = (0, after) if k == 0 else (len(found) - 1, before)
-            best, correlation = fits[lone]
-            is_borne_out = best > SURE and float(correlation[round(others / grid.step_s) + search]) < LOCKED
+        # Motion that repeats fits at a period of its own as well: the shorter side must not fit at the other's lag.
+        beyond, others = (fits[: k + 1], after) if k + 1 <= len(found) - k - 1 else (fits[k + 1 :], before)
+        there = round(others / grid.step_s) + search
+        is_borne_out = len(beyond) >= FEWEST_BEYOND or beyond[0][0] > SURE
+        is_borne_out &= float(np.median([correlation[there] for _, correlation in beyond])) < LOCKED
         if abs(after - before) > JUMP_S and abs(step[k]) > 5.0 * steady and is_borne_out:
             raise RefusedError(
                 f"{reference.motion.source}: the reference's clock jumps by {after - before:+.3g} s between "
