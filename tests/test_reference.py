@@ -288,6 +288,17 @@ def test_the_second_derivative_of_a_window_is_that_of_its_own_weights_at_ten_sam
         assert np.allclose(ratio / -(w**2), 1.0, atol=4.0 * (w * step) ** 4 / 240.0 + 1e-9)
 
 
+def test_a_log_without_poses_is_calibrated_by_its_reference_and_has_a_report():
+    trial = measured_table(81, 25)
+    n = len(trial.log.time_s)
+    level = np.tile([0.0, 0.0, G], (n, 1)) + 0.01 * np.sin(np.arange(3.0 * n)).reshape(-1, 3)
+    log = trihedron.Recording.from_arrays(
+        trial.log.time_s, level, trial.log.gyroscope, accelerometer_unit="m/s^2", gyroscope_unit="counts"
+    )
+    found = trihedron.calibrate(log, reference=trial.motion, gravity_m_s2=G)
+    assert "before calibration" not in trihedron.report(found)
+
+
 def test_a_rates_own_clock_does_not_stretch_the_scale():
     trial = measured_table(81, 30)
     fast = replace(trial.motion, time_s=trial.motion.time_s * (1.0 + 3e-4))
