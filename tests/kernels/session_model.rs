@@ -8,7 +8,7 @@ use trihedron::session_model::move_rows::Weights;
 use trihedron::session_model::moves::{Move, MoveNoise};
 use trihedron::session_model::strength_search::Within;
 use trihedron::session_model::strengths::tune;
-use trihedron::session_model::{AtRest, Distortion, Session, State, Strengths};
+use trihedron::session_model::{Distortion, Session, State, StaticMeans, Strengths};
 
 /// A small generator of uniform numbers in (-1, 1): the test must not depend on the simulator.
 struct Uniform(u64);
@@ -97,7 +97,7 @@ fn made(scatter: bool) -> (Session, State) {
     let noise_rate = Vector3::new(0.02, 0.03, 0.025);
     let at_rest = |mean: Vec<Vector3<f64>>, density: Vector3<f64>| {
         let sigma = vec![density / 2.0; mean.len()];
-        AtRest::of(mean, sigma, density, None).expect("means without verticals")
+        StaticMeans::of(mean, sigma, density, None).expect("means without verticals")
     };
     let force_mean = (0..N_POSES)
         .map(|i| inverse_force * (up[i] * G - force_bias) + slow[i])

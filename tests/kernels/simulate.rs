@@ -6,7 +6,7 @@ use trihedron::simulate::jet::{Jet, progress, window};
 use trihedron::simulate::mechanism::{Bridge, creep, first_order, play, second_order};
 use trihedron::simulate::noise::flicker_poles;
 use trihedron::simulate::random::Stream;
-use trihedron::simulate::sampling::{Converter, resample};
+use trihedron::simulate::sampling::{Adc, resample};
 
 /// Equal to the last bit.
 fn same((a, b): (&f64, f64)) -> bool {
@@ -185,7 +185,7 @@ fn resampling_is_exact_for_cubics_and_refuses_what_lies_outside() {
 
 #[test]
 fn a_converter_rounds_clips_skips_codes_and_sleeps_in_its_dead_band() {
-    let converter = Converter {
+    let converter = Adc {
         lsb: 0.5,
         low: -4.0,
         high: 4.0,
@@ -201,7 +201,7 @@ fn a_converter_rounds_clips_skips_codes_and_sleeps_in_its_dead_band() {
     assert_eq!(x[2][0].to_bits(), 2.0_f64.to_bits());
     assert_eq!(x[3][0].to_bits(), 2.0_f64.to_bits());
     assert!([x[4][0], x[5][0]].iter().zip([4.0, -4.0]).all(same));
-    let malformed = Converter {
+    let malformed = Adc {
         low: 5.0,
         ..converter
     };

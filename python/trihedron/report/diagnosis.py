@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 
-from trihedron.records import Finding
+from trihedron.records import Finding, Severity
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.report.axes import LETTERS
@@ -46,6 +46,7 @@ from trihedron.report.document import Block, Document, Facts, Paragraph, Picture
 from trihedron.report.effect_charts import effect_chart
 from trihedron.report.effect_rest_charts import rest_panels
 from trihedron.report.findings import findings_block
+from trihedron.report.findings.wording import opening
 from trihedron.report.numbers import (
     how_many,
     listed,
@@ -101,7 +102,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     document = Document(
         title="Diagnosis against a model" if diagnosis.parameters else "Diagnosis",
         subtitle=f"{diagnosis.recording_source} against {model}" if model else diagnosis.recording_source,
-        verdict=verdict_in_words(diagnosis),
+        verdict=verdict_in_words(diagnosis) + _distrust(diagnosis),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
         headlines=(*differing_headline(diagnosis), *headlines_of(diagnosis)),
@@ -110,6 +111,13 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         stated_level=level_of(diagnosis),
     )
     return beside_reference(document, found)
+
+
+def _distrust(diagnosis: Diagnosis) -> str:
+    """The first serious finding of the log's own calibration, which the diagnosis began with."""
+    own = None if getattr(diagnosis, "model_is_given", False) else getattr(diagnosis, "calibration", None)
+    serious = [one.seen for one in own.findings if one.severity is Severity.SERIOUS] if own is not None else []
+    return f" The calibration without effects is not to be trusted: {opening(serious[0])}." if serious else ""
 
 
 def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
