@@ -185,7 +185,7 @@ def test_losses_that_no_step_shows_are_in_the_error_bars_and_said():
     result = calibrate(recording_of(*with_losses(f, w, 400, 0.001), rate), gravity_m_s2=G)
     z, _ = gyro_z(result, lower(truth))
     assert np.abs(z).max() < 4.5
-    assert FindingCode.SAMPLES_LOST in {finding.code for finding in result.findings}
+    assert FindingCode.LOSSES_POSSIBLE in {finding.code for finding in result.findings}
     assert not result.is_trustworthy
 
 

@@ -235,3 +235,10 @@ def test_a_diagnosis_of_another_schema_is_not_guessed_at(said, tmp_path):
     (tmp_path / "old.json").write_text(json.dumps({**said[1], "schema_version": 2}))
     with pytest.raises(DiagnosisFileError, match="written in schema 2, this version reads 3; diagnose the log again"):
         read_diagnosis(tmp_path / "old.json")
+
+
+def test_a_bent_accelerometer_is_no_loss_of_samples_once_its_effect_is_found():
+    recording, _ = simulate(with_effect(scenario(layout=8, n_poses=18), "accel-quadratic", k2=K2), 8)
+    bent = trihedron.calibrate(recording, gravity_m_s2=9.80665)
+    assert FindingCode.LOSSES_POSSIBLE in {one.code for one in bent.calibration.findings}
+    assert trihedron.extend(bent).is_trustworthy

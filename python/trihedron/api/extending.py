@@ -130,6 +130,7 @@ _OF_THE_LINEAR_FIT = (
     FindingCode.JOINT_FIT_LEFT,
     FindingCode.GYRO_G_SENSITIVITY,
     FindingCode.GYRO_BIAS_DRIFT,
+    FindingCode.LOSSES_POSSIBLE,
 )
 
 

@@ -66,6 +66,7 @@ class FindingCode(str, Enum):
     TIMESTAMPS_KEPT = "timestamps-kept"
     CLOCK_UNDECIDED = "clock-undecided"
     SAMPLES_LOST = "samples-lost"
+    LOSSES_POSSIBLE = "losses-possible"
     GRAVITY_MISSING = "gravity-missing"
     # segment
     NO_INITIAL_POSE = "no-initial-pose"

@@ -62,7 +62,7 @@ class PossibleLosses:
         """Finding where the possible share exceeds ``sigma_scale``, the scale's relative standard uncertainty."""
         if self.possible <= sigma_scale:
             return ()
-        return (Finding.of(FindingCode.SAMPLES_LOST, "possible", lost_share=self.possible, sigma_scale=sigma_scale),)
+        return (Finding.of(FindingCode.LOSSES_POSSIBLE, lost_share=self.possible, sigma_scale=sigma_scale),)
 
 
 def relative_sigma(covariance: FloatArray, S: FloatArray) -> float:

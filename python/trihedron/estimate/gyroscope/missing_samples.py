@@ -98,8 +98,7 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
 
 def unless_seen(of_fit: tuple[Finding, ...], seen: tuple[Finding, ...]) -> tuple[Finding, ...]:
     """Findings of a fit, without its possible losses where losses were detected in the motion."""
-    is_seen = any(finding.code is FindingCode.SAMPLES_LOST for finding in seen)
-    return tuple(one for one in of_fit if not (is_seen and one.code is FindingCode.SAMPLES_LOST))
+    return tuple(one for one in of_fit if not (seen and one.code is FindingCode.LOSSES_POSSIBLE))
 
 
 def _positive(sigma: FloatArray) -> FloatArray:

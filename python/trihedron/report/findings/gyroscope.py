@@ -154,8 +154,8 @@ _MOVES = (
         or_severity=SERIOUS,
     ),
     Entry(
-        Code.SAMPLES_LOST,
-        "possible",
+        Code.LOSSES_POSSIBLE,
+        "",
         SERIOUS,
         "The tilt error after rotations exceeds noise, and the timestamps are so even that they may have been "
         "regenerated: {lost_share:.2g %} of the samples could be missing without a trace. Every turn, and the gyro's "
