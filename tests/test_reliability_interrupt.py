@@ -91,7 +91,7 @@ def test_a_library_that_does_not_listen_is_ended_all_the_same():
 
 
 def test_a_long_kernel_ends_between_blocks_when_python_is_interrupted():
-    # Half a minute of noise; the signal comes from a thread, the handler runs in the kernel's doorway.
+    # Half a minute of noise; the signal comes from a thread, the handler runs in the kernel's binding.
     n = 30_000_000
     threading.Timer(0.4, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
     # In seconds of the processor, of which a loaded machine gives no more.
