@@ -212,10 +212,10 @@ def _require_poses(recording: Recording, segments: Segments) -> None:
         of_log = [one for one in recording.findings if one.severity is Severity.SERIOUS]
         grave = next((one for one in (*of_log, *segments.findings) if one.severity is not Severity.NOTE), None)
         is_count = grave is not None and grave.code in COUNTS_OF_POSES
-        why = "" if is_count else f"Poses found: {segments.n_poses}. "
-        why += "" if grave is None else f"{grave.seen} {grave.action if of_log else ''}".strip()
+        why = [] if is_count else [f"Poses found: {segments.n_poses}."]
+        why += [] if grave is None else [grave.seen, *([grave.action] if of_log else [])]
         raise RefusedError(
-            f"{recording.source}: {why.strip()} Hold the sensor still for 3 to 5 seconds in each of 18 or more "
+            f"{recording.source}: {' '.join(why)} Hold the sensor still for 3 to 5 seconds in each of 18 or more "
             "different poses; `trihedron segment LOG` shows what was seen."
         )
 

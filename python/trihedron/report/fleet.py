@@ -102,7 +102,7 @@ def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> st
     if usable:
         steps.append("use each device's own calibration (a file of calibrations/): trihedron apply FILE LOG")
     said = "; ".join(steps)
-    return f"{said[0].upper()}{said[1:]}."
+    return f"{said[0].upper()}{said[1:]}." if said else ""
 
 
 def _is_usable(log: FleetLog) -> bool:
