@@ -69,6 +69,9 @@ def test_a_steady_reading_inside_one_step_is_one_error_and_a_ramp_is_none():
     assert hidden.variance_of_turns()[0, 0] == pytest.approx(2.0**2 / 12.0)
     assert hidden.passing[1, 1] == pytest.approx(8 * 0.01**2 / 12.0)
     assert hidden.variance_of_biases()[0] == pytest.approx(np.full(3, 3.0**2 / 12.0))
+    # The same turn with rest at its ends, 0.2 and 1 s in the step of the bias, which is one error more.
+    (ends,) = hidden_angles(readings, 0.01, np.ones(3), [(380, 700)], [(0, 300)], np.eye(3)[:1]).variance_of_turns()
+    assert ends[0] == pytest.approx((2.0**2 + 1.2**2) / 12.0)
 
 
 def test_faces_of_a_coarse_accelerometer_lie_within_their_error_bars():

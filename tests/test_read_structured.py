@@ -101,6 +101,7 @@ def test_sensorstream_rawimu_and_kitti_keep_every_reading(tmp_path):
     drive = read_recording(tmp_path / "drive")
     np.testing.assert_allclose(drive.accelerometer, force)
     assert drive.rate_hz == pytest.approx(100.0)
+    np.testing.assert_allclose(drive.time_s - drive.time_s[0], t - t[0], atol=1e-6)
     assert read_recording(oxts / "data").rows_read == drive.rows_read
 
 

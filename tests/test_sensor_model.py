@@ -175,6 +175,7 @@ def test_units_have_the_sizes_of_the_international_system():
     assert acceleration_to_si(AccelerationUnit.MG) == pytest.approx(9.80665e-3, rel=1e-15)
     assert rate_to_si(RateUnit.DEG_S) == pytest.approx(0.017453292519943295, rel=1e-15)
     assert (rate_to_si(RateUnit.MDEG_S), rate_to_si(RateUnit.MRAD_S)) == pytest.approx((1.7453292519943e-5, 1e-3))
+    assert (rate_to_si(RateUnit.DEG_H), rate_to_si(RateUnit.RPM)) == pytest.approx((4.848136811095e-6, 0.10471975512))
     assert acceleration_lsb_to_si("0.061 mg") == pytest.approx(0.061e-3 * 9.80665)
     assert rate_lsb_to_si("0.05 deg/s") == pytest.approx(8.726646259971648e-4)
     assert mg_from_m_s2(9.80665) == pytest.approx(1000.0)
