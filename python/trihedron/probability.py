@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from trihedron import _core
 
+NORMAL_95 = 1.96
+"""Half-width of a 95 % interval of a normal variate, in standard deviations."""
+
 
 def chdtrc(dof: float, value: float) -> float:
     """Probability that a chi-square variate exceeds ``value``."""

@@ -93,8 +93,8 @@ pub fn fit_quadric(u: &[Vector3<f64>]) -> Result<Quadric> {
     let n = u.len();
     if n < 9 {
         return Err(Error::not_determined(format!(
-            "{n} static poses cannot determine the nine parameters of an ellipsoid: record at least nine, better eighteen \
-             (six faces and twelve edges of a cube); {}",
+            "{n} static poses cannot determine the nine parameters of an ellipsoid: record at least nine, better \
+             eighteen (six faces and twelve edges of a cube); {}",
             missing_directions(u)
         )));
     }

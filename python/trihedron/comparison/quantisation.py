@@ -11,6 +11,7 @@ import numpy as np
 from trihedron.arrays import AXES
 from trihedron.channel_facts.pooled import ratio_of
 from trihedron.comparison.noise import Sampled, Sensor
+from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import NoiseDifference
 from trihedron.records.pose_noise import Measured, PoseNoise
 
@@ -40,7 +41,7 @@ class WhiteAndQuantisation:
     def measured(self) -> Measured:
         """Q with its 95 % interval, where it is shown."""
         value, log = math.sqrt(self.quantisation), 0.5 * self.sigma / self.quantisation
-        return Measured(value, value * math.exp(-1.96 * log), value * math.exp(1.96 * log), log)
+        return Measured(value, value * math.exp(-NORMAL_95 * log), value * math.exp(NORMAL_95 * log), log)
 
 
 def white_and_quantisation(axis: PoseNoise) -> WhiteAndQuantisation | None:

@@ -21,6 +21,7 @@ from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS,
 from trihedron.diagnose.sample_evidence import Seen
 from trihedron.diagnose.search import Found
 from trihedron.diagnose.session.solve import Fit
+from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectCurve, EffectParameter, Stage, StageDomain
 from trihedron.records.domains import DomainResiduals, HeldOut
 
@@ -29,7 +30,6 @@ HEADLINE = 0.5
 after the effects that explain poses and moves."""
 LEAST_P = 1e-300
 """Smallest p-value that a double holds with full precision."""
-NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 from trihedron.arrays import FloatArray
 from trihedron.estimate.filter_noise.strengths import ABSENT, PREFERRED, Fitted
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
+from trihedron.probability import NORMAL_95
 from trihedron.records.filter_noise import Bounded
 
 STEP = 0.05
@@ -44,7 +45,7 @@ def unlike_axes_beside(stretches: Sequence[Stretch], found: Fitted, N: Bounded) 
     common = (0.25 * np.log(N.upper / max(N.lower, N.upper / ABSENT))) ** 2
     each = []
     for x, variance in zip(best, own, strict=True):
-        value, factor = N.value * float(np.exp(x)), float(np.exp(1.96 * np.sqrt(variance + common)))
+        value, factor = N.value * float(np.exp(x)), float(np.exp(NORMAL_95 * np.sqrt(variance + common)))
         each.append(Bounded(value, value / factor, value * factor))
     return tuple(each)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.attitude import integrate_rate
+from trihedron.probability import NORMAL_95
 from trihedron.records import NoiseAxis, Segments, TermName
 from trihedron.records.filter_noise import Bounded, IntervalCheck, StaticNoise, TiltCheck
 
@@ -38,7 +39,7 @@ def _pooled(axes: Sequence[NoiseAxis], term: TermName) -> Bounded:
     value = _rms([one.value for one in terms])
     # Errors of the axes are independent: variances add.
     spread = math.sqrt(sum(one.sigma**2 * one.value**2 for one in terms)) / (len(terms) * max(value, 1e-300))
-    factor = math.exp(1.96 * spread / max(value, 1e-300))
+    factor = math.exp(NORMAL_95 * spread / max(value, 1e-300))
     return Bounded(value, value / factor, value * factor)
 
 

@@ -17,6 +17,7 @@ from trihedron.estimate.noise.screening import Event, Readout
 from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, select
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.estimate.noise.terms import SYMBOLS
+from trihedron.probability import NORMAL_95
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.noise import AllanCurve, GaussMarkov, NoiseAxis, NoiseTerm, SlowPair, TermName
 
@@ -235,8 +236,6 @@ def _tempered(selection: Selection) -> tuple[Selection, float, tuple[float, floa
 
 
 # White noise through a coarse ADC: the measured noise depends on the position of the mean inside the LSB.
-
-NORMAL_95 = 1.96
 
 
 def level_share(sigma: float, resolution: float) -> float:

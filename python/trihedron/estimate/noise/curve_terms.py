@@ -28,6 +28,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.terms import allan_variance_of_terms
+from trihedron.probability import NORMAL_95
 from trihedron.records.noise import TermName
 
 _DIFFERENCE = ((0, 1.0), (1, -2.0), (2, 1.0))
@@ -273,7 +274,7 @@ class CurvePoints:
 
         wald = 0.3
         if is_present and fit.covariance.size:
-            wald = 1.96 * math.sqrt(scale * float(fit.covariance[fit.active.index(k), fit.active.index(k)]))
+            wald = NORMAL_95 * math.sqrt(scale * float(fit.covariance[fit.active.index(k), fit.active.index(k)]))
         up = _crossing(excess, min(max(wald, 1e-4), 2.0))
         down = _crossing(excess, -min(max(wald, 1e-4), 2.0)) if is_present else -math.inf
         return best * math.exp(down), best * math.exp(up)

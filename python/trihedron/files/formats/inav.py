@@ -12,8 +12,9 @@ from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.files.formats.autopilot import AxisCorrection, Composed, composed
 from trihedron.files.formats.contract import ExportOptions, Format, heading, number
-from trihedron.files.formats.losses import HALF_WIDTH, lost_gyro_scale, lost_to_a_diagonal, size_of_bias
+from trihedron.files.formats.losses import lost_gyro_scale, lost_to_a_diagonal, size_of_bias
 from trihedron.files.plausible import named_sensors
+from trihedron.probability import NORMAL_95
 from trihedron.records import Calibration
 from trihedron.units import acceleration_lsb_to_si, rate_lsb_to_si
 
@@ -41,7 +42,7 @@ def to_inav(calibration: Calibration, options: ExportOptions) -> str:
     for name, sensor in named_sensors(own):
         count = _size_of_a_count(name, options)
         half = np.full(3, 0.5 * count)
-        if half[0] > HALF_WIDTH * float(sensor.sigma_b.max()):
+        if half[0] > NORMAL_95 * float(sensor.sigma_b.max()):
             lines.append(f"# Biases are whole counts: up to {size_of_bias(name, half)} of bias of the {name} is lost.")
         lines += _lines(name, sensors[name], count)
         if name == "gyroscope":

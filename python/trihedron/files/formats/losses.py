@@ -6,16 +6,14 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.files.plausible import ROUNDING, named_sensors
+from trihedron.probability import NORMAL_95
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
-
-HALF_WIDTH = 1.96
-"""Half-width of a 95 % interval in standard uncertainties."""
 
 
 def exceeds(value: FloatArray, sigma: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
     """Which values differ from 0 by more than their 95 % interval (``sigma`` is the standard uncertainty)."""
-    return np.asarray(np.abs(value) > np.maximum(HALF_WIDTH * sigma, ROUNDING))
+    return np.asarray(np.abs(value) > np.maximum(NORMAL_95 * sigma, ROUNDING))
 
 
 def has_matrix(sensor: SensorCalibration) -> bool:
