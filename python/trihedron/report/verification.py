@@ -63,7 +63,7 @@ def _expected(size: str, chi2_per_dof: float) -> str:
 def _usable(v: Verification) -> str:
     """``Verified``, or the errors that exceed noise and uncertainty."""
     above = {finding.code: _ABOVE_NOISE[finding.code] for finding in _above_noise(v)}
-    return f"Not verified: {listed(list(above.values()))} above noise and uncertainty" if above else "Verified"
+    return f"Doubtful: {listed(list(above.values()))} above noise and uncertainty" if above else "Verified"
 
 
 def _next_step(v: Verification) -> str:
