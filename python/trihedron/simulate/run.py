@@ -6,10 +6,9 @@ import hashlib
 from types import MappingProxyType
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.records.recording import Recording
 from trihedron.records.truth import TrueSegment, Truth
@@ -166,7 +165,7 @@ def _sample_instants(clock: Clock, n: int, seed: int) -> FloatArray:
     return grid + jitter
 
 
-def _kept(clock: Clock, true_s: FloatArray, seed: int) -> npt.NDArray[np.bool_]:
+def _kept(clock: Clock, true_s: FloatArray, seed: int) -> BoolArray:
     kept = np.ones(len(true_s), dtype=bool)
     for loss in clock.losses:
         first = int(np.searchsorted(true_s, loss.time_s))
@@ -178,7 +177,7 @@ def _kept(clock: Clock, true_s: FloatArray, seed: int) -> npt.NDArray[np.bool_]:
     return kept
 
 
-def _timestamps(clock: Clock, true_s: FloatArray, kept: npt.NDArray[np.bool_], seed: int) -> FloatArray:
+def _timestamps(clock: Clock, true_s: FloatArray, kept: BoolArray, seed: int) -> FloatArray:
     n = int(np.count_nonzero(kept))
     index = np.arange(n) if clock.restamped else np.flatnonzero(kept)
     timestamps: FloatArray = index / clock.rate_hz
@@ -193,7 +192,7 @@ def _timestamps(clock: Clock, true_s: FloatArray, kept: npt.NDArray[np.bool_], s
     return out
 
 
-def _pick(values: FloatArray, kept: npt.NDArray[np.bool_]) -> FloatArray:
+def _pick(values: FloatArray, kept: BoolArray) -> FloatArray:
     """Rows of the samples that were not lost; no copy where none was lost."""
     return values if kept.all() else values[kept]
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
@@ -89,7 +88,7 @@ def placements(values: FloatArray, noise: FloatArray, faces: IntArray, shared: F
     return Placements(merged, widened, faces[start], squares / apart, np.array(n_headings, dtype=np.float64))
 
 
-def _headings(values: FloatArray, noise: FloatArray) -> npt.NDArray[np.intp]:
+def _headings(values: FloatArray, noise: FloatArray) -> IntArray:
     """Heading number (n,) of each pose (n, 2): that of the first earlier pose with the same reading within noise."""
     limit = float(probability.chdtri(2, verdict.SIGNIFICANCE))
     out = np.zeros(len(values), dtype=np.intp)

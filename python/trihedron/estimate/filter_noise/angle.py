@@ -5,13 +5,10 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, Stretch, accumulated, walked
 from trihedron.estimate.reference.motion import MotionFit
-
-Mask = npt.NDArray[np.bool_]
 
 START_RAD = 0.3
 """Prior σ of the attitude error at the start of a stretch: the fit leaves some degrees."""
@@ -19,7 +16,7 @@ LONGEST, SHORTEST = 300, 12
 """Most and fewest blocks of a stretch: over five minutes parameters drift (temperature), and matrices stay small."""
 
 
-def runs(is_good: Mask) -> list[tuple[int, int]]:
+def runs(is_good: BoolArray) -> list[tuple[int, int]]:
     """Stretches ``(first, last)`` of good blocks, from ``SHORTEST`` to ``LONGEST`` blocks long."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_good, [False]]).astype(int))).reshape(-1, 2)
     out = []

@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.special import gammaln, logsumexp, ndtr, ndtri, stdtrit
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
 from trihedron.records.filter_noise import Bounded
-
-Mask = npt.NDArray[np.bool_]
 
 COORDINATES = ("noise", "vibration", "bias_walk", "white", "slow", "slow_s", "body")
 """Coordinates of the search: logarithms of strengths; ``slow`` is the reference's total slow error; ``body`` is a
@@ -63,7 +60,7 @@ class Prior:
     mean: FloatArray
     sigma: FloatArray
     is_there: FloatArray
-    may_be_nothing: Mask = field(default_factory=MAY_BE_NOTHING.copy)
+    may_be_nothing: BoolArray = field(default_factory=MAY_BE_NOTHING.copy)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import XYZ, FloatArray
+from trihedron.arrays import XYZ, BoolArray, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.turn_angles import (
     AMBIGUOUS,
@@ -120,7 +119,7 @@ def _inflation(fit: Solution) -> float:
     return fit.chi2 / fit.dof if is_beyond_chance else 1.0
 
 
-def _require_every_axis(known: Sequence[KnownTurn], used: npt.NDArray[np.bool_], recording_is_counts: bool) -> None:
+def _require_every_axis(known: Sequence[KnownTurn], used: BoolArray, recording_is_counts: bool) -> None:
     if any(turn.direction is not None for turn in known):
         vectors = np.array([turn.vector for turn in known])[used]
         directions = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
@@ -141,7 +140,7 @@ def _require_every_axis(known: Sequence[KnownTurn], used: npt.NDArray[np.bool_],
         )
 
 
-def _quality(system: TurnSystem, used: npt.NDArray[np.bool_], fit: Solution, S: FloatArray) -> FitQuality:
+def _quality(system: TurnSystem, used: BoolArray, fit: Solution, S: FloatArray) -> FitQuality:
     """Deviation of each turn from its known angle, (k, 3) rad, in sample and held out."""
     residual = system.residuals(fit) @ S.T
     noise = S @ system.covariances() @ S.T
@@ -170,7 +169,7 @@ def _quality(system: TurnSystem, used: npt.NDArray[np.bool_], fit: Solution, S: 
     )
 
 
-def _observability(system: TurnSystem, used: npt.NDArray[np.bool_], fit: Solution) -> Observability:
+def _observability(system: TurnSystem, used: BoolArray, fit: Solution) -> Observability:
     matrix, _ = system.whitened(used)
     singular = np.linalg.svd(matrix / np.linalg.norm(matrix, axis=0), compute_uv=False)
     sigma = np.sqrt(np.diag(fit.covariance)[:9]).reshape(3, 3) / np.linalg.norm(fit.S_w, 2)

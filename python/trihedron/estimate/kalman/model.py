@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy import stats
 
 from trihedron import _core
-from trihedron.arrays import AXES, FloatArray
+from trihedron.arrays import AXES, BoolArray, FloatArray
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisNoise, Consistency
 
@@ -65,7 +64,7 @@ DIFFUSE_RATIO = 30.0
 """Ratio of an innovation's σ to the later ones' above which the diffuse start dominates it, and not the noise."""
 
 
-def is_settled(innovation_sigma: FloatArray) -> npt.NDArray[np.bool_]:
+def is_settled(innovation_sigma: FloatArray) -> BoolArray:
     """Innovations (n,) that the data predict; the σ of the others is dominated by the diffuse start."""
     typical = float(np.median(innovation_sigma[len(innovation_sigma) // 2 :]))
     return innovation_sigma <= DIFFUSE_RATIO * typical

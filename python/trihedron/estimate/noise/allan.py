@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.special import chdtri
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.noise.degrees import KINDS, bias_along, edf_along
 from trihedron.estimate.noise.gaps import true_share
@@ -34,7 +34,7 @@ def default_clusters(n: int, kind: AllanKind = "overlapping") -> list[int]:
 def allan_deviation(
     x: npt.ArrayLike,
     rate_hz: float,
-    clusters: Sequence[int] | npt.NDArray[np.int64] | None = None,
+    clusters: Sequence[int] | IntArray | None = None,
     kind: AllanKind = "overlapping",
     *,
     confidence: float = 0.95,
@@ -131,7 +131,7 @@ def streamed_curve(
     )
 
 
-def as_readings(x: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def as_readings(x: npt.ArrayLike) -> FloatArray:
     """Readings as a C-contiguous array (n, channels) of a type the kernel reads, copied only where needed."""
     array = np.asarray(x)
     if array.ndim == 1:
@@ -162,7 +162,7 @@ def check_question(rate_hz: float, kind: str, confidence: float) -> None:
         raise RefusedError(f"confidence must lie between 0 and 1, got {confidence}")
 
 
-def checked_clusters(clusters: Sequence[int] | npt.NDArray[np.int64]) -> list[int]:
+def checked_clusters(clusters: Sequence[int] | IntArray) -> list[int]:
     """Cluster sizes as integers.
 
     Raises
@@ -183,9 +183,9 @@ def curve_with_intervals(
     kind: AllanKind,
     rate_hz: float,
     n: int,
-    clusters: npt.NDArray[np.int64],
+    clusters: IntArray,
     variance: FloatArray,
-    terms: npt.NDArray[np.int64],
+    terms: IntArray,
     weight: FloatArray,
     confidence: float,
     names: tuple[str, ...],

@@ -24,9 +24,8 @@ from functools import cached_property, lru_cache
 from itertools import combinations
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.noise.terms import allan_variance_of_terms
 from trihedron.probability import NORMAL_95
 from trihedron.records.noise import TermName
@@ -63,7 +62,7 @@ class CurveCovariance:
     with_ramp: FloatArray
 
     @classmethod
-    def of(cls, clusters: npt.NDArray[np.int64], n: int, rate_hz: float) -> CurveCovariance:
+    def of(cls, clusters: IntArray, n: int, rate_hz: float) -> CurveCovariance:
         """Tabulate for ``clusters`` (k,) readings of a log of ``n`` readings."""
         k = len(clusters)
         pairs, with_ramp = np.zeros((4, 4, k, k)), np.zeros((4, k, k))
@@ -114,7 +113,7 @@ def _pair(m_i: int, m_j: int, n: int, step_s: float) -> tuple[FloatArray, FloatA
     return pairs / scale, with_ramp / scale
 
 
-def _nodes(kinks: npt.NDArray[np.int64], first: int, last: int) -> tuple[npt.NDArray[np.int64], FloatArray]:
+def _nodes(kinks: IntArray, first: int, last: int) -> tuple[IntArray, FloatArray]:
     """Lags at which the sums are evaluated, dense at every kink, and the number of lags that each represents."""
     reach = max(last - first, 2)
     away = np.unique(np.round(_GRID_RATIO ** np.arange(int(np.log(reach) / np.log(_GRID_RATIO)) + 2)).astype(np.int64))

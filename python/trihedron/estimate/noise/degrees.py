@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.records.noise import AllanKind
 
 
@@ -44,9 +43,7 @@ TYPES = {
 }
 
 
-def edf_along(
-    n: int, clusters: npt.NDArray[np.int64], variance: FloatArray, weight: FloatArray, kind: AllanKind
-) -> FloatArray:
+def edf_along(n: int, clusters: IntArray, variance: FloatArray, weight: FloatArray, kind: AllanKind) -> FloatArray:
     """(k,) degrees of freedom along a curve; its slopes give the noise type, between types edf is interpolated.
 
     ``edf = 2 E(V)² / var(V)`` of each type after Greenhall and Riley (2003), docs/noise.md, eq. 6.
@@ -68,7 +65,7 @@ def edf_along(
     return out
 
 
-def bias_along(n: int, clusters: npt.NDArray[np.int64], variance: FloatArray, kind: AllanKind) -> FloatArray:
+def bias_along(n: int, clusters: IntArray, variance: FloatArray, kind: AllanKind) -> FloatArray:
     """(k,) expectation of a variance over the Allan variance: 1 except for the total variance (docs/noise.md, 2).
 
     Flicker and walk after Greenhall, Howe and Percival (1999); quantisation: every reflected term contains both ends of
@@ -86,7 +83,7 @@ def bias_along(n: int, clusters: npt.NDArray[np.int64], variance: FloatArray, ki
     return np.asarray(by_type[below, rows] ** (1.0 - share) * by_type[below + 1, rows] ** share)
 
 
-def slopes_along(n: int, clusters: npt.NDArray[np.int64], variance: FloatArray) -> FloatArray:
+def slopes_along(n: int, clusters: IntArray, variance: FloatArray) -> FloatArray:
     """(k,) slopes of log variance against log cluster size, non-decreasing.
 
     A sum of noise terms is convex in these scales; a curve that bends down at its end does so by chance. Without this

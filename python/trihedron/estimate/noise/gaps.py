@@ -10,9 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.noise.degrees import never_falling
 from trihedron.ranges import edges_of, ranges_of
 
@@ -131,7 +130,7 @@ def filled(parts: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.stack(out), np.array(shares)
 
 
-def true_share(x: FloatArray, clusters: npt.NDArray[np.int64], variance: FloatArray, order: int = 2) -> FloatArray:
+def true_share(x: FloatArray, clusters: IntArray, variance: FloatArray, order: int = 2) -> FloatArray:
     """(k,) ratio of the Allan variance without missing readings to ``variance`` (k,), that of the readings present.
 
     ``order`` 2 is the Allan, 3 the Hadamard variance. It lies between the ratio of white noise and 1 (slow noise, which

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import chdtri
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, binned
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
@@ -34,7 +33,7 @@ def expected_power(band: Ordinates, selection: Selection, step_s: float) -> Floa
 
 def find_lines(
     bands: Sequence[Ordinates], selection: Selection, step_s: float
-) -> tuple[list[SpectralLine], list[npt.NDArray[np.bool_]]]:
+) -> tuple[list[SpectralLine], list[BoolArray]]:
     """Significant sinusoids above the fitted noise, and masks of the ordinates of each band that they affect."""
     lines: list[tuple[SpectralLine, float, int]] = []
     masks = []
@@ -135,7 +134,7 @@ def smooth_level(band: Ordinates, ratio: FloatArray) -> FloatArray:
 
 
 def white_limit(
-    bands: Sequence[Ordinates], nyquist_hz: float, masked: Sequence[npt.NDArray[np.bool_]] | None
+    bands: Sequence[Ordinates], nyquist_hz: float, masked: Sequence[BoolArray] | None
 ) -> tuple[float, float]:
     """Upper end [Hz] of the fit band, up to which the spectrum is a sum of terms, and power at Nyquist over the terms'.
 
@@ -192,7 +191,7 @@ def _deviates(spectrum: BinnedSpectrum, expected: FloatArray, slope: float, high
 class MisfitGroup:
     """Half an octave of the spectrum: bins ``inside``, its power over the terms' minus 1, and that in sigmas."""
 
-    inside: npt.NDArray[np.bool_]
+    inside: BoolArray
     deviation: float
     z: float
     frequency_hz: float

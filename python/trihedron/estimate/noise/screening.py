@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import chdtri
 
 from trihedron import _core
@@ -168,7 +167,7 @@ def tail_error(x: FloatArray) -> float:
     return 0.5 * math.sqrt(max(excess, 0.0) / len(change))
 
 
-def repeated_rows(x: npt.NDArray[np.float64]) -> float:
+def repeated_rows(x: FloatArray) -> float:
     """Share of rows ``x`` (n, channels) that repeat the row before in all channels together, beyond chance."""
     sample = x[:200_000]
     if x.shape[1] < 2 or len(sample) < 2:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
@@ -67,7 +67,7 @@ class BinnedSpectrum:
 def binned(
     bands: Sequence[Ordinates],
     highest_hz: float,
-    masked: Sequence[npt.NDArray[np.bool_]] | None = None,
+    masked: Sequence[BoolArray] | None = None,
 ) -> BinnedSpectrum:
     """Ordinates up to ``highest_hz`` that are not ``masked``, averaged in bins of ``BIN_WIDTH``."""
     pick = [band.frequency_hz <= highest_hz for band in bands]
@@ -117,7 +117,7 @@ class Selection:
 def select(
     bands: Sequence[Ordinates],
     highest_hz: float,
-    masked: Sequence[npt.NDArray[np.bool_]] | None = None,
+    masked: Sequence[BoolArray] | None = None,
     evidence: float = EVIDENCE,
     *,
     tolerance: float = 0.0,
@@ -161,7 +161,7 @@ def select(
     return _with_gauss_markov(step_s, plain, evidence) or plain
 
 
-def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[npt.NDArray[np.bool_]]:
+def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[BoolArray]:
     """Masks of ordinates that the unpaired first and last phase of quantisation affect: these are correlated.
 
     The first ordinate of a band is not masked: alone it has no correlation, and it is where a ramp shows.

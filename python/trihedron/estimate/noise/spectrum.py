@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.noise.gaps import (
     MOST_BRIDGED,
@@ -55,7 +54,7 @@ class Ordinates:
     count: FloatArray
     cross: FloatArray
     line: FloatArray
-    order: npt.NDArray[np.int64]
+    order: IntArray
     length: int
     step_s: float
     block: int
@@ -81,9 +80,7 @@ class Ordinates:
         return np.asarray(self.kept * out + self.sampling * within[:, np.newaxis])
 
 
-def unit_densities(
-    frequency_hz: FloatArray, order: npt.NDArray[np.int64], length: int, step_s: float, block: int
-) -> FloatArray:
+def unit_densities(frequency_hz: FloatArray, order: IntArray, length: int, step_s: float, block: int) -> FloatArray:
     """(4, k) expected power of ordinates for Q = N = B = K = 1 without missing readings (docs/noise.md, eq. 9)."""
     h = step_s
     eigenvalue = 4.0 * np.sin(np.pi * frequency_hz * h) ** 2
@@ -201,7 +198,7 @@ def _segments(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]
     ]
 
 
-def line_coefficients(n: int, order: npt.NDArray[np.int64]) -> FloatArray:
+def line_coefficients(n: int, order: IntArray) -> FloatArray:
     """Orthonormal cosine coefficients of 0, 1, 2 … n−1 (order 1 and up): zero for even orders."""
     half = np.pi * order / (2.0 * n)
     return np.asarray(np.where(order % 2 == 1, -np.sqrt(2.0 / n) * np.cos(half) / (2.0 * np.sin(half) ** 2), 0.0))
@@ -225,7 +222,7 @@ def _table() -> FloatArray:
     return np.asarray(power * 2.0 * np.sin(np.pi * order / (2 * n)))
 
 
-def flicker_leakage(order: npt.NDArray[np.int64]) -> FloatArray:
+def flicker_leakage(order: IntArray) -> FloatArray:
     """Factor by which end effects change the expected power of 1/f noise at the lowest orders: 0.77, 0.90, 0.93 … 1."""
     table = _table()
     out = np.ones(len(order))

@@ -6,17 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from trihedron._core import ReferenceLog, rotation_from_vector
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.reference.likelihood import Problem
 from trihedron.estimate.reference.together import Grid, Reference
 from trihedron.gravity import EARTH_RATE_RAD_S
-
-Mask = npt.NDArray[np.bool_]
 
 BLOCK_S = 1.0
 """Length of a block: gyro errors over 1 s are negligible, and a reference's slow error lasts longer."""
@@ -83,7 +80,7 @@ class Beside:
 
     grid: Grid
     reference: Reference
-    seen: Mask
+    seen: BoolArray
     start: Point
     force: FloatArray | None
 

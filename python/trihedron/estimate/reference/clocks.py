@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.reference.settled import running_mean
 from trihedron.estimate.reference.together import Grid, Reference
@@ -109,7 +108,7 @@ def _best_lag(a: FloatArray, b: FloatArray, step: float, stamped: float | None) 
     return float(lag[best] * step), float(correlation[best]), bool(np.any(apart))
 
 
-def _correlations(a: FloatArray, b: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64], FloatArray]:
+def _correlations(a: FloatArray, b: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
     """Correlation of the overlap at every lag, without missing values; lags of b against a; common samples at each."""
     n = 1 << (len(a) + len(b) - 1).bit_length()
     ma, mb = np.isfinite(a).astype(float), np.isfinite(b).astype(float)

@@ -9,12 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import RefusedError
-
-Mask = npt.NDArray[np.bool_]
 
 ORDERS = (0, 2, 12)
 """Orders of the autoregression that are tried: none; one slope or line; wobble with some lines (two poles each)."""
@@ -49,7 +46,7 @@ class Solution:
     covariance: FloatArray
     influence: FloatArray
     residual: FloatArray
-    is_used: Mask
+    is_used: BoolArray
     widened: float
     rms_held_out: float
     model: NoiseModel
@@ -134,7 +131,7 @@ def _least_squares(X: FloatArray, y: FloatArray) -> FloatArray:
     return np.linalg.pinv(normal, rcond=1e-14, hermitian=True) @ (X.T @ y)
 
 
-def _weights(r: FloatArray, size: FloatArray, used: Mask) -> FloatArray:
+def _weights(r: FloatArray, size: FloatArray, used: BoolArray) -> FloatArray:
     """Weights (k,), the inverse of the noise σ of each row, whose square grows linearly with the squared motion."""
     square = np.sum(r**2, axis=1)
     order = np.argsort(size[used])
@@ -148,7 +145,7 @@ def _weights(r: FloatArray, size: FloatArray, used: Mask) -> FloatArray:
     return np.asarray(np.median(scale) / scale, dtype=np.float64)
 
 
-def _without_outliers(length: FloatArray) -> Mask:
+def _without_outliers(length: FloatArray) -> BoolArray:
     limit = OUTLIER * float(np.median(length)) / 1.538  # the median length of three standard normals
     odd = length > limit
     if odd.mean() > MOST_OUT:
@@ -159,7 +156,7 @@ def _without_outliers(length: FloatArray) -> Mask:
     return ~near
 
 
-def _autoregression(r: FloatArray, index: IntArray, used: Mask, order: int) -> FloatArray:
+def _autoregression(r: FloatArray, index: IntArray, used: BoolArray, order: int) -> FloatArray:
     """Whitening filter (order + 1,): 1, then minus the coefficients of the lags, divided by the innovation's σ."""
     rows = _with_past(index, used, order)
     if order == 0 or len(rows) < 3 * order:
@@ -170,7 +167,7 @@ def _autoregression(r: FloatArray, index: IntArray, used: Mask, order: int) -> F
     return np.concatenate([[1.0], -phi]) / max(sigma, 1e-300)
 
 
-def _with_past(index: IntArray, used: Mask, order: int) -> IntArray:
+def _with_past(index: IntArray, used: BoolArray, order: int) -> IntArray:
     """Rows with all ``order`` predecessors used and no gap between."""
     rows = np.arange(order, len(index))
     near = index[rows] - index[rows - order] == order
@@ -179,7 +176,7 @@ def _with_past(index: IntArray, used: Mask, order: int) -> IntArray:
 
 
 def _whitened(
-    X: FloatArray, y: FloatArray, index: IntArray, used: Mask, filters: list[FloatArray]
+    X: FloatArray, y: FloatArray, index: IntArray, used: BoolArray, filters: list[FloatArray]
 ) -> tuple[FloatArray, FloatArray, IntArray]:
     Z, z, rows_of = [], [], []
     for axis, f in enumerate(filters):
@@ -190,7 +187,7 @@ def _whitened(
     return np.concatenate(Z), np.concatenate(z), np.concatenate(rows_of)
 
 
-def _influence(of_white: FloatArray, index: IntArray, used: Mask, filters: list[FloatArray]) -> FloatArray:
+def _influence(of_white: FloatArray, index: IntArray, used: BoolArray, filters: list[FloatArray]) -> FloatArray:
     """Derivative (p, k, 3) of θ by the rows before whitening, from that by the whitened rows."""
     out = np.zeros((len(of_white), len(index), 3))
     first = 0
@@ -212,7 +209,7 @@ def _blocks(index: IntArray) -> IntArray:
 
 
 def _by_blocks(
-    X: FloatArray, target: FloatArray, index: IntArray, used: Mask, Z: FloatArray, y: FloatArray, rows: IntArray,
+    X: FloatArray, target: FloatArray, index: IntArray, used: BoolArray, Z: FloatArray, y: FloatArray, rows: IntArray,
     theta: FloatArray,
 ) -> tuple[FloatArray, float]:  # fmt: skip
     """Jackknife variances (p,) over blocks of time, and unweighted rms of the held-out rows."""

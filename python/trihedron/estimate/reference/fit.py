@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import AXES, FloatArray
+from trihedron.arrays import AXES, BoolArray, FloatArray
 from trihedron.estimate.reference.accelerometer import ForceFit, fit_accelerometer, force_along
 from trihedron.estimate.reference.beside import Beside, Point
 from trihedron.estimate.reference.carried import error_carried
@@ -31,8 +30,6 @@ from trihedron.estimate.reference.worth import error_of
 from trihedron.records import Recording
 from trihedron.records.reference import AgainstReference, Estimate, FitToReference, ReferenceMotion
 from trihedron.sensor_model import reframing
-
-Mask = npt.NDArray[np.bool_]
 
 MOST_WINDOWS = 20_000
 """Most windows; a longer log has longer windows: 0.18 s for an hour, still short for motion by hand."""
@@ -64,7 +61,7 @@ class Prepared:
     windows: Windows
     wide: Windows
     alignment: Alignment
-    seen: Mask
+    seen: BoolArray
     is_turned: bool
 
 
@@ -248,7 +245,7 @@ def _stamped(recording: Recording, motion: ReferenceMotion) -> float | None:
     return offset if abs(offset) < 0.5 * max(recording.duration_s, motion.time_s[-1]) else None
 
 
-def _windows(grid: Grid, reference: Reference, seen: Mask) -> Windows:
+def _windows(grid: Grid, reference: Reference, seen: BoolArray) -> Windows:
     spacing = max(FINEST, int(np.ceil(len(grid.time_s) / MOST_WINDOWS)))
     if not reference.motion.is_stepwise:
         spacing = max(spacing, int(np.ceil(2.0 * reference.step_s / grid.step_s)))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.reference.clocks import JUMP_S
 from trihedron.estimate.reference.gyroscope import GyroFit
 from trihedron.estimate.reference.settled import running_mean
-from trihedron.estimate.reference.together import Grid, Mask, Reference
+from trihedron.estimate.reference.together import Grid, Reference
 
 STRETCH_S, HOP_S = 2.0, 1.0
 """Length and spacing of the stretches: a hand reverses its rotation within two seconds, which determines a lag."""
@@ -48,7 +48,7 @@ def refuse_parts_elsewhere(grid: Grid, reference: Reference, gyro: GyroFit) -> N
     around = at[0] + step * np.arange(-ahead, len(at) + ahead) if len(at) else at
     fine = around[:, None] + grid.step_s * (np.arange(n_smooth) - 0.5 * (n_smooth - 1))
     time = fine * (1.0 + gyro.rate) + gyro.offset_s
-    covered: Mask = np.all(reference.covers(time.ravel()).reshape(time.shape), axis=1)
+    covered: BoolArray = np.all(reference.covers(time.ravel()).reshape(time.shape), axis=1)
     theirs = reference.rate(time.ravel()).reshape(*time.shape, 3).mean(axis=1)
     is_valid = grid.is_valid[::every]
     n, hop = round(STRETCH_S / step), max(1, round(HOP_S / step))
@@ -74,7 +74,7 @@ def refuse_parts_elsewhere(grid: Grid, reference: Reference, gyro: GyroFit) -> N
         )
 
 
-def _lag(ours: FloatArray, theirs: FloatArray, covered: Mask, least: float, jump: float) -> int:
+def _lag(ours: FloatArray, theirs: FloatArray, covered: BoolArray, least: float, jump: float) -> int:
     """Lag of the reference in this stretch, in steps; 0 where lag 0 fits or no lag does."""
     n, ahead = len(ours), (len(theirs) - len(ours)) // 2
     size = float(np.sum(ours**2))

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron._core import rotation_from_vector
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import REFUSALS
 from trihedron.estimate.reference.beside import Beside
 from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope
 from trihedron.estimate.reference.together import Grid, Reference
 from trihedron.estimate.reference.windows import Windows
 from trihedron.records.reference import ReplayStage
-
-Mask = npt.NDArray[np.bool_]
 
 HORIZON_S = 10.0
 """Time over which attitude is integrated: some turns of a hand, and a bias of 0.1 °/s adds a degree."""
@@ -26,8 +23,8 @@ LEAST_HELD_OUT_S = 12.0
 
 
 def held_out(
-    side: Beside, seen: Mask, gyro: GyroFit, given: tuple[FloatArray, FloatArray] | None,
-    windows: Callable[[Grid, Reference, Mask], Windows],
+    side: Beside, seen: BoolArray, gyro: GyroFit, given: tuple[FloatArray, FloatArray] | None,
+    windows: Callable[[Grid, Reference, BoolArray], Windows],
 ) -> tuple[ReplayStage, ...]:  # fmt: skip
     """Replay on the last part of a log: nominal, as ``given``, and calibrated on the first part by the reference."""
     grid, reference = side.grid, side.reference
@@ -56,7 +53,7 @@ def held_out(
     return tuple(stage for stage in done if stage is not None)
 
 
-def _nominal(grid: Grid, gyro: GyroFit, rate: FloatArray, seen: Mask) -> FloatArray:
+def _nominal(grid: Grid, gyro: GyroFit, rate: FloatArray, seen: BoolArray) -> FloatArray:
     """Nominal rates (n, 3): one scale for all axes, orthogonal axes, bias from the second with the least rotation."""
     u, s, vt = np.linalg.svd(gyro.A)
     A = (u @ vt) * float(np.mean(s))
@@ -69,7 +66,7 @@ def _nominal(grid: Grid, gyro: GyroFit, rate: FloatArray, seen: Mask) -> FloatAr
 
 
 def replay(
-    stage: str, rate: FloatArray, grid: Grid, reference: Reference, time: FloatArray, where: Mask
+    stage: str, rate: FloatArray, grid: Grid, reference: Reference, time: FloatArray, where: BoolArray
 ) -> ReplayStage | None:
     """Rms angle between attitude integrated over ``HORIZON_S`` and the reference's.
 

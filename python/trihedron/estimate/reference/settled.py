@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.reference.together import Grid, Reference
-
-Mask = npt.NDArray[np.bool_]
 
 GUARD_S = 0.2
 """Least time excluded on either side of a command: commands are timestamped by another computer."""
@@ -16,7 +13,7 @@ LEVELS = 6.0
 """Robust sigmas from the plateau's median above which a sample is not on it: the table still accelerates."""
 
 
-def plateaus(grid: Grid, reference: Reference, time: FloatArray) -> Mask:
+def plateaus(grid: Grid, reference: Reference, time: FloatArray) -> BoolArray:
     """(n,) True from where the gyro has reached the level that it keeps until the next command."""
     out = np.zeros(len(time), dtype=bool)
     row = np.searchsorted(reference.motion.time_s, time, side="right")

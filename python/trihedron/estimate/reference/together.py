@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.records import Recording
 from trihedron.records.reference import ReferenceMotion
-
-Mask = npt.NDArray[np.bool_]
 
 LONGEST_GAP = 3.5
 """Rows further apart than this many usual steps are a gap: a cubic over three steps (0.03 s) follows motion by hand."""
@@ -28,7 +25,7 @@ class Grid:
     step_s: float
     gyroscope: FloatArray
     accelerometer: FloatArray | None
-    is_valid: Mask
+    is_valid: BoolArray
 
 
 def grid_of(recording: Recording) -> Grid:
@@ -55,7 +52,7 @@ def grid_of(recording: Recording) -> Grid:
     return Grid(time, step, values[:, :3], accelerometer, within(timestamps, time, step))
 
 
-def within(timestamps: FloatArray, time: FloatArray, step: float) -> Mask:
+def within(timestamps: FloatArray, time: FloatArray, step: float) -> BoolArray:
     """Whether times (n,) lie between timestamps (m,) that are at most ``LONGEST_GAP`` steps apart."""
     after = np.clip(np.searchsorted(timestamps, time), 1, len(timestamps) - 1)
     is_close = timestamps[after] - timestamps[after - 1] <= LONGEST_GAP * step
@@ -79,7 +76,7 @@ class Reference:
         self._position = None if motion.position is None else CubicSpline(t, motion.position)
         self._force = None if motion.specific_force is None else CubicSpline(t, motion.specific_force)
 
-    def covers(self, time: FloatArray) -> Mask:
+    def covers(self, time: FloatArray) -> BoolArray:
         """Whether the reference has rows around these times (n,) of its own clock."""
         if self.motion.is_stepwise:
             return np.asarray((time >= self.motion.time_s[0]) & (time <= self.motion.time_s[-1]), dtype=bool)

@@ -9,11 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray, IntArray
-
-Mask = npt.NDArray[np.bool_]
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +38,7 @@ class Windows:
         return out.reshape(len(self.start), *signal.shape[1:])
 
 
-def windows_on(is_valid: Mask, step_s: float, spacing: int) -> Windows:
+def windows_on(is_valid: BoolArray, step_s: float, spacing: int) -> Windows:
     """All windows with valid samples only; ``spacing`` samples between neighbours."""
     m = spacing
     x = np.arange(-2 * m, 2 * m + 1) / m

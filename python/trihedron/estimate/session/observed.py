@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
@@ -46,7 +45,7 @@ class Observed:
     pose_rate_sigma: FloatArray
     rate_density: FloatArray
     moves: _core.SessionMoves
-    before: npt.NDArray[np.int64]
+    before: IntArray
     sigma_time_s: float
     nominal_step_s: float
     force_effect: FloatArray
@@ -185,7 +184,7 @@ def _samples_of(ranges: list[tuple[int, int]], samples: FloatArray) -> FloatArra
     return np.concatenate([samples[a:b] for a, b in ranges]) if ranges else samples[:0]
 
 
-def _in_turn(ranges: list[tuple[int, int]]) -> npt.NDArray[np.int64]:
+def _in_turn(ranges: list[tuple[int, int]]) -> IntArray:
     """Range (m, 2) of each move in the result of :func:`_samples_of`."""
     ends = np.cumsum([b - a for a, b in ranges], dtype=np.int64)
     starts = np.concatenate([[0], ends[:-1]]) if ranges else ends
