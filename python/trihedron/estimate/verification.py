@@ -42,12 +42,8 @@ def verify_calibration(
 ) -> Verification:
     """Judge a calibration by the poses (docs/model.md, 10) and moves (equation 5.1) of another recording; no fit.
 
-    Parameters are compared with ``own``, the calibration of that recording; without it only the gyro bias is.
-
-    Raises
-    ------
-    ValueError
-        When the recording has no accelerometer or no pose.
+    Parameters are compared with ``own``, the calibration of that recording; without it only the gyro bias is. Raises
+    ``RefusedError`` when the recording has no accelerometer or no pose.
     """
     if recording.accelerometer is None or segments.accelerometer_mean is None:
         raise RefusedError("verification needs the accelerometer: gravity is what a calibration is tested against")

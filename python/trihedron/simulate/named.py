@@ -137,13 +137,7 @@ def list_scenarios() -> dict[str, str]:
 
 
 def scenario_by_name(name: str) -> Scenario:
-    """A ready-made scenario.
-
-    Raises
-    ------
-    ValueError
-        When no scenario has that name.
-    """
+    """A ready-made scenario; raises ``RefusedError`` when no scenario has that name."""
     if name not in _SCENARIOS:
         raise RefusedError(f"no scenario is called {name!r}; there are {', '.join(_SCENARIOS)}")
     return replace(_SCENARIOS[name][1](), name=name)

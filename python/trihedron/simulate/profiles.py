@@ -178,13 +178,7 @@ PROFILES: dict[str, Profile] = {p.name: p for p in (ANALOG_6DOF, MPU, ADIS, TACT
 
 
 def profile_by_name(name: str) -> Profile:
-    """A class of IMU.
-
-    Raises
-    ------
-    ValueError
-        When no profile has that name.
-    """
+    """A class of IMU; raises ``RefusedError`` when no profile has that name."""
     if name not in PROFILES:
         raise RefusedError(f"no profile is called {name!r}{meant(name, PROFILES)}; there are {', '.join(PROFILES)}")
     return PROFILES[name]

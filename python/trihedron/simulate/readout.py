@@ -202,10 +202,7 @@ class Electronics:
 def sense_axes(S: Matrix, name: str) -> tuple[FloatArray, FloatArray]:
     """Unit sensitive directions (3, 3), row by row, and gains (3,) raw per SI: ``S^-1 = diag(gain) · directions``.
 
-    Raises
-    ------
-    ValueError
-        When S cannot be inverted.
+    Raises ``RefusedError`` when S cannot be inverted.
     """
     matrix = np.asarray(S, dtype=np.float64)
     if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)) or np.linalg.cond(matrix) > 1e12:

@@ -31,12 +31,8 @@ def simulate(scenario: Scenario, seed: int = 0) -> tuple[Recording, Truth]:
     """Simulate the motion and the readings of both sensors; return the recording and, separately, the truth.
 
     Every stage draws from its own random stream keyed by ``seed`` and the stage's name: switching one stage on or off,
-    or changing its size, does not change any sample of the others.
-
-    Raises
-    ------
-    ValueError
-        When the scenario is impossible; the message names the value in one sentence.
+    or changing its size, does not change any sample of the others. Raises ``RefusedError`` when the scenario is
+    impossible; the message names the value in one sentence.
     """
     plan = plan_motion(scenario.motion, stream(seed, "motion"))
     clock, place = scenario.clock, scenario.environment

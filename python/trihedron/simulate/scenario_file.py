@@ -38,10 +38,8 @@ _KEYS = (*_TOP, "accelerometer", "gyroscope", "effect")
 def read_scenario(path: str | Path) -> Scenario:
     """Read a scenario file.
 
-    Raises
-    ------
-    ValueError
-        When the file is not TOML or a table, key or name in it does not exist; the message names table and key.
+    Raises ``RefusedError`` when the file is not TOML or a table, key or name in it does not exist; the message names
+    table and key.
     """
     path = Path(path)
     try:

@@ -35,10 +35,7 @@ _KNOT_S = 0.01
 def twin_scenario(recording: Recording, segments: Segments, calibration: Calibration) -> Scenario:
     """A scenario whose simulation repeats a recording.
 
-    Raises
-    ------
-    ValueError
-        When the recording lacks a sensor or has no pose, or the calibration has no gyro.
+    Raises ``RefusedError`` when the recording lacks a sensor or has no pose, or the calibration has no gyro.
     """
     if recording.accelerometer is None or recording.gyroscope is None or calibration.gyroscope is None:
         raise RefusedError("a digital twin needs both sensors in the recording and in the calibration")

@@ -128,12 +128,8 @@ def identify(means: FloatArray, raw_unit: AccelerationUnit) -> IntArray:
     """Face (n,) of each mean reading (n, 3): the axis with the largest reading about the common centre; 0 for none.
 
     The centre is that of the sphere through the readings, so that bias and scale need not be known. With too few poses
-    for a sphere, readings in a physical unit are taken about 0.
-
-    Raises
-    ------
-    ValueError
-        When the readings determine no sphere and are in counts.
+    for a sphere, readings in a physical unit are taken about 0. Raises ``RefusedError`` when the readings determine no
+    sphere and are in counts.
     """
     centred = _about_centre(means)
     if centred is not None:
@@ -175,10 +171,7 @@ def _nearest(centred: FloatArray) -> IntArray:
 def faces_up(means: FloatArray, raw_unit: AccelerationUnit, up: Sequence[int] | None) -> IntArray:
     """Face (n,) of each mean reading (n, 3): ``up`` where given, else identified from the readings.
 
-    Raises
-    ------
-    ValueError
-        When there are no poses, or as :func:`identify` and :func:`given`.
+    Raises ``RefusedError`` when there are no poses, or as :func:`identify` and :func:`given`.
     """
     if len(means) == 0:
         raise RefusedError("no pose was found: keep each of the six faces up and still for some seconds")
@@ -188,10 +181,7 @@ def faces_up(means: FloatArray, raw_unit: AccelerationUnit, up: Sequence[int] | 
 def given(up: Sequence[int], n: int) -> IntArray:
     """Faces as the user states them: ±1, ±2, ±3, or 0 for a pose to exclude.
 
-    Raises
-    ------
-    ValueError
-        When ``up`` is not n such numbers.
+    Raises ``RefusedError`` when ``up`` is not n such numbers.
     """
     faces = np.asarray(up)
     if faces.shape != (n,) or not np.all(np.isin(faces, (0, *FACES))):
@@ -204,10 +194,7 @@ def given(up: Sequence[int], n: int) -> IntArray:
 def check_sufficient(faces: IntArray) -> None:
     """Check for four faces of all three axes, which the twelve parameters need.
 
-    Raises
-    ------
-    ValueError
-        Naming the missing faces.
+    Raises ``RefusedError`` naming the missing faces.
     """
     present = {int(face) for face in faces if face}
     missing = [face for face in FACES if face not in present]

@@ -21,10 +21,7 @@ def calibrate_few_faces(
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """The norm fit; undetermined directions are constrained to an ideal triad and named in a serious finding.
 
-    Raises
-    ------
-    ValueError
-        As :func:`calibrate_norm`.
+    Raises as :func:`calibrate_norm`.
     """
     sensor, findings = calibrate_norm(means, sigma, gravity_m_s2, raw_unit=raw_unit)
     turned = []

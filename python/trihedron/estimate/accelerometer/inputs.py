@@ -12,10 +12,7 @@ from trihedron.errors import RefusedError
 def pose_means(means: npt.ArrayLike, sigma_means: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Means (n, 3) and their covariances (n, 3, 3), from standard errors (), (3,), (n, 3) or covariances (n, 3, 3).
 
-    Raises
-    ------
-    ValueError
-        When shapes do not fit, or something is not finite or not positive.
+    Raises ``RefusedError`` when shapes do not fit, or something is not finite or not positive.
     """
     values = np.ascontiguousarray(means, dtype=np.float64)
     if values.ndim != 2 or values.shape[1] != 3:
@@ -43,10 +40,7 @@ def pose_means(means: npt.ArrayLike, sigma_means: npt.ArrayLike) -> tuple[FloatA
 def gravity(gravity_m_s2: float) -> float:
     """|g| in m/s².
 
-    Raises
-    ------
-    ValueError
-        When it is not between 1 and 100 m/s²: its relative error would be that of every scale.
+    Raises ``RefusedError`` when it is not between 1 and 100 m/s²: its relative error would be that of every scale.
     """
     value = float(gravity_m_s2)
     if not 1.0 < value < 100.0:
@@ -57,10 +51,7 @@ def gravity(gravity_m_s2: float) -> float:
 def axis_signs(signs: npt.ArrayLike | None) -> FloatArray:
     """(3,) of ±1: sign of each raw axis against the body frame's axis; +1 where ``signs`` is ``None``.
 
-    Raises
-    ------
-    ValueError
-        When ``signs`` is not three numbers ±1.
+    Raises ``RefusedError`` when ``signs`` is not three numbers ±1.
     """
     if signs is None:
         return np.ones(3)

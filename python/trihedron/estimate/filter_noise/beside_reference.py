@@ -78,10 +78,7 @@ class Request:
 def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Request) -> tuple[SensorFilterNoise, ...]:
     """Filter noise of the gyro, and with a reference position of the accelerometer, beside a reference attitude.
 
-    Raises
-    ------
-    ValueError
-        When the reference has no attitude, or log and reference share less than ``LEAST_S``.
+    Raises ``RefusedError`` when the reference has no attitude, or log and reference share less than ``LEAST_S``.
     """
     if motion.attitude is None:
         raise RefusedError(f"{motion.source}: the reference holds rates; give attitudes, whose errors do not add up.")

@@ -132,12 +132,8 @@ def measure_moves(
     """Collect pose means, moves and noise; clipped gyro readings are bridged if ``is_bridged``.
 
     A significant dependence of the bias on specific force is subtracted sample by sample: interpolation between two
-    poses would be wrong in the middle of a move.
-
-    Raises
-    ------
-    ValueError
-        When a sensor is missing or there is no move between two poses.
+    poses would be wrong in the middle of a move. Raises ``RefusedError`` when a sensor is missing or there is no move
+    between two poses.
     """
     gyroscope = _required(recording.gyroscope, "gyroscope")
     raw_force = _required(recording.accelerometer, "accelerometer")

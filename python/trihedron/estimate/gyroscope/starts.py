@@ -87,10 +87,7 @@ def starts(
 ) -> FloatArray:
     """Initial scales (k, 3, 3): the nominal one, else that of the unit, and that of :func:`integral_start`.
 
-    Raises
-    ------
-    ValueError
-        When readings are counts, no nominal scale is given and the moves do not determine a start.
+    Raises ``RefusedError`` when readings are counts, no nominal scale is given and the moves do not determine a start.
     """
     found = []
     if nominal is not None:

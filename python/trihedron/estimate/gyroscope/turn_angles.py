@@ -119,10 +119,8 @@ class MeasuredTurns:
 def measure_turns(recording: Recording, turns: Sequence[Turn], static: Sequence[tuple[int, int]]) -> MeasuredTurns:
     """Integrate turns and static intervals; the noise is measured in the static intervals.
 
-    Raises
-    ------
-    ValueError
-        When there is no gyro, no turn, or no static interval, or these are too short to measure the noise.
+    Raises ``RefusedError`` when there is no gyro, no turn, or no static interval, or these are too short to measure the
+    noise.
     """
     if recording.gyroscope is None:
         raise RefusedError("the recording has no gyroscope")
@@ -175,11 +173,8 @@ def nominal_matrix(
     """Nominal scale (3, 3), rad/s per raw unit: from stated turns, else as given, else from the unit.
 
     Stated turns have precedence. Turns of unknown size determine no scale: any divisor of their angles would fit.
-
-    Raises
-    ------
-    ValueError
-        With the question to the user, when readings are counts and neither angles nor a scale are known.
+    Raises ``RefusedError`` with the question to the user, when readings are counts and neither angles nor a scale are
+    known.
     """
     stated = scale_of_stated(measured, turns)
     if stated is not None:

@@ -49,12 +49,8 @@ def stated_turns(
 
     The axis of a turn is the table's normal in the body frame. As the body turns by θ, gravity moves on a circle about
     it: ``f(t) = n̄ + c cos θ + s sin θ + k θ'²`` (k for a sensor off the axis), fitted over the turn and the poses on
-    both sides; ``n̄`` is the axis.
-
-    Raises
-    ------
-    ValueError
-        When the numbers of turns and angles differ; the message states when each turn was found.
+    both sides; ``n̄`` is the axis. Raises ``RefusedError`` when the numbers of turns and angles differ; the message
+    states when each turn was found.
     """
     moves = turns_about_vertical(segments, accelerometer, gravity_m_s2)
     if len(angles_deg) != len(moves):

@@ -32,13 +32,9 @@ def design_least_squares(
 ) -> TurnDesign:
     """All rows ``φ'_i = S_w φ_i + b_w Δt_i + δφ_i`` at once: the manual's problem 4.
 
-    With ``v_i = N² Δt_i + σ_turn²``, ``Q_j = Σ φ²/v``, ``P_j = Σ φ Δt/v`` over the turns about axis j, and
-    ``T = Σ Δt²/v + Δt_0/N²``: ``var b = 1/(T - Σ_j P_j²/Q_j)`` and ``var S_j = 1/Q_j + (P_j/Q_j)² var b``.
-
-    Raises
-    ------
-    ValueError
-        When the turns do not determine an axis, or the bias is not determined.
+    With ``v_i = N² Δt_i + σ_turn²``, ``Q_j = Σ φ²/v``, ``P_j = Σ φ Δt/v`` over the turns about axis j, and ``T = Σ
+    Δt²/v + Δt_0/N²``: ``var b = 1/(T - Σ_j P_j²/Q_j)`` and ``var S_j = 1/Q_j + (P_j/Q_j)² var b``. Raises
+    ``RefusedError`` when the turns do not determine an axis, or the bias is not determined.
     """
     if not 1e-30 < noise_density < 1e30:
         raise RefusedError(f"a noise density of {noise_density:g} is that of no gyro")
@@ -60,12 +56,8 @@ def design_bias_first(
 ) -> TurnDesign:
     """``b_w = φ'_0/Δt_0`` from the static interval, then ``S_w`` from the turns less that bias: the manual's problem 3.
 
-    ``var b = N²/Δt_0``, ``var S_j = 1/Q_j + (P_j/Q_j)² N²/Δt_0``; for one turn ``N² Δt (1 + Δt/Δt_0)/φ²``.
-
-    Raises
-    ------
-    ValueError
-        When the turns do not determine an axis, or there is no static interval.
+    ``var b = N²/Δt_0``, ``var S_j = 1/Q_j + (P_j/Q_j)² N²/Δt_0``; for one turn ``N² Δt (1 + Δt/Δt_0)/φ²``. Raises
+    ``RefusedError`` when the turns do not determine an axis, or there is no static interval.
     """
     q, p, _ = _sums(axes, angles_rad, durations_s, noise_density, sigma_turn_rad)
     if not static_s > 0.0:

@@ -74,12 +74,8 @@ def noise_from_identified(
 ) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
     """Noise of the three accelerometer axes among the identified ones, in the raw unit of the log to be calibrated.
 
-    The axes with a unit of acceleration are used; where there is none (counts), the first three.
-
-    Raises
-    ------
-    ValueError
-        When there are not three such axes, or their unit cannot be converted to the raw unit.
+    The axes with a unit of acceleration are used; where there is none (counts), the first three. Raises
+    ``RefusedError`` when there are not three such axes, or their unit cannot be converted to the raw unit.
     """
     out = [_one(axis, AccelerationUnit(raw_unit)) for axis in _accelerometer_axes(axes)]
     return out[0], out[1], out[2]
@@ -97,12 +93,8 @@ def _accelerometer_axes(axes: Sequence[IdentifiedAxis]) -> list[IdentifiedAxis]:
 def check_same_gravity(axes: Sequence[IdentifiedAxis], accelerometer: SensorCalibration, gravity_m_s2: float) -> None:
     """Check that a static log measures gravity under the session's calibration, so that its noise applies.
 
-    Twice the range halves the noise in counts, which densities do not distinguish from a quieter place.
-
-    Raises
-    ------
-    ValueError
-        With the gravity that the static log reads, and the remedy.
+    Twice the range halves the noise in counts, which densities do not distinguish from a quieter place. Raises
+    ``RefusedError`` with the gravity that the static log reads, and the remedy.
     """
     raw_unit = AccelerationUnit(accelerometer.raw_unit)
     mean = np.array([axis.mean * _factor(axis, raw_unit) for axis in _accelerometer_axes(axes)])
@@ -160,12 +152,8 @@ def check_same_adc(
     """Check that the noise is of the session's ADC, whose ``steps`` (LSB) and noise ``octaves`` are given by axis.
 
     LSBs are compared where the session's exceeds the noise; densities are of another ADC where they differ by more than
-    a factor in every octave: a filter or a hand's tremor changes only some.
-
-    Raises
-    ------
-    ValueError
-        Naming the axis, both values and the remedy.
+    a factor in every octave: a filter or a hand's tremor changes only some. Raises ``RefusedError`` naming the axis,
+    both values and the remedy.
     """
     remedy = "record the static log with the range, rate and output of the session"
     for axis, noise, step, seen in zip(AXES, given, steps, octaves, strict=True):

@@ -55,10 +55,7 @@ class NormStart:
     def from_range(cls, readings: npt.ArrayLike, gravity_m_s2: float) -> NormStart:
         """Initial values from the range of mean readings (n, 3): each axis was near the vertical, both ways up.
 
-        Raises
-        ------
-        ValueError
-            When an axis did not move.
+        Raises ``RefusedError`` when an axis did not move.
         """
         a = np.asarray(readings, dtype=np.float64)
         half = (a.max(axis=0) - a.min(axis=0)) / 2.0
@@ -121,10 +118,7 @@ class NormFilter:
     def add(self, reading: FloatArray, start_s: float, pose_s: float, extra_variance: FloatArray) -> None:
         """Update with the mean raw reading (3,) of one pose; ``extra_variance`` (3,), raw², adds to the noise model.
 
-        Raises
-        ------
-        ValueError
-            When the reading is not finite or the pose is earlier than the last one.
+        Raises ``RefusedError`` when the reading is not finite or the pose is earlier than the last one.
         """
         self._filter.add([float(v) for v in reading - self._bias], start_s, pose_s, [float(v) for v in extra_variance])
 

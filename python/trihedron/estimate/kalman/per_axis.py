@@ -141,10 +141,7 @@ def pose_arrays(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Starts (n,), lengths (n,) and extra variances (n, 3) of n poses.
 
-    Raises
-    ------
-    ValueError
-        When there is not one start per pose, or a length is not positive.
+    Raises ``RefusedError`` when there is not one start per pose, or a length is not positive.
     """
     start = np.array(start_s, dtype=np.float64)
     pose = np.array(np.broadcast_to(np.asarray(pose_s, dtype=np.float64), (n,)))
@@ -224,10 +221,7 @@ def direct_form(
 ) -> SensorCalibration:
     """``raw = S_a f + b_a`` per axis → ``f = S raw + b`` with its covariance, to first order (docs/kalman.md, eq. 9).
 
-    Raises
-    ------
-    ValueError
-        When the three axes are not independent: no direct form exists.
+    Raises ``RefusedError`` when the three axes are not independent: no direct form exists.
     """
     inverse_S = np.array([a.constants[:3] for a in axes])
     inverse_b = np.array([a.constants[3] for a in axes])

@@ -37,12 +37,8 @@ def pose_readings(recording: Recording, segments: Segments, table: PoseTable | N
     """Means of the poses, matched with a pose table.
 
     With start and stop times the readings are averaged over these; with pose numbers the table selects poses of the
-    log; with neither it must have as many rows as the log has poses.
-
-    Raises
-    ------
-    ValueError
-        When there is no accelerometer, the log has no pose, or table and log do not match.
+    log; with neither it must have as many rows as the log has poses. Raises ``RefusedError`` when there is no
+    accelerometer, the log has no pose, or table and log do not match.
     """
     a = recording.accelerometer
     if a is None:
@@ -94,10 +90,7 @@ def _timed_means(
 def noise_from_poses(recording: Recording, segments: Segments) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
     """White noise from the scatter inside the poses, and the LSB where it exceeds that; no slow noise.
 
-    Raises
-    ------
-    ValueError
-        When there is no accelerometer.
+    Raises ``RefusedError`` when there is no accelerometer.
     """
     a = recording.accelerometer
     if a is None:
@@ -136,12 +129,8 @@ def calibrate_session(
 ) -> KalmanCalibration:
     """Calibrate the accelerometer of a recording in the known attitudes of a pose table, by all methods for comparison.
 
-    With ``noise`` None white noise and resolution are estimated from the poses, with a finding.
-
-    Raises
-    ------
-    ValueError
-        When table and log do not match, or the poses do not determine the constants.
+    With ``noise`` None white noise and resolution are estimated from the poses, with a finding. Raises ``RefusedError``
+    when table and log do not match, or the poses do not determine the constants.
     """
     poses = pose_readings(recording, segments, table)
     used, extra, findings = _noise(recording, segments, noise, poses)
@@ -167,10 +156,7 @@ def calibrate_session_without_references(
 ) -> NormKalmanCalibration:
     """Calibrate the accelerometer of a recording from the norm of gravity in its poses.
 
-    Raises
-    ------
-    ValueError
-        When there are fewer than nine poses.
+    Raises ``RefusedError`` when there are fewer than nine poses.
     """
     poses = pose_readings(recording, segments)
     used, extra, findings = _noise(recording, segments, noise, poses)

@@ -147,13 +147,7 @@ def as_readings(x: npt.ArrayLike) -> FloatArray:
 
 
 def check_question(rate_hz: float, kind: str, confidence: float) -> None:
-    """Check the arguments of an Allan deviation.
-
-    Raises
-    ------
-    ValueError
-        Naming the argument.
-    """
+    """Check the arguments of an Allan deviation; raises ``RefusedError`` naming the argument."""
     if not (math.isfinite(rate_hz) and rate_hz > 0):
         raise RefusedError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
     if kind not in KINDS:
@@ -163,13 +157,7 @@ def check_question(rate_hz: float, kind: str, confidence: float) -> None:
 
 
 def checked_clusters(clusters: Sequence[int] | IntArray) -> list[int]:
-    """Cluster sizes as integers.
-
-    Raises
-    ------
-    ValueError
-        When one is not a whole number of at least 1.
-    """
+    """Cluster sizes as integers; raises ``RefusedError`` when one is not a whole number of at least 1."""
     sizes = np.atleast_1d(np.asarray(clusters))
     if sizes.ndim != 1 or sizes.size == 0:
         raise RefusedError("clusters must be a list of cluster sizes in readings")

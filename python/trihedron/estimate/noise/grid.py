@@ -13,10 +13,7 @@ from trihedron.units import acceleration_to_si, rate_to_si
 def refuse_size_of_a_unit(sensor: str, unit: str, size: float | None) -> None:
     """Check that the ``size`` of a count is stated only for readings in counts.
 
-    Raises
-    ------
-    ValueError
-        When a ``size`` is stated and the readings have a physical unit.
+    Raises ``RefusedError`` when a ``size`` is stated and the readings have a physical unit.
     """
     if size is not None and unit != "counts":
         raise RefusedError(
@@ -30,12 +27,8 @@ def readings_of(
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
     """Readings (n, channels) in SI (counts stay counts), names and units of the channels; NaN where rows are lost.
 
-    ``rad_s_per_count`` and ``m_s2_per_count`` are the sizes of a count, where known.
-
-    Raises
-    ------
-    ValueError
-        When most of the time has no reading, or the size of a count is stated for readings in a physical unit.
+    ``rad_s_per_count`` and ``m_s2_per_count`` are the sizes of a count, where known. Raises ``RefusedError`` when most
+    of the time has no reading, or the size of a count is stated for readings in a physical unit.
     """
     columns: list[FloatArray] = []
     names: list[str] = []

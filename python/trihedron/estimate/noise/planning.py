@@ -54,10 +54,7 @@ def relative_sigma(axis: NoiseAxis, duration_s: float) -> dict[TermName, float]:
 def recording_length_s(axis: NoiseAxis, symbol: TermName | str, relative: float) -> float | None:
     """Recording time [s] after which ``symbol`` has the relative uncertainty ``relative``; None beyond a month.
 
-    Raises
-    ------
-    ValueError
-        When the term is not present on the axis, or ``relative`` is not positive.
+    Raises ``RefusedError`` when the term is not present on the axis, or ``relative`` is not positive.
     """
     term = TermName(symbol)
     if not axis.terms[term].is_present:

@@ -71,12 +71,8 @@ def densities_below(spectra: Sequence[Spectrum], low_pass: LowPass, rate_hz: flo
 
     Whittle likelihood of the ordinates below the corner: density times the gain of ``low_pass`` times exp of an even
     polynomial of frequency common to the axes, plus each axis' flicker and rounding. The density is the level at
-    frequency zero: the uncertainty of the filter's shape is included.
-
-    Raises
-    ------
-    ValueError
-        When ``low_pass`` has no corner.
+    frequency zero: the uncertainty of the filter's shape is included. Raises ``RefusedError`` when ``low_pass`` has no
+    corner.
     """
     if low_pass.corner_hz is None:
         raise RefusedError("no corner shows: the density is that of all readings")

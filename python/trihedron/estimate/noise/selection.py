@@ -125,10 +125,7 @@ def select(
 ) -> Selection:
     """The subset of {Q, N, B, K, R} of least deviance plus ``evidence`` per term, and a Gauss-Markov process if needed.
 
-    Raises
-    ------
-    ValueError
-        When the channel does not change, or no ordinate of the spectrum remains.
+    Raises ``RefusedError`` when the channel does not change, or no ordinate of the spectrum remains.
     """
     spectrum = binned(bands, highest_hz, masked)
     if tolerance > 0.0:

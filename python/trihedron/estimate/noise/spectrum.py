@@ -98,10 +98,7 @@ def unit_densities(frequency_hz: FloatArray, order: IntArray, length: int, step_
 def ordinates(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]]) -> list[Ordinates]:
     """Bands of all stretches ``[start, stop)`` of one channel ``x`` (n,); NaN marks a missing reading.
 
-    Raises
-    ------
-    ValueError
-        When no stretch is long enough for a spectrum.
+    Raises ``RefusedError`` when no stretch is long enough for a spectrum.
     """
     total = sum(stop - start for start, stop in stretches)
     block = -(-total // LONGEST_TRANSFORM) if total > LONGEST_TRANSFORM else 1

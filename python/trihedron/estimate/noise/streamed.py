@@ -51,12 +51,8 @@ def stream_noise(
     means; knocks are not excluded.
 
     ``keep`` is called after every chunk with the number of readings so far and a function that returns the state of the
-    pass; with such a ``state`` the pass continues, and ``chunks`` begin where it was taken.
-
-    Raises
-    ------
-    ValueError
-        When a chunk has missing readings or another number of channels, or the log is too short.
+    pass; with such a ``state`` the pass continues, and ``chunks`` begin where it was taken. Raises ``RefusedError``
+    when a chunk has missing readings or another number of channels, or the log is too short.
     """
     check_question(rate_hz, "overlapping", 0.95)
     sizes = default_clusters(n_samples or 1 << 44) if clusters is None else checked_clusters(clusters)

@@ -72,12 +72,8 @@ def fit_accelerometer(
     """Fit by windows; ``None`` where the reference has no force. ``handedness`` is the sign of the gyro's det A.
 
     With attitude alone the acceleration of the body is unknown: the second derivative of a bounded path has little
-    power at the low frequencies of gravity's rotation, and the spectrum of the residuals shows how much.
-
-    Raises
-    ------
-    ValueError
-        When there are too few windows, or the reference's frames are mirrored.
+    power at the low frequencies of gravity's rotation, and the spectrum of the residuals shows how much. Raises
+    ``RefusedError`` when there are too few windows, or the reference's frames are mirrored.
     """
     if grid.accelerometer is None:
         return None

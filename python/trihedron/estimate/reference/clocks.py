@@ -49,12 +49,8 @@ class Alignment:
 def align(grid: Grid, reference: Reference, stamped_offset_s: float | None) -> Alignment:
     """Offset and rate of the reference's clock, to about a sample.
 
-    ``stamped_offset_s`` is the offset by the absolute timestamps of both logs, where they have any.
-
-    Raises
-    ------
-    ValueError
-        When the motions differ at every lag, or the reference's clock jumps.
+    ``stamped_offset_s`` is the offset by the absolute timestamps of both logs, where they have any. Raises
+    ``RefusedError`` when the motions differ at every lag, or the reference's clock jumps.
     """
     ours = _size_of_rate(grid)
     theirs = _reference_size(reference, grid.step_s)
@@ -148,10 +144,7 @@ def _stretches(n: int, whole: int) -> list[tuple[int, int]]:
 def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) -> tuple[float, float]:
     """Offset [s] and rate from the lags of stretches.
 
-    Raises
-    ------
-    ValueError
-        When neighbouring stretches fit well at lags that no steady clock explains.
+    Raises ``RefusedError`` when neighbouring stretches fit well at lags that no steady clock explains.
     """
     if len(ours) < 3 * round(BLOCK_S / grid.step_s):
         return offset, 0.0

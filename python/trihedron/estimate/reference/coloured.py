@@ -58,12 +58,7 @@ def solve(
     """Estimate θ of ``target (k, 3) = design (k, 3, p) θ``.
 
     ``index`` (k,) numbers the windows, gaps included; ``size`` (k,) is the motion with which noise may grow; ``model``
-    the noise model where it is fixed.
-
-    Raises
-    ------
-    ValueError
-        When there are too few rows for the parameters.
+    the noise model where it is fixed. Raises ``RefusedError`` when there are too few rows for the parameters.
     """
     k, _, p = design.shape
     if 3 * k < 2 * p + 30:

@@ -75,13 +75,8 @@ def fit_reference(
     """Fit a log to reference motion.
 
     ``given`` is a gyro's (S, b) whose replay is compared; it has its own frame, and its rotation to the reference's
-    body is taken from the fit.
-
-    Raises
-    ------
-    ValueError
-        When the two share no motion, the clock jumps or has two possible offsets, units differ by a factor, frames are
-        mirrored, or the motion does not determine the 12 parameters.
+    body is taken from the fit. Raises ``RefusedError`` when the two share no motion, the clock jumps or has two
+    possible offsets, units differ by a factor, frames are mirrored, or the motion does not determine the 12 parameters.
     """
     return fit_references([(recording, motion)], gravity_m_s2, given=given)[0]
 
@@ -95,11 +90,7 @@ def fit_references(
     """Fit recordings of one unit, each with its reference: S and effects are common, biases and clocks per recording.
 
     Mountings are per recording where the evidence prefers it. One result per recording; common parameters are equal.
-
-    Raises
-    ------
-    ValueError
-        As :func:`fit_reference`, for the first pair concerned.
+    Raises as :func:`fit_reference`, for the first pair concerned.
     """
     ready = [_prepared(recording, motion, gravity_m_s2) for recording, motion in pairs]
     found, effects = _fitted([one.side for one in ready])
@@ -196,23 +187,14 @@ def _answer(
 
 
 def laid_beside(recording: Recording, motion: ReferenceMotion, gravity_m_s2: float) -> Beside:
-    """A log on its grid with its aligned reference and initial values for a fit.
-
-    Raises
-    ------
-    ValueError
-        As :func:`fit_reference`.
-    """
+    """A log on its grid with its aligned reference and initial values for a fit; raises as :func:`fit_reference`."""
     return _prepared(recording, motion, gravity_m_s2).side
 
 
 def moves_along(recording: Recording, motion: ReferenceMotion) -> float:
     """Correlation of the magnitudes of the rates of a log and a reference with one motion.
 
-    Raises
-    ------
-    ValueError
-        When they share no motion, or the clock jumps.
+    Raises ``RefusedError`` when they share no motion, or the clock jumps.
     """
     grid, reference = grid_of(recording), Reference(motion)
     found = align(grid, reference, _stamped(recording, motion))

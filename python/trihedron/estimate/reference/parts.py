@@ -31,12 +31,8 @@ def refuse_parts_elsewhere(grid: Grid, reference: Reference, gyro: GyroFit) -> N
     """Check that no part of the reference fits at another lag than the whole.
 
     The alignment's stretches are 8 s long and use only magnitudes of rates: it excludes a jump in the last seconds as
-    another motion, and the fit excludes it as outliers.
-
-    Raises
-    ------
-    ValueError
-        With the interval and the lag, when consecutive stretches have the same other lag.
+    another motion, and the fit excludes it as outliers. Raises ``RefusedError`` with the interval and the lag, when
+    consecutive stretches have the same other lag.
     """
     if reference.motion.is_stepwise:
         return

@@ -31,10 +31,7 @@ class Grid:
 def grid_of(recording: Recording) -> Grid:
     """The log at even times of its own rate, by cubic interpolation; not valid within gaps.
 
-    Raises
-    ------
-    ValueError
-        When there is no gyro.
+    Raises ``RefusedError`` when there is no gyro.
     """
     if recording.gyroscope is None:
         raise RefusedError(f"{recording.source}: a reference is held against the gyro, and this log has none.")

@@ -104,10 +104,7 @@ class _Fit:
 def solved(log: Log, options: MoveOptions) -> SolvedSession:
     """Fit the session model from the initial scale with the least tilt errors (docs/model-session.md).
 
-    Raises
-    ------
-    ValueError
-        When a sensor or every move is missing, or no initial scale can be determined.
+    Raises ``RefusedError`` when a sensor or every move is missing, or no initial scale can be determined.
     """
     measured, near = begun(log, options.nominal())
     found = _with_hidden_turns(log, _fitted(log, measured, near), near)

@@ -27,12 +27,8 @@ from trihedron.records.sessions import PARAMETERS, Repeated, Session, Spread
 def repeated_parameters(sessions: Sequence[Session]) -> tuple[Repeated, ...]:
     """Mean and spreads of each parameter over all sessions, which are grouped by their ``group``.
 
-    Where every session is its own group there is one spread, between sessions, in ``within``.
-
-    Raises
-    ------
-    ValueError
-        With fewer than two sessions.
+    Where every session is its own group there is one spread, between sessions, in ``within``. Raises ``RefusedError``
+    with fewer than two sessions.
     """
     if len(sessions) < 2:
         raise RefusedError("one recording does not show how far a parameter repeats; give two or more.")

@@ -32,10 +32,7 @@ MIN_SPAN_DEGC = 2.0
 def thermal_model(sessions: Sequence[Session]) -> ThermalModel:
     """The thermal model of sessions that all have a temperature.
 
-    Raises
-    ------
-    ValueError
-        Where temperatures are missing, or within ``MIN_SPAN_DEGC``.
+    Raises ``RefusedError`` where temperatures are missing, or within ``MIN_SPAN_DEGC``.
     """
     T = np.array([session.temperature_degc for session in sessions])
     if not np.all(np.isfinite(T)):

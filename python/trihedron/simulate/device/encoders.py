@@ -164,13 +164,7 @@ LINE_HEADERS = {"lines": "count,time [us],ax,ay,az,gx,gy,gz\r\n", "lines-space":
 
 
 def encoder_for(protocol: str | FrameDeclaration, scales: Scales | None = None) -> Encoder:
-    """The encoder of frames in that protocol.
-
-    Raises
-    ------
-    ValueError
-        When no simulated board has that protocol.
-    """
+    """The encoder of frames in that protocol; raises ``RefusedError`` when no simulated board has that protocol."""
     if isinstance(protocol, FrameDeclaration):
         return declared(protocol)
     if protocol not in ENCODERS:

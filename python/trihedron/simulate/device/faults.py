@@ -51,10 +51,7 @@ class Faults:
 def parse_faults(text: str) -> Faults:
     """``"1%"`` (every kind), or ``"cut=1%,garbage=0.5%,drift=50ppm,disconnect=20,away=2,text"``.
 
-    Raises
-    ------
-    ValueError
-        When a fault is unknown or its size is not a number.
+    Raises ``RefusedError`` when a fault is unknown or its size is not a number.
     """
     chosen: dict[str, float | bool | tuple[float, ...]] = {}
     for part in (piece.strip() for piece in text.split(",") if piece.strip()):

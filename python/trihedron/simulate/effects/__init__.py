@@ -58,10 +58,7 @@ EFFECT_IDS: tuple[str, ...] = tuple(_EFFECTS)
 def with_effect(scenario: Scenario, effect_id: str, **size: Any) -> Scenario:
     """The scenario with one effect of the catalogue added at a stated size.
 
-    Raises
-    ------
-    ValueError
-        When the id is unknown, or a parameter is unknown, missing or invalid.
+    Raises ``RefusedError`` when the id is unknown, or a parameter is unknown, missing or invalid.
     """
     if effect_id not in _EFFECTS:
         raise RefusedError(

@@ -200,10 +200,7 @@ class _Planner:
 def plan_motion(motion: Motion, rng: np.random.Generator) -> Plan:
     """Convert a motion to tables in time.
 
-    Raises
-    ------
-    ValueError
-        When there are no steps, a duration is not positive, or a direction has zero length.
+    Raises ``RefusedError`` when there are no steps, a duration is not positive, or a direction has zero length.
     """
     if not motion.steps:
         raise RefusedError("a motion needs at least one step, for instance a Pose")
