@@ -5,8 +5,7 @@ import pytest
 from scipy.stats import binom
 
 from test_accelerometer_shapes import G, drawn, linear_fit
-from trihedron.estimate.accelerometer.bending import covariance_by_bends
-from trihedron.estimate.accelerometer.shapes import SHAPES
+from trihedron.estimate.accelerometer.bending import SHAPES, covariance_by_bends
 
 SCATTER, BENDS = 8e-3, 2e-2
 """m/s²: the first as a consumer's bias repeats, the second 0.2 % of |g|, as its data sheet has it."""

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import binom
 
 from trihedron import calibrate
-from trihedron.estimate.accelerometer import shapes
+from trihedron.estimate.accelerometer import bending
 from trihedron.records import FindingCode
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.simulate.effects import with_effect
@@ -29,14 +29,14 @@ def drawn(rng, n):
 
 
 def test_sound_poses_have_a_shape_as_often_as_chance_says(monkeypatch):
-    monkeypatch.setattr(shapes, "CHANCE", 0.05)
-    monkeypatch.setattr(shapes, "MATTERS", 0.0)
+    monkeypatch.setattr(bending, "CHANCE", 0.05)
+    monkeypatch.setattr(bending, "MATTERS", 0.0)
     rng, said, n_trials = np.random.default_rng(3), 0, 600
     for _ in range(n_trials):
         up, sigma = drawn(rng, int(rng.integers(16, 45)))
         # Noise twice as large as stated: an F needs no size of it.
         residual, _ = linear_fit(up, 2.0 * sigma * rng.normal(size=len(up)), sigma)
-        said += shapes.shape_of(up, residual, sigma, G, 4.0) is not None
+        said += bending.shape_of(up, residual, sigma, G, 4.0) is not None
     # Bonferroni over three shapes that are much alike: at most the stated rate.
     assert said <= binom.ppf(0.999, n_trials, 0.05)
     assert said >= binom.ppf(0.001, n_trials, 0.05 / 3.0)
@@ -50,7 +50,7 @@ def test_a_shape_is_named_with_what_the_fit_took_up_of_it(name, power):
     bent = up**power @ size + sigma * rng.normal(size=len(up))
     residual, found = linear_fit(up, bent, sigma)
     _, clean = linear_fit(up, bent - up**power @ size, sigma)
-    shape = shapes.shape_of(up, residual, sigma, G, 1.0)
+    shape = bending.shape_of(up, residual, sigma, G, 1.0)
     assert shape is not None
     assert shape.name == name
     assert shape.p < 1e-6
@@ -60,9 +60,9 @@ def test_a_shape_is_named_with_what_the_fit_took_up_of_it(name, power):
 def test_few_poses_and_poses_alike_say_nothing():
     rng = np.random.default_rng(7)
     up, sigma = drawn(rng, 14)
-    assert shapes.shape_of(up, 0.1 * up[:, 0] ** 4, sigma, G, 1.0) is None  # two degrees of freedom beside a shape
+    assert bending.shape_of(up, 0.1 * up[:, 0] ** 4, sigma, G, 1.0) is None  # two degrees of freedom beside a shape
     alike = np.repeat(up[:5], 8, axis=0)
-    assert shapes.shape_of(alike, rng.normal(size=40), np.ones(40), G, 1.0) is None
+    assert bending.shape_of(alike, rng.normal(size=40), np.ones(40), G, 1.0) is None
 
 
 def test_a_calibration_of_a_bent_accelerometer_is_not_to_be_trusted_and_a_sound_one_is():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trihedron.estimate.accelerometer.face_tilt import widened
+from trihedron.estimate.accelerometer.face_poses import widened
 from trihedron.estimate.accelerometer.faces import calibrate_faces
 
 G = 9.81

@@ -14,16 +14,14 @@ from scipy.spatial.transform import Rotation
 import trihedron
 from reference_rig import FINE_HZ, G, forces, hand, rates_of
 from trihedron.estimate.filter_noise.angle import bias_steps
-from trihedron.estimate.filter_noise.axes import _of_axes, _without_noise, unlike_axes_beside
 from trihedron.estimate.filter_noise.beside_reference import (
     ANGLE,
     independent_or_not,
     informed,
     parts_of,
 )
-from trihedron.estimate.filter_noise.held_out import errors_over
-from trihedron.estimate.filter_noise.strengths import Fitted, Prior, fit
-from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, matern, walked
+from trihedron.estimate.filter_noise.strengths import Fitted, Prior, _of_axes, _without_noise, fit, unlike_axes_beside
+from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, errors_over, matern, walked
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
 from trihedron.records import Recording
 from trihedron.records.filter_noise import Bounded, StaticNoise

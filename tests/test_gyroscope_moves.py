@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trihedron.estimate.gyroscope.starts import MoveOptions
 from trihedron.estimate.session.solved import calibrate_moves
+from trihedron.estimate.session.start import MoveOptions
 from trihedron.records import FindingCode, SensorCalibration
 from trihedron.simulate import Accelerometer, Gyroscope, Motion, MoveTo, NoiseTerms, Scenario, hand_session, simulate
 from trihedron.simulate import Pose as SimulatedPose

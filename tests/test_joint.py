@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from trihedron.estimate.accelerometer.norm import calibrate_norm
-from trihedron.estimate.gyroscope.starts import MoveOptions
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.estimate.session.solved import calibrate_moves
+from trihedron.estimate.session.start import MoveOptions
 from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
 from true_segments import segments_from_truth
 

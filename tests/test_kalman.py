@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from trihedron import _core
-from trihedron.estimate.kalman.model import ShapingOptions, shaping_model
+from trihedron.estimate.kalman.model import shaping_model
 from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
 from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode, PoseTable
 from twins_kalman import (
@@ -148,7 +148,7 @@ START, POSE = 10.0 * np.arange(324), np.full(324, 5.0)
 @functools.cache
 def noise_factor(noise):
     """(324, 324) root of the covariance of the article's poses: 5 s each with 5 s between."""
-    model = shaping_model(noise, ShapingOptions(), session_s=float(START[-1] + 5.0), pose_s=5.0)
+    model = shaping_model(noise, session_s=float(START[-1] + 5.0), pose_s=5.0)
     return np.linalg.cholesky(_core.kalman_noise_covariance(model, START, POSE, np.zeros(324)))
 
 

@@ -5,7 +5,7 @@ from scipy import stats
 from scipy.optimize import least_squares
 
 from trihedron import _core
-from trihedron.estimate.kalman.model import ShapingOptions, shaping_model
+from trihedron.estimate.kalman.model import shaping_model
 from trihedron.estimate.kalman.norm_invariant import NormFilter, NormStart, calibrate_without_references
 from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise
 from twins_kalman import normalised_error_squared
@@ -23,7 +23,7 @@ def session(seed, *, n=24, S=S_TRUE, b=B_TRUE, noise=NOISE):
     f = rng.standard_normal((n, 3))
     f *= GRAVITY / np.linalg.norm(f, axis=1)[:, None]
     start, pose = 8.0 * np.arange(n), np.full(n, 4.0)
-    model = shaping_model(noise, ShapingOptions(), session_s=float(start[-1] + 4.0), pose_s=4.0)
+    model = shaping_model(noise, session_s=float(start[-1] + 4.0), pose_s=4.0)
     covariance = _core.kalman_noise_covariance(model, start, pose, np.zeros(n))
     noise_now = np.linalg.cholesky(covariance) @ rng.standard_normal((n, 3))
     return (f - b) @ np.linalg.inv(S).T + noise_now, start, pose, covariance

@@ -51,10 +51,10 @@ def test_moves_are_judged_each_for_itself_in_noises_of_their_channels():
     together = _steps(readings, noise, moves)
     scaled = np.nan_to_num(readings / noise)
     alone = [_steps(scaled[a - 4 : b + 5], np.ones(6), np.array([(4, 4 + b - a)])) for a, b in moves]
-    for name in ("is_sharp", "is_long", "is_short"):
-        assert np.array_equal(getattr(together, name), np.concatenate([getattr(one, name) for one in alone]))
-    assert together.is_sharp.any()
-    assert len(together.is_sharp) == sum(b - a for a, b in moves)
+    for flags, of_each in zip(together, zip(*alone, strict=True), strict=True):
+        assert np.array_equal(flags, np.concatenate(of_each))
+    assert together[0].any()
+    assert len(together[0]) == sum(b - a for a, b in moves)
     for outside in ([(3, 50)], [(50, 396)], [(60, 50)], [(10, 500)]):
         with pytest.raises(ValueError, match=r"samples before|rows"):
             _steps(readings, noise, np.array(outside))

@@ -7,8 +7,8 @@ from confidence.motion import G
 from confidence.sessions import hand
 from trihedron import _core, diagnose
 from trihedron.estimate.accelerometer.norm import calibrate_norm
-from trihedron.estimate.gyroscope.starts import MoveOptions
 from trihedron.estimate.joint import calibrate_joint
+from trihedron.estimate.session.start import MoveOptions
 from trihedron.records import Recording
 from trihedron.session.noise import expected_scatter
 from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate

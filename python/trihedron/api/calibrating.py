@@ -13,22 +13,19 @@ from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
 from trihedron.api.turns_on_faces import opposite_on_faces, resting_spans, turns_on_faces
 from trihedron.errors import REFUSALS, RefusedError
-from trihedron.estimate.accelerometer.bending import with_bending
+from trihedron.estimate.accelerometer.bending import with_bending, with_shapes
 from trihedron.estimate.accelerometer.face_poses import faces_up, shared_rounding
 from trihedron.estimate.accelerometer.faces import calibrate_faces
-from trihedron.estimate.accelerometer.few_faces import calibrate_few_faces
-from trihedron.estimate.accelerometer.norm import calibrate_norm
-from trihedron.estimate.accelerometer.shapes import with_shapes
+from trihedron.estimate.accelerometer.norm import calibrate_few_faces, calibrate_norm
 from trihedron.estimate.gyroscope.findings import scale_findings
-from trihedron.estimate.gyroscope.gravity_scale import scale_by_gravity
 from trihedron.estimate.gyroscope.missing_samples import missing_samples, unless_seen
-from trihedron.estimate.gyroscope.starts import MoveOptions
 from trihedron.estimate.gyroscope.turn_angles import AMBIGUOUS, SCALE_TOLERANCE
 from trihedron.estimate.gyroscope.turn_axes import shared_errors, stated_turns
 from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.estimate.gyroscope.turntable import on_turntable
 from trihedron.estimate.joint import calibrate_joint, pull_allowed, pull_on_accelerometer
-from trihedron.estimate.session.solved import calibrate_moves
+from trihedron.estimate.session.solved import calibrate_moves, scale_by_gravity
+from trihedron.estimate.session.start import MoveOptions
 from trihedron.quantiles import median
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.plain import as_plain
@@ -306,7 +303,7 @@ def _by_faces(
     if nominal is None and turns_deg is None and rate_to_si(recording.gyroscope_unit) is None:
         by_gravity = scale_by_gravity(recording, segments, accelerometer, gravity)
         if by_gravity is not None:
-            scale, tolerance = by_gravity.S, by_gravity.tolerance
+            scale, tolerance = by_gravity
     try:
         gyroscope, more = calibrate_turns(
             recording, turns, resting_spans(segments), nominal_scale=scale, nominal_tolerance=tolerance

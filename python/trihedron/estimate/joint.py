@@ -6,11 +6,10 @@ from dataclasses import replace
 
 from trihedron import probability
 from trihedron.estimate.accelerometer.verdict import covariance_scale
-from trihedron.estimate.gyroscope.starts import MoveOptions
 from trihedron.estimate.session.carried import norm_quality
 from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.solved import solved
-from trihedron.estimate.session.start import Log
+from trihedron.estimate.session.start import Log, MoveOptions
 from trihedron.records.calibration import Calibration, FitQuality, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording

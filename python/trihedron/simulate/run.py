@@ -184,8 +184,7 @@ def _timestamps(clock: Clock, true_s: FloatArray, kept: BoolArray, seed: int) ->
     if clock.timestamp_jitter_s > 0.0:
         noise = clock.timestamp_jitter_s * stream(seed, "clock/timestamps").standard_normal(len(true_s))[kept]
         timestamps = np.maximum.accumulate(timestamps + noise)
-    out: FloatArray = timestamps - timestamps[0]
-    return out
+    return np.asarray(timestamps - timestamps[0])
 
 
 def _pick(values: FloatArray, kept: BoolArray) -> FloatArray:

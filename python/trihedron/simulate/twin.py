@@ -175,8 +175,7 @@ def _coming_to_rest(acceleration: FloatArray) -> FloatArray:
     """
     m = len(acceleration)
     hump = np.sin(np.pi * np.arange(m) / (m - 1)) ** 2
-    out: FloatArray = acceleration - hump[:, None] * (acceleration.sum(axis=0) / hump.sum())
-    return out
+    return np.asarray(acceleration - hump[:, None] * (acceleration.sum(axis=0) / hump.sum()))
 
 
 def _matrices(q: FloatArray) -> FloatArray:

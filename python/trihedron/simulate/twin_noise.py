@@ -218,5 +218,4 @@ def _power(low_pass: Smoother, dt: float) -> FloatArray:
     if low_pass.corner_hz == 0.0:
         return np.ones(len(_FREQUENCIES))
     a = low_pass.feedback(dt)
-    out: FloatArray = np.abs(a.sum() / np.polyval(a[::-1], np.exp(-1j * _FREQUENCIES))) ** 2
-    return out
+    return np.asarray(np.abs(a.sum() / np.polyval(a[::-1], np.exp(-1j * _FREQUENCIES))) ** 2)

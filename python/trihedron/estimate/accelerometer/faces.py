@@ -11,7 +11,7 @@ import numpy.typing as npt
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import REFUSALS
-from trihedron.estimate.accelerometer import face_poses, face_tilt, inputs, verdict
+from trihedron.estimate.accelerometer import face_poses, inputs, verdict
 from trihedron.estimate.accelerometer.face_poses import placements
 from trihedron.estimate.accelerometer.norm import norm_residual
 from trihedron.estimate.accelerometer.whole_turns import OppositeHeadings, with_opposite
@@ -130,7 +130,7 @@ def _estimate_placements(
         tilt2 = placed.scatter / (g**2 * float(np.mean(np.sum(S_a**2, axis=0))))
         # Misalignments couple the tilt into the reading of the vertical axis.
         if not is_cancelled:
-            spread = face_tilt.tilted(placed.noise, placed.faces, S_a, g, np.sqrt(tilt2 / placed.n_headings))
+            spread = face_poses.tilted(placed.noise, placed.faces, S_a, g, np.sqrt(tilt2 / placed.n_headings))
     estimate = _estimate(placed.means, spread, placed.faces, g)
     if placed.scatter is not None:
         estimate = _with_doubt(estimate, tilt2, 0.0 if is_cancelled else g)
@@ -161,15 +161,15 @@ def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float) 
     low, high = 0.0, 0.5
     for _ in range(60):
         tilt = 0.5 * (low + high)
-        if _chi2(values, face_tilt.tilted(noise, faces, S_a, g, tilt), faces, g) > dof:
+        if _chi2(values, face_poses.tilted(noise, faces, S_a, g, tilt), faces, g) > dof:
             low = tilt
         else:
             high = tilt
-    widened = face_tilt.tilted(noise, faces, S_a, g, high)
+    widened = face_poses.tilted(noise, faces, S_a, g, high)
     S_a, b_a, covariance = _least_squares(values, widened, faces, g)
     residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
     # A tilt estimated with few degrees of freedom has Student's tails: 1.96 standard uncertainties shall cover 95 %.
-    covariance = covariance * face_tilt.widened(dof, len(values)) ** 2
+    covariance = covariance * face_poses.widened(dof, len(values)) ** 2
     return _with_doubt(_Estimate(S_a, b_a, covariance, residual, 0.0, chi2_noise, dof), high**2, g)
 
 
@@ -177,8 +177,7 @@ def _inverses(noise: FloatArray) -> FloatArray:
     """Inverse covariances (n, 3, 3); the variance of a stuck axis is a millionth of the trace instead of zero."""
     variance, axes = np.linalg.eigh(noise)
     variance = np.maximum(variance, 1e-6 * variance.sum(axis=1, keepdims=True))
-    out: FloatArray = np.einsum("nij,nj,nkj->nik", axes, 1.0 / variance, axes)
-    return out
+    return np.asarray(np.einsum("nij,nj,nkj->nik", axes, 1.0 / variance, axes))
 
 
 def _design(faces: IntArray, g: float) -> FloatArray:
@@ -261,7 +260,7 @@ def _left_out_pose(
 ) -> tuple[float, float]:
     """Held-out norm residual of one pose, from a fit to the other poses, and its standard error, m/s²."""
     S_a, _, _ = _least_squares(values[others], noise[others], faces[others], g)
-    widened = face_tilt.tilted(noise[others], faces[others], S_a, g, tilt_rad)
+    widened = face_poses.tilted(noise[others], faces[others], S_a, g, tilt_rad)
     S_a, b_a, covariance = _least_squares(values[others], widened, faces[others], g)
     S, b = other_form(S_a, b_a)
     f = values[pose] @ S.T + b
@@ -293,7 +292,7 @@ def _tilt_findings(estimate: _Estimate, S: FloatArray, faces: IntArray, used: In
 
 def _observability(noise: FloatArray, faces: IntArray, estimate: _Estimate, g: float) -> Observability:
     """Observability of the twelve parameters, from the whitened and column-scaled design matrix."""
-    roots = np.linalg.cholesky(_inverses(face_tilt.tilted(noise, faces, estimate.S_a, g, estimate.tilt_rad)))
+    roots = np.linalg.cholesky(_inverses(face_poses.tilted(noise, faces, estimate.S_a, g, estimate.tilt_rad)))
     rows = np.einsum("nji,njk->nik", roots, _design(faces, g)).reshape(-1, 12)
     rows = rows / np.linalg.norm(rows, axis=0)
     s = np.linalg.svd(rows, compute_uv=False)

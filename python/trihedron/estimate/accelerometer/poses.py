@@ -36,8 +36,7 @@ def parameter_names() -> tuple[Words, ...]:
 
 
 def _unit(directions: FloatArray) -> FloatArray:
-    out: FloatArray = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    return out
+    return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))
 
 
 CANDIDATES: FloatArray = _unit(np.array([c for c in product((-1.0, 0.0, 1.0), repeat=3) if any(c)]))

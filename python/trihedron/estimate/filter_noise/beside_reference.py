@@ -11,9 +11,7 @@ from scipy.integrate import trapezoid
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.filter_noise.angle import angle_stretches
-from trihedron.estimate.filter_noise.axes import unlike_axes_beside
-from trihedron.estimate.filter_noise.held_out import Errors, errors_over
-from trihedron.estimate.filter_noise.left_over import Left, left_over
+from trihedron.estimate.filter_noise.left_over import PER_KELVIN, Left, beside_temperature, left_over, of_temperature
 from trihedron.estimate.filter_noise.strengths import (
     PREFERRED,
     Fitted,
@@ -21,10 +19,10 @@ from trihedron.estimate.filter_noise.strengths import (
     bounded,
     fit,
     forgetting,
+    unlike_axes_beside,
     with_slow_error_of,
 )
-from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, matern
-from trihedron.estimate.filter_noise.temperature import PER_KELVIN, beside_temperature, of_temperature
+from trihedron.estimate.filter_noise.stretch import NAMES, Errors, Stretch, errors_over, matern
 from trihedron.estimate.filter_noise.velocity import velocity_stretches
 from trihedron.estimate.reference.beside import BLOCK_S
 from trihedron.estimate.reference.fit import laid_beside

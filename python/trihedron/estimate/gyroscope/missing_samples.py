@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trihedron import _core
@@ -68,12 +66,12 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
     is_missing: BoolArray = ~np.all(np.isfinite(readings), axis=1)
     is_gap |= is_missing[1:] | is_missing[:-1]
     is_cut = np.convolve(is_gap, np.ones(2 * HALF_WINDOW + 1), mode="same") > 0.5
-    found = _steps(readings, np.concatenate(noise), inner)
+    is_sharp, is_long, is_short = _steps(readings, np.concatenate(noise), inner)
     step = np.concatenate([np.arange(first, last) for first, last in inner])
     is_known = ~is_cut[step]
-    n = int(np.count_nonzero(found.is_sharp & is_known))
-    n_short = int(np.count_nonzero(found.is_short & is_known))
-    at = step[found.is_long & is_known]
+    n = int(np.count_nonzero(is_sharp & is_known))
+    n_short = int(np.count_nonzero(is_short & is_known))
+    at = step[is_long & is_known]
     n_long = len(at)
     if n_long < FEWEST or float(bdtrc(n_long - 1, n_long + n_short, 0.5)) > CHANCE:
         return []
@@ -107,15 +105,6 @@ def _positive(sigma: FloatArray) -> FloatArray:
     return np.where(sigma > 0.0, sigma, max(float(sigma.max()), 1e-300))
 
 
-@dataclass(frozen=True, eq=False)
-class _Steps:
-    """Flags (k,) of the steps of moves: a loss would be detectable, one sample too long, one sample too short."""
-
-    is_sharp: BoolArray
-    is_long: BoolArray
-    is_short: BoolArray
-
-
 def _contrasts(missing: int) -> FloatArray:
     """(2, 8) contrasts that vanish for quintics through four samples on either side, ``missing`` more steps apart."""
     offsets = np.r_[np.arange(-HALF_WINDOW, 0) + 0.5, np.arange(HALF_WINDOW) + 0.5 + missing] / HALF_WINDOW
@@ -127,13 +116,14 @@ CONTRASTS = np.array([_contrasts(missing) for missing in (0, 1, -1)])
 """Contrasts (3, 2, 8): as logged, with one sample inserted, with one removed."""
 
 
-def _steps(readings: FloatArray, noise: FloatArray, moves: IntArray) -> _Steps:
-    """Flags of the step after each sample of ``moves`` (m, 2), move after move; ``noise`` (c,) of the channels.
+def _steps(readings: FloatArray, noise: FloatArray, moves: IntArray) -> tuple[BoolArray, BoolArray, BoolArray]:
+    """Flags (k,) of the step after each sample of ``moves`` (m, 2): a loss would be detectable, one sample too long,
+    one sample too short; ``noise`` (c,) of the channels.
 
     A step whose change is smaller than the slope beside it, the mirror image of a long one, also counts as short:
     curvature causes both equally often.
     """
-    flags = _core.motion_joints(
+    return _core.motion_joints(
         readings,
         noise,
         moves,
@@ -144,4 +134,3 @@ def _steps(readings: FloatArray, noise: FloatArray, moves: IntArray) -> _Steps:
         whole=WHOLE,
         left=(STILL_ORDINARY, MIRRORED),
     )
-    return _Steps(*flags)

@@ -82,13 +82,11 @@ class HiddenAngles:
 
     def variance_of_turns(self) -> FloatArray:
         """(k, 3) variance of the turns by rounding, raw²."""
-        out: FloatArray = np.sum(self.turns**2, axis=2) + self.passing
-        return out
+        return np.asarray(np.sum(self.turns**2, axis=2) + self.passing)
 
     def variance_of_biases(self) -> FloatArray:
         """(z, 3) variance of the static intervals by rounding, raw²."""
-        out: FloatArray = np.sum(self.static**2, axis=2)
-        return out
+        return np.asarray(np.sum(self.static**2, axis=2))
 
 
 def hidden_angles(

@@ -121,8 +121,7 @@ class TurnSystem:
         gain = np.swapaxes(np.concatenate([of_turns, still]), 1, 2)
         together = np.einsum("rjk,rkm->jm", gain, errors)
         apart = np.einsum("rjk,rk,rlk->jl", gain, np.sum(errors**2, axis=2), gain)
-        out: FloatArray = together @ together.T - apart
-        return out
+        return np.asarray(together @ together.T - apart)
 
     def residuals(self, fit: Solution) -> FloatArray:
         """(k, 3) measured minus predicted raw turns."""

@@ -19,8 +19,7 @@ from trihedron.estimate.gyroscope.turn_angles import (
     measure_turns,
     nominal_matrix,
 )
-from trihedron.estimate.gyroscope.turn_findings import turn_findings
-from trihedron.estimate.gyroscope.turn_screening import FALSE_ALARM, screen
+from trihedron.estimate.gyroscope.turn_screening import FALSE_ALARM, screen, turn_findings
 from trihedron.estimate.gyroscope.turn_system import Solution, TurnSystem, left_out, solve
 from trihedron.probability import chdtrc
 from trihedron.records.calibration import FitQuality, Observability, SensorCalibration

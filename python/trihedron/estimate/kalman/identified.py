@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from trihedron.arrays import AXES
 from trihedron.errors import RefusedError
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.kalman import AxisNoise
+from trihedron.records.noise import NoiseAxis
 from trihedron.records.pose_noise import OctaveNoise
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
@@ -26,51 +26,8 @@ COARSER = math.sqrt(2.0)
 """Largest ratio of two resolutions of one ADC and range."""
 
 
-class IdentifiedProcess(Protocol):
-    """An identified Gauss-Markov process."""
-
-    @property
-    def sigma_process(self) -> float:
-        """Standard deviation."""
-
-    @property
-    def correlation_time_s(self) -> float:
-        """Correlation time."""
-
-
-class IdentifiedAxis(Protocol):
-    """Interface of an axis of identified noise; values in ``unit`` and seconds."""
-
-    @property
-    def name(self) -> str:
-        """Name of the channel."""
-
-    @property
-    def unit(self) -> str:
-        """Unit of the channel."""
-
-    @property
-    def mean(self) -> float:
-        """Mean of the readings."""
-
-    @property
-    def sample_sigma(self) -> float:
-        """Standard deviation of one sample."""
-
-    @property
-    def resolution(self) -> float:
-        """Resolution (LSB) of the ADC."""
-
-    @property
-    def gauss_markov(self) -> IdentifiedProcess | None:
-        """First-order Gauss-Markov process beside the five terms, or ``None``."""
-
-    def fitted(self, symbol: str) -> float:
-        """Coefficient of Q, N, B, K or R in the most likely sum of terms."""
-
-
 def noise_from_identified(
-    axes: Sequence[IdentifiedAxis], raw_unit: AccelerationUnit | str
+    axes: Sequence[NoiseAxis], raw_unit: AccelerationUnit | str
 ) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
     """Noise of the three accelerometer axes among the identified ones, in the raw unit of the log to be calibrated.
 
@@ -81,7 +38,7 @@ def noise_from_identified(
     return out[0], out[1], out[2]
 
 
-def _accelerometer_axes(axes: Sequence[IdentifiedAxis]) -> list[IdentifiedAxis]:
+def _accelerometer_axes(axes: Sequence[NoiseAxis]) -> list[NoiseAxis]:
     units = {unit.value for unit in AccelerationUnit} - {AccelerationUnit.COUNTS.value}
     chosen = [axis for axis in axes if axis.unit in units] or list(axes[:3])
     if len(chosen) != 3:
@@ -90,7 +47,7 @@ def _accelerometer_axes(axes: Sequence[IdentifiedAxis]) -> list[IdentifiedAxis]:
     return chosen
 
 
-def check_same_gravity(axes: Sequence[IdentifiedAxis], accelerometer: SensorCalibration, gravity_m_s2: float) -> None:
+def check_same_gravity(axes: Sequence[NoiseAxis], accelerometer: SensorCalibration, gravity_m_s2: float) -> None:
     """Check that a static log measures gravity under the session's calibration, so that its noise applies.
 
     Twice the range halves the noise in counts, which densities do not distinguish from a quieter place. Raises
@@ -106,7 +63,7 @@ def check_same_gravity(axes: Sequence[IdentifiedAxis], accelerometer: SensorCali
         )
 
 
-def _one(axis: IdentifiedAxis, raw_unit: AccelerationUnit) -> AxisNoise:
+def _one(axis: NoiseAxis, raw_unit: AccelerationUnit) -> AxisNoise:
     factor = _factor(axis, raw_unit)
     process = axis.gauss_markov
     noise = AxisNoise(
@@ -123,23 +80,18 @@ def _one(axis: IdentifiedAxis, raw_unit: AccelerationUnit) -> AxisNoise:
     return noise.scaled(factor)
 
 
-def _factor(axis: IdentifiedAxis, raw_unit: AccelerationUnit) -> float:
+def _factor(axis: NoiseAxis, raw_unit: AccelerationUnit) -> float:
     """Raw units of the log to be calibrated per unit of the axis."""
-    factor = 1.0
-    if axis.unit != raw_unit.value:
-        has = (
-            acceleration_to_si(AccelerationUnit(axis.unit))
-            if axis.unit in {unit.value for unit in AccelerationUnit}
-            else None
+    if axis.unit == raw_unit.value:
+        return 1.0
+    is_known = axis.unit in {unit.value for unit in AccelerationUnit}
+    has, wanted = acceleration_to_si(AccelerationUnit(axis.unit)) if is_known else None, acceleration_to_si(raw_unit)
+    if has is None or wanted is None:
+        raise RefusedError(
+            f"the noise of {axis.name} is in {axis.unit or 'an unknown unit'} and the log in {raw_unit.value}: "
+            "identify the noise from a log in the same unit"
         )
-        wanted = acceleration_to_si(raw_unit)
-        if has is None or wanted is None:
-            raise RefusedError(
-                f"the noise of {axis.name} is in {axis.unit or 'an unknown unit'} and the log in {raw_unit.value}: "
-                "identify the noise from a log in the same unit"
-            )
-        factor = has / wanted
-    return factor
+    return has / wanted
 
 
 def check_same_adc(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy import stats
 
@@ -17,31 +15,15 @@ SLOWEST_PER_SESSION, FASTEST_PER_POSE = 0.3, 6.0
 per decade between them the Allan deviation follows flicker within 2 %."""
 
 
-@dataclass(frozen=True)
-class ShapingOptions:
-    """Representation of the noise by states (docs/kalman.md, eq. 4-8).
-
-    ``flicker_rates_per_s`` are the inverse correlation times β of the Gauss-Markov processes for flicker: one for the
-    article's filter, empty for as many as the session needs. ``ramp_frequency_rad_s`` is ω₀ of the second-order ramp, 0
-    for one tenth of the session's inverse length: its slope then lasts for the whole session; ``ramp_damping`` is ζ.
-    With ``averages`` a reading is the exact mean over its pose; without, it is the value at its end (the article).
-    """
-
-    flicker_rates_per_s: tuple[float, ...] = ()
-    ramp_frequency_rad_s: float = 0.0
-    ramp_damping: float = 1.0 / np.sqrt(2.0)
-    averages: bool = True
+RAMP_PER_SESSION, RAMP_DAMPING = 0.1, 1.0 / np.sqrt(2.0)
+"""ω₀ of the second-order ramp, times the length of the session, for a slope that lasts for all of it; ζ."""
 
 
-def shaping_model(
-    noise: AxisNoise, options: ShapingOptions, *, session_s: float, pose_s: float
-) -> _core.AxisKalmanModel:
-    """Compiled shaping filter of one axis for a session of ``session_s`` with poses of about ``pose_s``."""
-    rates = options.flicker_rates_per_s
-    if not rates:
-        slow, fast = SLOWEST_PER_SESSION / session_s, FASTEST_PER_POSE / pose_s
-        n = max(2, int(np.ceil(np.log10(fast / slow))) + 1)
-        rates = tuple(float(rate) for rate in np.geomspace(slow, fast, n))
+def shaping_model(noise: AxisNoise, *, session_s: float, pose_s: float) -> _core.AxisKalmanModel:
+    """Compiled shaping filter of one axis for a session of ``session_s`` with poses of about ``pose_s``; a reading is
+    the exact mean over its pose (docs/kalman.md, eq. 4-8)."""
+    slow, fast = SLOWEST_PER_SESSION / session_s, FASTEST_PER_POSE / pose_s
+    n = max(2, int(np.ceil(np.log10(fast / slow))) + 1)
     return _core.AxisKalmanModel(
         quantisation=noise.quantisation,
         white=noise.white,
@@ -52,10 +34,10 @@ def shaping_model(
         gauss_markov_rate=1.0 / noise.gauss_markov_time_s if noise.gauss_markov_time_s > 0 else 0.0,
         resolution=noise.resolution,
         dither=noise.sample_sigma,
-        flicker_rates=list(rates),
-        ramp_frequency=options.ramp_frequency_rad_s or 0.1 / session_s,
-        ramp_damping=options.ramp_damping,
-        averages=options.averages,
+        flicker_rates=np.geomspace(slow, fast, n).tolist(),
+        ramp_frequency=RAMP_PER_SESSION / session_s,
+        ramp_damping=RAMP_DAMPING,
+        averages=True,
     )
 
 

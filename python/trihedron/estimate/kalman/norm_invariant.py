@@ -13,7 +13,6 @@ from trihedron import _core
 from trihedron.arrays import AXES, XYZ, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.kalman.model import (
-    ShapingOptions,
     check_innovations,
     consistency_findings,
     is_settled,
@@ -98,15 +97,13 @@ class NormFilter:
         gravity_m_s2: float,
         start: NormStart,
         frame: NormFrame = "lower",
-        options: ShapingOptions | None = None,
         session_s: float = 1800.0,
         pose_s: float = 3.0,
     ) -> None:
         self.frame: NormFrame = frame
         self._gravity = gravity_m_s2
         self._bias = start.bias
-        options = options or ShapingOptions()
-        models = [shaping_model(n, options, session_s=session_s, pose_s=pose_s) for n in noise_per_axis(noise)]
+        models = [shaping_model(n, session_s=session_s, pose_s=pose_s) for n in noise_per_axis(noise)]
         size = np.abs(np.diag(start.S)).mean()
         sigma = np.array([start.sigma_relative * size] * 6 + [start.sigma_bias_m_s2] * 3)
         mean = np.array([start.S[i, j] for i, j in ENTRIES] + [0.0] * 3)
@@ -172,7 +169,6 @@ def calibrate_without_references(
     start: NormStart | None = None,
     frame: NormFrame = "lower",
     extra_variance: npt.ArrayLike = 0.0,
-    options: ShapingOptions | None = None,
     raw_unit: str = "counts",
 ) -> NormKalmanCalibration:
     """Calibrate a triad from mean readings in unknown attitudes, with the estimate after every pose.
@@ -204,7 +200,6 @@ def calibrate_without_references(
             gravity_m_s2=gravity_m_s2,
             start=start or NormStart.from_range(a, gravity_m_s2),
             frame=frame,
-            options=options,
             session_s=float(begin[-1] + pose[-1] - begin[0]),
             pose_s=float(np.median(pose)),
         )

@@ -12,7 +12,6 @@ from trihedron import _core
 from trihedron.arrays import AXES, FloatArray
 from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.kalman.model import (
-    ShapingOptions,
     check_innovations,
     consistency_findings,
     is_settled,
@@ -71,7 +70,6 @@ def calibrate_with_references(
     pose_s: npt.ArrayLike,
     extra_variance: npt.ArrayLike = 0.0,
     prior: Prior | None = None,
-    options: ShapingOptions | None = None,
     raw_unit: str = "counts",
     with_baselines: bool = True,
 ) -> KalmanCalibration:
@@ -109,9 +107,8 @@ def calibrate_with_references(
         )
     start, pose, extra = pose_arrays(len(f), start_s, pose_s, extra_variance)
     noises = noise_per_axis(noise)
-    options = options or ShapingOptions()
     session = float(start[-1] + pose[-1] - start[0])
-    models = [shaping_model(n, options, session_s=session, pose_s=float(np.median(pose))) for n in noises]
+    models = [shaping_model(n, session_s=session, pose_s=float(np.median(pose))) for n in noises]
     if table.sigma_m_s2 > 0:
         # An angle error changes the reference by σ across it; the axis' sensitivity converts it to raw units.
         extra = extra + (table.sigma_m_s2 * _sensitivity(z, f)) ** 2
@@ -156,8 +153,7 @@ def pose_arrays(
 def _sensitivity(z: FloatArray, f: FloatArray) -> FloatArray:
     """(3,) approximate norm of each axis' sensitivity row [raw/(m/s²)], to scale an angle error."""
     rows = np.linalg.lstsq(np.column_stack([f, np.ones(len(f))]), z, rcond=None)[0][:3]
-    out: FloatArray = np.linalg.norm(rows, axis=0)
-    return out
+    return np.asarray(np.linalg.norm(rows, axis=0))
 
 
 def _one_axis(

@@ -103,13 +103,12 @@ def binned(
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The chosen model: ``active`` indices of the basis, whether it has a ramp, its fit, the evidence of each term."""
+    """The chosen model: ``active`` indices of the basis, whether it has a ramp, its fit, its spectrum."""
 
     active: tuple[int, ...]
     has_ramp: bool
     fit: _core.SpectralFit
     spectrum: BinnedSpectrum
-    evidence: tuple[float, ...]
     correlation_time_s: float | None = None
     evidence_gauss_markov: float = 0.0
 
@@ -147,13 +146,7 @@ def select(
             both = cornered if masked is None else [c | m for c, m in zip(cornered, masked, strict=True)]
             return select(bands, highest_hz, both, evidence, tolerance=tolerance, is_cornered=True)
     active, has_ramp = best
-    earned = []
-    for k in range(len(SYMBOLS)):
-        with_k = tuple(sorted({*active, k}))
-        without = tuple(i for i in active if i != k)
-        base = table[without, has_ramp].deviance if without else float("inf")
-        earned.append(base - table[with_k, has_ramp].deviance)
-    plain = Selection(active, has_ramp, table[best], spectrum, tuple(earned))
+    plain = Selection(active, has_ramp, table[best], spectrum)
     step_s = min(band.step_s / band.block for band in bands)
     return _with_gauss_markov(step_s, plain, evidence) or plain
 
@@ -209,19 +202,12 @@ def _with_gauss_markov(step_s: float, plain: Selection, evidence: float) -> Sele
         return None
     time_s = float(fine[place])
     full = plain.spectrum.with_gauss_markov(step_s, time_s)
-    likelihood = full.likelihood()
-    fit = likelihood.fit(model, has_ramp)
-    evidence_terms = []
-    for k in range(extra):
-        with_k = tuple(sorted({*model, k}))
-        without = tuple(i for i in model if i != k)
-        evidence_terms.append(likelihood.fit(without, has_ramp).deviance - likelihood.fit(with_k, has_ramp).deviance)
+    fit = full.likelihood().fit(model, has_ramp)
     return Selection(
         active=model,
         has_ramp=has_ramp,
         fit=fit,
         spectrum=full,
-        evidence=tuple(evidence_terms),
         correlation_time_s=time_s,
         evidence_gauss_markov=price_plain - price + EVIDENCE_GAUSS_MARKOV,
     )

@@ -8,8 +8,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import RefusedError
-from trihedron.estimate.reference.settled import running_mean
-from trihedron.estimate.reference.together import Grid, Reference
+from trihedron.estimate.reference.together import Grid, Reference, running_mean
 
 LEAST_CORRELATION = 0.7
 """Least correlation of shared motion: of 7140 pairs of unrelated hand motions of 30 to 60 s one in a thousand reaches

@@ -14,19 +14,22 @@ from trihedron.estimate.reference.beside import Beside, Point
 from trihedron.estimate.reference.carried import error_carried
 from trihedron.estimate.reference.clocks import Alignment, align
 from trihedron.estimate.reference.coloured import Solution
-from trihedron.estimate.reference.earth import earth_of
 from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope
 from trihedron.estimate.reference.motion import ALWAYS, EFFECTS, MotionFit, Scored, fit_motion, scores
-from trihedron.estimate.reference.optima import refuse_two_clocks
-from trihedron.estimate.reference.parts import refuse_parts_elsewhere
-from trihedron.estimate.reference.refusals import refuse_still, refuse_strangers, refuse_units, share_left
+from trihedron.estimate.reference.refusals import (
+    refuse_parts_elsewhere,
+    refuse_still,
+    refuse_strangers,
+    refuse_two_clocks,
+    refuse_units,
+    share_left,
+)
 from trihedron.estimate.reference.remarks import remarks
 from trihedron.estimate.reference.replay import held_out
-from trihedron.estimate.reference.settled import plateaus
 from trihedron.estimate.reference.smoothed import bias_over_time, error_over_time, frame_covariance, without_slow_error
-from trihedron.estimate.reference.together import Grid, Reference, grid_of
+from trihedron.estimate.reference.together import Grid, Reference, grid_of, plateaus
 from trihedron.estimate.reference.windows import Windows, windows_on
-from trihedron.estimate.reference.worth import error_of
+from trihedron.estimate.reference.worth import earth_of, error_of
 from trihedron.records import Recording
 from trihedron.records.reference import AgainstReference, Estimate, FitToReference, ReferenceMotion
 from trihedron.sensor_model import reframing

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import chi2
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.estimate.reference.beside import Beside
 from trihedron.estimate.reference.motion import MotionFit, fit_motion
-from trihedron.records.reference import ReferenceError, Sign
+from trihedron.gravity import EARTH_RATE_RAD_S
+from trihedron.records.reference import Estimate, ReferenceError, Sign
 from trihedron.sensor_model import reframing
 
 FINE_S, COARSE = 0.1, 4.0
@@ -105,3 +106,34 @@ def noise_at_rest(side: Beside, found: MotionFit, k: int) -> float:
     change = np.sum(np.diff(rate, axis=0) ** 2, axis=1) / 6.0
     total = np.concatenate([[0.0], np.cumsum(change)])
     return float(np.sqrt((total[n:] - total[:-n]).min() / n * side.grid.step_s))
+
+
+# The Earth's rate in the world frame of a reference: a vector of known length, whose direction a good gyro shows.
+
+
+RESOLVED = 1.0 / 3.0
+"""Largest σ of the vector, relative to its length, with which its direction is determined."""
+FAR = 3.0
+"""Standard uncertainties by which the estimate may be shorter than the Earth's rate."""
+
+
+def earth_of(found: MotionFit, k: int) -> Estimate | None:
+    """The vector in the world frame [rad/s] with its length imposed; ``None`` where the log does not determine it.
+
+    A reference computed from a gyro rotates with the Earth: the estimate is then too short.
+    """
+    if "earth" not in found.places[k] or found.sides[k].reference.motion.attitude is None:
+        return None
+    value, covariance = found.value(k, "earth"), found.covariance(k, ("earth",))
+    sigma = float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
+    length = float(np.linalg.norm(value))
+    if sigma > RESOLVED * EARTH_RATE_RAD_S or EARTH_RATE_RAD_S - length > FAR * sigma:
+        return None
+    along = value / length
+    gain = covariance @ along / float(along @ covariance @ along)
+    return Estimate(
+        AXES,
+        value + gain * (EARTH_RATE_RAD_S - length),
+        covariance - np.outer(gain, covariance @ along),
+        "rad/s",
+    )

@@ -111,8 +111,7 @@ def _of_model(observed: Observed, S: FloatArray, b_centred: FloatArray, covarian
     up = force / np.linalg.norm(force, axis=1, keepdims=True)
     means = observed.pose_force + observed.force_origin
     jacobian = np.concatenate([(up[:, :, None] * means[:, None, :]).reshape(-1, 9), up], axis=1)
-    out: FloatArray = np.maximum(np.einsum("ni,ij,nj->n", jacobian, covariance, jacobian), 0.0)
-    return out
+    return np.asarray(np.maximum(np.einsum("ni,ij,nj->n", jacobian, covariance, jacobian), 0.0))
 
 
 def move_quality(
@@ -166,8 +165,7 @@ class Carried:
     @property
     def sigma(self) -> FloatArray:
         """(m, 3) standard errors of the residual, m/s²."""
-        out: FloatArray = np.sqrt(np.einsum("mii->mi", self.covariance))
-        return out
+        return np.asarray(np.sqrt(np.einsum("mii->mi", self.covariance)))
 
     def spread(self, which: IntArray, n_moves: int) -> Carried:
         """These moves as the moves ``which`` (m,) of ``n_moves``; the others are NaN."""
@@ -269,12 +267,10 @@ def carried_each(measured: MoveMeasurements, anchors_s: FloatArray, models: list
 def _across2(up: FloatArray, root: FloatArray) -> FloatArray:
     """(m,) variance across verticals (m, 3) of errors with roots (m, 3, k) of their covariance."""
     across = np.eye(3) - up[:, :, None] * up[:, None, :]
-    out: FloatArray = np.sum((across @ root) ** 2, axis=(1, 2))
-    return out
+    return np.asarray(np.sum((across @ root) ** 2, axis=(1, 2)))
 
 
 def _root(covariance: FloatArray) -> FloatArray:
     """L with L Lᵀ = C for covariances C (..., n, n) that are positive semidefinite up to rounding."""
     values, vectors = np.linalg.eigh(covariance)
-    out: FloatArray = vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]
-    return out
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :])

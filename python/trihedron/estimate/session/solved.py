@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.estimate.gyroscope.findings import findings_of
+from trihedron.errors import REFUSALS
+from trihedron.estimate.gyroscope.findings import describe, findings_of
 from trihedron.estimate.gyroscope.lost_turns import (
     PossibleLosses,
     is_asked_for_losses,
@@ -15,12 +16,10 @@ from trihedron.estimate.gyroscope.lost_turns import (
     relative_sigma,
 )
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.estimate.gyroscope.observability import describe
-from trihedron.estimate.gyroscope.starts import MoveOptions
 from trihedron.estimate.session.carried import Carried, HeldOut, carried, held_out, move_quality
 from trihedron.estimate.session.fit import FALSE_ALARM, SessionSolution, far_moves, refitted, solve_session
 from trihedron.estimate.session.observed import Observed, with_prior
-from trihedron.estimate.session.start import Log, Near, begun, is_enough, lower, near_one_another
+from trihedron.estimate.session.start import Log, MoveOptions, Near, begun, is_enough, lower, near_one_another
 from trihedron.probability import chdtri
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding
@@ -217,8 +216,7 @@ def _standard_errors(covariance: FloatArray) -> FloatArray:
     # Scaled to a correlation matrix: in counts and m/s² the variances span many decades.
     values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
     keep = values > 1e-10 * float(values.max())
-    out: FloatArray = (size[:, None] * vectors[:, keep] * np.sqrt(values[keep])).T
-    return out
+    return np.asarray((size[:, None] * vectors[:, keep] * np.sqrt(values[keep])).T)
 
 
 def _is_asked_for_losses(log: Log, found: _Fit) -> bool:
@@ -233,3 +231,37 @@ def _losses(log: Log, found: _Fit) -> PossibleLosses:
     return losses_that_fit(
         log.recording.time_s, found.measured, found.solution.S_w, log.gravity_m_s2, missed, dof, found.used
     )
+
+
+# The gyro's scale from gravity: rough, but sufficient to distinguish turns of 90, 180 and 360 degrees.
+
+
+LARGEST_DOUBT = 0.1
+"""Largest relative standard uncertainty of a scale that is used: three of them still exclude half and twice."""
+LEAST_TOLERANCE = 0.01
+"""Smallest tolerance: errors that the fit does not show (nonlinearity, accelerations of the hand)."""
+
+
+def scale_by_gravity(
+    recording: Recording, segments: Segments, accelerometer: SensorCalibration, gravity_m_s2: float
+) -> tuple[FloatArray, float] | None:
+    """Scale (3, 3) [rad/s per raw unit] of the gyro from moves that change gravity's direction (method 2), and three
+    relative standard uncertainties of its worst direction; ``None`` where they do not determine it.
+
+    Moves from face to face rotate gravity by 90°, turns on a tilted table by a little: with a scale wrong by a factor
+    of two the tilt errors would be tens of degrees.
+    """
+    if recording.gyroscope is None or recording.accelerometer is None:
+        return None
+    try:
+        gyroscope, _ = calibrate_moves(recording, segments, accelerometer, gravity_m_s2, MoveOptions(n_folds=0))
+    except REFUSALS:
+        return None
+    quality, seen = gyroscope.quality, gyroscope.observability
+    if quality is None or seen is None or seen.rank < seen.n_parameters or quality.angle_deg is None:
+        return None
+    size = float(np.linalg.norm(gyroscope.S, 2))
+    sigma = float(np.sqrt(max(np.linalg.eigvalsh(gyroscope.covariance[:9, :9])[-1], 0.0))) / size
+    if not sigma < LARGEST_DOUBT:
+        return None
+    return gyroscope.S, max(3.0 * sigma, LEAST_TOLERANCE)

@@ -195,8 +195,7 @@ def _q(values: FloatArray, variances: FloatArray, members: list[IntArray], s2: F
     y, v, is_there = _padded(values, variances, members)
     weights = np.where(is_there, 1.0 / (v + s2[:, None, None]), 0.0)
     mean = (weights * y).sum(axis=2) / weights.sum(axis=2)
-    out: FloatArray = (weights * (y - mean[:, :, None]) ** 2).sum(axis=(1, 2))
-    return out
+    return np.asarray((weights * (y - mean[:, :, None]) ** 2).sum(axis=(1, 2)))
 
 
 def _padded(
@@ -231,8 +230,7 @@ def _solved_for_all(means: FloatArray, variances: FloatArray, targets: FloatArra
     def q(s2: FloatArray) -> FloatArray:
         weights = 1.0 / (variances[:, None, :] + s2[:, :, None])
         centre = (weights * means[:, None, :]).sum(axis=2) / weights.sum(axis=2)
-        out: FloatArray = (weights * (means[:, None, :] - centre[:, :, None]) ** 2).sum(axis=2)
-        return out
+        return np.asarray((weights * (means[:, None, :] - centre[:, :, None]) ** 2).sum(axis=2))
 
     scale = max(float(np.max(np.ptp(means, axis=1)) ** 2 * means.shape[1]), float(variances.max()), 1e-300)
     shape = (len(means), len(targets))

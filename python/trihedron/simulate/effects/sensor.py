@@ -10,8 +10,18 @@ from typing import Literal
 import numpy as np
 
 from trihedron.errors import RefusedError
-from trihedron.simulate.effects.response import mass_response, suspension, with_response
-from trihedron.simulate.effects.sizes import Change, Sensor, Values, checked, electronics, matrix3, triple
+from trihedron.simulate.effects.sizes import (
+    Change,
+    Sensor,
+    Values,
+    checked,
+    electronics,
+    mass_response,
+    matrix3,
+    suspension,
+    triple,
+    with_response,
+)
 from trihedron.simulate.readout import Adc, Drift, Interference
 from trihedron.simulate.scenario import Scenario, Temperature
 

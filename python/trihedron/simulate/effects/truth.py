@@ -8,8 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from trihedron.simulate.effects.response import mass_response, response
-from trihedron.simulate.effects.sizes import triple
+from trihedron.simulate.effects.sizes import mass_response, response, triple
 from trihedron.simulate.motion.steps import Disturb, Motion, Pose, Turn
 from trihedron.simulate.readout import Electronics
 from trihedron.simulate.scenario import Scenario, Temperature
