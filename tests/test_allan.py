@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from trihedron import _core
-from trihedron.estimate.noise.allan import allan_deviation
-from trihedron.estimate.noise.degrees import KINDS, TYPES
+from trihedron.estimate.noise.allan import KINDS, TYPES, allan_deviation
 from trihedron.estimate.noise.streamed import stream_noise
 from twins_noise import overlapping_variance, running_sum_in_long_double, weighted_hadamard, weighted_variance
 

@@ -48,29 +48,14 @@ def calibrate_joint(
     """Fit ``S_f, b_f, S_ω`` to the norm of every pose and the rotation of every move at once (equation 5.7).
 
     The noise of a pose's mean enters its norm and both neighbouring moves, with its full covariance. The frame is
-    lower-triangular: the data do not determine the rotation of the triad against the case.
-
-    Parameters
-    ----------
-    recording, segments : Recording, Segments
-        Raw readings of both sensors, their poses and moves.
-    accelerometer : SensorCalibration
-        Solution of the accelerometer alone, from which the fit starts (``quality``: its residual against noise).
-    gravity_m_s2, gravity_source : float, str
-        Magnitude of gravity and where it comes from.
-    options : MoveOptions
-        As for method 2.
-
-    Raises
-    ------
-    ValueError
-        As :func:`trihedron.estimate.gyroscope.calibrate_moves`.
+    lower-triangular: the data do not determine the rotation of the triad against the case. The fit starts from
+    ``accelerometer``, calibrated alone; ``options`` and errors are those of ``calibrate_moves``.
     """
     log = Log(recording, segments, accelerometer, gravity_m_s2, is_given=False)
     found = solved(log, options or MoveOptions())
     solution, left_out, alone = found.solution, found.held_out, accelerometer.quality
-    held = (None, None) if left_out is None else (left_out.norm, left_out.norm_sigma)
-    quality = norm_quality(found.observed, solution, *held)
+    held = None if left_out is None else (left_out.norm, left_out.norm_sigma)
+    quality = norm_quality(found.observed, solution, held)
     if left_out is None and alone is not None:
         quality = replace(
             quality, held_out=alone.held_out, held_out_sigma=alone.held_out_sigma, held_out_rms=alone.held_out_rms

@@ -163,6 +163,17 @@ class SpectralLine:
     width_hz: float = 0.0
 
 
+def allan_of_unit_terms(tau_s: FloatArray) -> dict[TermName, FloatArray]:
+    """Allan variance (k,) of each term of IEEE 952 with value 1 at averaging times (k,) [s] (docs/noise.md, eq. 7)."""
+    return {
+        TermName.QUANTISATION: 3.0 / tau_s**2,
+        TermName.WHITE: 1.0 / tau_s,
+        TermName.BIAS_INSTABILITY: np.full_like(tau_s, 2.0 * math.log(2.0) / math.pi),
+        TermName.RATE_RANDOM_WALK: tau_s / 3.0,
+        TermName.RATE_RAMP: 0.5 * tau_s**2,
+    }
+
+
 @dataclass(frozen=True)
 class NoiseAxis(Frozen):
     """The noise of one axis.
@@ -228,14 +239,7 @@ class NoiseAxis(Frozen):
 
     def allan_parts(self, tau_s: FloatArray) -> dict[str, FloatArray]:
         """Allan variance (k,) of every part of the sum, by a term's symbol, "Gauss-Markov" or "lines"."""
-        tau = tau_s
-        of_one = {
-            TermName.QUANTISATION: 3.0 / tau**2,
-            TermName.WHITE: 1.0 / tau,
-            TermName.BIAS_INSTABILITY: np.full_like(tau, 2.0 * math.log(2.0) / math.pi),
-            TermName.RATE_RANDOM_WALK: tau / 3.0,
-            TermName.RATE_RAMP: 0.5 * tau**2,
-        }
+        tau, of_one = tau_s, allan_of_unit_terms(tau_s)
         parts = {term.value: self.fitted(term) ** 2 * one for term, one in of_one.items() if self.fitted(term) > 0.0}
         if self.gauss_markov is not None:
             parts["Gauss-Markov"] = _gauss_markov_allan(self.gauss_markov, tau)

@@ -148,23 +148,21 @@ def _changed(base: Any, values: Mapping[str, Any], where: str) -> Any:
     """The dataclass ``base`` with some fields replaced by values of a table."""
     if not isinstance(values, Mapping):
         raise RefusedError(f"{where} must be a table, got {values!r}")
-    cls = type(base)
-    names = tuple(f.name for f in dataclasses.fields(cls))
-    _refuse_unknown(values, names, where)
-    hints = typing.get_type_hints(cls)
-    changes = {key: _value(hints[key], value, getattr(base, key), f"{where}.{key}") for key, value in values.items()}
-    return dataclasses.replace(base, **changes)
+    return dataclasses.replace(base, **_fields(type(base), values, base, where))
 
 
 def _made(cls: type[Any], values: Mapping[str, Any], where: str) -> Any:
     """A dataclass from a table; other fields have their defaults."""
-    names = tuple(f.name for f in dataclasses.fields(cls))
-    _refuse_unknown(values, names, where)
-    hints = typing.get_type_hints(cls)
     try:
-        return cls(**{key: _value(hints[key], value, None, f"{where}.{key}") for key, value in values.items()})
+        return cls(**_fields(cls, values, None, where))
     except TypeError as error:
         raise RefusedError(f"{where}: {str(error).split('() ', 1)[-1]}") from None
+
+
+def _fields(cls: type[Any], values: Mapping[str, Any], base: Any, where: str) -> dict[str, Any]:
+    _refuse_unknown(values, tuple(f.name for f in dataclasses.fields(cls)), where)
+    hints = typing.get_type_hints(cls)
+    return {k: _value(hints[k], v, getattr(base, k, None), f"{where}.{k}") for k, v in values.items()}
 
 
 def _value(hint: Any, value: Any, base: Any, where: str) -> Any:

@@ -42,7 +42,7 @@ def noise_of_poses(
     """
     steps = np.broadcast_to(np.asarray(step, dtype=np.float64), (3,))
     measured = [_pooled(signal[:, k], poses, float(steps[k])) for k in range(3)]
-    filters = [Smoother(), *(Smoother(part / dt, order) for order in _ORDERS for part in _CORNERS)]
+    filters = _filters(dt)
     windows = [_windows(axis[0]) for axis in measured]
     powers = [_power(low_pass, dt) for low_pass in filters]
     fits = [
@@ -55,6 +55,10 @@ def noise_of_poses(
         return (columns[0][j], columns[1][j], columns[2][j])
 
     return NoiseTerms(N=triple(0), B=triple(1)), filters[best]
+
+
+def _filters(dt: float) -> list[Smoother]:
+    return [Smoother(), *(Smoother(part / dt, order) for order in _ORDERS for part in _CORNERS)]
 
 
 FEWEST_BELOW = 4
@@ -96,7 +100,7 @@ def noise_of_octaves(
         return terms, misfit
 
     if not isinstance(low_pass, Smoother):
-        filters = [Smoother(), *(Smoother(part / dt, order) for order in _ORDERS for part in _CORNERS)]
+        filters = _filters(dt)
         misfits = [fitted(one)[1] for one in filters]
         corner_hz = low_pass
         near = [k for k in range(1, len(filters)) if corner_hz and abs(np.log(filters[k].corner_hz / corner_hz)) < NEAR]
@@ -135,23 +139,25 @@ def low_pass_like(frequency_hz: FloatArray, gain: FloatArray, dt: float) -> Smoo
 
 def _earned(design: FloatArray, density: FloatArray, relative: FloatArray) -> tuple[FloatArray, float]:
     """Variances of white noise and of flicker (0 where it gains less than ``FLICKER_EARNS``), and -2 log-likelihood."""
-    white, alone = _non_negative(design[:, :1], density, relative)
-    both, misfit = _non_negative(design, density, relative)
+    spread, most = np.hypot(relative, SHAPES), float(density.max())
+    white, alone = _non_negative(design[:, :1], density, spread, (1e-3 * most, 1e-6 * most))
+    both, misfit = _non_negative(design, density, spread, (1e-3 * most, 1e-6 * most))
     return (both, misfit) if alone - misfit > FLICKER_EARNS else (np.append(white, 0.0), alone)
 
 
-def _non_negative(design: FloatArray, density: FloatArray, relative: FloatArray) -> tuple[FloatArray, float]:
-    """Non-negative weights of the columns, errors relative to the model, and -2 log-likelihood."""
-    spread = np.hypot(relative, SHAPES)
-    model = np.maximum(density, 1e-3 * float(density.max()))
-    solution = np.zeros(design.shape[1])
-    misfit = 0.0
+def _non_negative(
+    design: FloatArray, seen: FloatArray, relative: FloatArray, least: tuple[FloatArray | float, FloatArray | float]
+) -> tuple[FloatArray, float]:
+    """Non-negative weights of the columns, errors ``relative`` to the model, and -2 log-likelihood; the model is at
+    least ``least``, at first and later."""
+    model = np.maximum(seen, least[0])
+    solution, misfit = np.zeros(design.shape[1]), 0.0
     for _ in range(5):
-        scaled = design / (model * spread)[:, None]
+        scaled = design / (model * relative)[:, None]
         norms = np.linalg.norm(scaled, axis=0)
-        found, misfit = nnls(scaled / norms, density / (model * spread))
+        found, misfit = nnls(scaled / norms, seen / (model * relative))
         solution = found / norms
-        model = np.maximum(design @ solution, 1e-6 * float(density.max()))
+        model = np.maximum(design @ solution, least[1])
     return solution, float(misfit) ** 2 + 2.0 * float(np.sum(np.log(model)))
 
 
@@ -197,14 +203,10 @@ def _fit(
     # Relative standard error of a variance with these degrees of freedom, with 3 % of model error in quadrature. It is
     # relative to the model, so that a variance that is small by chance does not get the largest weight.
     relative = np.hypot(np.sqrt(2.0 / freedom), 0.03)
-    model = np.maximum(measured, 0.1 * measured.max() / size)
-    for _ in range(5):
-        scaled = design / (model * relative)[:, None]
-        norms = np.linalg.norm(scaled, axis=0)
-        solution, misfit = nnls(scaled / norms, measured / (model * relative))
-        model = np.maximum(design @ (solution / norms), 1e-6 * measured.max() / size)
-    white, flicker = (float(v) for v in np.sqrt(solution / norms))
-    return (white, flicker), float(misfit) ** 2 + 2.0 * float(np.sum(np.log(model)))
+    least = measured.max() / size
+    solution, misfit = _non_negative(design, measured, relative, (0.1 * least, 1e-6 * least))
+    white, flicker = (float(v) for v in np.sqrt(solution))
+    return (white, flicker), misfit
 
 
 def _windows(size: FloatArray) -> FloatArray:

@@ -37,19 +37,11 @@ SAID = 2.0
 
 def covariance_by_bends(up: FloatArray, residual: FloatArray, sigma: FloatArray, gravity_m_s2: float) -> FloatArray:
     """Covariance (9, 9) that nonlinearity of unknown strength adds to the relative errors of S, row by row of its
-    lower triangle, and of b in units of |g|.
+    lower triangle, and of b in units of |g|, from unit verticals ``up`` (n, 3) and gravity errors (n,) [m/s²].
 
     With r = X θ + B c + ε, B of one shape, c ~ N(0, τ²) and ε ~ N(0, σ² + s²), θ fitted without B has the error T c
     beside its noise, T the part of B that the nine columns X absorb. The second moment T (C_c + ĉ ĉᵀ) Tᵀ is averaged
     over shapes, τ and s by restricted likelihood and priors (τ half-t about the data sheet, s uniform in its log).
-
-    Parameters
-    ----------
-    up : (n, 3)
-        Unit verticals.
-    residual, sigma : (n,)
-        Gravity errors in static poses, and their noise, m/s².
-    gravity_m_s2 : float
     """
     design, bends = design_rows(up) * gravity_m_s2, [of(up) * gravity_m_s2 for of in SHAPES.values()]
     prior = -0.5 * (TAIL_DOF + 1.0) * np.log1p((STRENGTHS / NONLINEARITY) ** 2 / TAIL_DOF) + np.log(STRENGTHS)
@@ -146,15 +138,8 @@ def shape_of(
 ) -> Shape | None:
     """The shape with the smallest p below ``CHANCE`` that shifts a parameter by more than ``MATTERS`` σ, or ``None``.
 
-    Parameters
-    ----------
-    up : (n, 3)
-        Unit verticals.
-    residual, sigma : (n,)
-        Gravity errors in static poses after the fit, and their noise, m/s².
-    gravity_m_s2 : float
-    scale : float
-        χ² per degree of freedom by which the covariance of S and b is widened.
+    ``up`` (n, 3) are unit verticals, ``residual``, ``sigma`` (n,) gravity errors in static poses after the fit and
+    their noise [m/s²]; ``scale`` is the χ² per degree of freedom by which the covariance of S and b is widened.
     """
     white = 1.0 / sigma[:, None]
     linear = design_rows(up) * gravity_m_s2 * white
@@ -195,32 +180,25 @@ def verticals(fitted: SensorCalibration, reading: FloatArray) -> FloatArray:
     return up
 
 
-def shape_findings(calibration: Calibration, segments: Segments) -> tuple[Finding, ...]:
-    """Finding for a nonlinear shape in the gravity errors of static poses, with the shift of S and b that it causes."""
+def with_shapes(calibration: Calibration, segments: Segments) -> tuple[Finding, ...]:
+    """A calibration's findings; a nonlinear shape in the gravity errors of static poses, with the shift of S and b that
+    it causes, replaces an earlier NONLINEAR_RESIDUAL finding."""
     fitted, reading = calibration.accelerometer, segments.accelerometer_mean
     if fitted.quality is None or reading is None or len(fitted.quality.residual) != len(reading):
-        return ()
+        return calibration.findings
     seen, is_known = fitted.quality, np.isfinite(fitted.quality.residual)  # excluded poses have no residual
     up = verticals(fitted, reading)[is_known]
     scale = max(seen.covariance_scale, seen.chi2 / seen.dof if seen.dof > 0 else 1.0, 1.0)
     shape = shape_of(up, seen.residual[is_known], seen.sigma[is_known], calibration.gravity_m_s2, scale)
     if shape is None:
-        return ()
-    return (
-        Finding.of(
-            FindingCode.NONLINEAR_RESIDUAL,
-            "poses",
-            is_cubic=float(shape.name == "cubic"),
-            is_quadratic=float(shape.name == "quadratic"),
-            p=shape.p,
-            shift_m_s2=shape.shift_m_s2,
-            shift_sigma=shape.shift_sigma,
-        ),
+        return calibration.findings
+    said = Finding.of(
+        FindingCode.NONLINEAR_RESIDUAL,
+        "poses",
+        is_cubic=float(shape.name == "cubic"),
+        is_quadratic=float(shape.name == "quadratic"),
+        p=shape.p,
+        shift_m_s2=shape.shift_m_s2,
+        shift_sigma=shape.shift_sigma,
     )
-
-
-def with_shapes(calibration: Calibration, segments: Segments) -> tuple[Finding, ...]:
-    """A calibration's findings and a shape's; a detected shape replaces an earlier NONLINEAR_RESIDUAL finding."""
-    shapes = shape_findings(calibration, segments)
-    kept = (one for one in calibration.findings if not shapes or one.code is not FindingCode.NONLINEAR_RESIDUAL)
-    return (*kept, *shapes)
+    return (*(one for one in calibration.findings if one.code is not FindingCode.NONLINEAR_RESIDUAL), said)

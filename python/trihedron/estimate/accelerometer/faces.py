@@ -50,34 +50,17 @@ def calibrate_faces(
     """Accelerometer triad from poses with one axis of the case along the vertical.
 
     ``a'[i] = S_a (±|g| e) + b_a + δa[i]`` by weighted least squares over all poses; faces may repeat or be missing
-    (eq. 7; for six faces it is eq. 8).
+    (eq. 7; for six faces it is eq. 8). ``means`` (n, 3) are raw, ``sigma_means`` as in ``calibrate_norm``; ``shared``
+    (3,) [raw²] is the part of their variance that equal readings share (rounding), ``opposite`` the readings at the
+    opposite headings, determined from whole turns.
 
     Faces that contradict each other beyond their noise were not level: the rms tilt per pose that makes them consistent
     is estimated, reported (TABLE_TILT) and added to the variance of each pose as a horizontal error. A tilt common to
     all poses in the axes of the case is not observable; it rotates the body frame against the case.
 
-    Parameters
-    ----------
-    means : (n, 3)
-        Mean raw reading of each pose.
-    sigma_means : (3,), (n, 3) or (n, 3, 3)
-        Standard errors of the means in raw units, or their covariances.
-    gravity_m_s2 : float
-        |g| where the recording was made.
-    up : (n,) of ±1, ±2, ±3, optional
-        Axis of the case that points up in each pose (0: the pose is excluded). Without it the axis with the largest
-        reading is taken, and a positive reading is taken as up: handedness is then not tested.
-    raw_unit : AccelerationUnit
-        Unit of ``means``.
-    shared : (3,), optional
-        Part of the means' variance, raw², that equal readings share (rounding).
-    opposite : OppositeHeadings, optional
-        Readings at the opposite headings, determined from whole turns.
-
-    Raises
-    ------
-    ValueError
-        When shapes do not fit, or naming the faces that are missing.
+    ``up`` (n,) of ±1, ±2, ±3 is the axis of the case that points up in each pose (0: the pose is excluded). Without it
+    the axis with the largest reading is taken, and a positive reading is taken as up: handedness is then not tested.
+    Raises ``RefusedError`` when shapes do not fit, or naming the faces that are missing.
     """
     values, noise = inputs.pose_means(means, sigma_means)
     g, unit = inputs.gravity(gravity_m_s2), AccelerationUnit(raw_unit)

@@ -93,36 +93,16 @@ def calibrate_norm(
     """Accelerometer triad from the mean readings of poses, whatever their orientation.
 
     Minimises ``Σ ρ(((|S a' + b| - |g|)/σ)²)`` with ``σ² = uᵀ S Σ Sᵀ u``, the noise of the mean along gravity (eq. 12).
+    ``means`` (n, 3) are raw, ``sigma_means`` their standard errors (3,) or (n, 3), or covariances (n, 3, 3). Robust
+    losses keep 95 % efficiency on Gaussian noise. ``raw_unit`` is only used to question implausible scales.
+    ``axis_signs`` (3,) of ±1 is the sign of each raw axis against the body frame's axis, from the board's documentation
+    or method 1: gravity's magnitude does not determine the signs of the diagonal of S; the default is +1. An odd number
+    of minus signs is reported as a left-handed triad.
 
-    Parameters
-    ----------
-    means : (n, 3)
-        Mean raw reading of each pose.
-    sigma_means : (3,), (n, 3) or (n, 3, 3)
-        Standard errors of the means in raw units, or their covariances. They decide weights and uncertainties.
-    gravity_m_s2 : float
-        |g| where the recording was made. A relative error of |g| is the same relative error of every scale.
-    raw_unit : AccelerationUnit
-        Unit of ``means``; only kept in the result and used to question implausible scales.
-    frame : "lower" or "symmetric"
-        Body frame. (``case`` needs method 1: norms do not depend on the orientation of the case.)
-    loss : "linear", "huber", "soft_l1" or "cauchy"
-        Robust losses keep 95 % efficiency on Gaussian noise.
-    axis_signs : (3,) of ±1, optional
-        Sign of each raw axis against the body frame's axis, from the board's documentation or method 1: the signs of
-        the diagonal of S. Gravity's magnitude does not determine them; the default is +1. An odd number of minus signs
-        is reported as a left-handed triad.
-
-    Returns
-    -------
-    (SensorCalibration, findings)
-        When the poses do not determine nine parameters, these have a prior of 10 % about the sphere through the
-        readings, which is the uncertainty of undetermined directions, and a SERIOUS finding names the poses to add.
-
-    Raises
-    ------
-    ValueError
-        When shapes do not fit, values are NaN, there are fewer than three poses, or all poses read the same.
+    When the poses do not determine nine parameters, these have a prior of 10 % about the sphere through the readings,
+    which is the uncertainty of undetermined directions, and a SERIOUS finding names the poses to add. Raises
+    ``RefusedError`` when shapes do not fit, values are NaN, there are fewer than three poses, or all poses read the
+    same.
     """
     values, noise = inputs.pose_means(means, sigma_means)
     g = inputs.gravity(gravity_m_s2)
@@ -183,8 +163,7 @@ def _assemble(
     f = values @ S.T + fit.b
     up = f / np.linalg.norm(f, axis=1)[:, None]
     residual, sigma = norm_residual(f, S, noise, g)
-    dof = len(values) - 9
-    z2 = (residual / sigma) ** 2
+    dof = len(values) - N_PARAMETERS
     # With a robust loss χ² excludes the rejected poses.
     chi2 = fit.robust_chi2
     scale = verdict.covariance_scale(chi2, dof)
@@ -195,24 +174,9 @@ def _assemble(
     else:
         turn = np.concatenate([np.tile(signs, 3), np.ones(3)])
         covariance = fit.covariance * np.outer(turn, turn) * scale
-    rms = float(np.sqrt(np.mean(residual**2)))
-    rms_dof = float(np.sqrt(np.sum(residual**2) / dof)) if dof > 0 else float("nan")
-    floor = float(np.sqrt(np.mean(sigma**2)))
-    unseen = apart[:, 0]
-    predicted = np.isfinite(unseen)
     observability = design.observability(relative_sigma)
-    quality = FitQuality(
-        unit="m/s^2",
-        residual=residual,
-        sigma=sigma,
-        chi2=float(z2.sum()),
-        dof=max(dof, 0),
-        rms=rms,
-        rms_dof=rms_dof,
-        floor=floor,
-        held_out=unseen,
-        held_out_sigma=apart[:, 1],
-        held_out_rms=float(np.sqrt(np.mean(unseen[predicted] ** 2))) if predicted.any() else None,
+    quality = replace(
+        gravity_quality(residual, sigma, (apart[:, 0], apart[:, 1])),
         weights=fit.weights,
         n_iterations=fit.n_iterations,
         stopped_because=words(fit.stopped_because),
@@ -229,8 +193,8 @@ def _assemble(
         ),
         *verdict.convergence_findings(fit.is_converged, words(fit.stopped_because)),
         *verdict.model_findings(S, unit, signs_are_known=signs_are_known),
-        *verdict.residual_findings(chi2, dof, rms, floor),
-        *verdict.held_out_findings(unseen, apart[:, 1], apart[:, 2], dof),
+        *verdict.residual_findings(chi2, dof, quality.rms, quality.floor),
+        *verdict.held_out_findings(apart[:, 0], apart[:, 1], apart[:, 2], dof),
     ]
     sensor = SensorCalibration(
         S=S,
@@ -243,6 +207,29 @@ def _assemble(
         observability=observability,
     )
     return sensor, tuple(findings)
+
+
+N_PARAMETERS = 9
+
+
+def gravity_quality(residual: FloatArray, sigma: FloatArray, held: tuple[FloatArray, FloatArray] | None) -> FitQuality:
+    """Gravity errors (n,) in static poses and their noise, m/s²; ``held``: the held-out ones (NaN where there is none)
+    and their standard errors."""
+    dof, total = max(len(residual) - N_PARAMETERS, 0), float(np.sum(residual**2))
+    known = None if held is None else held[0][np.isfinite(held[0])]
+    return FitQuality(
+        unit="m/s^2",
+        residual=residual,
+        sigma=sigma,
+        chi2=float(np.sum((residual / np.maximum(sigma, 1e-300)) ** 2)),
+        dof=dof,
+        rms=float(np.sqrt(total / len(residual))),
+        rms_dof=float(np.sqrt(total / dof)) if dof else float("nan"),
+        floor=float(np.sqrt(np.mean(sigma**2))),
+        held_out=None if held is None else held[0],
+        held_out_sigma=None if held is None else held[1],
+        held_out_rms=float(np.sqrt(np.mean(known**2))) if known is not None and len(known) else None,
+    )
 
 
 def norm_residual(f: FloatArray, S: FloatArray, noise: FloatArray, g: float) -> tuple[FloatArray, FloatArray]:

@@ -154,18 +154,8 @@ def losses_that_fit(
     from the tilt errors beyond noise (docs/model-session.md, 11.17). The excess mostly has another cause; the
     uncertainties must include this one.
 
-    Parameters
-    ----------
-    time_s, measured : (n,), MoveMeasurements
-        Timestamps, moves.
-    S, gravity_m_s2 : (3, 3), float
-        The gyro's scale in rad/s per raw unit, |g|.
-    missed : (m,), (m,)
-        Tilt error [deg] after every move, and its variance by noise [(m/s²)²].
-    dof : float
-        Degrees of freedom of the tilt errors of the moves in use.
-    used : (m,)
-        The moves that were fitted.
+    ``S`` (3, 3) is the gyro's scale in rad/s per raw unit; ``missed`` the tilt error (m,) [deg] after every move and
+    its variance (m,) by noise [(m/s²)²]; ``dof`` the degrees of freedom of the moves ``used`` (m,) in the fit.
     """
     step_s = measured.nominal_step_s
     if measured.sigma_time_s > EVEN * step_s or not could_be_remade(time_s, step_s):

@@ -41,36 +41,15 @@ def calibrate_turns(
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Calibrate the gyro from turns about case axes: ``φ'_i = S_w φ_i + b_w Δt_i + δφ_i`` (equation 5.12).
 
-    Parameters
-    ----------
-    recording : Recording
-        With raw gyro readings.
-    turns : sequence of Turn
-        Where the turns are; axis and angle (whole turns too) are found from the data where they are not given.
-    static : sequence of (start, stop)
-        Intervals without rotation.
-    nominal_scale : (3, 3) or float, optional
-        rad/s per raw unit, to identify multiples of 90°; it follows from the unit unless readings are counts.
-        Stated turns (angle and axis) need none; their scale has precedence where they span three axes.
-    nominal_tolerance : float
-        Relative tolerance of the nominal scale.
-    shared_errors : (k, 3, m), optional
-        Change of the turns [rad] by one standard error of each of m independent errors that all turns share.
+    Axis and angle of ``turns`` (whole turns too) are found from the data where they are not given; ``static`` are
+    intervals without rotation. ``nominal_scale`` (3, 3) or a number [rad/s per raw unit], with its relative tolerance,
+    identifies multiples of 90°; it follows from the unit unless readings are counts. Stated turns (angle and axis) need
+    none; their scale has precedence where they span three axes. ``shared_errors`` (k, 3, m) is the change of the turns
+    [rad] by one standard error of each of m independent errors that all turns share. White rate noise ``N`` [unit/√Hz]
+    gives ``var δφ = N² Δt``. The result is the direct form ``ω = S raw + b`` in the case frame.
 
-    Returns
-    -------
-    SensorCalibration, tuple of Finding
-        Direct form ``ω = S raw + b`` in the case frame, and the findings.
-
-    Raises
-    ------
-    ValueError
-        When an axis has no usable turn or there is no static interval; or, with the question to the user, when readings
-        are counts and neither the angles nor a nominal scale are given.
-
-    Notes
-    -----
-    White rate noise ``N`` [unit/√Hz] gives ``var δφ = N² Δt``.
+    Raises ``RefusedError`` when an axis has no usable turn or there is no static interval; or, with the question to the
+    user, when readings are counts and neither the angles nor a nominal scale are given.
     """
     measured = measure_turns(recording, turns, static)
     nominal = nominal_matrix(recording, measured, turns, nominal_scale)

@@ -149,21 +149,11 @@ def on_turntable(
     speeds_deg_s: Sequence[float] | None,
     relative_sigma: float = 0.0,
 ) -> Calibration:
-    """The calibration updated with the speeds of a turntable, for any orientation of the unit on it.
+    """The calibration updated with the speeds of a turntable in the same log, for any orientation of the unit on it.
 
-    Parameters
-    ----------
-    calibration : Calibration
-        Of the same log, with a gyro.
-    speeds_deg_s : sequence of float
-        One for all steady turns, or one a turn in the order of the log; 0 excludes a turn. Signs do not matter.
-    relative_sigma : float
-        Standard error of the table's speed, common to all turns (0.001: one part in a thousand).
-
-    Raises
-    ------
-    ValueError
-        When there is no gyro, no steady turn, or another number of them than of speeds.
+    ``speeds_deg_s`` is one for all steady turns, or one a turn in the order of the log; 0 excludes a turn, signs do not
+    matter. ``relative_sigma`` is the standard error of the table's speed, common to all turns (0.001: one part in a
+    thousand). Raises ``RefusedError`` when there is no gyro, no steady turn, or another number of them than of speeds.
     """
     if not 0.0 <= number_of("turntable_sigma", relative_sigma) < 0.5:
         raise RefusedError(f"turntable_sigma is a relative error such as 0.001, not {relative_sigma}.")

@@ -76,18 +76,9 @@ N_PARAMETERS = 9
 class NormFilter:
     """Kalman filter of a triad in unknown attitudes, over poses in order of time.
 
-    Parameters
-    ----------
-    noise : AxisNoise or three of them
-        Noise of the raw readings.
-    gravity_m_s2 : float
-        Local gravity.
-    start : NormStart
-        Initial calibration, signs included.
-    frame : "lower" or "symmetric"
-        Form of S, which fixes the rotation that the norm does not determine.
-    session_s, pose_s : float
-        Approximate length of the session, which sets the slowest noise state, and of a pose.
+    ``noise`` of one axis or of three, in raw units; ``start`` the initial calibration, signs included; ``frame`` the
+    form of S, which fixes the rotation that the norm does not determine; ``session_s``, ``pose_s`` the approximate
+    length of the session, which sets the slowest noise state, and of a pose.
     """
 
     def __init__(
@@ -173,23 +164,9 @@ def calibrate_without_references(
 ) -> NormKalmanCalibration:
     """Calibrate a triad from mean readings in unknown attitudes, with the estimate after every pose.
 
-    Parameters
-    ----------
-    readings : (n, 3)
-        Mean raw reading of each pose.
-    noise : AxisNoise or three of them
-        Noise of the raw readings.
-    start_s, pose_s : (n,)
-        Start time and length of each pose, s.
-    start : NormStart, optional
-        Default: from the range of the readings, with positive axes.
-    extra_variance : scalar, (n,) or (n, 3)
-        Variance of a reading in addition to the noise model, raw².
-
-    Raises
-    ------
-    ValueError
-        When shapes disagree, values are not finite, poses are out of order, or there are fewer than nine.
+    Arguments are those of ``calibrate_with_references``; the default ``start`` is from the range of the readings, with
+    positive axes. Raises ``RefusedError`` when shapes disagree, values are not finite, poses are out of order, or there
+    are fewer than nine.
     """
     a = _mean_readings(readings)
     begin, pose, extra = pose_arrays(len(a), start_s, pose_s, extra_variance)

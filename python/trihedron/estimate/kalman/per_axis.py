@@ -75,28 +75,15 @@ def calibrate_with_references(
 ) -> KalmanCalibration:
     """Calibrate a triad from mean readings in known attitudes, by all methods after every pose (docs/kalman.md, eq. 2).
 
-    Parameters
-    ----------
-    readings : (n, 3)
-        Mean raw reading of each pose.
-    references : PoseTable or (n, 3)
-        Specific force in the body, m/s².
-    noise : AxisNoise or three of them
-        Noise of the raw readings.
-    start_s, pose_s : (n,)
-        Start time and length of each pose, s; ``pose_s`` may be a scalar.
-    extra_variance : (n,), (n, 3) or scalar
-        Variance of a reading in addition to the noise model, raw².
-    prior : Prior, optional
-        Default: diffuse. With a prior the poses need not determine every constant (a head with one axis); the batch
-        solutions are then omitted.
-    with_baselines : bool
-        Also run recursive and batch least squares, ordinary and generalised. The latter cost O(n³).
+    ``readings`` (n, 3) are the mean raw readings of the poses, ``references`` a table or the specific force (n, 3) in
+    the body [m/s²], ``noise`` that of one axis or of three, ``start_s`` (n,) and ``pose_s`` (n,) or a number the start
+    and length of the poses [s], ``extra_variance`` (), (n,) or (n, 3) [raw²] in addition to the noise model. With a
+    ``prior`` (default: diffuse) the poses need not determine every constant (a head with one axis); the batch solutions
+    are then omitted. ``with_baselines`` adds recursive and batch least squares, ordinary and generalised; the latter
+    cost O(n³).
 
-    Raises
-    ------
-    ValueError
-        When shapes disagree, values are not finite, poses are out of order or do not determine the constants.
+    Raises ``RefusedError`` when shapes disagree, values are not finite, poses are out of order or do not determine the
+    constants.
     """
     table = references if isinstance(references, PoseTable) else PoseTable(np.asarray(references, dtype=np.float64))
     f = table.specific_force

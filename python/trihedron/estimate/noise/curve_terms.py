@@ -26,9 +26,8 @@ from itertools import combinations
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.estimate.noise.terms import allan_variance_of_terms
 from trihedron.probability import NORMAL_95
-from trihedron.records.noise import TermName
+from trihedron.records.noise import TermName, allan_of_unit_terms
 
 _DIFFERENCE = ((0, 1.0), (1, -2.0), (2, 1.0))
 _GRID_RATIO = 1.12
@@ -173,7 +172,7 @@ class CurvePoints:
     @cached_property
     def design(self) -> FloatArray:
         """(k, 5) Allan variance of unit terms."""
-        return np.stack([allan_variance_of_terms(self.tau_s, term.value, 1.0) for term in TERMS], axis=1)
+        return np.stack(list(allan_of_unit_terms(self.tau_s).values()), axis=1)
 
     def from_point(self, first: int, tolerance: float) -> CurvePoints:
         """The points without the first ``first``, with this ``tolerance``."""

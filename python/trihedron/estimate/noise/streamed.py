@@ -17,8 +17,8 @@ from trihedron.estimate.noise.allan import (
     as_readings,
     check_question,
     checked_clusters,
+    curve_with_intervals,
     default_clusters,
-    streamed_curve,
 )
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
 from trihedron.estimate.noise.screening import readout, steps_and_knocks, tail_error
@@ -90,13 +90,27 @@ def stream_noise(
     *_, n, means = stream.finish()
     channels = len(means)
     names = tuple(names) or tuple(f"channel {c + 1}" for c in range(channels))
-    curve = streamed_curve(stream, rate_hz, 0.95, names, tuple(units) or ("",) * channels)
+    curve = _curve(stream, rate_hz, names, tuple(units) or ("",) * channels)
     first = np.concatenate(head)
     block = -(-n // LONGEST_TRANSFORM)
     axes = [
         _axis(stream, c, block, rate_hz, np.ascontiguousarray(first[:, c]), curve, n, means[c]) for c in range(channels)
     ]
     return Noise(axes=tuple(axes), curve=curve, source=source)
+
+
+def _curve(stream: _core.AllanStream, rate_hz: float, names: tuple[str, ...], units: tuple[str, ...]) -> AllanCurve:
+    """The curve of all readings of a stream.
+
+    Longer clusters start at every ``stride``-th reading only, at least 64 times per cluster: they contain the
+    information of every start and have its degrees of freedom.
+    """
+    found, variance, terms, stride, n, _ = stream.finish()
+    clusters = np.array(found)
+    starts = np.repeat((n - 2.0 * clusters + 1.0)[:, np.newaxis], len(variance), axis=1)
+    return curve_with_intervals(
+        "overlapping", rate_hz, n, clusters, variance.T, terms.T, starts, 0.95, names, units, stride
+    )
 
 
 def _stream_of(channels: int, sizes: Sequence[int], budget_bytes: int) -> _core.AllanStream:

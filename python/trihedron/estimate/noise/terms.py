@@ -19,18 +19,3 @@ def gauss_markov_density(frequency_hz: FloatArray, step_s: float, correlation_ti
     # 1 - 2 d cos + d² loses its digits for time constants and periods of a million steps.
     denominator = math.expm1(-ratio) ** 2 + 4.0 * decay * np.sin(np.pi * frequency_hz * step_s) ** 2
     return np.asarray(-step_s * math.expm1(-2.0 * ratio) / denominator)
-
-
-def allan_variance_of_terms(tau_s: FloatArray, symbol: str, value: float) -> FloatArray:
-    """Allan variance at ``tau_s`` of one term of IEEE 952 (docs/noise.md, eq. 7)."""
-    tau = np.asarray(tau_s, dtype=np.float64)
-    square = value**2
-    if symbol == "Q":
-        return np.asarray(3.0 * square / tau**2)
-    if symbol == "N":
-        return np.asarray(square / tau)
-    if symbol == "B":
-        return np.full_like(tau, 2.0 * math.log(2.0) / math.pi * square)
-    if symbol == "K":
-        return np.asarray(square * tau / 3.0)
-    return np.asarray(square * tau**2 / 2.0)

@@ -12,6 +12,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.estimate.accelerometer.norm import N_PARAMETERS, gravity_quality
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.fit import DYNAMICS, MOVES, STATIC_FORCE, SessionSolution
 from trihedron.estimate.session.observed import Observed
@@ -20,32 +21,21 @@ from trihedron.records.segments import Segments
 from trihedron.session.averaging import sharpened
 from trihedron.session.noise import along_gradient
 
-N_ACCELEROMETER, N_GYROSCOPE = 9, 9
+N_GYROSCOPE = 9
 
 
 def norm_quality(
-    observed: Observed, solution: SessionSolution, held: FloatArray | None, held_sigma: FloatArray | None
+    observed: Observed, solution: SessionSolution, held: tuple[FloatArray, FloatArray] | None
 ) -> FitQuality:
-    """Gravity errors in static poses at the saved S, b of the accelerometer; ``held`` (n,) are the held-out ones."""
-    residual, sigma = norm_errors(observed, solution.S_a, solution.b_a)
-    dof = max(len(residual) - N_ACCELEROMETER, 0)
-    total, chi2 = float(np.sum(residual**2)), float(np.sum((residual / np.maximum(sigma, 1e-300)) ** 2))
-    return FitQuality(
-        unit="m/s^2",
-        residual=residual,
-        sigma=sigma,
-        chi2=chi2,
-        dof=dof,
-        rms=float(np.sqrt(total / len(residual))),
-        rms_dof=float(np.sqrt(total / dof)) if dof else float("nan"),
-        floor=float(np.sqrt(np.mean(sigma**2))),
-        held_out=held,
-        held_out_sigma=held_sigma,
-        held_out_rms=None if held is None else float(np.sqrt(np.mean(held**2))),
+    """Gravity errors in static poses at the saved S, b of the accelerometer; ``held`` (n,) are the held-out ones with
+    their standard errors."""
+    found = gravity_quality(*norm_errors(observed, solution.S_a, solution.b_a), held)
+    return replace(
+        found,
         n_iterations=solution.iterations,
         stopped_because=solution.stopped_because,
         # The covariance includes the error of one bias for the session under bias drift.
-        covariance_scale=max(chi2 / dof, 1.0) if solution.is_drifting and dof else 1.0,
+        covariance_scale=max(found.chi2 / found.dof, 1.0) if solution.is_drifting and found.dof else 1.0,
     )
 
 
@@ -79,7 +69,7 @@ def held_out(
     linear step from the optimum (eq. 11.15).
     """
     n, m = len(observed.pose_force), len(observed.before)
-    if n_folds < 2 or m - -(-m // n_folds) < N_GYROSCOPE // 2 + 1 or n - -(-n // n_folds) < N_ACCELEROMETER:
+    if n_folds < 2 or m - -(-m // n_folds) < N_GYROSCOPE // 2 + 1 or n - -(-n // n_folds) < N_PARAMETERS:
         return None
     core = solution.core
     labels = core.labels

@@ -36,28 +36,8 @@ def calibrate_moves(
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Calibrate the gyro from the tilt errors after rotations between poses (equations 5.1-5.7).
 
-    Parameters
-    ----------
-    recording : Recording
-        Raw readings of both sensors.
-    segments : Segments
-        Its poses and moves.
-    accelerometer : SensorCalibration
-        Calibrated accelerometer: its frame becomes the gyro's, its covariance enters the gyro's.
-    gravity_m_s2 : float
-        Magnitude of gravity, m/s².
-    options : MoveOptions
-        Folds, nominal scale.
-
-    Returns
-    -------
-    SensorCalibration, tuple of Finding
-        ``ω = S raw + b`` in rad/s, and the findings.
-
-    Raises
-    ------
-    ValueError
-        When a sensor or every move is missing, or no initial scale can be determined.
+    The frame of the calibrated ``accelerometer`` becomes the gyro's, its covariance enters the gyro's. Raises
+    ``RefusedError`` when a sensor or every move is missing, or no initial scale can be determined.
     """
     log = Log(recording, segments, accelerometer, gravity_m_s2, is_given=True)
     found = solved(log, options or MoveOptions())

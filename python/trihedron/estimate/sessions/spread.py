@@ -12,7 +12,7 @@ group's mean depends on the unknown σ_u: (1) is averaged over the distribution 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -215,12 +215,20 @@ def _solved(values: FloatArray, variances: FloatArray, members: list[IntArray], 
     scale = max(
         sum(float(np.sum((values[g] - values[g].mean()) ** 2)) for g in members), float(variances.max()), 1e-300
     )
-    low, high = np.full(len(targets), np.log(1e-12 * scale)), np.full(len(targets), np.log(1e6 * scale))
-    for _ in range(BISECTIONS):
+    return _crossed(lambda s2: _q(values, variances, members, s2), targets, scale, targets.shape, BISECTIONS)
+
+
+def _crossed(
+    q: Callable[[FloatArray], FloatArray], targets: FloatArray, scale: float, shape: tuple[int, ...], n: int
+) -> FloatArray:
+    """σ² (``shape``) at which the decreasing function ``q`` equals the targets, by ``n`` bisections of its logarithm; 0
+    where q(0) is below."""
+    low, high = np.full(shape, np.log(1e-12 * scale)), np.full(shape, np.log(1e6 * scale))
+    is_zero = q(np.full(shape, 1e-12 * scale)) <= targets
+    for _ in range(n):
         middle = 0.5 * (low + high)
-        above = _q(values, variances, members, np.exp(middle)) > targets
+        above = q(np.exp(middle)) > targets
         low, high = np.where(above, middle, low), np.where(above, high, middle)
-    is_zero = _q(values, variances, members, np.zeros(len(targets)) + 1e-12 * scale) <= targets
     return np.where(is_zero, 0.0, np.exp(0.5 * (low + high)))
 
 
@@ -233,15 +241,8 @@ def _solved_for_all(means: FloatArray, variances: FloatArray, targets: FloatArra
         return np.asarray((weights * (means[:, None, :] - centre[:, :, None]) ** 2).sum(axis=2))
 
     scale = max(float(np.max(np.ptp(means, axis=1)) ** 2 * means.shape[1]), float(variances.max()), 1e-300)
-    shape = (len(means), len(targets))
-    low, high = np.full(shape, np.log(1e-12 * scale)), np.full(shape, np.log(1e6 * scale))
-    is_zero = q(np.exp(low)) <= targets
     # Half the bisections: accurate to four decades more than the ends of an interval need.
-    for _ in range(BISECTIONS // 2):
-        middle = 0.5 * (low + high)
-        above = q(np.exp(middle)) > targets
-        low, high = np.where(above, middle, low), np.where(above, high, middle)
-    return np.where(is_zero, 0.0, np.exp(0.5 * (low + high)))
+    return _crossed(q, targets, scale, (len(means), len(targets)), BISECTIONS // 2)
 
 
 def _restricted(values: FloatArray, variances: FloatArray, members: list[IntArray]) -> float:

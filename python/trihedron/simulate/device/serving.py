@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -73,28 +72,6 @@ def scales_of(recording: Recording, truth: Truth | None = None) -> Scales:
         accel = accel or float(np.mean(np.linalg.norm(truth.accelerometer_S, axis=0)))
         gyro = gyro or float(np.mean(np.linalg.norm(truth.gyroscope_S, axis=0)))
     return Scales(accel or 1e-3, gyro or 2e-4)
-
-
-class Line(Protocol):
-    """A connection to which bytes are sent; a reader opens it by ``name``."""
-
-    name: str
-
-    def send(self, data: bytes) -> None:
-        """Write all bytes, waiting for a reader if there is none."""
-        ...
-
-    def disconnect(self) -> None:
-        """Break the connection, as when the cable is unplugged."""
-        ...
-
-    def connect(self) -> None:
-        """Make the connection again, as when the cable is plugged in."""
-        ...
-
-    def close(self) -> None:
-        """Let the reader finish reading what was sent, then close the connection."""
-        ...
 
 
 class PseudoTerminal:
@@ -216,7 +193,7 @@ class TcpServer:
 
 def serve(
     device: Device,
-    line: Line,
+    line: PseudoTerminal | TcpServer,
     said: Callable[[str], None] = lambda _text: None,
     is_wanted: Callable[[], bool] = lambda: True,
     sent: Sent | None = None,
