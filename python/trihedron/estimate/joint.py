@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 from trihedron import probability
@@ -83,18 +84,16 @@ def calibrate_joint(
     )
 
 
-def _poses_above_noise(quality: FitQuality, solution: SessionSolution) -> tuple[Finding, ...]:
+def _poses_above_noise(quality: FitQuality, solution: SessionSolution) -> Iterator[Finding]:
     """Finding where the gravity error in static poses exceeds the noise of the means, with the bias repeatability."""
     if covariance_scale(quality.chi2, quality.dof) == 1.0:
-        return ()
-    return (
-        Finding.of(
-            FindingCode.RESIDUAL_ABOVE_NOISE,
-            "poses-joint",
-            rms_m_s2=quality.rms,
-            floor_m_s2=quality.floor,
-            chi2_per_dof=quality.chi2 / quality.dof,
-            dof=quality.dof,
-            bias_repeatability_m_s2=solution.accel_bias_rms,
-        ),
+        return
+    yield Finding.of(
+        FindingCode.RESIDUAL_ABOVE_NOISE,
+        "poses-joint",
+        rms_m_s2=quality.rms,
+        floor_m_s2=quality.floor,
+        chi2_per_dof=quality.chi2 / quality.dof,
+        dof=quality.dof,
+        bias_repeatability_m_s2=solution.accel_bias_rms,
     )

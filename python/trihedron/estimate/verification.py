@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -131,19 +132,19 @@ def _worse_than_none(
     ]
 
 
-def _bias_findings(gyroscope: SensorCalibration | None, rest: FloatArray) -> list[Finding]:
+def _bias_findings(gyroscope: SensorCalibration | None, rest: FloatArray) -> Iterator[Finding]:
     """Finding where the gyro bias differs by more than ``FAR_BEYOND`` σ, of the poses' scatter and stated uncertainty.
 
     Sessions of one unit differ by 0.1 to 1.5 σ (mimu4444, kim, getovermassif).
     """
     if gyroscope is None or len(rest) < 2:
-        return []
+        return
     sigma = float(np.sqrt(np.mean(np.var(rest, axis=0, ddof=1)) + np.mean(gyroscope.sigma_b**2)))
     shift = _rms(np.mean(rest, axis=0))
     if shift <= FAR_BEYOND * sigma:
-        return []
+        return
     times = shift / sigma if sigma > 0.0 else float("inf")
-    return [Finding.of(FindingCode.CALIBRATION_SHIFT, "gyro-bias", rate_rad_s=shift, times_expected=times)]
+    yield Finding.of(FindingCode.CALIBRATION_SHIFT, "gyro-bias", rate_rad_s=shift, times_expected=times)
 
 
 def _is_larger(errors: FloatArray, others: FloatArray) -> bool:
@@ -198,43 +199,39 @@ def _carried(
     return Carriage(seen.angle_deg[told], np.degrees(noise), np.degrees(total), told, left_out)
 
 
-def _norm_findings(error: FloatArray, sigma: FloatArray) -> list[Finding]:
+def _norm_findings(error: FloatArray, sigma: FloatArray) -> Iterator[Finding]:
     z2 = (error / sigma) ** 2
     if probability.chdtrc(len(z2), float(z2.sum())) > FALSE_ALARM:
-        return []
+        return
     rms = float(np.sqrt(np.mean(error**2)))
     times, worst = float(np.sqrt(np.mean(z2))), int(np.argmax(z2))
-    return [
-        Finding.of(
-            FindingCode.RESIDUAL_ABOVE_NOISE,
-            "verify-rest",
-            severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
-            norm_rms_m_s2=rms,
-            worst_pose=worst + 1,
-            worst_m_s2=error[worst],
-            chi2_per_dof=times**2,
-        )
-    ]
+    yield Finding.of(
+        FindingCode.RESIDUAL_ABOVE_NOISE,
+        "verify-rest",
+        severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
+        norm_rms_m_s2=rms,
+        worst_pose=worst + 1,
+        worst_m_s2=error[worst],
+        chi2_per_dof=times**2,
+    )
 
 
-def _angle_findings(moves: Carriage) -> list[Finding]:
+def _angle_findings(moves: Carriage) -> Iterator[Finding]:
     angle_deg, sigma_deg = moves.angle_deg, moves.sigma_deg
     if not len(angle_deg):
-        return []
+        return
     # Two components per move share the variance sigma², so the squared ratio has mean one and two degrees of freedom.
     z2 = 2.0 * (angle_deg / sigma_deg) ** 2
     if probability.chdtrc(2 * len(z2), float(z2.sum())) > FALSE_ALARM:
-        return []
+        return
     rms = float(np.sqrt(np.mean(angle_deg**2)))
     times, worst = float(np.sqrt(np.mean(z2) / 2.0)), int(np.argmax(z2))
-    return [
-        Finding.of(
-            FindingCode.HELD_OUT_WORSE,
-            "verify-moves",
-            severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
-            angle_rms_deg=rms,
-            worst_move=int(moves.which[worst]) + 1,
-            worst_deg=angle_deg[worst],
-            chi2_per_dof=times**2,
-        )
-    ]
+    yield Finding.of(
+        FindingCode.HELD_OUT_WORSE,
+        "verify-moves",
+        severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
+        angle_rms_deg=rms,
+        worst_move=int(moves.which[worst]) + 1,
+        worst_deg=angle_deg[worst],
+        chi2_per_dof=times**2,
+    )

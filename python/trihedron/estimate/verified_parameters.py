@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -55,24 +56,22 @@ def judge_parameters(known: Calibration, own: Calibration | None, segments: Segm
     return tuple(out)
 
 
-def shift_findings(parameters: tuple[JudgedParameter, ...]) -> list[Finding]:
+def shift_findings(parameters: tuple[JudgedParameter, ...]) -> Iterator[Finding]:
     """Finding with the parameters that differ by more than chance allows, where the file states uncertainties."""
     judged = [one for one in parameters if one.is_judged]
     if not judged or not any(one.sigma_file > 0.0 for one in parameters):
-        return []
+        return
     limit = -float(probability.ndtri(0.5 * FALSE_ALARM / len(judged)))
     shifted = sorted((one for one in judged if abs(one.times_sigma) > limit), key=lambda one: -abs(one.times_sigma))
     if not shifted:
-        return []
-    return [
-        Finding.of(
-            FindingCode.CALIBRATION_SHIFT,
-            parameters=[_label(one) for one in shifted],
-            n_parameters=len(shifted),
-            n_judged=len(judged),
-            times_sigma=abs(shifted[0].times_sigma),
-        )
-    ]
+        return
+    yield Finding.of(
+        FindingCode.CALIBRATION_SHIFT,
+        parameters=[_label(one) for one in shifted],
+        n_parameters=len(shifted),
+        n_judged=len(judged),
+        times_sigma=abs(shifted[0].times_sigma),
+    )
 
 
 def _label(one: JudgedParameter) -> str:

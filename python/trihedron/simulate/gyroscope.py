@@ -58,11 +58,7 @@ class Gyroscope:
         return self.sense_mode.bandwidth_hz > 0.0 or any(self.rectification) or self.electronics.is_dynamic
 
     def sense(
-        self,
-        motion: tuple[FloatArray, FloatArray, FloatArray],
-        time_s: FloatArray,
-        dt: float,
-        die_k: FloatArray | None,
+        self, motion: tuple[FloatArray, FloatArray, FloatArray], time_s: FloatArray, dt: float, die_k: FloatArray | None
     ) -> FloatArray:
         """(n, 3) input-referred signal along the sensitive axes, from specific force, rate and its derivative."""
         force, rate, _ = motion

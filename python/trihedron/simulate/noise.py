@@ -5,7 +5,6 @@ from __future__ import annotations
 import zlib
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TypeAlias
 
 import numpy as np
 
@@ -13,10 +12,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.simulate.motion.plan import Label
-
-Triple: TypeAlias = tuple[float, float, float]
-
-_NONE: Triple = (0.0, 0.0, 0.0)
+from trihedron.simulate.readout import NONE, Triple
 
 
 @dataclass(frozen=True)
@@ -27,11 +23,11 @@ class NoiseTerms:
     ``B`` bias instability [u], (2 ln 2/π) B²; ``K`` rate random walk [u/√s], K²τ/3; ``R`` ramp [u/s], R²τ²/2.
     """
 
-    Q: Triple = _NONE
-    N: Triple = _NONE
-    B: Triple = _NONE
-    K: Triple = _NONE
-    R: Triple = _NONE
+    Q: Triple = NONE
+    N: Triple = NONE
+    B: Triple = NONE
+    K: Triple = NONE
+    R: Triple = NONE
 
     def __post_init__(self) -> None:
         for name in "QNBKR":

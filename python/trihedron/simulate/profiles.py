@@ -14,7 +14,7 @@ from trihedron.sanitise import meant
 from trihedron.simulate.accelerometer import Accelerometer, ProofMass
 from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.noise import NoiseTerms, stream
-from trihedron.simulate.readout import Adc, Matrix, Triple
+from trihedron.simulate.readout import Adc, Matrix, Triple, matrix3, triple
 from trihedron.simulate.scenario import Clock
 from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, radians_from_degrees
 
@@ -55,19 +55,14 @@ class Profile:
             error = error + (np.tril(cross, -1) if k == 0 else cross - np.diag(np.diag(cross)))
             S = (np.eye(3) + error) @ np.asarray(sensor.S)
             b = np.asarray(sensor.b) + self.bias[k] / 3.0 * rng.standard_normal(3)
-            rows = tuple((float(r[0]), float(r[1]), float(r[2])) for r in S)
-            out.append(((rows[0], rows[1], rows[2]), (float(b[0]), float(b[1]), float(b[2]))))
+            out.append((matrix3(S), triple(b)))
         accel = replace(self.accelerometer, S=out[0][0], b=out[0][1])
         gyro = replace(self.gyroscope, S=out[1][0], b=out[1][1])
         return accel, gyro
 
 
 def _diagonal(value: float) -> Matrix:
-    return ((value, 0.0, 0.0), (0.0, value, 0.0), (0.0, 0.0, value))
-
-
-def _all(value: float) -> Triple:
-    return (value, value, value)
+    return matrix3(value * np.eye(3))
 
 
 # SparkFun 6DOF with a 10-bit ADC at 3.3 V: Freescale MMA7260Q (800 mV/g at ±1.5 g, 350 µg/√Hz, one pole at
@@ -87,15 +82,15 @@ ANALOG_6DOF = Profile(
         S=_MANUAL_S_F,
         b=_MANUAL_B_F,
         unit=AccelerationUnit.COUNTS,
-        mass=ProofMass(resonance_hz=_all(3500.0), gap_m=_all(1.5e-6)),
-        noise=NoiseTerms(N=_all(0.35 * _MG), B=_all(0.3 * _MG), K=_all(2e-5)),
+        mass=ProofMass(resonance_hz=triple(3500.0), gap_m=triple(1.5e-6)),
+        noise=NoiseTerms(N=triple(0.35 * _MG), B=triple(0.3 * _MG), K=triple(2e-5)),
         adc=Adc(1.0, 0.0, 1023.0),
     ),
     gyroscope=Gyroscope(
         S=_MANUAL_S_W,
-        b=(float(_b_w[0]), float(_b_w[1]), float(_b_w[2])),
+        b=triple(_b_w),
         unit=RateUnit.COUNTS,
-        noise=NoiseTerms(N=_all(0.014 * _DEG), B=_all(0.01 * _DEG), K=_all(2e-5)),
+        noise=NoiseTerms(N=triple(0.014 * _DEG), B=triple(0.01 * _DEG), K=triple(2e-5)),
         adc=Adc(1.0, 0.0, 1023.0),
     ),
     clock=Clock(50.0),
@@ -112,14 +107,14 @@ MPU = Profile(
     accelerometer=Accelerometer(
         S=_diagonal(STANDARD_GRAVITY_M_S2 / 16384.0),
         unit=AccelerationUnit.COUNTS,
-        mass=ProofMass(resonance_hz=_all(3000.0), gap_m=_all(1.5e-6)),
-        noise=NoiseTerms(N=_all(0.4 * _MG), B=_all(0.05 * _MG), K=_all(1e-5)),
+        mass=ProofMass(resonance_hz=triple(3000.0), gap_m=triple(1.5e-6)),
+        noise=NoiseTerms(N=triple(0.4 * _MG), B=triple(0.05 * _MG), K=triple(1e-5)),
         adc=Adc(1.0, -32768.0, 32767.0),
     ),
     gyroscope=Gyroscope(
         S=_diagonal(_DEG / 131.0),
         unit=RateUnit.COUNTS,
-        noise=NoiseTerms(N=_all(0.005 * _DEG), B=_all(6.0 * _DEG_PER_HOUR), K=_all(1e-6)),
+        noise=NoiseTerms(N=triple(0.005 * _DEG), B=triple(6.0 * _DEG_PER_HOUR), K=triple(1e-6)),
         adc=Adc(1.0, -32768.0, 32767.0),
     ),
     clock=Clock(100.0),
@@ -136,14 +131,14 @@ ADIS = Profile(
     accelerometer=Accelerometer(
         S=_diagonal(3.33 * _MG),
         unit=AccelerationUnit.COUNTS,
-        mass=ProofMass(resonance_hz=_all(5500.0), gap_m=_all(1.3e-6)),
-        noise=NoiseTerms(N=_all(0.2 * _PER_ROOT_HOUR), B=_all(0.2 * _MG), K=_all(1e-5)),
+        mass=ProofMass(resonance_hz=triple(5500.0), gap_m=triple(1.3e-6)),
+        noise=NoiseTerms(N=triple(0.2 * _PER_ROOT_HOUR), B=triple(0.2 * _MG), K=triple(1e-5)),
         adc=Adc(1.0, -8192.0, 8191.0),
     ),
     gyroscope=Gyroscope(
         S=_diagonal(0.05 * _DEG),
         unit=RateUnit.COUNTS,
-        noise=NoiseTerms(N=_all(2.0 * _DEG * _PER_ROOT_HOUR), B=_all(0.007 * _DEG), K=_all(3e-6)),
+        noise=NoiseTerms(N=triple(2.0 * _DEG * _PER_ROOT_HOUR), B=triple(0.007 * _DEG), K=triple(3e-6)),
         adc=Adc(1.0, -8192.0, 8191.0),
     ),
     clock=Clock(100.0),
@@ -158,11 +153,11 @@ TACTICAL = Profile(
     name="tactical",
     about="tactical-grade MEMS unit (STIM300), 250 Hz, SI output",
     accelerometer=Accelerometer(
-        noise=NoiseTerms(N=_all(0.06 * _PER_ROOT_HOUR), B=_all(0.05 * _MG), K=_all(5e-7)),
+        noise=NoiseTerms(N=triple(0.06 * _PER_ROOT_HOUR), B=triple(0.05 * _MG), K=triple(5e-7)),
         adc=Adc(0.0019 * _MG, -10.0 * STANDARD_GRAVITY_M_S2, 10.0 * STANDARD_GRAVITY_M_S2),
     ),
     gyroscope=Gyroscope(
-        noise=NoiseTerms(N=_all(0.15 * _DEG * _PER_ROOT_HOUR), B=_all(0.5 * _DEG_PER_HOUR), K=_all(3e-8)),
+        noise=NoiseTerms(N=triple(0.15 * _DEG * _PER_ROOT_HOUR), B=triple(0.5 * _DEG_PER_HOUR), K=triple(3e-8)),
         adc=Adc(0.22 * _DEG_PER_HOUR, -400.0 * _DEG, 400.0 * _DEG),
     ),
     clock=Clock(250.0),

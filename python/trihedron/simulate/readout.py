@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -19,6 +20,22 @@ Matrix: TypeAlias = tuple[Triple, Triple, Triple]
 NONE: Triple = (0.0, 0.0, 0.0)
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 NO_MATRIX: Matrix = (NONE, NONE, NONE)
+Values: TypeAlias = float | Sequence[float] | FloatArray
+"""One number for all axes, or one each."""
+
+
+def triple(value: Values) -> Triple:
+    if isinstance(value, (int, float)):
+        return (float(value), float(value), float(value))
+    if len(value) != 3:
+        raise RefusedError(f"three numbers, one per axis, are wanted, got {list(value)}")
+    return (float(value[0]), float(value[1]), float(value[2]))
+
+
+def matrix3(rows: Sequence[Values] | FloatArray) -> Matrix:
+    if len(rows) != 3:
+        raise RefusedError(f"three rows are wanted, got {len(rows)}")
+    return (triple(rows[0]), triple(rows[1]), triple(rows[2]))
 
 
 @dataclass(frozen=True)

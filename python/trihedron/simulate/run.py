@@ -17,7 +17,7 @@ from trihedron.simulate.effects import effects_of
 from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.motion.plan import Plan, plan_motion
 from trihedron.simulate.noise import NoiseTerms, bias_in_moves, bias_of_poses, make_noise, stream
-from trihedron.simulate.readout import Triple, sense_axes
+from trihedron.simulate.readout import sense_axes, triple
 from trihedron.simulate.scenario import Clock, Environment, Scenario
 
 Sensor = Accelerometer | Gyroscope
@@ -134,9 +134,8 @@ def _read(
     if sensor.electronics.ratiometric:
         supply = place.supply.at(time_s) / place.supply.nominal_v
         raw *= 1.0 + sensor.electronics.ratiometric * (supply[:, None] - 1.0)
-    bias: Triple = (float(offset[0]), float(offset[1]), float(offset[2]))
     adc = sensor.adc
-    return adc.convert(raw, bias) if adc.is_there else raw
+    return adc.convert(raw, triple(offset)) if adc.is_there else raw
 
 
 def _die(sensor: Sensor, place: Environment, time_s: FloatArray, dt: float) -> FloatArray | None:

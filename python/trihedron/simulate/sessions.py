@@ -12,6 +12,7 @@ from trihedron.errors import RefusedError
 from trihedron.simulate.motion.attitude import attitude_with_up
 from trihedron.simulate.motion.steps import Motion, MoveTo, Pose, Step, Turn
 from trihedron.simulate.noise import stream
+from trihedron.simulate.readout import triple
 
 FACES: tuple[tuple[float, float, float], ...] = (
     (0.0, 0.0, 1.0),
@@ -55,7 +56,7 @@ def hand_session(
     steps: list[Step] = []
     for count, k in enumerate(order):
         d = directions[k]
-        up = (float(d[0]), float(d[1]), float(d[2]))
+        up = triple(d)
         if count:
             travel = travel_m * rng.normal(size=3)
             steps.append(

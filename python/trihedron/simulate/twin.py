@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import solveh_banded
+from scipy.spatial.transform import Rotation
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
@@ -23,7 +24,7 @@ from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.motion.attitude import attitude_with_up, shortest_turn
 from trihedron.simulate.motion.steps import Motion, Pose, Quaternion, Replay, Step
-from trihedron.simulate.readout import Adc, Matrix, Triple, sense_axes
+from trihedron.simulate.readout import Adc, matrix3, sense_axes, triple
 from trihedron.simulate.scenario import Clock, Environment, Scenario
 from trihedron.simulate.twin_noise import noise_of_poses
 
@@ -56,7 +57,7 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
         (gyro, readings[1], facts.of("gyroscope"), "gyroscope"),
     ):
         step = known.common_step
-        S, b = _matrix(sensor.S), _triple(sensor.b)
+        S, b = matrix3(sensor.S), triple(sensor.b)
         _, gain = sense_axes(S, name)
         noise, low_pass = noise_of_poses(raw / gain, poses, dt, step / gain)
         parts.append(
@@ -103,19 +104,19 @@ def _motion(
             continue
         bias = still[i] if is_last else 0.5 * (still[i] + still[i + 1])
         knots = _knots(time_s, end[i], stop_s)
-        w = _averaged(time_s, rate - bias, knots)
+        turning = _averaged(time_s, rate - bias, knots)
         f = _averaged(time_s, force, knots)
         if not is_last:
-            w = _ending_in(w, attitude, stop_s - end[i], ups[i + 1])
-        path = _attitudes(w, attitude, stop_s - end[i])
+            turning = _ending_in(turning, attitude, stop_s - end[i], ups[i + 1])
+        path = _attitudes(turning, attitude, stop_s - end[i])
         acceleration = np.einsum("nij,nj->ni", _matrices(path), f) - [0.0, 0.0, g]
         acceleration[0] = 0.0
         if not is_last:
             acceleration[-1] = 0.0
             acceleration = _coming_to_rest(acceleration)
-        steps.append(Replay(w, acceleration, stop_s - end[i], name=f"move {i + 1}"))
-        q = path[-1]
-        attitude = (float(q[0]), float(q[1]), float(q[2]), float(q[3]))
+        steps.append(Replay(turning, acceleration, stop_s - end[i], name=f"move {i + 1}"))
+        w, x, y, z = path[-1].tolist()
+        attitude = (w, x, y, z)
     return Motion(tuple(steps), start=start)
 
 
@@ -180,13 +181,7 @@ def _coming_to_rest(acceleration: FloatArray) -> FloatArray:
 
 def _matrices(q: FloatArray) -> FloatArray:
     """(m, 3, 3) body-to-level rotation matrices of quaternions (m, 4)."""
-    w, x, y, z = q.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
+    return Rotation.from_quat(q[:, [1, 2, 3, 0]]).as_matrix()
 
 
 def _filled(raw: FloatArray) -> FloatArray:
@@ -203,14 +198,6 @@ def _filled(raw: FloatArray) -> FloatArray:
 
 def _unit(v: FloatArray) -> FloatArray:
     return v / np.linalg.norm(v)
-
-
-def _triple(v: FloatArray) -> Triple:
-    return (float(v[0]), float(v[1]), float(v[2]))
-
-
-def _matrix(S: FloatArray) -> Matrix:
-    return (_triple(S[0]), _triple(S[1]), _triple(S[2]))
 
 
 # Motion beyond a sensor's range, extrapolated from the readings before and after it.

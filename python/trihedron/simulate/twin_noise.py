@@ -11,8 +11,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar, nnls
 
 from trihedron.arrays import FloatArray
-from trihedron.simulate.noise import NoiseTerms, Triple
-from trihedron.simulate.readout import Smoother
+from trihedron.simulate.noise import NoiseTerms
+from trihedron.simulate.readout import Smoother, Triple
 
 _FREQUENCIES = np.pi * (np.arange(1 << 13) + 0.5) / (1 << 13)
 # Corner frequencies, as fractions of the sampling rate, and orders that are tried.

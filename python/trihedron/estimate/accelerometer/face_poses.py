@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -206,20 +206,18 @@ def check_sufficient(faces: IntArray) -> None:
         )
 
 
-def left_out(faces: IntArray, values: FloatArray) -> list[Finding]:
+def left_out(faces: IntArray, values: FloatArray) -> Iterator[Finding]:
     """Finding that names the poses which are not faces."""
     left = np.flatnonzero(faces == 0)
     if len(left) == 0:
-        return []
-    return [
-        Finding.of(
-            FindingCode.POSE_NOT_A_FACE,
-            n_left_out=len(left),
-            n_poses=len(values),
-            largest_tilt_deg=LARGEST_TILT_DEG,
-            poses=left.tolist(),
-        )
-    ]
+        return
+    yield Finding.of(
+        FindingCode.POSE_NOT_A_FACE,
+        n_left_out=len(left),
+        n_poses=len(values),
+        largest_tilt_deg=LARGEST_TILT_DEG,
+        poses=left.tolist(),
+    )
 
 
 # Effect on the faces' readings of a table that is not level, or a case that does not lie flat (docs/model.md, 2).

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -233,13 +233,7 @@ def _quality(
 
 
 def _left_out_pose(
-    values: FloatArray,
-    noise: FloatArray,
-    faces: IntArray,
-    g: float,
-    pose: int,
-    others: IntArray,
-    tilt_rad: float,
+    values: FloatArray, noise: FloatArray, faces: IntArray, g: float, pose: int, others: IntArray, tilt_rad: float
 ) -> tuple[float, float]:
     """Held-out norm residual of one pose, from a fit to the other poses, and its standard error, m/s²."""
     S_a, _, _ = _least_squares(values[others], noise[others], faces[others], g)
@@ -253,24 +247,22 @@ def _left_out_pose(
     return float(error[0]), float(np.sqrt(sigma[0] ** 2 + slope @ covariance @ slope))
 
 
-def _tilt_findings(estimate: _Estimate, S: FloatArray, faces: IntArray, used: IntArray) -> list[Finding]:
+def _tilt_findings(estimate: _Estimate, S: FloatArray, faces: IntArray, used: IntArray) -> Iterator[Finding]:
     """Finding where faces contradict each other beyond noise, with the tilt and the worst pose."""
     if estimate.tilt_rad == 0.0:
-        return []
+        return
     horizontal = estimate.residual @ S.T
     horizontal[np.arange(len(faces)), np.abs(faces) - 1] = 0.0
     worst = int(np.argmax(np.linalg.norm(horizontal, axis=1)))
     tilt_deg = degrees_from_radians(estimate.tilt_rad)
-    return [
-        Finding.of(
-            FindingCode.TABLE_TILT,
-            chi2_per_dof=estimate.chi2_noise / estimate.dof,
-            severity=Severity.SERIOUS if tilt_deg > face_poses.LARGEST_TILT_DEG else Severity.WARNING,
-            tilt_deg=tilt_deg,
-            pose=int(used[worst]) + 1,
-            face=face_poses.face_in_words(int(faces[worst])),
-        )
-    ]
+    yield Finding.of(
+        FindingCode.TABLE_TILT,
+        chi2_per_dof=estimate.chi2_noise / estimate.dof,
+        severity=Severity.SERIOUS if tilt_deg > face_poses.LARGEST_TILT_DEG else Severity.WARNING,
+        tilt_deg=tilt_deg,
+        pose=int(used[worst]) + 1,
+        face=face_poses.face_in_words(int(faces[worst])),
+    )
 
 
 def _observability(noise: FloatArray, faces: IntArray, estimate: _Estimate, g: float) -> Observability:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from trihedron import probability
@@ -25,22 +27,20 @@ def covariance_scale(chi2: float, dof: int) -> float:
     return chi2 / dof
 
 
-def residual_findings(chi2: float, dof: int, rms: float, floor: float) -> list[Finding]:
+def residual_findings(chi2: float, dof: int, rms: float, floor: float) -> Iterator[Finding]:
     """Finding where the stated noise does not explain the residuals."""
     scale = covariance_scale(chi2, dof)
     if scale == 1.0:
-        return []
-    return [
-        Finding.of(
-            FindingCode.RESIDUAL_ABOVE_NOISE,
-            "poses",
-            rms_m_s2=rms,
-            floor_m_s2=floor,
-            chi2_per_dof=scale,
-            dof=dof,
-            widening=np.sqrt(scale),
-        )
-    ]
+        return
+    yield Finding.of(
+        FindingCode.RESIDUAL_ABOVE_NOISE,
+        "poses",
+        rms_m_s2=rms,
+        floor_m_s2=floor,
+        chi2_per_dof=scale,
+        dof=dof,
+        widening=np.sqrt(scale),
+    )
 
 
 def observability_findings(
@@ -51,51 +51,47 @@ def observability_findings(
     is_anchored: bool,
     anchor: float,
     are_faces: bool,
-) -> list[Finding]:
+) -> Iterator[Finding]:
     """No finding, WEAKLY_OBSERVABLE or NOT_OBSERVABLE, with the poses to add; ``are_faces``: method 1 would apply."""
     if design.rank < 9:
-        return [
-            Finding.of(
-                FindingCode.NOT_OBSERVABLE,
-                "poses-rank",
-                rank=design.rank,
-                n_parameters=9,
-                unseen=_unseen(design),
-                anchor=anchor,
-                are_faces=are_faces,
-                advice=advice,
-            )
-        ]
+        yield Finding.of(
+            FindingCode.NOT_OBSERVABLE,
+            "poses-rank",
+            rank=design.rank,
+            n_parameters=9,
+            unseen=_unseen(design),
+            anchor=anchor,
+            are_faces=are_faces,
+            advice=advice,
+        )
+        return
     worst = design.worst_prediction()
     if is_anchored:
-        return [
-            Finding.of(
-                FindingCode.NOT_OBSERVABLE,
-                "poses-weak",
-                at_worst=min(worst, 1.0),
-                weakest=design.weakest(),
-                anchor=anchor,
-                are_faces=are_faces,
-                advice=advice,
-                rank=design.rank,
-                n_parameters=9,
-                worst_prediction_g=worst,
-            )
-        ]
+        yield Finding.of(
+            FindingCode.NOT_OBSERVABLE,
+            "poses-weak",
+            at_worst=min(worst, 1.0),
+            weakest=design.weakest(),
+            anchor=anchor,
+            are_faces=are_faces,
+            advice=advice,
+            rank=design.rank,
+            n_parameters=9,
+            worst_prediction_g=worst,
+        )
+        return
     if worst > WEAK_PREDICTION * relative_sigma:
-        return [
-            Finding.of(
-                FindingCode.WEAKLY_OBSERVABLE,
-                "poses",
-                times_worse=worst / relative_sigma,
-                weakest=design.weakest(),
-                advice=advice,
-                rank=design.rank,
-                n_parameters=9,
-                worst_prediction_g=worst,
-            )
-        ]
-    return []
+        yield Finding.of(
+            FindingCode.WEAKLY_OBSERVABLE,
+            "poses",
+            times_worse=worst / relative_sigma,
+            weakest=design.weakest(),
+            advice=advice,
+            rank=design.rank,
+            n_parameters=9,
+            worst_prediction_g=worst,
+        )
+        return
 
 
 def _unseen(design: PoseDesign) -> list[str]:
@@ -125,18 +121,15 @@ def held_out_findings(held_out: FloatArray, sigma: FloatArray, chi2_per_dof: Flo
     return found
 
 
-def model_findings(S: FloatArray, raw_unit: AccelerationUnit, *, signs_are_known: bool) -> list[Finding]:
+def model_findings(S: FloatArray, raw_unit: AccelerationUnit, *, signs_are_known: bool) -> Iterator[Finding]:
     """Findings for a left-handed triad, and for scales that contradict the unit of the log."""
-    found = []
     if np.linalg.det(S) < 0:
         signs = "".join("+" if s > 0 else "-" for s in np.diag(S))
-        found.append(
-            Finding.of(
-                FindingCode.LEFT_HANDED,
-                "accelerometer" if signs_are_known else "accelerometer-signs-asked",
-                signs=signs,
-                det_S_sign=-1.0,
-            )
+        yield Finding.of(
+            FindingCode.LEFT_HANDED,
+            "accelerometer" if signs_are_known else "accelerometer-signs-asked",
+            signs=signs,
+            det_S_sign=-1.0,
         )
     nominal = acceleration_to_si(raw_unit)
     if nominal is not None:
@@ -144,20 +137,17 @@ def model_findings(S: FloatArray, raw_unit: AccelerationUnit, *, signs_are_known
         worst = int(np.argmax(np.abs(np.log(ratio))))
         # Uncalibrated consumer triads are within 10 % of their data sheet; a wrong unit or |g| is off by far more.
         if abs(np.log(ratio[worst])) > 0.15:
-            found.append(
-                Finding.of(
-                    FindingCode.SCALE_NOT_NOMINAL,
-                    "accelerometer",
-                    axis=worst + 1,
-                    scale_ratio=ratio[worst],
-                    unit=raw_unit.value,
-                )
+            yield Finding.of(
+                FindingCode.SCALE_NOT_NOMINAL,
+                "accelerometer",
+                axis=worst + 1,
+                scale_ratio=ratio[worst],
+                unit=raw_unit.value,
             )
-    return found
 
 
-def convergence_findings(is_converged: bool, stopped_because: str) -> list[Finding]:
+def convergence_findings(is_converged: bool, stopped_because: str) -> Iterator[Finding]:
     """Finding where the solver stopped without convergence."""
     if is_converged:
-        return []
-    return [Finding.of(FindingCode.NOT_CONVERGED, "accelerometer", stopped_because=stopped_because)]
+        return
+    yield Finding.of(FindingCode.NOT_CONVERGED, "accelerometer", stopped_because=stopped_because)

@@ -46,11 +46,7 @@ ANGLE = Prior(
     np.ones(7),
 )
 """Prior for consumer gyros and optical trackers: factor 30 either way, 4 for the time constant (as `--reference`)."""
-VELOCITY = Prior(
-    np.append(np.log([2e-3, 2e-3, 3e-4, 1e-3, 1e-3, 8.0]), 0.0),
-    ANGLE.sigma,
-    np.ones(7),
-)
+VELOCITY = Prior(np.append(np.log([2e-3, 2e-3, 3e-4, 1e-3, 1e-3, 8.0]), 0.0), ANGLE.sigma, np.ones(7))
 """Prior for accelerometers with a reference position: 1 mm of white error; the slow error is that of the attitude and
 gets its prior from the gyro's fit (`Learnt.told`)."""
 LEAST_S = 40.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from trihedron.arrays import FloatArray
@@ -25,160 +27,130 @@ def findings_of(
     solution: SessionSolution,
     gyroscope: SensorCalibration,
     seen: Carried,
-) -> tuple[Finding, ...]:
+) -> Iterator[Finding]:
     """All findings of the fit of moves; ``outliers`` are the moves that were excluded."""
     S, observability = gyroscope.S, gyroscope.observability
     assert observability is not None
-    found = audit_moves(measured)
-    found += handedness(S, solution.S_a)
-    found += observability_findings(observability, gyroscope.covariance[:9, :9], S)
+    yield from audit_moves(measured)
+    yield from handedness(S, solution.S_a)
+    yield from observability_findings(observability, gyroscope.covariance[:9, :9], S)
     if not solution.is_converged:
-        found.append(Finding.of(FindingCode.NOT_CONVERGED, "session", stopped_because=solution.stopped_because))
-    found += _outlier_findings(outliers, measured, seen)
+        yield Finding.of(FindingCode.NOT_CONVERGED, "session", stopped_because=solution.stopped_because)
+    yield from _outlier_findings(outliers, measured, seen)
     if solution.inflation[0] > 1.0:
         # Widened uncertainties do not cover convergence to a wrong minimum: large tilt errors are serious.
         is_astray = usual_deg(seen.angle_deg, measured, solution.S_a, solution.b_a) > ASTRAY_DEG
-        found.append(
-            Finding.of(
-                FindingCode.RESIDUAL_ABOVE_NOISE,
-                "moves",
-                severity=Severity.SERIOUS if is_astray else Severity.WARNING,
-                chi2_per_dof=solution.moves_chi2 / max(solution.moves_dof, 1.0),
-                dof=solution.moves_dof,
-            )
+        yield Finding.of(
+            FindingCode.RESIDUAL_ABOVE_NOISE,
+            "moves",
+            severity=Severity.SERIOUS if is_astray else Severity.WARNING,
+            chi2_per_dof=solution.moves_chi2 / max(solution.moves_dof, 1.0),
+            dof=solution.moves_dof,
         )
-    found += _attitude_findings(measured, S)
-    found += _drift_findings(measured, S)
-    return tuple(found)
+    yield from _attitude_findings(measured, S)
+    yield from _drift_findings(measured, S)
 
 
-def scale_findings(S: FloatArray, raw_unit: RateUnit) -> list[Finding]:
+def scale_findings(S: FloatArray, raw_unit: RateUnit) -> Iterator[Finding]:
     """Finding for a scale that contradicts the unit of the log: sample rate or unit is wrong by that factor."""
     nominal = rate_to_si(raw_unit)
     if nominal is None:
-        return []
+        return
     ratio = float(np.exp(np.mean(np.log(np.linalg.norm(S, axis=0) / nominal))))
     if not np.isfinite(ratio) or 1.0 / MAX_SCALE_RATIO <= ratio <= MAX_SCALE_RATIO:
-        return []
-    return [Finding.of(FindingCode.SCALE_NOT_NOMINAL, "gyro", scale_ratio=ratio, unit=raw_unit.value)]
+        return
+    yield Finding.of(FindingCode.SCALE_NOT_NOMINAL, "gyro", scale_ratio=ratio, unit=raw_unit.value)
 
 
-def handedness(S: FloatArray, S_accelerometer: FloatArray) -> list[Finding]:
+def handedness(S: FloatArray, S_accelerometer: FloatArray) -> Iterator[Finding]:
     """LEFT_HANDED when the logged axes of a sensor form a left-handed triad, or those of both sensors disagree.
 
     ``det S_ω < 0`` is not due to the accelerometer's sign conventions: a reflection ``R`` of its frame makes
     ``S_ω → −R S_ω``, whose determinant keeps its sign. Two gyro axes opposite to the accelerometer's show a reflection
     of the accelerometer.
     """
-    found = []
     if np.linalg.det(S) < 0.0:
-        found.append(Finding.of(FindingCode.LEFT_HANDED, "gyro", determinant=np.linalg.det(S)))
+        yield Finding.of(FindingCode.LEFT_HANDED, "gyro", determinant=np.linalg.det(S))
     if np.linalg.det(S_accelerometer) < 0.0:
-        return found
+        return
     order = np.argmax(np.abs(S), axis=0)
-    signs = np.sign(S[order, np.arange(3)])
-    if (
-        len(set(order.tolist())) == 3
-        and np.linalg.det(S) > 0.0
-        and not (np.array_equal(order, np.arange(3)) and np.all(signs > 0))
-    ):
-        reversed_axes = [f"{i + 1}" for i in range(3) if signs[i] < 0]
-        found.append(
-            Finding.of(FindingCode.LEFT_HANDED, "gyro-against-accelerometer", axes=reversed_axes)
-            if np.array_equal(order, np.arange(3))
-            else Finding.of(FindingCode.LEFT_HANDED, "gyro-other-axes")
-        )
-    return found
+    if len(set(order.tolist())) < 3 or np.linalg.det(S) <= 0.0:
+        return
+    reversed_axes = [f"{i + 1}" for i in range(3) if S[order[i], i] < 0.0]
+    if not np.array_equal(order, np.arange(3)):
+        yield Finding.of(FindingCode.LEFT_HANDED, "gyro-other-axes")
+    elif reversed_axes:
+        yield Finding.of(FindingCode.LEFT_HANDED, "gyro-against-accelerometer", axes=reversed_axes)
 
 
-def _outlier_findings(outliers: tuple[int, ...], measured: MoveMeasurements, seen: Carried) -> list[Finding]:
-    found = []
+def _outlier_findings(outliers: tuple[int, ...], measured: MoveMeasurements, seen: Carried) -> Iterator[Finding]:
     for index in outliers:
         before, after = (int(k) for k in measured.links[index])
         sigma = float(np.sqrt(seen.covariance[index].trace() / 2.0))
         size = float(np.linalg.norm(seen.residual[index]))
-        found.append(
-            Finding.of(
-                FindingCode.OUTLIER_MOVE,
-                move=int(index) + 1,
-                before=before + 1,
-                after=after + 1,
-                residual_deg=degrees_from_radians(size / STANDARD_GRAVITY_M_S2),
-                times=size / sigma,
-            )
+        yield Finding.of(
+            FindingCode.OUTLIER_MOVE,
+            move=int(index) + 1,
+            before=before + 1,
+            after=after + 1,
+            residual_deg=degrees_from_radians(size / STANDARD_GRAVITY_M_S2),
+            times=size / sigma,
         )
-    return found
 
 
-def _attitude_findings(measured: MoveMeasurements, S: FloatArray) -> list[Finding]:
+def _attitude_findings(measured: MoveMeasurements, S: FloatArray) -> Iterator[Finding]:
     attitude = measured.attitude
     if attitude is None:
-        return []
+        return
     per_g = np.abs(S @ attitude.A) * STANDARD_GRAVITY_M_S2
     rate, force = (int(k) for k in np.unravel_index(int(np.argmax(per_g)), (3, 3)))
     per_move = np.median(measured.durations_s) * np.abs(attitude.A).max(axis=1) * STANDARD_GRAVITY_M_S2
     is_material = bool(np.any(per_move > measured.noise_density * np.sqrt(np.median(measured.durations_s))))
-    return [
-        Finding.of(
-            FindingCode.GYRO_G_SENSITIVITY,
-            severity=Severity.WARNING if is_material else Severity.NOTE,
-            per_g_rad_s=per_g[rate, force],
-            rate_axis=rate + 1,
-            force_axis=force + 1,
-            scatter_left=attitude.scatter_left,
-            largest_rad_s_per_m_s2=np.max(np.abs(S @ attitude.A)),
-        )
-    ]
+    yield Finding.of(
+        FindingCode.GYRO_G_SENSITIVITY,
+        severity=Severity.WARNING if is_material else Severity.NOTE,
+        per_g_rad_s=per_g[rate, force],
+        rate_axis=rate + 1,
+        force_axis=force + 1,
+        scatter_left=attitude.scatter_left,
+        largest_rad_s_per_m_s2=np.max(np.abs(S @ attitude.A)),
+    )
 
 
-def _drift_findings(measured: MoveMeasurements, S: FloatArray) -> list[Finding]:
+def _drift_findings(measured: MoveMeasurements, S: FloatArray) -> Iterator[Finding]:
     dof = len(measured.bias) - 1
     if dof < 1 or chdtrc(dof, float(measured.bias_excess.max())) > FALSE_ALARM / 3.0:
-        return []
+        return
     rates = np.abs(np.diagonal(S)) if np.all(np.abs(np.diagonal(S)) > 0) else np.linalg.norm(S, axis=0)
     change = np.ptp(measured.bias, axis=0) * rates
     axis = int(np.argmax(measured.bias_excess))
-    return [
-        Finding.of(
-            FindingCode.GYRO_BIAS_DRIFT,
-            "poses",
-            change_rad_s=change[axis],
-            axis=axis + 1,
-            times=np.sqrt(measured.bias_excess[axis] / dof),
-        )
-    ]
+    yield Finding.of(
+        FindingCode.GYRO_BIAS_DRIFT,
+        "poses",
+        change_rad_s=change[axis],
+        axis=axis + 1,
+        times=np.sqrt(measured.bias_excess[axis] / dof),
+    )
 
 
-def audit_moves(measured: MoveMeasurements) -> list[Finding]:
+def audit_moves(measured: MoveMeasurements) -> Iterator[Finding]:
     """Findings on clipped moves and on gaps inside moves."""
-    findings = []
     if np.any(measured.clipped_s > 0.0):
         which = [int(i) + 1 for i in np.flatnonzero(measured.clipped_s > 0.0)]
         lost = int(np.count_nonzero(measured.is_lost))
-        findings.append(
-            Finding.of(
-                FindingCode.CLIPPING,
-                "moves",
-                moves=len(which),
-                n_moves=measured.n_moves,
-                which=which,
-                longest_s=measured.clipped_s.max(),
-                bridged=len(which) - lost,
-                left_out=lost,
-            )
+        yield Finding.of(
+            FindingCode.CLIPPING,
+            "moves",
+            moves=len(which),
+            n_moves=measured.n_moves,
+            which=which,
+            longest_s=measured.clipped_s.max(),
+            bridged=len(which) - lost,
+            left_out=lost,
         )
     if np.any(measured.is_gapped):
         which = [int(i) + 1 for i in np.flatnonzero(measured.is_gapped)]
-        findings.append(
-            Finding.of(
-                FindingCode.TIME_GAP,
-                "moves",
-                moves=len(which),
-                n_moves=measured.n_moves,
-                which=which,
-            )
-        )
-    return findings
+        yield Finding.of(FindingCode.TIME_GAP, "moves", moves=len(which), n_moves=measured.n_moves, which=which)
 
 
 # Which parameters the moves determine, in words, with the moves to add.
@@ -247,24 +219,22 @@ def _advice(covariance: FloatArray, size: float, rank: int) -> list[Words]:
     return lines
 
 
-def observability_findings(observability: Observability, covariance: FloatArray, S: FloatArray) -> list[Finding]:
+def observability_findings(observability: Observability, covariance: FloatArray, S: FloatArray) -> Iterator[Finding]:
     """NOT_OBSERVABLE or WEAKLY_OBSERVABLE with the moves to add, or an empty list."""
     advice = observability.advice
     missing = observability.n_parameters - observability.rank
     if missing > 0:
-        return [
-            Finding.of(
-                FindingCode.NOT_OBSERVABLE,
-                "moves-rank",
-                rank=observability.rank,
-                n_parameters=observability.n_parameters,
-                weakest=observability.weakest,
-                advice=advice,
-            )
-        ]
+        yield Finding.of(
+            FindingCode.NOT_OBSERVABLE,
+            "moves-rank",
+            rank=observability.rank,
+            n_parameters=observability.n_parameters,
+            weakest=observability.weakest,
+            advice=advice,
+        )
+        return
     worst = _worst(covariance, S)
     if worst > HARDLY_SEEN:
-        return [Finding.of(FindingCode.NOT_OBSERVABLE, "moves-weak", weakest=observability.weakest, advice=advice)]
-    if worst > WEAK:
-        return [Finding.of(FindingCode.WEAKLY_OBSERVABLE, "moves", weakest=observability.weakest, advice=advice)]
-    return []
+        yield Finding.of(FindingCode.NOT_OBSERVABLE, "moves-weak", weakest=observability.weakest, advice=advice)
+    elif worst > WEAK:
+        yield Finding.of(FindingCode.WEAKLY_OBSERVABLE, "moves", weakest=observability.weakest, advice=advice)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,11 +59,11 @@ class PossibleLosses:
         along = self.carried * np.concatenate([S.ravel(), b])
         return covariance * max(self.scatter / inflation, 1.0) + np.outer(along, along)
 
-    def findings(self, sigma_scale: float) -> tuple[Finding, ...]:
+    def findings(self, sigma_scale: float) -> Iterator[Finding]:
         """Finding where the possible share exceeds ``sigma_scale``, the scale's relative standard uncertainty."""
         if self.possible <= sigma_scale:
-            return ()
-        return (Finding.of(FindingCode.LOSSES_POSSIBLE, lost_share=self.possible, sigma_scale=sigma_scale),)
+            return
+        yield Finding.of(FindingCode.LOSSES_POSSIBLE, lost_share=self.possible, sigma_scale=sigma_scale)
 
 
 def relative_sigma(covariance: FloatArray, S: FloatArray) -> float:

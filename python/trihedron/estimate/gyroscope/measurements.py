@@ -10,12 +10,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import RefusedError
-from trihedron.estimate.gyroscope.biases import (
-    AttitudeDependence,
-    attitude_dependence,
-    pool_biases,
-    shrink,
-)
+from trihedron.estimate.gyroscope.biases import AttitudeDependence, attitude_dependence, pool_biases, shrink
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, Clipped, bridge_clipping, clipped_time
 from trihedron.estimate.gyroscope.turn_rounding import resting_ends
 from trihedron.probability import chdtrc
@@ -123,11 +118,7 @@ def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
 
 
 def measure_moves(
-    recording: Recording,
-    segments: Segments,
-    accelerometer: SensorCalibration,
-    *,
-    is_bridged: bool = True,
+    recording: Recording, segments: Segments, accelerometer: SensorCalibration, *, is_bridged: bool = True
 ) -> MoveMeasurements:
     """Collect pose means, moves and noise; clipped gyro readings are bridged if ``is_bridged``.
 

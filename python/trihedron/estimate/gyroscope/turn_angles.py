@@ -165,10 +165,7 @@ AMBIGUOUS = (
 
 
 def nominal_matrix(
-    recording: Recording,
-    measured: MeasuredTurns,
-    turns: Sequence[Turn],
-    nominal_scale: FloatArray | float | None,
+    recording: Recording, measured: MeasuredTurns, turns: Sequence[Turn], nominal_scale: FloatArray | float | None
 ) -> FloatArray:
     """Nominal scale (3, 3), rad/s per raw unit: from stated turns, else as given, else from the unit.
 
@@ -219,10 +216,7 @@ def scale_of_stated(measured: MeasuredTurns, turns: Sequence[Turn]) -> FloatArra
 
 
 def identify_turns(
-    measured: MeasuredTurns,
-    turns: Sequence[Turn],
-    nominal: FloatArray,
-    tolerance: float = SCALE_TOLERANCE,
+    measured: MeasuredTurns, turns: Sequence[Turn], nominal: FloatArray, tolerance: float = SCALE_TOLERANCE
 ) -> list[KnownTurn]:
     """Nearest case axis and nearest multiple of 90° for every turn without a stated one.
 

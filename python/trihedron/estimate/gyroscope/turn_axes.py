@@ -68,11 +68,7 @@ def stated_turns(
 
 
 def _turn(
-    recording: Recording,
-    segments: Segments,
-    accelerometer: SensorCalibration,
-    move: Move,
-    angle_rad: float,
+    recording: Recording, segments: Segments, accelerometer: SensorCalibration, move: Move, angle_rad: float
 ) -> Turn:
     assert segments.accelerometer_mean is not None
     both = segments.accelerometer_mean[[move.pose_before, move.pose_after]]
@@ -106,11 +102,7 @@ def shared_errors(turns: Sequence[Turn], accelerometer: SensorCalibration, gravi
 
 
 def axis_of_turn(
-    recording: Recording,
-    segments: Segments,
-    accelerometer: SensorCalibration,
-    move: Move,
-    angle_rad: float,
+    recording: Recording, segments: Segments, accelerometer: SensorCalibration, move: Move, angle_rad: float
 ) -> tuple[FloatArray, float]:
     """Mean force (3,) over the circle of a turn by ``angle_rad``, and the standard error [rad] of its direction."""
     assert recording.accelerometer is not None

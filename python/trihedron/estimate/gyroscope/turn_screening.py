@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -143,38 +143,30 @@ LOOSE_TURN_RAD = math.radians(1.0)
 
 
 def turn_findings(
-    known: Sequence[KnownTurn],
-    screened: Screened,
-    deviation: FloatArray,
-    S: FloatArray,
-    inflation: float,
-    dof: int,
-) -> tuple[Finding, ...]:
+    known: Sequence[KnownTurn], screened: Screened, deviation: FloatArray, S: FloatArray, inflation: float, dof: int
+) -> Iterator[Finding]:
     """Findings: turns that are no multiple of 90°, contradicting turns, axes with a single turn, handedness, drift."""
-    found = [_not_a_multiple(i, turn) for i, turn in enumerate(known) if _is_wrong(turn)]
+    yield from (_not_a_multiple(i, turn) for i, turn in enumerate(known) if _is_wrong(turn))
     for index in screened.suspects:
         turn = known[index]
-        found.append(
-            Finding.of(
-                FindingCode.TURN_NOT_A_MULTIPLE,
-                "left-out" if index in screened.removed else "contradicted",
-                turn=int(index),
-                angle_rad=turn.angle_rad,
-                axis=turn.axis + 1,
-                deviation_rad=np.linalg.norm(deviation[index]),
-            )
+        yield Finding.of(
+            FindingCode.TURN_NOT_A_MULTIPLE,
+            "left-out" if index in screened.removed else "contradicted",
+            turn=int(index),
+            angle_rad=turn.angle_rad,
+            axis=turn.axis + 1,
+            deviation_rad=np.linalg.norm(deviation[index]),
         )
     sigma = screened.system.sigma_turn
     if sigma > LOOSE_TURN_RAD:
-        found.append(Finding.of(FindingCode.TURN_NOT_A_MULTIPLE, "scatter", sigma_turn_rad=sigma))
+        yield Finding.of(FindingCode.TURN_NOT_A_MULTIPLE, "scatter", sigma_turn_rad=sigma)
     if screened.unchecked_axes:
-        found.append(Finding.of(FindingCode.TURN_UNCHECKED, axes=[axis + 1 for axis in screened.unchecked_axes]))
+        yield Finding.of(FindingCode.TURN_UNCHECKED, axes=[axis + 1 for axis in screened.unchecked_axes])
     if np.linalg.det(S) < 0.0:
-        found.append(Finding.of(FindingCode.LEFT_HANDED, "gyro", determinant=np.linalg.det(S)))
+        yield Finding.of(FindingCode.LEFT_HANDED, "gyro", determinant=np.linalg.det(S))
     if inflation > 1.0:
-        found.append(Finding.of(FindingCode.RESIDUAL_ABOVE_NOISE, "turns", chi2_per_dof=inflation, dof=dof))
-    found += _drift(screened)
-    return tuple(found)
+        yield Finding.of(FindingCode.RESIDUAL_ABOVE_NOISE, "turns", chi2_per_dof=inflation, dof=dof)
+    yield from _drift(screened)
 
 
 def _is_wrong(turn: KnownTurn) -> bool:
@@ -193,18 +185,16 @@ def _not_a_multiple(index: int, turn: KnownTurn) -> Finding:
     )
 
 
-def _drift(screened: Screened) -> list[Finding]:
+def _drift(screened: Screened) -> Iterator[Finding]:
     measured = screened.system.measured
     dof = len(measured.static_duration_s) - 1
     if dof < 1 or chdtrc(dof, float(measured.bias_excess.max())) > FALSE_ALARM / 3.0:
-        return []
+        return
     axis = int(np.argmax(measured.bias_excess))
-    return [
-        Finding.of(
-            FindingCode.GYRO_BIAS_DRIFT,
-            "turns",
-            times=np.sqrt(measured.bias_excess[axis] / dof),
-            axis=axis + 1,
-            chi2_per_dof=measured.bias_excess[axis] / dof,
-        )
-    ]
+    yield Finding.of(
+        FindingCode.GYRO_BIAS_DRIFT,
+        "turns",
+        times=np.sqrt(measured.bias_excess[axis] / dof),
+        axis=axis + 1,
+        chi2_per_dof=measured.bias_excess[axis] / dof,
+    )

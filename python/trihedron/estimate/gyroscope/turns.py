@@ -81,7 +81,7 @@ def calibrate_turns(
         observability=_observability(system, used, fit),
     )
     deviation = (measured.raw_angle - np.outer(measured.duration_s, fit.b_w)) @ S.T - system.angles
-    return calibration, turn_findings(known, screened, deviation, S, inflation, fit.dof)
+    return calibration, tuple(turn_findings(known, screened, deviation, S, inflation, fit.dof))
 
 
 def _covariance(fit: Solution, inflation: float, added: FloatArray) -> FloatArray:

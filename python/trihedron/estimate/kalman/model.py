@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy import stats
 
@@ -76,36 +78,28 @@ def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray) -> C
     return Consistency(power / n, low, high, n, p, n_lags, tuple(float(v) for v in r))
 
 
-def consistency_findings(axis: int | None, seen: Consistency) -> list[Finding]:
+def consistency_findings(axis: int | None, seen: Consistency) -> Iterator[Finding]:
     """Findings where innovations contradict the noise model; ``axis`` None for the norm of all three."""
-    out: list[Finding] = []
     case, name = ("norm", "") if axis is None else ("axis", AXES[axis])
     mean, low, high = seen.nis_mean, seen.nis_low, seen.nis_high
     if seen.n and mean > high:
-        out.append(
-            Finding.of(
-                FindingCode.INNOVATIONS_TOO_LARGE,
-                case,
-                axis=name,
-                nis_mean=mean,
-                nis_low=low,
-                nis_high=high,
-                widening=np.sqrt(mean),
-            )
+        yield Finding.of(
+            FindingCode.INNOVATIONS_TOO_LARGE,
+            case,
+            axis=name,
+            nis_mean=mean,
+            nis_low=low,
+            nis_high=high,
+            widening=np.sqrt(mean),
         )
     elif seen.n and mean < low:
-        out.append(
-            Finding.of(FindingCode.INNOVATIONS_TOO_SMALL, case, axis=name, nis_mean=mean, nis_low=low, nis_high=high)
-        )
+        yield Finding.of(FindingCode.INNOVATIONS_TOO_SMALL, case, axis=name, nis_mean=mean, nis_low=low, nis_high=high)
     if seen.n_lags and seen.whiteness_p < 1.0 - CONFIDENCE:
-        out.append(
-            Finding.of(
-                FindingCode.INNOVATIONS_COLOURED,
-                case,
-                axis=name,
-                whiteness_p=seen.whiteness_p,
-                n_lags=seen.n_lags,
-                autocorrelation_1=seen.autocorrelation[0],
-            )
+        yield Finding.of(
+            FindingCode.INNOVATIONS_COLOURED,
+            case,
+            axis=name,
+            whiteness_p=seen.whiteness_p,
+            n_lags=seen.n_lags,
+            autocorrelation_1=seen.autocorrelation[0],
         )
-    return out

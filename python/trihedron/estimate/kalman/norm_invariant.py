@@ -12,12 +12,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import AXES, XYZ, FloatArray
 from trihedron.errors import RefusedError
-from trihedron.estimate.kalman.model import (
-    check_innovations,
-    consistency_findings,
-    is_settled,
-    shaping_model,
-)
+from trihedron.estimate.kalman.model import check_innovations, consistency_findings, is_settled, shaping_model
 from trihedron.estimate.kalman.per_axis import noise_per_axis, pose_arrays
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode

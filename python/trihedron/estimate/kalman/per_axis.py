@@ -11,12 +11,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import AXES, FloatArray
 from trihedron.errors import REFUSALS, RefusedError
-from trihedron.estimate.kalman.model import (
-    check_innovations,
-    consistency_findings,
-    is_settled,
-    shaping_model,
-)
+from trihedron.estimate.kalman.model import check_innovations, consistency_findings, is_settled, shaping_model
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisKalmanResult, AxisNoise, ConstantsTrack, KalmanCalibration, PoseTable

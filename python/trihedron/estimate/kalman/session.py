@@ -121,11 +121,7 @@ def _noise(
 
 
 def calibrate_session(
-    recording: Recording,
-    segments: Segments,
-    table: PoseTable,
-    *,
-    noise: AxisNoise | Sequence[AxisNoise] | None = None,
+    recording: Recording, segments: Segments, table: PoseTable, *, noise: AxisNoise | Sequence[AxisNoise] | None = None
 ) -> KalmanCalibration:
     """Calibrate the accelerometer of a recording in the known attitudes of a pose table, by all methods for comparison.
 

@@ -190,7 +190,7 @@ def identify_axis(
 def blank_axis(name: str, unit: str, rate_hz: float, n_samples: int, mean: float, written: Readout) -> NoiseAxis:
     """An axis without terms yet: length, mean, noise of a reading, resolution and findings on these."""
     unknown = {term: NoiseTerm(term, False, 0.0, 0.0, 0.0, math.inf, math.inf, 0.0) for term in TermName}
-    findings = remarks.written(written)
+    findings = [*remarks.written(written)]
     if written.sigma == 0.0 or written.is_dead:
         findings.append(remarks.dead(written, unit))
     return NoiseAxis(
@@ -264,9 +264,5 @@ def widened(term: NoiseTerm, own: float) -> NoiseTerm:
     upper = term.estimate + math.hypot(max(term.upper - term.estimate, 0.0), reach)
     lower = max(term.estimate - math.hypot(max(term.estimate - term.lower, 0.0), reach), 0.0)
     return replace(
-        term,
-        sigma=math.hypot(term.sigma, own),
-        lower=min(lower, term.lower),
-        upper=upper,
-        limit=max(term.limit, upper),
+        term, sigma=math.hypot(term.sigma, own), lower=min(lower, term.lower), upper=upper, limit=max(term.limit, upper)
     )

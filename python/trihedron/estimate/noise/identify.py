@@ -188,13 +188,7 @@ class _Screened:
 
 
 def _screen(
-    readings: FloatArray,
-    rate_hz: float,
-    excluded: Sequence[tuple[int, int]],
-    name: str,
-    unit: str,
-    *,
-    automatic: bool,
+    readings: FloatArray, rate_hz: float, excluded: Sequence[tuple[int, int]], name: str, unit: str, *, automatic: bool
 ) -> _Screened:
     column = np.array(readings, dtype=np.float64)
     for start, stop in excluded:

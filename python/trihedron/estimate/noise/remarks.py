@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from trihedron.records.finding import Finding, FindingCode
@@ -18,34 +18,23 @@ NAMED = 4
 
 def events(
     steps: Sequence[Event], knocks: Sequence[Event], shocks: Sequence[Event], rate_hz: float, unit: str
-) -> list[Finding]:
+) -> Iterator[Finding]:
     """Findings for steps, knocks and shaking of one axis; the largest step and knock with their times."""
-    out = []
     if steps:
         worst = max(steps, key=lambda e: abs(e.size))
-        out.append(
-            Finding.of(
-                FindingCode.LOG_STEP, n_steps=len(steps), step=worst.size, unit=unit, time_s=worst.start / rate_hz
-            )
+        yield Finding.of(
+            FindingCode.LOG_STEP, n_steps=len(steps), step=worst.size, unit=unit, time_s=worst.start / rate_hz
         )
     if knocks:
         worst = max(knocks, key=lambda e: abs(e.size))
-        out.append(
-            Finding.of(
-                FindingCode.LOG_KNOCK, n_knocks=len(knocks), knock=worst.size, unit=unit, time_s=worst.start / rate_hz
-            )
+        yield Finding.of(
+            FindingCode.LOG_KNOCK, n_knocks=len(knocks), knock=worst.size, unit=unit, time_s=worst.start / rate_hz
         )
     if shocks:
         total = sum(e.stop - e.start for e in shocks) / rate_hz
-        out.append(
-            Finding.of(
-                FindingCode.LOG_MOTION,
-                shaken_s=total,
-                times=max(e.size for e in shocks),
-                first_s=shocks[0].start / rate_hz,
-            )
+        yield Finding.of(
+            FindingCode.LOG_MOTION, shaken_s=total, times=max(e.size for e in shocks), first_s=shocks[0].start / rate_hz
         )
-    return out
 
 
 def stretches_excluded(stretches: Sequence[tuple[int, int]], n: int, rate_hz: float) -> Finding:
@@ -56,11 +45,11 @@ def stretches_excluded(stretches: Sequence[tuple[int, int]], n: int, rate_hz: fl
     )
 
 
-def written(readings: Readout) -> list[Finding]:
+def written(readings: Readout) -> Iterator[Finding]:
     """Finding for readings at the range limit of one axis."""
     if readings.clipped == 0.0:
-        return []
-    return [Finding.of(FindingCode.CLIPPING, "at-rest", share=readings.clipped)]
+        return
+    yield Finding.of(FindingCode.CLIPPING, "at-rest", share=readings.clipped)
 
 
 def dead(readings: Readout, unit: str) -> Finding:
@@ -116,23 +105,19 @@ def _slow_noise_unresolved(axis: NoiseAxis) -> Finding:
     )
 
 
-def about_terms(axis: NoiseAxis) -> list[Finding]:
+def about_terms(axis: NoiseAxis) -> Iterator[Finding]:
     """Findings for drift, inseparable slow noise, and a log too short for a minimum of the Allan deviation."""
-    out = []
     ramp = axis.terms[TermName.RATE_RAMP]
     if ramp.is_present:
-        out.append(
-            Finding.of(
-                FindingCode.LOG_DRIFT,
-                drift=ramp.value * axis.duration_s,
-                slope=ramp.value,
-                sigma_slope=ramp.sigma,
-                unit=axis.unit,
-            )
+        yield Finding.of(
+            FindingCode.LOG_DRIFT,
+            drift=ramp.value * axis.duration_s,
+            slope=ramp.value,
+            sigma_slope=ramp.sigma,
+            unit=axis.unit,
         )
     if axis.is_slow_noise_unresolved:
-        out.append(_slow_noise_unresolved(axis))
+        yield _slow_noise_unresolved(axis)
     if not axis.terms[TermName.RATE_RANDOM_WALK].is_present and axis.optimal_averaging() is None:
         limit = axis.terms[TermName.RATE_RANDOM_WALK].limit
-        out.append(Finding.of(FindingCode.LOG_TOO_SHORT, limit=limit, unit=axis.unit))
-    return out
+        yield Finding.of(FindingCode.LOG_TOO_SHORT, limit=limit, unit=axis.unit)

@@ -64,11 +64,7 @@ class BinnedSpectrum:
         return self.power - 2.0 * slope * self.cross + slope**2 * self.square
 
 
-def binned(
-    bands: Sequence[Ordinates],
-    highest_hz: float,
-    masked: Sequence[BoolArray] | None = None,
-) -> BinnedSpectrum:
+def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolArray] | None = None) -> BinnedSpectrum:
     """Ordinates up to ``highest_hz`` that are not ``masked``, averaged in bins of ``BIN_WIDTH``."""
     pick = [band.frequency_hz <= highest_hz for band in bands]
     if masked is not None:

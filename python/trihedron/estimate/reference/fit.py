@@ -11,7 +11,6 @@ import numpy as np
 from trihedron.arrays import AXES, BoolArray, FloatArray
 from trihedron.estimate.reference.accelerometer import ForceFit, fit_accelerometer, force_along
 from trihedron.estimate.reference.beside import Beside, Point
-from trihedron.estimate.reference.carried import error_carried
 from trihedron.estimate.reference.clocks import Alignment, align
 from trihedron.estimate.reference.coloured import Solution
 from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope
@@ -24,12 +23,17 @@ from trihedron.estimate.reference.refusals import (
     refuse_units,
     share_left,
 )
-from trihedron.estimate.reference.remarks import remarks
 from trihedron.estimate.reference.replay import held_out
-from trihedron.estimate.reference.smoothed import bias_over_time, error_over_time, frame_covariance, without_slow_error
+from trihedron.estimate.reference.smoothed import (
+    bias_over_time,
+    error_carried,
+    error_over_time,
+    frame_covariance,
+    without_slow_error,
+)
 from trihedron.estimate.reference.together import Grid, Reference, grid_of, plateaus
 from trihedron.estimate.reference.windows import Windows, windows_on
-from trihedron.estimate.reference.worth import earth_of, error_of
+from trihedron.estimate.reference.worth import earth_of, error_of, remarks
 from trihedron.records import Recording
 from trihedron.records.reference import AgainstReference, Estimate, FitToReference, ReferenceMotion
 from trihedron.sensor_model import reframing
@@ -42,10 +46,7 @@ FORCE_WINDOW_S = 0.1
 """Least spacing of windows for forces, up to 5 Hz: above it a twice differentiated position is noise."""
 TURNED_ROUND = 0.2
 """Residual share of the motion above which the inverse attitude is tried: shared motion leaves some 0.01."""
-UNITS = {
-    "gyro-g-sensitivity": "(rad/s)/(m/s^2)",
-    "gyro-scale-nonlinearity": "1/(rad/s), 1/(rad/s)^2",
-}
+UNITS = {"gyro-g-sensitivity": "(rad/s)/(m/s^2)", "gyro-scale-nonlinearity": "1/(rad/s), 1/(rad/s)^2"}
 LABELS = {
     "gyro-g-sensitivity": tuple(f"{a}{b}" for a in AXES for b in AXES),
     "gyro-scale-nonlinearity": tuple(f"{bend} {a}" for bend in ("quadratic", "cubic") for a in AXES),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.stats import chi2
 
@@ -9,7 +11,8 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.estimate.reference.beside import Beside
 from trihedron.estimate.reference.motion import MotionFit, fit_motion
 from trihedron.gravity import EARTH_RATE_RAD_S
-from trihedron.records.reference import Estimate, ReferenceError, Sign
+from trihedron.records import Finding, FindingCode
+from trihedron.records.reference import AgainstReference, Estimate, ReferenceError, Sign
 from trihedron.sensor_model import reframing
 
 FINE_S, COARSE = 0.1, 4.0
@@ -132,8 +135,53 @@ def earth_of(found: MotionFit, k: int) -> Estimate | None:
     along = value / length
     gain = covariance @ along / float(along @ covariance @ along)
     return Estimate(
-        AXES,
-        value + gain * (EARTH_RATE_RAD_S - length),
-        covariance - np.outer(gain, covariance @ along),
-        "rad/s",
+        AXES, value + gain * (EARTH_RATE_RAD_S - length), covariance - np.outer(gain, covariance @ along), "rad/s"
     )
+
+
+# Findings on a reference that affect the result.
+
+
+TILT_DEG = 10.0
+"""Largest angle of the world's z axis from the vertical without a finding."""
+COLOURED = 3.0
+"""Factor on the accelerometer's uncertainties above which its residuals are not explained by the noise model."""
+LEFT_OUT = 0.05
+
+
+def remarks(result: AgainstReference, is_turned: bool) -> Iterator[Finding]:
+    """Findings of a fit: independence of the reference, direction of up, outliers, deviating intervals, misfit."""
+    error = result.error
+    if is_turned:
+        yield Finding.of(FindingCode.REFERENCE_TURNED_ROUND)
+    if result.vertical is not None:
+        yield from _up(result)
+    if error.signs:
+        seen = {sign.kind: sign.seen for sign in error.signs}
+        yield Finding.of(
+            FindingCode.REFERENCE_NOT_INDEPENDENT,
+            is_quiet="quieter-than-gyro" in seen,
+            is_square="mounted-without-error" in seen,
+            angle_rad=seen.get("mounted-without-error", float("nan")),
+            varies="S-depends-on-duration" in seen,
+        )
+    if error.rows_left_out > LEFT_OUT * (error.rows + error.rows_left_out):
+        rows = error.rows + error.rows_left_out
+        yield Finding.of(FindingCode.REFERENCE_OUTLIERS, left_out=error.rows_left_out, rows=rows)
+    for start, end in error.apart_s:
+        yield Finding.of(FindingCode.REFERENCE_APART, start_s=start, end_s=end)
+    force = result.accelerometer
+    if force is not None and force.widened > COLOURED:
+        yield Finding.of(FindingCode.REFERENCE_MISFIT, sensor="accelerometer", widened=force.widened)
+
+
+def _up(result: AgainstReference) -> Iterator[Finding]:
+    assert result.vertical is not None
+    up = result.vertical.value
+    lean = float(np.degrees(np.arccos(np.clip(abs(up[2]), 0.0, 1.0))))
+    if up[2] < -np.cos(np.radians(45.0)):
+        yield Finding.of(FindingCode.REFERENCE_UPSIDE_DOWN, "down", up_x=up[0], up_y=up[1], up_z=up[2])
+        return
+    if lean > TILT_DEG:
+        yield Finding.of(FindingCode.REFERENCE_UPSIDE_DOWN, "leans", lean_deg=lean, up_x=up[0], up_y=up[1], up_z=up[2])
+        return

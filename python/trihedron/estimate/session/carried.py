@@ -57,11 +57,7 @@ class HeldOut:
 
 
 def held_out(
-    observed: Observed,
-    measured: MoveMeasurements,
-    anchors_s: FloatArray,
-    solution: SessionSolution,
-    n_folds: int,
+    observed: Observed, measured: MoveMeasurements, anchors_s: FloatArray, solution: SessionSolution, n_folds: int
 ) -> HeldOut | None:
     """Cross-validation over every k-th pose, then every k-th move; ``None`` where too few would remain.
 
@@ -179,11 +175,7 @@ class Carried:
 
 
 def carried(
-    measured: MoveMeasurements,
-    anchors_s: FloatArray,
-    S_a: FloatArray,
-    b_a: FloatArray,
-    S_w: FloatArray,
+    measured: MoveMeasurements, anchors_s: FloatArray, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray
 ) -> Carried:
     """Tilt error ``B f_i - f_j`` of every move, from the pose means at both ends, with a bias per pose.
 

@@ -9,12 +9,7 @@ import numpy as np
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import REFUSALS
 from trihedron.estimate.gyroscope.findings import describe, findings_of
-from trihedron.estimate.gyroscope.lost_turns import (
-    PossibleLosses,
-    is_asked_for_losses,
-    losses_that_fit,
-    relative_sigma,
-)
+from trihedron.estimate.gyroscope.lost_turns import PossibleLosses, is_asked_for_losses, losses_that_fit, relative_sigma
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import Carried, HeldOut, carried, held_out, move_quality
 from trihedron.estimate.session.fit import FALSE_ALARM, SessionSolution, far_moves, refitted, solve_session

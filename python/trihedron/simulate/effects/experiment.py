@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from trihedron.errors import RefusedError
-from trihedron.simulate.effects.sizes import Sensor, Values, checked, triple
+from trihedron.simulate.effects.sizes import Sensor, checked
 from trihedron.simulate.motion.steps import Disturb, Motion, Pose, Step, Turn, Vibrate
+from trihedron.simulate.readout import Values, triple
 from trihedron.simulate.scenario import Loss, Scenario
 
 
@@ -16,10 +17,7 @@ def time_offset(scenario: Scenario, offset_s: float) -> Scenario:
 
 
 def dropped(
-    scenario: Scenario,
-    losses: Sequence[Sequence[float]] = (),
-    probability: float = 0.0,
-    restamped: bool = True,
+    scenario: Scenario, losses: Sequence[Sequence[float]] = (), probability: float = 0.0, restamped: bool = True
 ) -> Scenario:
     listed = tuple(Loss(float(t), int(n)) for t, n in losses)
     clock = replace(scenario.clock, losses=listed, loss_probability=probability, restamped=restamped)

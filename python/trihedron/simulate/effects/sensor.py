@@ -13,16 +13,13 @@ from trihedron.errors import RefusedError
 from trihedron.simulate.effects.sizes import (
     Change,
     Sensor,
-    Values,
     checked,
     electronics,
     mass_response,
-    matrix3,
     suspension,
-    triple,
     with_response,
 )
-from trihedron.simulate.readout import Adc, Drift, Interference
+from trihedron.simulate.readout import Adc, Drift, Interference, Values, matrix3, triple
 from trihedron.simulate.scenario import Scenario, Temperature
 
 
@@ -93,11 +90,7 @@ def thermal(sensor: Sensor, kind: Literal["bias", "scale"]) -> Change:
 
 def drift(sensor: Sensor) -> Change:
     def drifting(
-        scenario: Scenario,
-        amplitude: Values = 0.0,
-        tau_s: float = 120.0,
-        change: Values = 0.0,
-        length_s: float = 300.0,
+        scenario: Scenario, amplitude: Values = 0.0, tau_s: float = 120.0, change: Values = 0.0, length_s: float = 300.0
     ) -> Scenario:
         if not (tau_s > 0.0 and length_s > 0.0):
             raise RefusedError(f"a drift needs a positive tau_s and length_s, got {tau_s} and {length_s}")
@@ -131,10 +124,7 @@ def gyro_nonlinearity(scenario: Scenario, c2: Values = 0.0, c3: Values = 0.0) ->
             deflection[k] = 1e-3
             second[k], third[k] = suspension(1e-3, quadratic[k], cubic[k])
     mode = replace(
-        scenario.gyroscope.sense_mode,
-        deflection_s_rad=triple(deflection),
-        second=triple(second),
-        third=triple(third),
+        scenario.gyroscope.sense_mode, deflection_s_rad=triple(deflection), second=triple(second), third=triple(third)
     )
     return replace(scenario, gyroscope=replace(scenario.gyroscope, sense_mode=mode))
 

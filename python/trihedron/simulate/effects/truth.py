@@ -8,9 +8,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from trihedron.simulate.effects.sizes import mass_response, response, triple
+from trihedron.simulate.effects.sizes import mass_response, response
 from trihedron.simulate.motion.steps import Disturb, Motion, Pose, Turn
-from trihedron.simulate.readout import Electronics
+from trihedron.simulate.readout import Electronics, triple
 from trihedron.simulate.scenario import Scenario, Temperature
 
 

@@ -188,7 +188,7 @@ class _Planner:
         empty = np.zeros((0, 6))
         end = np.array([self.time])
         q, *_ = _core.simulate_motion(np.array([self.rows[-1]]), empty, empty, alone, end, 0.0, NOWHERE)
-        w, x, y, z = (float(c) for c in q[0])
+        w, x, y, z = q[0].tolist()
         return (w, x, y, z)
 
     def attitude_above_table(self) -> Quaternion:
