@@ -5,7 +5,7 @@ import pytest
 
 from noise_series import series
 from trihedron.estimate.noise.allan import allan_deviation
-from trihedron.estimate.noise.curve_terms import CurveCovariance
+from trihedron.estimate.noise.curve_terms import tabulated
 from trihedron.estimate.noise.from_curve import identify_curve
 from trihedron.records.finding import FindingCode
 from trihedron.records.noise import TermName
@@ -30,7 +30,7 @@ def test_the_covariance_of_the_points_is_that_of_simulated_curves(terms):
     curves = [allan_deviation(series(rng, N_READINGS, RATE, **terms), RATE, CLUSTERS).variance for _ in range(runs)]
     found = np.cov(np.transpose(curves))
     squares = np.array([terms.get(s, 0.0) ** 2 for s in "QNBKR"])
-    expected = CurveCovariance.of(CLUSTERS, N_READINGS, RATE).at(squares)
+    expected = tabulated(tuple(CLUSTERS.tolist()), N_READINGS, RATE).at(squares)
     # A variance of skewed values from 500 runs: 10 % each, a correlation 0.045; four of them.
     assert np.sqrt(np.diag(expected) / np.diag(found)) == pytest.approx(np.ones(len(CLUSTERS)), abs=0.2)
     scale = np.sqrt(np.diag(expected))

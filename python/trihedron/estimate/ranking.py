@@ -9,7 +9,7 @@ from itertools import permutations, product
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
+from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by
 from trihedron.estimate.verification import norm_error
 from trihedron.gravity import normal_gravity
@@ -95,28 +95,19 @@ def suspicions_of(
     measured = measure_moves(recording, segments, own.accelerometer)
     # A wrong accelerometer causes tilt errors too: the log's own replaces it.
     base = calibration if found is None else own
-    tilt = _Tilt(segments, measured)
     rates = segments.gyroscope_mean
+
+    def tilt_deg(accel: Calibration, S: FloatArray) -> float:
+        return _rms(carried_by(accel, S, measured, segments).angle_deg[~measured.is_lost])
+
     of_gyro = gyroscope_suspicion(
         gyro.S,
         gyro.b,
         own_gyro.S,
-        Misses(lambda S, _: tilt.rms_deg(base, S), tilt.rms_deg(own, own_gyro.S)),
+        Misses(lambda S, _: tilt_deg(base, S), tilt_deg(own, own_gyro.S)),
         Misses(lambda S, b: _rms(rates @ S.T + b), _rms(rates @ own_gyro.S.T + own_gyro.b)),
     )
     return (*out, of_gyro) if of_gyro is not None else tuple(out)
-
-
-class _Tilt:
-    """Tilt errors after the moves of one log, for any S of the gyro."""
-
-    def __init__(self, segments: Segments, measured: MoveMeasurements) -> None:
-        self._segments, self._measured = segments, measured
-
-    def rms_deg(self, calibration: Calibration, S: FloatArray) -> float:
-        """Root mean square of the tilt errors [deg]."""
-        seen = carried_by(calibration, S, self._measured, self._segments)
-        return _rms(seen.angle_deg[~self._measured.is_lost])
 
 
 def _rms(values: FloatArray) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, Stretch, accumulated, walked
 from trihedron.estimate.reference.motion import MotionFit
+from trihedron.ranges import edges_of
 
 START_RAD = 0.3
 """Prior σ of the attitude error at the start of a stretch: the fit leaves some degrees."""
@@ -18,9 +19,8 @@ LONGEST, SHORTEST = 300, 12
 
 def runs(is_good: BoolArray) -> list[tuple[int, int]]:
     """Stretches ``(first, last)`` of good blocks, from ``SHORTEST`` to ``LONGEST`` blocks long."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_good, [False]]).astype(int))).reshape(-1, 2)
     out = []
-    for first, last in edges:
+    for first, last in edges_of(is_good):
         parts = max(1, int(np.ceil((last - first) / LONGEST)))
         cuts = np.linspace(first, last, parts + 1).astype(int)
         out += [(int(a), int(b)) for a, b in pairwise(cuts) if b - a >= SHORTEST]

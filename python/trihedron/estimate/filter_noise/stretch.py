@@ -163,9 +163,13 @@ def accumulated(per_block: FloatArray, ends: tuple[float, float]) -> FloatArray:
     """(m, m) covariance of block means of a random walk whose variance grows by ``per_block`` (m,): min(t, t') at the
     middles of the blocks, less the corrections ``ends``."""
     upto = np.cumsum(per_block) - 0.5 * per_block
-    neighbours = np.eye(len(upto), k=1) + np.eye(len(upto), k=-1)
-    less = np.diag(ends[0] * per_block) + ends[1] * per_block.mean() * neighbours
+    less = np.diag(ends[0] * per_block) + ends[1] * per_block.mean() * neighbours(len(upto))
     return np.asarray(np.minimum.outer(upto, upto) - less)
+
+
+def neighbours(m: int) -> FloatArray:
+    """(m, m) matrix with ones on the two secondary diagonals."""
+    return np.eye(m, k=1) + np.eye(m, k=-1)
 
 
 def walked(steps: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.filter_noise.angle import band_power, bias_steps, relative, runs
-from trihedron.estimate.filter_noise.stretch import TRIANGLE_ENDS, Stretch, accumulated, walked
+from trihedron.estimate.filter_noise.stretch import TRIANGLE_ENDS, Stretch, accumulated, neighbours, walked
 from trihedron.estimate.reference.beside import Beside, Point
 
 LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)[None])
@@ -97,11 +97,6 @@ def _of_white_attitude(stretch: Stretch, white_rad: float) -> FloatArray:
     m = len(stretch.tilts)
     per_block = np.einsum("kij,klj->il", stretch.tilts, stretch.tilts) / m * white_rad**2
     return np.kron(accumulated(np.ones(m), TRIANGLE_ENDS), per_block)
-
-
-def neighbours(m: int) -> FloatArray:
-    """(m, m) matrix with ones on the two secondary diagonals."""
-    return np.eye(m, k=1) + np.eye(m, k=-1)
 
 
 def _differences(samples: FloatArray, n: int) -> FloatArray:

@@ -60,17 +60,6 @@ class CurveCovariance:
     pairs: FloatArray
     with_ramp: FloatArray
 
-    @classmethod
-    def of(cls, clusters: IntArray, n: int, rate_hz: float) -> CurveCovariance:
-        """Tabulate for ``clusters`` (k,) readings of a log of ``n`` readings."""
-        k = len(clusters)
-        pairs, with_ramp = np.zeros((4, 4, k, k)), np.zeros((4, k, k))
-        for i in range(k):
-            for j in range(i, k):
-                pairs[:, :, i, j], with_ramp[:, i, j] = _pair(int(clusters[i]), int(clusters[j]), n, 1.0 / rate_hz)
-                pairs[:, :, j, i], with_ramp[:, j, i] = pairs[:, :, i, j], with_ramp[:, i, j]
-        return cls(pairs, with_ramp)
-
     def from_point(self, first: int) -> CurveCovariance:
         """The table without the first ``first`` points."""
         return CurveCovariance(self.pairs[:, :, first:, first:], self.with_ramp[:, first:, first:])
@@ -162,7 +151,7 @@ class CurvePoints:
     @classmethod
     def of(cls, clusters: FloatArray, variance: FloatArray, n: int, rate_hz: float) -> CurvePoints:
         """Points with the covariance table of their cluster sizes."""
-        return cls(clusters, variance, rate_hz, _tabulated(tuple(int(m) for m in clusters), n, rate_hz))
+        return cls(clusters, variance, rate_hz, tabulated(tuple(int(m) for m in clusters), n, rate_hz))
 
     @cached_property
     def tau_s(self) -> FloatArray:
@@ -279,9 +268,15 @@ class CurvePoints:
 
 
 @lru_cache(maxsize=64)
-def _tabulated(clusters: tuple[int, ...], n: int, rate_hz: float) -> CurveCovariance:
-    """Table of the covariance, cached: the channels of a log share it."""
-    return CurveCovariance.of(np.array(clusters, dtype=np.int64), n, rate_hz)
+def tabulated(clusters: tuple[int, ...], n: int, rate_hz: float) -> CurveCovariance:
+    """Table for ``clusters`` (k,) readings of a log of ``n`` readings, cached: the channels of a log share it."""
+    k = len(clusters)
+    pairs, with_ramp = np.zeros((4, 4, k, k)), np.zeros((4, k, k))
+    for i in range(k):
+        for j in range(i, k):
+            pairs[:, :, i, j], with_ramp[:, i, j] = _pair(clusters[i], clusters[j], n, 1.0 / rate_hz)
+            pairs[:, :, j, i], with_ramp[:, j, i] = pairs[:, :, i, j], with_ramp[:, i, j]
+    return CurveCovariance(pairs, with_ramp)
 
 
 def _crossing(excess: Callable[[float], float], first: float) -> float:

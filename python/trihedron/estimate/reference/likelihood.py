@@ -90,8 +90,16 @@ class Together:
     evidence: float
 
 
-def together(problems: Sequence[Problem], found: Sequence[Equations]) -> Together:
-    """Posterior of several recordings in one fit; the prior of every parameter counts once."""
+def together(problems: Sequence[Problem], strengths: FloatArray) -> Together:
+    """Posterior of several recordings in one fit under ``strengths`` (recordings, 7); every prior counts once."""
+    return _solved(problems, _equations(problems, strengths))
+
+
+def _equations(problems: Sequence[Problem], strengths: FloatArray) -> list[Equations]:
+    return [equations(p, s) for p, s in zip(problems, strengths, strict=True)]
+
+
+def _solved(problems: Sequence[Problem], found: Sequence[Equations]) -> Together:
     L, half, evidence = _eliminated(problems, found)
     inverse = np.linalg.inv(L)
     return Together(inverse.T @ half, inverse.T @ inverse, evidence)
@@ -115,7 +123,7 @@ def _eliminated(problems: Sequence[Problem], found: Sequence[Equations]) -> tupl
 
 def at_the_point(problems: Sequence[Problem], strengths: FloatArray) -> float:
     """Log density of the readings and of all parameters at the point of linearisation."""
-    found = [equations(p, s) for p, s in zip(problems, strengths, strict=True)]
+    found = _equations(problems, strengths)
     priors = {int(i): float(c) for p in problems for i, c in zip(p.index, p.centre, strict=True)}
     return sum(one.constant for one in found) - 0.5 * sum(c * c for c in priors.values())
 
@@ -217,8 +225,8 @@ def _walk(height: Height, start: FloatArray) -> FloatArray:
 
 def _with_mean_bias(problems: Sequence[Problem], strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Posterior mean and covariance with every bias as its mean over time instead of its value at the start."""
-    found = [equations(p, s) for p, s in zip(problems, strengths, strict=True)]
-    all_of = together(problems, found)
+    found = _equations(problems, strengths)
+    all_of = _solved(problems, found)
     change, shift = np.eye(len(all_of.mean)), np.zeros(len(all_of.mean))
     added = np.zeros_like(all_of.covariance)
     for problem, one in zip(problems, found, strict=True):

@@ -15,7 +15,6 @@ from trihedron.estimate.reference.likelihood import (
     Fitted,
     Problem,
     at_the_point,
-    equations,
     fit,
     most_likely,
     together,
@@ -77,7 +76,7 @@ def fit_motion(
     for turn in range(RELINEARISED if before is None else 1):
         if turn:
             strengths, _ = most_likely(problems, strengths)
-        mean = together(problems, [equations(p, s) for p, s in zip(problems, strengths, strict=True)]).mean
+        mean = together(problems, strengths).mean
         # Log densities are compared about the same slow error: another one is another linear model.
         points = [
             point if side.reference.motion.attitude is None else replace(point, slow=slow_error(problem, s, mean))
@@ -182,6 +181,6 @@ def _tuned(found: MotionFit, names: tuple[str, ...], wider: Mapping[str, float])
     where = places(found.sides, names)
     problems = _problems(found.sides, points, where, wider)
     strengths, evidence = most_likely(problems, found.fitted.strengths, found.fitted.spread())
-    all_of = together(problems, [equations(p, s) for p, s in zip(problems, strengths, strict=True)])
+    all_of = together(problems, strengths)
     fitted = Fitted(all_of.mean, all_of.covariance, evidence, strengths, strengths[None])
     return MotionFit(found.sides, points, where, problems, fitted, wider)

@@ -10,7 +10,7 @@ from trihedron.arrays import XYZ, BoolArray, FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.reference.clocks import JUMP_S
 from trihedron.estimate.reference.gyroscope import GyroFit
-from trihedron.estimate.reference.likelihood import Problem, equations, most_likely, together
+from trihedron.estimate.reference.likelihood import Problem, most_likely, together
 from trihedron.estimate.reference.motion import MotionFit
 from trihedron.estimate.reference.together import Grid, Reference, running_mean
 from trihedron.records import Recording
@@ -96,7 +96,7 @@ def refuse_two_clocks(found: MotionFit, k: int) -> None:
     def problem(shift: float) -> Problem:
         return side.problem(replace(point, offset_s=point.offset_s + float(shift)), where, {})
 
-    heights = np.array([_height(problem(shift), strengths) for shift in shifts])
+    heights = np.array([together([problem(shift)], strengths).evidence for shift in shifts])
     inner = np.flatnonzero((heights[1:-1] > heights[:-2]) & (heights[1:-1] > heights[2:])) + 1
     others = [i for i in inner if abs(shifts[i]) > SHIFT_S]
     if not others:
@@ -112,10 +112,6 @@ def refuse_two_clocks(found: MotionFit, k: int) -> None:
             f"{at + shifts[best]:+.4g} s (evidence {2.0 * (here - there):.1f} apart, {NAMED_FROM:g} needed): shake the "
             "unit once, irregularly, or give the reference timestamps of the log's own clock."
         )
-
-
-def _height(problem: Problem, strengths: FloatArray) -> float:
-    return together([problem], [equations(problem, strengths[0])]).evidence
 
 
 # Parts of a log with another offset of the reference's clock: a clock that jumps late or for a short time.

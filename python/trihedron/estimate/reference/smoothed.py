@@ -27,7 +27,6 @@ from trihedron.estimate.reference.likelihood import (
     TYPICAL,
     Problem,
     Together,
-    equations,
     together,
 )
 from trihedron.estimate.reference.motion import MotionFit, slow_error
@@ -128,7 +127,7 @@ def frame_covariance(found: MotionFit, k: int) -> FloatArray:
 
 def posterior(found: MotionFit, strengths: FloatArray) -> Together:
     """Posterior of all parameters at given strengths; biases are those at the start."""
-    return together(found.problems, [equations(p, s) for p, s in zip(found.problems, strengths, strict=True)])
+    return together(found.problems, strengths)
 
 
 def error_carried(found: MotionFit, k: int, force: ForceFit, time_s: FloatArray, frame: FloatArray) -> FloatArray:

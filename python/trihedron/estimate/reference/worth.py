@@ -11,6 +11,7 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.estimate.reference.beside import Beside
 from trihedron.estimate.reference.motion import MotionFit, fit_motion
 from trihedron.gravity import EARTH_RATE_RAD_S
+from trihedron.ranges import edges_of
 from trihedron.records import Finding, FindingCode
 from trihedron.records.reference import AgainstReference, Estimate, ReferenceError, Sign
 from trihedron.sensor_model import reframing
@@ -63,9 +64,8 @@ def surprises(found: MotionFit, k: int) -> FloatArray:
 
 def _runs(time: FloatArray, where: np.ndarray) -> tuple[tuple[float, float], ...]:
     """Start and end times of every run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
     last = len(time) - 1
-    return tuple((float(time[a]), float(time[min(b, last)])) for a, b in edges.reshape(-1, 2))
+    return tuple((float(time[a]), float(time[min(b, last)])) for a, b in edges_of(where))
 
 
 def signs_of_this_gyro(side: Beside, found: MotionFit, k: int) -> tuple[Sign, ...]:

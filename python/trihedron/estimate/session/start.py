@@ -20,6 +20,7 @@ from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.sensor_model import reframing
+from trihedron.transforms import cross_matrix
 from trihedron.units import rate_to_si
 
 ASTRAY_DEG = 5.0
@@ -286,7 +287,8 @@ def turned_starts(
             courses.append((measured.time_s[a:b], rate, up[before], up[after]))
     if len(courses) < FEWEST_MOVES:
         return None
-    most = max(float(np.linalg.norm(rate, axis=1) @ _trapezoid_weights(time)) for time, rate, _, _ in courses)
+    sizes = [(time, np.linalg.norm(rate, axis=1)) for time, rate, _, _ in courses]
+    most = max(float(0.5 * np.diff(time) @ (size[1:] + size[:-1])) for time, size in sizes)
     if not most > 0.0:
         return None
     left, _, right = np.linalg.svd(linear)
@@ -306,15 +308,5 @@ def _missed_rad(time: FloatArray, rate: FloatArray, before: FloatArray, after: F
     return float(np.arccos(np.clip(turned @ after, -1.0, 1.0)))
 
 
-def _trapezoid_weights(time: FloatArray) -> FloatArray:
-    half = 0.5 * np.diff(time)
-    weights = np.zeros(len(time))
-    weights[1:] += half
-    weights[:-1] += half
-    return weights
-
-
-_ACROSS = np.array(
-    [[[0, 0, 0], [0, 0, 1], [0, -1, 0]], [[0, 0, -1], [0, 0, 0], [1, 0, 0]], [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]]
-)
+_ACROSS = -np.array([cross_matrix(axis) for axis in np.eye(3)])
 """(3, 3, 3) matrix [i] that multiplies ``f`` to give ``f × e_i``."""
