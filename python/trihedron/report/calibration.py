@@ -10,10 +10,7 @@ from trihedron.arrays import AXES, XYZ
 from trihedron.records import Calibration, Recording, Segments, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST
 from trihedron.report.axes import Axes, axes_of
-from trihedron.report.calibration_charts import (
-    correlations,
-    strong_correlations,
-)
+from trihedron.report.calibration_charts import correlations, strong_correlations
 from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor
 from trihedron.report.calibration_pictures import (
     before_words,
@@ -57,10 +54,7 @@ def calibration_report(
     figures = tuple(figure_blocks(calibration, segments, recording))
     if figures:
         sections.append(Section("Figures", figures))
-    sections += [
-        Section("Axes", _meaning(calibration)),
-        Section("Uncertainty", tuple(_certainty(calibration))),
-    ]
+    sections += [Section("Axes", _meaning(calibration)), Section("Uncertainty", tuple(_certainty(calibration)))]
     residuals = tuple(residual_tables(calibration, segments))
     if residuals:
         sections.append(Section("Residuals", residuals))
@@ -101,12 +95,7 @@ def _headlines(calibration: Calibration) -> list[Headline]:
 
 def verdict(calibration: Calibration) -> str:
     """The verdict in one sentence: usable or not."""
-    return verdict_of(
-        calibration.findings,
-        "OK: no problems found.",
-        "Usable",
-        "NOT TO BE TRUSTED",
-    )
+    return verdict_of(calibration.findings, "OK: no problems found.", "Usable", "NOT TO BE TRUSTED")
 
 
 def _result(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> tuple[Block, ...]:

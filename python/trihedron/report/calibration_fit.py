@@ -16,10 +16,7 @@ from trihedron.report.many_charts import shown
 from trihedron.report.numbers import how_many, in_mm_s2, plain_number, with_sigma
 from trihedron.units import degrees_from_radians
 
-METHODS = {
-    "joint": "both sensors in one fit of poses and moves",
-    "moves": "gravity after rotations between poses",
-}
+METHODS = {"joint": "both sensors in one fit of poses and moves", "moves": "gravity after rotations between poses"}
 """Words for methods that records store as ids; other methods are words already."""
 
 

@@ -43,11 +43,7 @@ def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture
     if means is not None and len(means) == len(quality.residual):
         chart = partial(lead_chart, calibration, means)
         caption += f" Beside it the error's size before calibration ({before_words(calibration)}) and after."
-    return Picture(
-        "residuals",
-        caption,
-        chart,
-    )
+    return Picture("residuals", caption, chart)
 
 
 def lead_chart(calibration: Calibration, means: FloatArray) -> Chart:

@@ -5,14 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.records import Calibration, FitQuality, Segments, SensorCalibration
-from trihedron.report.calibration_charts import (
-    move_noise_deg,
-)
+from trihedron.report.calibration_charts import move_noise_deg
 from trihedron.report.document import Block, Table
-from trihedron.report.numbers import (
-    plain_number,
-    with_sigma,
-)
+from trihedron.report.numbers import plain_number, with_sigma
 from trihedron.units import mm_s2_from_m_s2
 
 

@@ -15,12 +15,7 @@ from trihedron.report.calibration_fit import figures_table
 from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pictures
 from trihedron.report.diagnosis_charts import before_after_chart
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relations_blocks
-from trihedron.report.diagnosis_numbers import (
-    differing_blocks,
-    noise_blocks,
-    numbers_blocks,
-    stages_blocks,
-)
+from trihedron.report.diagnosis_numbers import differing_blocks, noise_blocks, numbers_blocks, stages_blocks
 from trihedron.report.diagnosis_overview_charts import (
     forest_pictures,
     ratio_pictures,
@@ -47,11 +42,7 @@ from trihedron.report.effect_charts import effect_chart
 from trihedron.report.effect_rest_charts import rest_panels
 from trihedron.report.findings import findings_block
 from trihedron.report.findings.wording import opening
-from trihedron.report.numbers import (
-    how_many,
-    listed,
-    plain_number,
-)
+from trihedron.report.numbers import how_many, listed, plain_number
 from trihedron.report.reference import beside_reference
 
 _CAPTIONS = {

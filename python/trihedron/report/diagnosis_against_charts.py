@@ -135,10 +135,7 @@ def allan_of(edges_hz: FloatArray, density: FloatArray, tau_s: FloatArray) -> Fl
 
 
 def _both(x: FloatArray, model: FloatArray, own: FloatArray) -> tuple[Mark, ...]:
-    return (
-        Line(x, own, "recording", "accent"),
-        Line(x, model, "model", "ink", is_dashed=True),
-    )
+    return (Line(x, own, "recording", "accent"), Line(x, model, "model", "ink", is_dashed=True))
 
 
 def _panel(x: str, unit_x: str, y: str, unit_y: str, marks: Sequence[Mark], title: str) -> Panel:

@@ -32,13 +32,7 @@ def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Char
             residuals.sigma_before,
             residuals.names_before,
         ),
-        (
-            "with the effects",
-            residuals.time_after_s,
-            residuals.after,
-            residuals.sigma_after,
-            residuals.names_after,
-        ),
+        ("with the effects", residuals.time_after_s, residuals.after, residuals.sigma_after, residuals.names_after),
     ][: 2 if has_effects else 1]
     low, high = _limits(sides, factor, is_angle=residuals.domain == "moves")
     times = np.concatenate([np.ravel(time_s) for _, time_s, *_ in sides])

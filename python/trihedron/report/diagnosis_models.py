@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from trihedron.arrays import AXES
 from trihedron.records.diagnosis import Candidate, Diagnosis, Relation
-from trihedron.report.diagnosis_words import (
-    parameter_in_words,
-    size_in_words,
-    value_in_words,
-)
+from trihedron.report.diagnosis_words import parameter_in_words, size_in_words, value_in_words
 from trihedron.report.document import Block, Facts, Table
 from trihedron.report.numbers import (
     MINUS,

@@ -39,12 +39,7 @@ _SENTENCES_FIRST = ("unit", "frame", "range", "rate")
 """Errors of every reading of a sensor, which come before its noise."""
 _SIZE = re.compile(r"(?<![\w.])\d[\d.]*(?:e[+−-]?\d+)?")
 _HEAD = ("parameter", "model", "recording", "recording − model", "p of its group")
-_STAGES = {
-    "as-given": "as given",
-    "parameters": "parameters",
-    "noise": "noise",
-    "effects": "effects",
-}
+_STAGES = {"as-given": "as given", "parameters": "parameters", "noise": "noise", "effects": "effects"}
 
 
 def differing_numbers(diagnosis: Diagnosis) -> list[str]:

@@ -85,12 +85,7 @@ def _headlines(one: SensorFilterNoise) -> list[Headline]:
     """N and K for the filter."""
     static: tuple[Bounded | None, ...] = (None, None) if one.static is None else (one.static.N, one.static.K)
     return [
-        Headline(
-            f"{one.sensor} {name}",
-            _number(value),
-            f"{unit_in_print(one.unit)}/{per}",
-            _beside(value, at_rest),
-        )
+        Headline(f"{one.sensor} {name}", _number(value), f"{unit_in_print(one.unit)}/{per}", _beside(value, at_rest))
         for name, value, at_rest, per in (("N", one.N, static[0], "√Hz"), ("K", one.K, static[1], "√s"))
     ]
 

@@ -161,10 +161,7 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
     seconds = [log.seconds for log in summary.logs if log.seconds is not None]
     if seconds:
         facts.append(
-            (
-                "work",
-                f"{plain_number(sum(seconds), 3)} s in all, {plain_number(max(seconds), 2)} s the longest log",
-            )
+            ("work", f"{plain_number(sum(seconds), 3)} s in all, {plain_number(max(seconds), 2)} s the longest log")
         )
     return tuple(facts)
 

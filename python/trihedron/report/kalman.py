@@ -190,13 +190,7 @@ def _row(constants: FloatArray, sigma: FloatArray) -> tuple[str, ...]:
 
 def _consistency_table(seen: list[tuple[str, Consistency, int]]) -> Table:
     rows = tuple(
-        (
-            name,
-            f"{c.n} of {n}",
-            plain_number(c.nis_mean),
-            _limits(c),
-            plain_number(c.whiteness_p, 2),
-        )
+        (name, f"{c.n} of {n}", plain_number(c.nis_mean), _limits(c), plain_number(c.whiteness_p, 2))
         for name, c, n in seen
     )
     head = ("axis", "poses judged", "mean NIS", "99 % when right", "whiteness, p")

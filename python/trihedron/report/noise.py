@@ -33,7 +33,7 @@ def noise_report(
     findings = all_findings(noise)
     length = noise.curve.n_samples / noise.curve.rate_hz
     facts = [
-        ("length", f"{duration(length)}, {noise.curve.n_samples} samples at {plain_number(noise.curve.rate_hz, 5)} Hz"),
+        ("length", f"{duration(length)}, {noise.curve.n_samples} samples at {plain_number(noise.curve.rate_hz, 5)} Hz")
     ]
     if noise.excluded_s:
         total = sum(stop - start for start, stop in noise.excluded_s)
@@ -47,10 +47,7 @@ def noise_report(
         title="Noise of a static log",
         subtitle=noise.source,
         verdict=verdict_of(
-            findings,
-            "OK: a sum of noise terms fits the whole spectrum.",
-            "Usable",
-            "NOT TO BE TRUSTED",
+            findings, "OK: a sum of noise terms fits the whole spectrum.", "Usable", "NOT TO BE TRUSTED"
         ),
         is_trustworthy=noise.is_trustworthy,
         headlines=tuple(_headlines(groups)),
@@ -223,10 +220,7 @@ def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
             for window in (1.0, 10.0)
         ),
         ("longest averaging time with 25 % uncertainty [s]", *(plain_number(axis.longest_tau_s, 3) for axis in axes)),
-        (
-            "fit band [Hz]",
-            *(f"{plain_number(a.lowest_hz, 2)} … {plain_number(a.highest_hz, 3)}" for a in axes),
-        ),
+        ("fit band [Hz]", *(f"{plain_number(a.lowest_hz, 2)} … {plain_number(a.highest_hz, 3)}" for a in axes)),
     )
     return Table(("", *(axis_in_print(axis.name) for axis in axes)), rows, "How long to average")
 
@@ -308,11 +302,7 @@ def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
         'N is read off at 1 s, K at 3 s; "K < 2" is in the sum and does not show by itself; '
         "the orange mark is the least deviation."
     )
-    return Picture(
-        f"allan-{axes[0].name.split()[0]}",
-        caption,
-        partial(allan_chart, noise.curve, unit, axes),
-    )
+    return Picture(f"allan-{axes[0].name.split()[0]}", caption, partial(allan_chart, noise.curve, unit, axes))
 
 
 def _lead(noise: Noise, groups: list[tuple[str, list[NoiseAxis]]]) -> Picture:

@@ -42,10 +42,7 @@ def plan_report(plan: ExperimentPlan) -> Document:
         sections=(
             Section(
                 "Poses",
-                (
-                    _poses(plan.poses),
-                    Facts(tuple((pose.name, _worth(pose)) for pose in plan.poses if pose.worth)),
-                ),
+                (_poses(plan.poses), Facts(tuple((pose.name, _worth(pose)) for pose in plan.poses if pose.worth))),
             ),
             Section(
                 "Moves between poses",

@@ -65,9 +65,7 @@ def _calibrated(result: Any) -> Any:
 
 _KINDS: dict[type, _Shown] = {
     CalibrationResult: _Shown(
-        calibration_result_report,
-        _calibrated,
-        lambda r: frames.calibration_columns(r.calibration),
+        calibration_result_report, _calibrated, lambda r: frames.calibration_columns(r.calibration)
     ),
     VerificationResult: _Shown(
         lambda r: verification_report(r.verification, r.segments, r.recording),

@@ -40,10 +40,7 @@ def ranking_report(ranking: Ranking) -> Document:
         verdict = f"None of these calibrations fits this log: of the best, {best.name}, {said_of(best)}."
     chart = partial(ranking_chart, ranking)
     caption = "Errors of each calibration on this log, the best first."
-    facts = (
-        ("gravity", f"{ranking.gravity_m_s2:.5f} m/s², {ranking.gravity_source}"),
-        ("judged on", _judged_on(best)),
-    )
+    facts = (("gravity", f"{ranking.gravity_m_s2:.5f} m/s², {ranking.gravity_source}"), ("judged on", _judged_on(best)))
     sections = [
         Section("Ranking", (Facts(facts), _order(ranking))),
         Section("What is wrong with each", (Facts(tuple((one.name, said_of(one)) for one in ranking.candidates)),)),

@@ -39,10 +39,7 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
             * bool(found.error.signs)
         ),
         ("clock", _clock(found)),
-        (
-            "mounting",
-            f"rotation vector {_vector(found.mounting, degrees_from_radians(1.0))}° (log's gyro → reference)",
-        ),
+        ("mounting", f"rotation vector {_vector(found.mounting, degrees_from_radians(1.0))}° (log's gyro → reference)"),
     ]
     if found.lever_arm is not None:
         length = 1000.0 * float(np.linalg.norm(found.lever_arm.value))

@@ -35,10 +35,7 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
         sections=(
             Section("Effects that all recordings share", _effects(found, names)),
             Section("Each recording by itself", (_each(found, names),)),
-            Section(
-                "Candidates",
-                (Table(("effect", "score together"), _candidates(found), "The catalogue"),),
-            ),
+            Section("Candidates", (Table(("effect", "score together"), _candidates(found), "The catalogue"),)),
         ),
         stated_level="usable" if found.effects else "good",
         headlines=_headlines(found),

@@ -22,11 +22,7 @@ ENTRIES = (
         "the accelerometers have a cubic nonlinearity, as a differential capacitive bridge does",
         "add tilts between the faces (20° steps): an odd curve bends between level and 1 g",
     ),
-    EffectWords(
-        "accel-quadratic",
-        "the accelerometers have a quadratic nonlinearity",
-        BOTH_SIDES_OF_LEVEL,
-    ),
+    EffectWords("accel-quadratic", "the accelerometers have a quadratic nonlinearity", BOTH_SIDES_OF_LEVEL),
     EffectWords(
         "accel-scale-asymmetry",
         "the accelerometer scale differs between positive and negative force",
@@ -49,11 +45,7 @@ ENTRIES = (
         follows_temperature("accelerometer", "mm/s²"),
         "repeat the cycle with the sensor turned over",
     ),
-    EffectWords(
-        "accel-thermal-scale",
-        "the accelerometer scale depends on temperature",
-        TWO_TEMPERATURES,
-    ),
+    EffectWords("accel-thermal-scale", "the accelerometer scale depends on temperature", TWO_TEMPERATURES),
     EffectWords(
         "accel-bias-drift",
         "the accelerometer bias drifts smoothly in time; no logged channel explains it",

@@ -27,16 +27,9 @@ ENTRIES = (
         "turn by the same angle slowly and fast, both ways, about each axis",
     ),
     EffectWords(
-        "gyro-thermal-bias",
-        "the gyro bias depends on temperature",
-        UP_AND_DOWN,
-        follows_temperature("gyro", "°/s"),
+        "gyro-thermal-bias", "the gyro bias depends on temperature", UP_AND_DOWN, follows_temperature("gyro", "°/s")
     ),
-    EffectWords(
-        "gyro-thermal-scale",
-        "the gyro scale depends on temperature",
-        TWO_TEMPERATURES,
-    ),
+    EffectWords("gyro-thermal-scale", "the gyro scale depends on temperature", TWO_TEMPERATURES),
     EffectWords(
         "gyro-bias-drift",
         "the gyro bias drifts smoothly in time; no logged channel explains it",

@@ -13,11 +13,7 @@ ENTRIES = (
         "accelerometer and gyro samples with the same timestamp were taken at different times",
         SHAKE,
     ),
-    EffectWords(
-        "sensor-lag",
-        "one sensor follows the motion through a low-pass filter",
-        SHAKE,
-    ),
+    EffectWords("sensor-lag", "one sensor follows the motion through a low-pass filter", SHAKE),
     EffectWords(
         "axis-handedness",
         "the documented axes do not form one right-handed triad",
@@ -33,9 +29,7 @@ ENTRIES = (
         ),
     ),
     EffectWords(
-        "supply-sensitivity",
-        "the readings depend on the supply voltage",
-        "repeat one pose at two supply voltages",
+        "supply-sensitivity", "the readings depend on the supply voltage", "repeat one pose at two supply voltages"
     ),
     EffectWords(
         "vibration-rectification",
