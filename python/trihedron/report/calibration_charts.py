@@ -43,7 +43,7 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
         held = mm_s2(quality.held_out)
         held_sigma = None if quality.held_out_sigma is None else mm_s2(quality.held_out_sigma)
         told = [
-            said(f"cross-validated, {name}", "", v, "mm/s²", None if held_sigma is None else s)
+            said(f"cross-validated, {name}", v, "mm/s²", None if held_sigma is None else s)
             for name, v, s in zip(label, held, held if held_sigma is None else held_sigma, strict=True)
         ]
         marks.append(
@@ -51,7 +51,7 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
                 pose + 0.17, held, told, held_sigma, "cross-validated (predicted by a fit without it)", "accent", True
             )
         )
-    told = [said(name, "", v, "mm/s²", s) for name, v, s in zip(label, residual, sigma, strict=True)]
+    told = [said(name, v, "mm/s²", s) for name, v, s in zip(label, residual, sigma, strict=True)]
     marks.append(Points(pose - 0.17, residual, told, None, "in sample", "c1"))
     x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
     top = _highest(held, held_sigma, residual, limit) if has_held else None
@@ -89,7 +89,7 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
         for k in range(n)
     ]
     told = [
-        f"{said(w, '', v, '°')}{', excluded' if out else ''}"
+        f"{said(w, v, '°')}{', excluded' if out else ''}"
         for w, v, out in zip(names, quality.angle_deg, is_out, strict=True)
     ]
     noise = move_noise_deg(quality)
@@ -102,9 +102,9 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     if np.any(is_out):
         marks.append(Bars(move - shift, np.where(is_out, quality.angle_deg, np.nan), width, told, "excluded", "soft"))
     if held is not None:
-        told_held = [said(f"cross-validated, {w}", "", v, "°") for w, v in zip(names, held, strict=True)]
+        told_held = [said(f"cross-validated, {w}", v, "°") for w, v in zip(names, held, strict=True)]
         marks.append(Bars(move + shift, np.where(is_out, np.nan, held), width, told_held, "cross-validated", "accent"))
-    told_noise = [said(f"noise alone, {w}", "", v, "° rms") for w, v in zip(names, noise, strict=True)]
+    told_noise = [said(f"noise alone, {w}", v, "° rms") for w, v in zip(names, noise, strict=True)]
     marks.append(Points(move, noise, told_noise, None, "noise alone (rms)", "ink"))
     shown = np.concatenate([quality.angle_deg[~is_out], [] if held is None else held[~is_out]])
     shown = shown[np.isfinite(shown)]

@@ -12,8 +12,7 @@ from trihedron.records.published import AFTER_MOVES, AT_REST, counted_moves
 from trihedron.report.axes import BIAS, axes_of
 from trihedron.report.calibration_charts import move_noise_deg
 from trihedron.report.document import Table
-from trihedron.report.many_charts import shown
-from trihedron.report.numbers import how_many, in_mm_s2, plain_number, with_sigma
+from trihedron.report.numbers import how_many, in_mm_s2, plain_number, shown, with_sigma
 from trihedron.units import degrees_from_radians
 
 METHODS = {"joint": "both sensors in one fit of poses and moves", "moves": "gravity after rotations between poses"}

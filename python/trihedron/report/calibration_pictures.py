@@ -67,7 +67,7 @@ def before_after_panel(calibration: Calibration, means: FloatArray) -> Panel:
     held = _is_held(quality)
     kinds = ((before, "before", "soft"), (after, "after" + held * ", cross-validated", "accent" if held else "c1"))
     for values, name, colour in kinds:
-        told = [said(f"pose {k}", "", v, "mm/s²") for k, v in enumerate(values, 1)]
+        told = [said(f"pose {k}", v, "mm/s²") for k, v in enumerate(values, 1)]
         size = np.where(values == 0.0, np.nan, np.abs(values))
         marks.append(Points(pose, size, told, None, name, colour, colour == "accent"))  # type: ignore[arg-type]
     rms = [plain_number(float(np.sqrt(np.nanmean(values**2)))) for values in (before, after)]
@@ -158,7 +158,7 @@ def orientation_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
     values = mm_s2(_unseen(sensor.quality))
     limit = float(np.nanmax(np.abs(values), initial=0.0))
     told = [
-        f"{said(f'pose {k}', '', v, 'mm/s²')}, up {direction(f)}"
+        f"{said(f'pose {k}', v, 'mm/s²')}, up {direction(f)}"
         for k, (v, f) in enumerate(zip(values, force, strict=True), 1)
     ]
     title = f"gravity error by orientation, largest {plain_number(limit)} mm/s²"
@@ -198,7 +198,7 @@ def _over_time(
     for k, name in enumerate(names):
         values = mm_s2(residual[:, k])
         told = [
-            said(f"{kind} {n}{', ' + name if name else ''}, {t:.1f} s", "", v, "mm/s²")
+            said(f"{kind} {n}{', ' + name if name else ''}, {t:.1f} s", v, "mm/s²")
             for n, (t, v) in enumerate(zip(time_s, values, strict=True), 1)
         ]
         colour = AXIS_COLOURS[k] if name else "accent"

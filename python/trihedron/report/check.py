@@ -10,8 +10,7 @@ from trihedron.report.axes import axes_of
 from trihedron.report.channels import channels_table
 from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.many_charts import shown
-from trihedron.report.numbers import how_many, plain_number
+from trihedron.report.numbers import how_many, plain_number, shown
 from trihedron.report.segments import recording_facts, signals_picture
 from trihedron.units import mrad_from_radians
 

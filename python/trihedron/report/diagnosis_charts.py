@@ -75,7 +75,7 @@ def _domain_marks(
     for k, channel in enumerate(residuals.channels):
         colour: Colour = AXIS_COLOURS[k] if len(residuals.channels) > 1 else "accent"
         axis = channel_in_print(channel)
-        told = [said(f"{name}, {axis}", "", float(v), unit) for name, v in zip(names, value[:, k], strict=True)]
+        told = [said(f"{name}, {axis}", float(v), unit) for name, v in zip(names, value[:, k], strict=True)]
         marks.append(Points(time_s, value[:, k], told, None, axis, colour))
     return tuple(marks)
 

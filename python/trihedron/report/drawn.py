@@ -28,7 +28,7 @@ from trihedron.report.chart import (
 from trihedron.report.disc import drawn_disc
 from trihedron.report.matrix import drawn_matrix
 from trihedron.report.notes import apart
-from trihedron.report.numbers import plain_number
+from trihedron.report.numbers import plain_number, with_sigma
 from trihedron.report.places import UNITS, Places
 from trihedron.report.sphere import drawn_sphere
 from trihedron.report.ticks import ticks
@@ -313,9 +313,7 @@ def envelope(x: FloatArray, y: FloatArray, most: int = 1000) -> tuple[FloatArray
     return np.column_stack([middle[:, 0], middle[:, block // 2]]).ravel(), low_high.ravel()
 
 
-def said(what: str, x: str, value: float, unit: str, sigma: float | None = None) -> str:
+def said(what: str, value: float, unit: str, sigma: float | None = None) -> str:
     """Tooltip of a point: ``pose 7: 1.53 ± 0.98 mm/s²``."""
-    from trihedron.report.numbers import with_sigma
-
     number = plain_number(value) if sigma is None else with_sigma(value, sigma)
-    return f"{what}{' ' if x else ''}{x}: {number} {unit}".strip()
+    return f"{what}: {number} {unit}".strip()

@@ -70,7 +70,7 @@ def _curve_marks(one: EffectCurve, factor: float, unit_x: str) -> list[Mark]:
     said_x = [f"{plain_number(float(factor * a))} {unit_x}" for a in one.data_x]
     axis = XYZ[one.axis]
     told = [
-        f"{said(f'pose {k + 1}, {axis}', '', float(v), unit)} at {at}"
+        f"{said(f'pose {k + 1}, {axis}', float(v), unit)} at {at}"
         for k, v, at in zip(one.poses, scale * one.data, said_x, strict=True)
     ]
     marks: list[Mark] = [
@@ -178,7 +178,7 @@ def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> P
         colour: Colour = AXIS_COLOURS[k] if len(seen.channels) > 1 else "c1"
         data = factor * seen.before[:, k]
         told = [
-            f"{said(f'{kind} {n}, {channel}', '', float(v), unit)}, "
+            f"{said(f'{kind} {n}, {channel}', float(v), unit)}, "
             f"{label.split(' [')[0]} {plain_number(float(a))} {unit_x}"
             for n, (a, v) in enumerate(zip(x, data, strict=True), start=1)
         ]
@@ -186,13 +186,13 @@ def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> P
         # Tilt errors are angles between vectors: their difference is not the explained part.
         after = factor * seen.after[:, k]
         if is_same and seen.domain == "moves":
-            told = [said(f"{kind} {n}, with the effects", "", float(v), unit) for n, v in enumerate(after, 1)]
+            told = [said(f"{kind} {n}, with the effects", float(v), unit) for n, v in enumerate(after, 1)]
             marks.append(Points(x, after, told, None, f"{channel}: with the effects", "accent", True))
         elif is_same:
             if seen.domain == "static-gyro" and unit_x in ("s", "°C"):
                 order = np.argsort(x)
                 marks.append(Line(x[order], (data - after)[order], f"{channel}: model", colour))
                 continue
-            told = [said(f"{kind} {n}, model", "", float(v), unit) for n, v in enumerate(data - after, 1)]
+            told = [said(f"{kind} {n}, model", float(v), unit) for n, v in enumerate(data - after, 1)]
             marks.append(Points(x, data - after, told, None, f"{channel}: explained by the effects", colour, True))
     return Panel(Scale(label, unit_x), Scale(f"{seen.quantity} [{unit}]", unit), tuple(marks), height_px=220)

@@ -44,9 +44,7 @@ def _over_temperature(effect: AcceptedEffect) -> list[Panel]:
         mean = np.array([of_heat[pose == p].mean() for p in range(pose.max() + 1)])[pose]
         dots = factor * _averaged(values[k] + mean - of_heat.mean())
         curve = factor * (_polynomial(along - about, slopes) - of_heat.mean())
-        told = [
-            f"{said(axis, '', float(v), unit)} at {plain_number(float(t))} °C" for t, v in zip(at, dots, strict=True)
-        ]
+        told = [f"{said(axis, float(v), unit)} at {plain_number(float(t))} °C" for t, v in zip(at, dots, strict=True)]
         marks: tuple[Mark, ...] = (
             Level(y=0.0),
             Points(at, dots, told, None, f"{axis}: log", AXIS_COLOURS[k]),

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import math
 import statistics
 from collections import Counter
 from functools import partial
 
 from trihedron.records.fleet import FleetLog, FleetSummary
-from trihedron.records.sessions import Change, Repeated
+from trihedron.records.sessions import Change, Parameter
 from trihedron.report.axes import axis_in_print
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
-from trihedron.report.many_charts import fleet_chart, shown
-from trihedron.report.numbers import how_many, plain_number, with_sigma
+from trihedron.report.many_charts import fleet_chart
+from trihedron.report.numbers import capital, how_many, plain_number, shown
+from trihedron.report.sessions import change_in_words, repeated_cells
 
 MOST_NAMED = 4
-MOST_LEADING = 4
-"""Most devices in a sentence, and most parameters in the first picture."""
+"""Most devices or logs in a sentence, and most parameters in the first picture."""
 VERDICTS = {
     "consistent": "the linear model explains everything",
     "missing-physics": "physics beyond the linear model",
@@ -101,8 +100,7 @@ def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> st
     steps += [f"calibrate those that changed anew before use{doubt}"] if moved else []
     if usable:
         steps.append("use each device's own calibration (a file of calibrations/): trihedron apply FILE LOG")
-    said = "; ".join(steps)
-    return f"{said[0].upper()}{said[1:]}." if said else ""
+    return capital("; ".join(steps)) + "." if steps else ""
 
 
 def _is_usable(log: FleetLog) -> bool:
@@ -139,7 +137,7 @@ def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
 def _lead(summary: FleetSummary) -> Picture:
     caption = "The parameters that differ most beside their uncertainties: a point for each log, about the median of "
     caption += "devices; bars: 1 σ."
-    return Picture("differ", caption, partial(fleet_chart, summary, MOST_LEADING))
+    return Picture("differ", caption, partial(fleet_chart, summary, MOST_NAMED))
 
 
 def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
@@ -171,11 +169,7 @@ def _bad(logs: list[FleetLog]) -> Facts:
 
 
 def _mixed(summary: FleetSummary) -> list[Block]:
-    rows = []
-    for one in summary.mixed:
-        factor, unit = shown(one.parameter.unit)
-        by = f"{plain_number(one.difference * factor, 2)} {unit}"
-        rows.append((one.serial, str(one.n_logs), f"{one.parameter.id} {axis_in_print(one.parameter.name)}", by))
+    rows = [(one.serial, str(one.n_logs), *_by(one.parameter, one.difference)) for one in summary.mixed]
     said = (
         "Scales and directions of axes of one unit repeat within 1 %. Name devices with --serial, or give each a "
         "folder; until then these logs are compared with nothing."
@@ -184,6 +178,12 @@ def _mixed(summary: FleetSummary) -> list[Block]:
         Paragraph(said),
         Table(("taken for one device", "logs", "parameter", "differs by"), tuple(rows), "Logs too unlike"),
     ]
+
+
+def _by(parameter: Parameter, difference: float) -> tuple[str, str]:
+    """A parameter, and a difference of it."""
+    factor, unit = shown(parameter.unit)
+    return f"{parameter.id} {axis_in_print(parameter.name)}", f"{plain_number(difference * factor, 2)} {unit}"
 
 
 def _physics(summary: FleetSummary) -> list[Block]:
@@ -206,7 +206,10 @@ def _spread(summary: FleetSummary) -> list[Block]:
     is_grouped = any(one.between is not None for one in summary.repeated)
     head = ["parameter", "mean ± σ", "device to device" if is_grouped else "from log to log", "95 %"]
     head += ["session to session", "95 %"] if is_grouped else []
-    rows = [tuple(_spread_row(one, is_grouped)) for one in summary.repeated]
+    rows = [
+        tuple(repeated_cells(one, (one.between, one.within) if is_grouped else (one.within,)))
+        for one in summary.repeated
+    ]
     said = "Standard deviations beyond each log's uncertainty. Scales are relative to their mean; misalignments are "
     said += "departures from 90°."
     if summary.passed_over:
@@ -214,35 +217,16 @@ def _spread(summary: FleetSummary) -> list[Block]:
     return [Paragraph(said), Table(tuple(head), tuple(rows), "Scatter between devices and of one device")]
 
 
-def _spread_row(one: Repeated, is_grouped: bool) -> list[str]:
-    factor, unit = shown(one.parameter.unit)
-    value = one.value - (0.5 * math.pi if one.parameter.id.endswith("misalignment") else 0.0)
-    is_scale = one.parameter.id.endswith("scale")
-    cells = [f"{one.parameter.id} {axis_in_print(one.parameter.name)} [{unit}]"]
-    cells.append(f"± {plain_number(one.std * factor, 2)}" if is_scale else with_sigma(value * factor, one.std * factor))
-    for spread in (one.between, one.within) if is_grouped else (one.within,):
-        if spread is None:
-            cells += ["–", "–"]
-            continue
-        sd = "not detectable" if spread.sd == 0.0 else plain_number(spread.sd * factor, 2)
-        cells += [sd, f"{plain_number(spread.low * factor, 2)} to {plain_number(spread.high * factor, 2)}"]
-    return cells
-
-
 def _outliers(summary: FleetSummary) -> list[Block]:
     if not summary.outliers:
         return [Paragraph("No device lies outside what the others make likely (1 % over all devices and parameters).")]
-    rows = []
-    for one in summary.outliers:
-        factor, unit = shown(one.parameter.unit)
-        away = f"{plain_number(one.deviation * factor, 2)} {unit}"
-        cells = (
-            one.serial,
-            f"{one.parameter.id} {axis_in_print(one.parameter.name)}",
-            away,
-            plain_number(one.sigmas, 2),
+    rows = [
+        (
+            one.serial, *_by(one.parameter, one.deviation),
+            plain_number(one.sigmas, 2), plain_number(one.p_adjusted, 1),
         )
-        rows.append((*cells, plain_number(one.p_adjusted, 1)))
+        for one in summary.outliers
+    ]  # fmt: skip
     return [Table(("device", "parameter", "from the median", "in spreads of the others", "p"), tuple(rows), "Outliers")]
 
 
@@ -262,18 +246,9 @@ def _drift(summary: FleetSummary) -> list[Block]:
 
 
 def _drift_cells(change: Change) -> tuple[str, str, str]:
-    factor, unit = shown(change.unit)
+    how, sizes, unit = change_in_words(change)
     k = max(range(len(change.size)), key=lambda i: abs(change.size[i]))
-    how = {
-        "differs": "second less first",
-        "apart": f"{change.where} apart",
-        "step": f"from {change.where} on",
-        "trend": "each session",
-        "scatter": "every session",
-    }[change.kind]
-    value = change.size[k] * factor
-    amount = plain_number(value, 2) if change.kind == "scatter" else with_sigma(value, change.std[k] * factor)
-    return how, f"{amount} {unit} in {change.names[k]}", plain_number(change.p_adjusted, 1)
+    return how, f"{sizes[k]} {unit} in {change.names[k]}", plain_number(change.p_adjusted, 1)
 
 
 def _logs(summary: FleetSummary) -> Table:

@@ -90,7 +90,7 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
         mean = np.convolve(nis, np.ones(window) / window, mode="valid")
         name = XYZ[result.axis] if isinstance(result, AxisKalmanResult) else "norm of gravity"
         told = [
-            said(f"pose {p:.0f}, {name}", "", float(v), "times its predicted variance")
+            said(f"pose {p:.0f}, {name}", float(v), "times its predicted variance")
             for p, v in zip(pose, nis, strict=True)
         ]
         marks.append(Points(pose, np.minimum(nis, 12.0), told, None, f"{name}: one pose", AXIS_COLOURS[k], True))
@@ -128,7 +128,7 @@ def residual_chart(residual: FloatArray) -> Chart:
     for k in range(residual.shape[1]):
         name = f"f{AXES[k]}" if residual.shape[1] == 3 else "|f| − |g|"
         values = mm_s2(residual[:, k])
-        told = [said(f"pose {p}, {name}", "", float(v), "mm/s²") for p, v in enumerate(values, start=1)]
+        told = [said(f"pose {p}, {name}", float(v), "mm/s²") for p, v in enumerate(values, start=1)]
         marks.append(Points(pose, values, told, None, name, AXIS_COLOURS[k]))
     x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
     return Chart((Panel(x, Scale("residual [mm/s²]", "mm/s²"), tuple(marks)),))

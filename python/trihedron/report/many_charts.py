@@ -11,26 +11,14 @@ from trihedron.arrays import FloatArray
 from trihedron.records.fleet import FleetSummary
 from trihedron.records.sessions import PARAMETERS, Session, SessionsModel
 from trihedron.report.axes import axis_in_print
-from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Panel, Points, Scale
+from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.drawn import said
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
+from trihedron.report.numbers import shown
 
-SHOWN: dict[str, tuple[float, str]] = {
-    "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
-    "rad/s": (degrees_from_radians(1.0), "°/s"),
-    "rad": (degrees_from_radians(1.0), "°"),
-    "1": (1e2, "%"),
-}
-"""Factor from SI and printed unit for parameters of each unit."""
 REPEATS = "session to session (1 σ)"
 
 
-def shown(unit: str) -> tuple[float, str]:
-    """Factor from SI and printed unit."""
-    return SHOWN[unit]
-
-
-def short_names(names: Sequence[str]) -> tuple[str, ...]:
+def _short_names(names: Sequence[str]) -> tuple[str, ...]:
     """Short names of files for an axis, without a file name or an ending that all share."""
     paths = [PurePath(name) for name in names]
     if len(paths) > 1 and len({path.name for path in paths}) == 1 and all(path.parent.name for path in paths):
@@ -39,7 +27,7 @@ def short_names(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(str(path.with_suffix("")) if is_shared else str(path) for path in paths)
 
 
-def compared_variance(sessions: Sequence[Session], k: int) -> FloatArray:
+def _compared_variance(sessions: Sequence[Session], k: int) -> FloatArray:
     """(n,) variance of parameter ``k`` for comparing recordings: that of each plus the mean drift of its group."""
     drift = {
         group: np.mean([s.drift[k] for s in sessions if s.group == group]) for group in {s.group for s in sessions}
@@ -49,47 +37,57 @@ def compared_variance(sessions: Sequence[Session], k: int) -> FloatArray:
 
 def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int = 1) -> Chart:
     """One panel per id: deviations from the common value, over temperature where modelled; ``only`` these ids."""
-    thermal = model.thermal
-    place = np.arange(1.0, len(model.sessions) + 1.0)
-    if thermal is not None:
-        place = np.array([session.temperature_degc for session in model.sessions])
-    step = 0.12 * max(float(np.ptp(place)) / max(len(place) - 1, 1), 1e-9)
-    names = short_names([session.name for session in model.sessions])
+    places = np.arange(1.0, len(model.sessions) + 1.0)
+    names = _short_names([session.name for session in model.sessions])
+    x = Scale("recording", whole=True, names=names, limits=(0.5, len(places) + 0.5))
+    if model.thermal is not None:
+        places = np.array([session.temperature_degc for session in model.sessions])
+        x = Scale("temperature [°C]", "°C")
     panels = []
     for name in dict.fromkeys(one.parameter.id for one in model.repeated):
         if only and name not in only:
             continue
         picked = [k for k, parameter in enumerate(PARAMETERS) if parameter.id == name]
-        factor, unit = shown(PARAMETERS[picked[0]].unit)
-        marks: list[Band | Level | Line | Points] = [Level(y=0.0)]
-        for colour, k in zip(AXIS_COLOURS, picked, strict=True):
-            centre = model.repeated[k].value
-            if thermal is not None:
-                term = next(term for term in thermal.terms if term.id == name)
-                column = term.coefficients[:, k - picked[0]]
-                centre = float(column[0])
-                along = np.linspace(place.min(), place.max(), 80)
-                curve = (along - thermal.reference_degc)[:, None] ** np.arange(len(column)) @ column - centre
-                marks.append(Line(along, curve * factor, "", colour, is_thin=True))
-            values = np.array([session.numbers[k] - centre for session in model.sessions]) * factor
-            error = np.sqrt(compared_variance(model.sessions, k)) * factor
-            told = [
-                said(f"{session.name}, {axis_in_print(PARAMETERS[k].name)}", "", v, f"± {e:.2g} {unit}")
-                for session, v, e in zip(model.sessions, values, error, strict=True)
-            ]
-            spread = model.repeated[k].within
-            if thermal is None and spread is not None:
-                reach = np.full(2, spread.sd * factor)
-                marks.insert(0, Band(np.array([0.5, len(place) + 0.5]), -reach, reach, REPEATS))
-            axis = axis_in_print(PARAMETERS[k].name)
-            marks.append(Points(place + (k - picked[0] - 1) * step, values, told, error, axis, colour))
-        x = (
-            Scale("temperature [°C]", "°C")
-            if thermal is not None
-            else Scale("recording", whole=True, names=names, limits=(0.5, len(place) + 0.5))
-        )
+        unit = shown(PARAMETERS[picked[0]].unit)[1]
+        # The bands of all axes lie behind their points.
+        bands = [band for k in picked[::-1] for band in _repeatability(model, k, len(places))]
+        marks: list[Mark] = [*bands, Level(y=0.0)]
+        for axis, k in enumerate(picked):
+            marks += _deviations(model, k, axis, places)
         panels.append(Panel(x, Scale(f"{name}  [{unit}]", unit), tuple(marks), height_px=170))
     return Chart(tuple(panels), columns=columns, is_linked=True)
+
+
+def _repeatability(model: SessionsModel, k: int, n: int) -> list[Mark]:
+    """The spread of parameter ``k`` between sessions, where it is not described by temperature."""
+    spread = model.repeated[k].within
+    if model.thermal is not None or spread is None:
+        return []
+    reach = np.full(2, spread.sd * shown(PARAMETERS[k].unit)[0])
+    return [Band(np.array([0.5, n + 0.5]), -reach, reach, REPEATS)]
+
+
+def _deviations(model: SessionsModel, k: int, axis: int, places: FloatArray) -> list[Mark]:
+    """Parameter ``k``, one ``axis`` of its group, in every recording, and its curve over temperature."""
+    parameter, colour = PARAMETERS[k], AXIS_COLOURS[axis]
+    factor, unit = shown(parameter.unit)
+    centre, marks = model.repeated[k].value, list[Mark]()
+    if model.thermal is not None:
+        term = next(term for term in model.thermal.terms if term.id == parameter.id)
+        column = term.coefficients[:, axis]
+        centre = float(column[0])
+        along = np.linspace(places.min(), places.max(), 80)
+        curve = (along - model.thermal.reference_degc)[:, None] ** np.arange(len(column)) @ column - centre
+        marks.append(Line(along, curve * factor, "", colour, is_thin=True))
+    values = np.array([session.numbers[k] - centre for session in model.sessions]) * factor
+    error = np.sqrt(_compared_variance(model.sessions, k)) * factor
+    name = axis_in_print(parameter.name)
+    told = [
+        said(f"{session.name}, {name}", v, f"± {e:.2g} {unit}")
+        for session, v, e in zip(model.sessions, values, error, strict=True)
+    ]
+    step = 0.12 * max(float(np.ptp(places)) / max(len(places) - 1, 1), 1e-9)
+    return [*marks, Points(places + (axis - 1) * step, values, told, error, name, colour)]
 
 
 def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
@@ -121,7 +119,7 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
         marks: list[Level | Points] = [Level(y=0.0)]
         for part, colour, name in ((~is_stray, AXIS_COLOURS[0], "a log"), (is_stray, "accent", "unlike the others")):
             if part.any():
-                told = [said(logs[i].serial, "", values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
+                told = [said(logs[i].serial, values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
                 marks.append(Points(across[part], values[part], told, error[part], name, colour))
         y = Scale(f"{parameter.id} {axis_in_print(parameter.name)}  [{unit}]", unit)
         panels.append(Panel(x, y, tuple(marks), height_px=150))

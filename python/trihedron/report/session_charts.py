@@ -64,7 +64,7 @@ def means_chart(segments: Segments) -> Chart:
         marks = tuple(
             Points(
                 segments.time_mid_s, means[:, k],
-                [said(f"pose {n}, {axis}", "", v, "") for n, v in enumerate(means[:, k], 1)],
+                [said(f"pose {n}, {axis}", v, "") for n, v in enumerate(means[:, k], 1)],
                 None, axis, AXIS_COLOURS[k],
             )
             for k, axis in enumerate(XYZ)
@@ -81,7 +81,7 @@ def verification_chart(verification: Verification) -> Chart:
     edge = np.column_stack([pose - 0.5, pose + 0.5]).ravel()
     limit = np.repeat(LIMIT_SIGMAS * sigma, 2)
     told = [
-        said(f"pose {k}", "", e, f"mm/s² ({e / s:+.1f}σ)".replace("-", "−"))
+        said(f"pose {k}", e, f"mm/s² ({e / s:+.1f}σ)".replace("-", "−"))
         for k, (e, s) in enumerate(zip(error, sigma, strict=True), start=1)
     ]
     norm = Panel(
@@ -99,7 +99,7 @@ def verification_chart(verification: Verification) -> Chart:
     if not len(v.angle_deg):
         return Chart((norm,))
     move = (v.moves + 1).astype(np.float64)
-    told = [said(f"move {k + 1}", "", a, "°") for k, a in zip(v.moves, v.angle_deg, strict=True)]
+    told = [said(f"move {k + 1}", a, "°") for k, a in zip(v.moves, v.angle_deg, strict=True)]
     edge = np.column_stack([move - 0.5, move + 0.5]).ravel()
     limit = np.repeat(LIMIT_RMS * v.angle_sigma_deg, 2)
     moves = Panel(

@@ -8,23 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.records.sessions import Change, Repeated, Session, SessionsModel, Spread, ThermalModel
+from trihedron.records.sessions import PARAMETERS, Change, Repeated, Session, SessionsModel, Spread, ThermalModel
 from trihedron.report.axes import BIAS, axis_in_print
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.frames import Columns
-from trihedron.report.many_charts import sessions_chart, shown
-from trihedron.report.numbers import how_many, plain_number, with_sigma
+from trihedron.report.many_charts import sessions_chart
+from trihedron.report.numbers import each_with_sigma, how_many, listed, plain_number, shown, with_sigma
 
-DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
-"""Groups of parameters in the first picture; the others follow below."""
-HEADLINES = {
+DRIFTING = {
     "accel-bias": "accelerometer bias",
     "accel-scale": "accelerometer scale",
     "gyro-bias": "gyroscope bias",
     "gyro-scale": "gyroscope scale",
 }
-
+"""Groups of parameters in the first picture and the headlines; the others follow below."""
 BARS = "bars: 1 σ, the bias drift within a recording included"
 NEXT = "Use the common parameters (-o FILE writes them): their uncertainty is that of the next recording."
 
@@ -53,7 +51,8 @@ def sessions_report(model: SessionsModel) -> Document:
     sections += [Section("Figures", (picture,)) for picture in _further(model)]
     usable = agree
     if changed:
-        usable = f"{how_many(n, 'recording')} of which {_and([change.id for change in changed])} changed"
+        names = listed(list(dict.fromkeys(change.id for change in changed)))
+        usable = f"{how_many(n, 'recording')} of which {names} changed"
     return Document(
         title="Many recordings",
         subtitle=_named([session.name for session in model.sessions]),
@@ -69,7 +68,7 @@ def sessions_report(model: SessionsModel) -> Document:
 def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
     """Uncertainty of the next recording's parameters on the worst axis: of the common value, with repeatability."""
     out = []
-    for name, words in HEADLINES.items():
+    for name, words in DRIFTING.items():
         axes = [one for one in model.repeated if one.parameter.id == name]
         if not axes:
             continue
@@ -85,7 +84,7 @@ def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
 
 def _lead(model: SessionsModel) -> Picture:
     """Scales and biases of every recording."""
-    chart = partial(sessions_chart, model, DRIFTING, 2)
+    chart = partial(sessions_chart, model, tuple(DRIFTING), 2)
     has_band = model.thermal is None and any(one.within is not None for one in model.repeated)
     caption = f"Scale and bias of both sensors in every recording, about the common value; {BARS}"
     caption += "; band: session to session (1 σ)." if has_band else "."
@@ -94,11 +93,6 @@ def _lead(model: SessionsModel) -> Picture:
 
 def _named(names: list[str]) -> str:
     return ", ".join(names) if len(names) <= 6 else f"{', '.join(names[:3])} ... {names[-1]}"
-
-
-def _and(words: list[str]) -> str:
-    words = list(dict.fromkeys(words))
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
 
 
 def _range(thermal: ThermalModel) -> str:
@@ -132,7 +126,10 @@ def _repeatability(model: SessionsModel) -> list[Block]:
     head = ["parameter", "common ± σ", "session to session", "95 %"]
     head += [between, "95 %"] if grouped else []
     head += ["median σ of one"]
-    rows = [tuple(_row(one, grouped)) for one in model.repeated]
+    rows = []
+    for one in model.repeated:
+        own = plain_number(one.own_std * shown(one.parameter.unit)[0], 2)
+        rows.append((*repeated_cells(one, (one.within, one.between) if grouped else (one.within,)), own))
     return [
         Table(
             tuple(head),
@@ -144,30 +141,21 @@ def _repeatability(model: SessionsModel) -> list[Block]:
     ]
 
 
-def _row(one: Repeated, grouped: bool) -> list[str]:
+def repeated_cells(one: Repeated, spreads: tuple[Spread | None, ...]) -> list[str]:
+    """A parameter with its common value, and each of its ``spreads`` with its 95 % interval."""
     factor, unit = shown(one.parameter.unit)
-    value = one.value
+    value = one.value - (0.5 * math.pi if one.parameter.id.endswith("misalignment") else 0.0)
+    common = with_sigma(value * factor, one.std * factor)
     if one.parameter.id.endswith("scale"):
-        value = 0.0
-    elif one.parameter.id.endswith("misalignment"):
-        value -= 0.5 * math.pi
-    cells = [f"{one.parameter.id} {axis_in_print(one.parameter.name)} [{unit}]"]
-    cells.append(
-        f"± {plain_number(one.std * factor, 2)}"
-        if one.parameter.id.endswith("scale")
-        else with_sigma(value * factor, one.std * factor)
-    )
-    cells += _spread_cells(one.within, factor)
-    if grouped:
-        cells += _spread_cells(one.between, factor)
-    return [*cells, plain_number(one.own_std * factor, 2)]
-
-
-def _spread_cells(spread: Spread | None, factor: float) -> list[str]:
-    if spread is None:
-        return ["–", "–"]
-    low, high = (plain_number(value * factor, 2) for value in (spread.low, spread.high))
-    return ["not detectable" if spread.sd == 0.0 else plain_number(spread.sd * factor, 2), f"{low} to {high}"]
+        common = f"± {plain_number(one.std * factor, 2)}"
+    cells = [f"{one.parameter.id} {axis_in_print(one.parameter.name)} [{unit}]", common]
+    for spread in spreads:
+        if spread is None:
+            cells += ["–", "–"]
+            continue
+        sd, low, high = (plain_number(size * factor, 2) for size in (spread.sd, spread.low, spread.high))
+        cells += [sd if spread.sd else "not detectable", f"{low} to {high}"]
+    return cells
 
 
 def _changes(model: SessionsModel) -> list[Block]:
@@ -186,32 +174,38 @@ def _changes(model: SessionsModel) -> list[Block]:
     ]
 
 
-def _said(change: Change) -> str:
+def change_in_words(change: Change) -> tuple[str, list[str], str]:
+    """What changed from recording to recording, its size along each axis, and their unit."""
     factor, unit = shown(change.unit)
-    pairs = [(size * factor, std * factor) for size, std in zip(change.size, change.std, strict=True)]
-    cells = [plain_number(v, 2) if change.kind == "scatter" else with_sigma(v, s) for v, s in pairs]
-    sizes = ", ".join(f"{axis_in_print(name)} {cell}" for name, cell in zip(change.names, cells, strict=True))
+    sizes = each_with_sigma(change.size, change.std, factor)
+    if change.kind == "scatter":
+        sizes = [plain_number(size * factor, 2) for size in change.size]
     what = {
         "differs": "second less first",
         "apart": f"{change.where} apart",
         "step": f"from {change.where} on",
-        "trend": "each recording by",
-        "scatter": "in every recording, sd",
+        "trend": "per recording",
+        "scatter": "standard deviation",
     }[change.kind]
-    return f"{what}: {sizes} {unit}"
+    return what, sizes, unit
+
+
+def _said(change: Change) -> str:
+    what, sizes, unit = change_in_words(change)
+    along = ", ".join(f"{axis_in_print(name)} {size}" for name, size in zip(change.names, sizes, strict=True))
+    return f"{what}: {along} {unit}"
 
 
 def _thermal(thermal: ThermalModel) -> list[Block]:
     rows = []
     powers = ("", "per °C", "per °C²", "per °C³")
     for term in thermal.terms:
-        factor, unit = shown("1" if term.id.endswith("scale") else _unit(term.id))
+        factor, unit = shown(next(one.unit for one in PARAMETERS if one.id == term.id))
         for k in range(term.order + 1):
-            values = term.coefficients[k] * factor
-            sigma = [math.sqrt(max(float(term.covariance[axis][k, k]), 0.0)) * factor for axis in range(3)]
             if k == 0 and term.id.endswith(("scale", "misalignment")):
                 continue
-            cells = [with_sigma(float(v), s) for v, s in zip(values, sigma, strict=True)]
+            sigma = [math.sqrt(max(float(term.covariance[axis][k, k]), 0.0)) for axis in range(3)]
+            cells = each_with_sigma(term.coefficients[k], sigma, factor)
             rows.append((f"{term.id} [{unit} {powers[k]}]".replace(" ]", "]"), *cells))
         spread = [plain_number(one.sd * factor, 2) for one in term.remaining]
         rows.append((f"{term.id}, order {term.order}: what remains [{unit}]", *spread))
@@ -225,10 +219,6 @@ def _thermal(thermal: ThermalModel) -> list[Block]:
         ),
         Table(("parameter", "x or xy", "y or xz", "z or yz"), tuple(rows), "Slopes by axis"),
     ]
-
-
-def _unit(name: str) -> str:
-    return {"accel-bias": "m/s^2", "gyro-bias": "rad/s"}.get(name, "rad")
 
 
 def _sessions(model: SessionsModel) -> Table:
@@ -255,12 +245,9 @@ def _further(model: SessionsModel) -> list[Picture]:
 def sessions_columns(model: SessionsModel) -> Columns:
     """A row per parameter: common value, standard error, spreads with their intervals (SI)."""
     columns: dict[str, list[Any]] = {
-        "id": [one.parameter.id for one in model.repeated],
-        "name": [one.parameter.name for one in model.repeated],
-        "unit": [one.parameter.unit for one in model.repeated],
-        "value": [one.value for one in model.repeated],
-        "std": [one.std for one in model.repeated],
+        name: [getattr(one.parameter, name) for one in model.repeated] for name in ("id", "name", "unit")
     }
+    columns |= {name: [getattr(one, name) for one in model.repeated] for name in ("value", "std")}
     for kind in ("within", "between"):
         spreads: list[Spread | None] = [getattr(one, kind) for one in model.repeated]
         for part in ("sd", "low", "high"):
