@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,17 +13,8 @@ from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.report.axes import axis_in_print
 from trihedron.report.chart import Chart, Colour, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Picture
-from trihedron.report.numbers import plain_number
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
+from trihedron.report.numbers import SHOWN, plain_number
 
-STAGES = {"as-given": "as given", "parameters": "parameters", "noise": "noise", "effects": "effects"}
-PRINTED = {
-    "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
-    "rad/s": (degrees_from_radians(1.0), "°/s"),
-    "deg": (1.0, "°"),
-    "m/s": (1.0, "m/s"),
-    "dB": (1.0, "dB"),
-}
 WORDS = {
     "static-accel": "gravity error in static poses",
     "static-gyro": "gyro rate in static poses",
@@ -31,6 +23,7 @@ WORDS = {
     "noise": "noise, octave by octave",
 }
 SLOPES: tuple[Colour, ...] = ("c1", "c2", "c3", "accent", "soft")
+FEWEST_STAGES = 3
 FEWEST_OCTAVES = 2
 PER_OCTAVE = 24
 """Frequencies per octave of the integral: at the longest averaging time sin⁴ oscillates within the upper octaves."""
@@ -41,12 +34,10 @@ Spectrum = tuple[FloatArray, FloatArray, FloatArray]
 
 def stages_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
     """Cross-validated misfit after every stage."""
-    if len(diagnosis.stages) < len(STAGES) - 1:
+    if len(diagnosis.stages) < FEWEST_STAGES:
         return ()
-    caption = (
-        "Cross-validated residual, stage by stage: as given, with its own parameters, noise, effects; each domain "
-    )
-    caption += "against its own first stage."
+    caption = "Cross-validated residual, stage by stage: as given, with its own parameters, noise, effects; each "
+    caption += "domain against its own first stage."
     return (Picture("stages", caption, partial(stages_chart, diagnosis)),)
 
 
@@ -65,15 +56,15 @@ def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 def stages_chart(diagnosis: Diagnosis) -> Chart:
     """One line per domain: rms after every stage over that of the first, since units differ."""
-    names = tuple(STAGES[stage.stage] for stage in diagnosis.stages)
+    names = tuple(stage.stage.replace("-", " ") for stage in diagnosis.stages)
     marks: list[Mark] = []
     least = 1.0
     for (domain, words), colour in zip(WORDS.items(), SLOPES, strict=True):
         found = [(k, d) for k, stage in enumerate(diagnosis.stages, 1) for d in stage.domains if d.domain == domain]
-        found = [(k, d) for k, d in found if d.unit in PRINTED and d.rms > 0.0]
+        found = [(k, d) for k, d in found if d.unit in SHOWN and d.rms > 0.0]
         if len(found) < FEWEST_OCTAVES:
             continue
-        factor, unit = PRINTED[found[0][1].unit]
+        factor, unit = SHOWN[found[0][1].unit]
         x = np.array([k for k, _ in found], dtype=np.float64)
         y = 100.0 * np.array([d.rms for _, d in found]) / found[0][1].rms
         told = [f"{words}, {names[k - 1]}: {plain_number(factor * d.rms)} {unit} rms" for k, d in found]
@@ -88,12 +79,11 @@ def spectra_chart(diagnosis: Diagnosis) -> Chart:
     """A panel per sensor and axis: noise density in every octave, constant over its band."""
     panels = []
     for (sensor, axis), (edges, model, own) in _spectra(diagnosis.noise_compared).items():
-        unit = _unit(sensor) + "/√Hz"
+        unit = f"{_unit(sensor)}/√Hz"
         x = np.concatenate([edges, np.full((len(edges), 1), np.nan)], axis=1).ravel()
-        marks = _both(x, np.repeat(model, 3), np.repeat(own, 3))
-        panels.append(
-            _panel("frequency [Hz]", "Hz", f"density [{unit}]", unit, marks, f"{_said(sensor)} {axis_in_print(axis)}")
-        )
+        lines = _both(x, np.repeat(model, 3), np.repeat(own, 3))
+        scales = Scale("frequency [Hz]", "Hz", is_log=True), Scale(f"density [{unit}]", unit, is_log=True)
+        panels.append(_panel(scales, lines, f"{_said(sensor)} {axis_in_print(axis)}"))
     return Chart(tuple(panels), columns=3)
 
 
@@ -110,17 +100,9 @@ def allan_chart(diagnosis: Diagnosis) -> Chart:
         if len(edges) < FEWEST_OCTAVES:
             continue
         tau = np.geomspace(0.5 / edges[-1, 1], 0.25 / edges[0, 0], 60)
-        marks = _both(tau, allan_of(edges, model, tau), allan_of(edges, own, tau))
-        panels.append(
-            _panel(
-                "averaging time τ [s]",
-                "s",
-                f"Allan deviation [{unit}]",
-                unit,
-                marks,
-                f"{_said(sensor)} {axis_in_print(axis)}",
-            )
-        )
+        lines = _both(tau, allan_of(edges, model, tau), allan_of(edges, own, tau))
+        scales = Scale("averaging time τ [s]", "s", is_log=True), Scale(f"Allan deviation [{unit}]", unit, is_log=True)
+        panels.append(_panel(scales, lines, f"{_said(sensor)} {axis_in_print(axis)}"))
     return Chart(tuple(panels), columns=3)
 
 
@@ -134,14 +116,14 @@ def allan_of(edges_hz: FloatArray, density: FloatArray, tau_s: FloatArray) -> Fl
     return np.sqrt(out)
 
 
-def _both(x: FloatArray, model: FloatArray, own: FloatArray) -> tuple[Mark, ...]:
+def _both(x: FloatArray, model: FloatArray, own: FloatArray) -> tuple[Line, Line]:
     return (Line(x, own, "recording", "accent"), Line(x, model, "model", "ink", is_dashed=True))
 
 
-def _panel(x: str, unit_x: str, y: str, unit_y: str, marks: Sequence[Mark], title: str) -> Panel:
-    seen = np.concatenate([m.y[np.isfinite(m.x)] for m in marks if isinstance(m, Line)])
+def _panel(scales: tuple[Scale, Scale], lines: tuple[Line, Line], title: str) -> Panel:
+    seen = np.concatenate([line.y[np.isfinite(line.x)] for line in lines])
     limits = (float(seen.min()) / 1.6, float(seen.max()) * 1.6)
-    return Panel(Scale(x, unit_x, is_log=True), Scale(y, unit_y, is_log=True, limits=limits), tuple(marks), title=title)
+    return Panel(scales[0], replace(scales[1], limits=limits), lines, title=title)
 
 
 def _spectra(compared: Sequence[NoiseDifference]) -> dict[tuple[str, str], Spectrum]:

@@ -11,19 +11,12 @@ from trihedron.records.domains import DomainResiduals
 from trihedron.report.axes import channel_in_print
 from trihedron.report.chart import AXIS_COLOURS, MOST_OF_A_BAR, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.drawn import said
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
-
-PRINTED = {
-    "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
-    "rad/s": (degrees_from_radians(1.0), "°/s"),
-    "deg": (1.0, "°"),
-    "m/s": (1.0, "m/s"),
-}
+from trihedron.report.numbers import shown
 
 
 def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Chart:
     """Residuals of one domain before and after the effects on one scale; without effects a single panel."""
-    factor, unit = PRINTED[residuals.unit]
+    factor, unit = shown(residuals.unit)
     sides = [
         (
             "linear model" if has_effects else "fitted model",
@@ -38,18 +31,12 @@ def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Char
     times = np.concatenate([np.ravel(time_s) for _, time_s, *_ in sides])
     start, end = (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)
     room = 0.02 * (end - start) or 1.0
+    x = Scale("time [s]", "s", limits=(max(start - room, min(start, 0.0)), end + room))
+    y = Scale(f"{residuals.quantity} [{unit}]", unit, limits=(low, high))
     panels = []
     for title, time_s, value, sigma, names in sides:
         marks = _domain_marks(residuals, (time_s, factor * value, factor * sigma), names, unit)
-        panels.append(
-            Panel(
-                Scale("time [s]", "s", limits=(max(start - room, min(start, 0.0)), end + room)),
-                Scale(f"{residuals.quantity} [{unit}]", unit, limits=(low, high)),
-                marks,
-                title=title,
-                height_px=200,
-            )
-        )
+        panels.append(Panel(x, y, marks, title=title, height_px=200))
     return Chart(tuple(panels), columns=len(panels))
 
 

@@ -25,13 +25,9 @@ from trihedron.report.chart import (
     Sphere,
     limits_of,
 )
-from trihedron.report.disc import drawn_disc
-from trihedron.report.matrix import drawn_matrix
-from trihedron.report.notes import apart
+from trihedron.report.directions import drawn_disc, drawn_matrix, drawn_sphere
+from trihedron.report.layout import UNITS, Places, apart, ticks
 from trihedron.report.numbers import plain_number, with_sigma
-from trihedron.report.places import UNITS, Places
-from trihedron.report.sphere import drawn_sphere
-from trihedron.report.ticks import ticks
 
 COARSE = 10
 """Resolution of long curves, in units of a panel; finer steps are not visible."""

@@ -34,7 +34,7 @@ from trihedron.report.chart import (
     Span,
     Sphere,
 )
-from trihedron.report.disc import equal_area
+from trihedron.report.directions import equal_area
 
 # The axes: distinct for colour-blind readers and in grey (Okabe and Ito).
 COLOURS: dict[Colour, str] = {

@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from trihedron.errors import RefusedError
 from trihedron.files.calibration import calibration_document, plain
@@ -50,8 +49,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class _Shown:
+class _Shown(NamedTuple):
     """Functions that make the report, the JSON and the columns of one kind of record."""
 
     document: Any
@@ -59,13 +57,11 @@ class _Shown:
     columns: Any = None
 
 
-def _calibrated(result: Any) -> Any:
-    return machine.calibration_record(result.calibration, result.segments, result.recording)
-
-
 _KINDS: dict[type, _Shown] = {
     CalibrationResult: _Shown(
-        calibration_result_report, _calibrated, lambda r: frames.calibration_columns(r.calibration)
+        calibration_result_report,
+        lambda r: machine.calibration_record(r.calibration, r.segments, r.recording),
+        lambda r: frames.calibration_columns(r.calibration),
     ),
     VerificationResult: _Shown(
         lambda r: verification_report(r.verification, r.segments, r.recording),

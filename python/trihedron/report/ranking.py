@@ -38,9 +38,10 @@ def ranking_report(ranking: Ranking) -> Document:
     verdict += f"; {listed(rejected)} {'is' if len(rejected) == 1 else 'are'} rejected." if rejected else "."
     if best.is_rejected:
         verdict = f"None of these calibrations fits this log: of the best, {best.name}, {said_of(best)}."
-    chart = partial(ranking_chart, ranking)
     caption = "Errors of each calibration on this log, the best first."
-    facts = (("gravity", f"{ranking.gravity_m_s2:.5f} m/s², {ranking.gravity_source}"), ("judged on", _judged_on(best)))
+    v = best.verification
+    judged_on = f"{how_many(len(v.norm_error), 'pose')}, {how_many(len(v.angle_deg), 'move')}"
+    facts = (("gravity", f"{ranking.gravity_m_s2:.5f} m/s², {ranking.gravity_source}"), ("judged on", judged_on))
     sections = [
         Section("Ranking", (Facts(facts), _order(ranking))),
         Section("What is wrong with each", (Facts(tuple((one.name, said_of(one)) for one in ranking.candidates)),)),
@@ -53,7 +54,7 @@ def ranking_report(ranking: Ranking) -> Document:
         is_trustworthy=not best.is_rejected,
         sections=tuple(sections),
         headlines=headlines_of(best.verification),
-        lead=Picture("order", caption, chart),
+        lead=Picture("order", caption, partial(_ranking_chart, ranking)),
         next_step=AGAIN if best.is_rejected else f"Use {best.name}: trihedron apply, trihedron export.",
     )
 
@@ -85,11 +86,6 @@ def _factor(factor: float) -> str:
         if math.isclose(factor, value) or math.isclose(factor, 1.0 / value):
             return words
     return f"{factor:.4g}"
-
-
-def _judged_on(one: Ranked) -> str:
-    v = one.verification
-    return f"{how_many(len(v.norm_error), 'pose')}, {how_many(len(v.angle_deg), 'move')}"
 
 
 def _order(ranking: Ranking) -> Table:
@@ -153,7 +149,7 @@ ROW_PX = 34
 INTERVAL = "95 % interval"
 
 
-def ranking_chart(ranking: Ranking) -> Chart:
+def _ranking_chart(ranking: Ranking) -> Chart:
     """A row per calibration, the best first: gravity error in static poses, and tilt error after a rotation."""
     found = ranking.candidates
     gravity = [(one.verification.norm_rms, *one.norm_interval) for one in found]

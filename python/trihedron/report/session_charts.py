@@ -7,6 +7,7 @@ import numpy as np
 from trihedron.arrays import XYZ, BoolArray
 from trihedron.records import Recording, Segments, Truth, Verification
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
+from trihedron.report.channels import logged_sensors
 from trihedron.report.chart import AXIS_COLOURS, Band, Bars, Chart, Colour, Level, Line, Panel, Points, Scale, Span
 from trihedron.report.drawn import envelope, said
 from trihedron.report.numbers import unit_in_print
@@ -40,12 +41,7 @@ def truth_chart(recording: Recording, truth: Truth) -> Chart:
 def _signals(recording: Recording, spans: tuple[Span, ...]) -> Chart:
     panels = []
     limits = (float(recording.time_s[0]), float(recording.time_s[-1]) or 1.0)
-    for readings, name, unit in (
-        (recording.accelerometer, "accelerometer", recording.accelerometer_unit.value),
-        (recording.gyroscope, "gyroscope", recording.gyroscope_unit.value),
-    ):
-        if readings is None:
-            continue
+    for name, readings, unit in logged_sensors(recording):
         lines = [
             Line(*envelope(recording.time_s, readings[:, k]), XYZ[k], AXIS_COLOURS[k], is_thin=True) for k in range(3)
         ]

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.recording import distinct_names
 from trihedron.records.shared_effects import SharedCandidate, SharedDiagnosis, SharedEffect
 from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale
@@ -27,6 +26,8 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
         verdict = f"{listed(own)} {verb} to the instrument: one size fits all recordings."
     elif found.effects:
         verdict = f"{listed([one.id for one in found.effects])} differs from recording to recording."
+    tried = tuple((one.id, plain_number(one.score)) for one in found.candidates)
+    n_alone = sum(map(bool, found.of_single_recordings))
     return Document(
         title="Diagnosis of several recordings",
         subtitle=", ".join(names),
@@ -35,20 +36,15 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
         sections=(
             Section("Effects that all recordings share", _effects(found, names)),
             Section("Each recording by itself", (_each(found, names),)),
-            Section("Candidates", (Table(("effect", "score together"), _candidates(found), "The catalogue"),)),
+            Section("Candidates", (Table(("effect", "score together"), tried, "The catalogue"),)),
         ),
         stated_level="usable" if found.effects else "good",
-        headlines=_headlines(found),
+        headlines=(
+            Headline("recordings", str(len(found.diagnoses)), "", f"{n_alone} with effects of their own"),
+            Headline("shared effects", str(len(own)), "", "of the instrument"),
+        ),
         lead=_lead(found, names),
         next_step=_next_step(found, own),
-    )
-
-
-def _headlines(found: SharedDiagnosis) -> tuple[Headline, ...]:
-    n_named = sum(bool(alone) for alone in found.of_single_recordings)
-    return (
-        Headline("recordings", str(len(found.diagnoses)), "", f"{n_named} with effects of their own"),
-        Headline("shared effects", str(sum(one.is_of_instrument for one in found.effects)), "", "of the instrument"),
     )
 
 
@@ -80,15 +76,9 @@ def _effects(found: SharedDiagnosis, names: list[str]) -> tuple[Block, ...]:
     blocks: list[Block] = []
     for k, effect in enumerate(found.effects):
         alone = ", ".join(plain_number(score) for score in effect.scores)
-        blocks.append(
-            Facts(
-                (
-                    (f"{k + 1}. {effect.id}", f"score {plain_number(effect.score)} together; {alone} in each"),
-                    ("", _agreement(effect)),
-                )
-            )
-        )
-        blocks.append(_parameters(effect, names))
+        scores = f"score {plain_number(effect.score)} together; {alone} in each"
+        facts = Facts(((f"{k + 1}. {effect.id}", scores), ("", _agreement(effect))))
+        blocks += [facts, _parameters(effect, names)]
     return tuple(blocks)
 
 
@@ -104,13 +94,10 @@ def _parameters(effect: SharedEffect, names: list[str]) -> Table:
     for i, common in enumerate(effect.parameters):
         largest = max(abs(one[i].value) for one in (effect.parameters, *effect.each))
         scale, unit = parameter_unit(common.unit, largest)
-        cells = [_cell(one[i], scale) for one in (effect.parameters, *effect.each)]
+        found = [one[i] for one in (effect.parameters, *effect.each)]
+        cells = [value_in_words(scale * one.value, scale * one.std) for one in found]
         rows.append((common.name, *cells, unit))
     return Table(("parameter", "together", *names, "unit"), tuple(rows), "Parameters together and alone")
-
-
-def _cell(one: EffectParameter, scale: float) -> str:
-    return value_in_words(scale * one.value, scale * one.std)
 
 
 def _each(found: SharedDiagnosis, names: list[str]) -> Table:
@@ -119,10 +106,6 @@ def _each(found: SharedDiagnosis, names: list[str]) -> Table:
         for name, one, alone in zip(names, found.diagnoses, found.of_single_recordings, strict=True)
     )
     return Table(("recording", "verdict", "named here alone"), rows, "Recordings by themselves")
-
-
-def _candidates(found: SharedDiagnosis) -> tuple[tuple[str, ...], ...]:
-    return tuple((one.id, plain_number(one.score)) for one in found.candidates)
 
 
 def shared_diagnosis_record(found: SharedDiagnosis) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+from trihedron.records.finding import Severity
 from trihedron.report.findings import (
     accelerometer,
     api,
@@ -19,7 +20,7 @@ from trihedron.report.findings import (
     reference,
     segment,
 )
-from trihedron.report.findings.entry import Code, Entry, Severity
+from trihedron.report.findings.entry import Code, Entry
 from trihedron.report.findings.wording import filled
 
 ENTRIES: tuple[Entry, ...] = tuple(
