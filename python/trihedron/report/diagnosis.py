@@ -12,8 +12,7 @@ from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.report.axes import LETTERS
 from trihedron.report.calibration_fit import figures_table
-from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pictures
-from trihedron.report.diagnosis_charts import before_after_chart
+from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relations_blocks
 from trihedron.report.diagnosis_numbers import differing_blocks, noise_blocks, numbers_blocks, stages_blocks
 from trihedron.report.diagnosis_overview_charts import (

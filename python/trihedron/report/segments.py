@@ -1,4 +1,4 @@
-"""Report of a segmentation: poses, moves, noise."""
+"""Reports of a recording and of its poses and moves, with the charts of its signals."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import AXES
-from trihedron.records import Recording, Segments, Severity
+from trihedron.arrays import AXES, XYZ
+from trihedron.records import Recording, Segments, Severity, Truth
+from trihedron.report.channels import logged_sensors
+from trihedron.report.chart import AXIS_COLOURS, Chart, Line, Panel, Points, Scale, Span
 from trihedron.report.document import Document, Facts, Headline, Picture, Section, Table
+from trihedron.report.drawn import envelope, said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
-from trihedron.report.session_charts import means_chart, signals_chart
 
 
 def segments_report(segments: Segments, recording: Recording | None = None) -> Document:
@@ -99,3 +101,74 @@ def signals_picture(recording: Recording, segments: Segments) -> Picture:
     caption = "The recording; shaded where the sensor stood still"
     caption += ", orange where a pose was disturbed." if any(pose.disturbed for pose in segments.poses) else "."
     return Picture("signals", caption, partial(signals_chart, recording, segments))
+
+
+def signals_chart(recording: Recording, segments: Segments | None = None) -> Chart:
+    """Both sensors over time; with segments, poses are shaded and disturbances marked."""
+    poses = () if segments is None else segments.poses
+    time_s = recording.time_s
+    spans = [Span(float(time_s[h.start]), float(time_s[h.stop - 1]), "pose") for h in poses]
+    last = recording.n_samples - 1
+    bumps = [
+        Span(float(time_s[a]), float(time_s[min(b, last)]), "disturbed, excluded", "warn")
+        for pose in poses
+        for a, b in pose.disturbed
+    ]
+    return _signals(recording, (*spans, *bumps))
+
+
+def truth_chart(recording: Recording, truth: Truth) -> Chart:
+    """Both sensors of a simulation over time, with the true static intervals shaded."""
+    time_s, last = recording.time_s, recording.n_samples - 1
+    spans = [Span(float(time_s[min(h.start, last)]), float(time_s[min(h.stop - 1, last)]), "pose") for h in truth.poses]
+    return _signals(recording, tuple(spans))
+
+
+def _signals(recording: Recording, spans: tuple[Span, ...]) -> Chart:
+    panels = []
+    limits = (float(recording.time_s[0]), float(recording.time_s[-1]) or 1.0)
+    for name, readings, unit in logged_sensors(recording):
+        lines = [
+            Line(*envelope(recording.time_s, readings[:, k]), XYZ[k], AXIS_COLOURS[k], is_thin=True) for k in range(3)
+        ]
+        printed = unit_in_print(unit)
+        y = Scale(f"{name}  [{printed}]", printed)
+        panels.append(Panel(Scale("time [s]", "s", limits=limits), y, (*spans, *lines), height_px=190))
+    return Chart(tuple(panels), is_linked=True)
+
+
+def means_chart(segments: Segments) -> Chart:
+    """Mean readings of every pose over time, in the unit of the log."""
+    panels = []
+    for name, means in (("accelerometer", segments.accelerometer_mean), ("gyroscope", segments.gyroscope_mean)):
+        if means is None:
+            continue
+        marks = tuple(
+            Points(
+                segments.time_mid_s, means[:, k],
+                [said(f"pose {n}, {axis}", v, "") for n, v in enumerate(means[:, k], 1)],
+                None, axis, AXIS_COLOURS[k],
+            )
+            for k, axis in enumerate(XYZ)
+        )  # fmt: skip
+        panels.append(Panel(Scale("time [s]", "s"), Scale(name), marks, height_px=190))
+    return Chart(tuple(panels), is_linked=True)
+
+
+def recording_summary(recording: Recording) -> Document:
+    """Length, rate, sensors and rows of a log, with its audit."""
+    facts = recording_facts(recording)
+    if recording.rows_in_file:
+        rows = f"{recording.rows_in_file} in the file, {recording.rows_read} read, {recording.rows_reported} reported"
+        facts = (*facts, ("rows", rows))
+    return Document(
+        title="Recording",
+        subtitle=recording.source,
+        verdict=verdict_of(recording.findings, "OK: no problems found.", "Read", "DOUBTFUL"),
+        is_trustworthy=not any(finding.severity is Severity.SERIOUS for finding in recording.findings),
+        sections=(
+            Section("Recording", (Facts(facts),)),
+            Section("Findings", (findings_block(recording.findings),)),
+            Section("Figures", (Picture("signals", "The recording.", partial(signals_chart, recording)),)),
+        ),
+    )

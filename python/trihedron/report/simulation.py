@@ -14,7 +14,7 @@ from trihedron.report.calibration import SYMBOLS
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.noise_units import unit_of
 from trihedron.report.numbers import duration, how_many, one_of, plain_number, unit_in_print
-from trihedron.report.session_charts import truth_chart
+from trihedron.report.segments import truth_chart
 
 
 def simulation_report(recording: Recording, truth: Truth) -> Document:

@@ -7,12 +7,15 @@ from functools import partial
 
 import numpy as np
 
+from trihedron.arrays import BoolArray
 from trihedron.records import Finding, FindingCode, Recording, Segments, Verification
+from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
+from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
+from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown
 from trihedron.report.segments import signals_picture
-from trihedron.report.session_charts import verification_chart
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_radians
 
 _ABOVE_NOISE = {
@@ -161,3 +164,58 @@ def _tables(v: Verification, segments: Segments | None) -> list[Block]:
         caption = "Tilt error after every rotation: gravity predicted with the gyro against gravity measured"
         blocks.append(Table(head, rows, caption))
     return blocks
+
+
+ALLOWED = "3 σ of noise and calibration uncertainty"
+LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
+"""Limit of the length of a two-component Gaussian error, over its rms, with the probability of 3σ (0.27 %)."""
+
+
+def verification_chart(verification: Verification) -> Chart:
+    """Gravity error of every pose and tilt error after every move, with their expected size."""
+    v = verification
+    pose = np.arange(1, len(v.norm_error) + 1, dtype=np.float64)
+    error, sigma = mm_s2(v.norm_error), mm_s2(v.norm_sigma)
+    edge = np.column_stack([pose - 0.5, pose + 0.5]).ravel()
+    limit = np.repeat(LIMIT_SIGMAS * sigma, 2)
+    told = [
+        said(f"pose {k}", e, f"mm/s² ({e / s:+.1f}σ)".replace("-", "−"))
+        for k, (e, s) in enumerate(zip(error, sigma, strict=True), start=1)
+    ]
+    norm = Panel(
+        Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True),
+        Scale("|f| − |g|  [mm/s²]", "mm/s²"),
+        (
+            Band(edge, -limit, limit, ALLOWED),
+            Level(y=0.0),
+            *(
+                Points(pose[part], error[part], [told[i] for i in np.flatnonzero(part)], None, name, colour)
+                for part, name, colour in _parted(np.abs(error) > LIMIT_SIGMAS * sigma)
+            ),
+        ),
+    )
+    if not len(v.angle_deg):
+        return Chart((norm,))
+    move = (v.moves + 1).astype(np.float64)
+    told = [said(f"move {k + 1}", a, "°") for k, a in zip(v.moves, v.angle_deg, strict=True)]
+    edge = np.column_stack([move - 0.5, move + 0.5]).ravel()
+    limit = np.repeat(LIMIT_RMS * v.angle_sigma_deg, 2)
+    moves = Panel(
+        Scale("move", limits=(0.3, move[-1] + 0.7), whole=True),
+        Scale("tilt error  [°]", "°", includes=(0.0,)),
+        (
+            Band(edge, 0.0 * limit, limit, ALLOWED),
+            *(
+                Bars(move[part], v.angle_deg[part], 0.7, [told[i] for i in np.flatnonzero(part)], name, colour)
+                for part, name, colour in _parted(v.angle_deg > LIMIT_RMS * v.angle_sigma_deg)
+            ),
+        ),
+        height_px=180,
+    )
+    return Chart((norm, moves))
+
+
+def _parted(is_beyond: BoolArray) -> list[tuple[BoolArray, str, Colour]]:
+    """Masks, names and colours of the points within and beyond the 3 σ band, without empty ones."""
+    parts: list[tuple[BoolArray, str, Colour]] = [(~is_beyond, "within 3 σ", "c1"), (is_beyond, "beyond 3 σ", "accent")]
+    return [part for part in parts if part[0].any()]
