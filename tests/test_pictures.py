@@ -24,10 +24,9 @@ from trihedron.report.effect_charts import rest_panels
 from trihedron.report.findings.grouping import combined
 from trihedron.report.findings.wording import filled
 from trihedron.report.layout import Places, _box, _covered, apart, ticks
-from trihedron.report.many_charts import sessions_chart
 from trihedron.report.numbers import unit_with_power, with_sigma_and_power
 from trihedron.report.segments import signals_picture
-from trihedron.report.sessions import DRIFTING, sessions_report
+from trihedron.report.sessions import DRIFTING, sessions_chart, sessions_report
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.units import AccelerationUnit, RateUnit
 

@@ -87,8 +87,7 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     noise = move_noise_deg(quality)
     marks: list[Bars | Points] = []
     held = quality.held_out_angle_deg
-    width = 0.38 if held is not None else 0.7
-    shift = 0.2 if held is not None else 0.0
+    width, shift = (0.7, 0.0) if held is None else (0.38, 0.2)
     inside = np.where(is_out, np.nan, quality.angle_deg)
     marks.append(Bars(move - shift, inside, width, told, "in sample", "c1"))
     if np.any(is_out):

@@ -39,6 +39,8 @@ def demonstration_report(
     files: tuple[tuple[Path, str], ...],
 ) -> Document:
     """Lay out the demonstration."""
+    before = f"{in_mm_s2(uncalibrated_rms_m_s2)} rms with the data sheet's scale"
+    verified = (("gravity error before", before), *facts_of(verification))
     return Document(
         title="A complete session, on a simulated sensor",
         subtitle="Everything below was computed from the CSV log; only section 4 uses the truth.",
@@ -47,7 +49,7 @@ def demonstration_report(
         sections=(
             Section("1  The session", (Paragraph(_session(segments, recording)),)),
             Section("2  Calibrate", _calibrated(calibration, latitude_deg)),
-            Section("3  Verify on another session", _verified(verification, uncalibrated_rms_m_s2)),
+            Section("3  Verify on another session", (Facts(verified), *_warnings(verification.findings))),
             Section("4  Compare with the truth", (_truth_table(comparison), Paragraph(_coverage(comparison)))),
             Section("5  Files", (Facts(tuple((str(path), what) for path, what in files)),)),
             Section("Your own sensor", (_next_steps(),)),
@@ -85,11 +87,6 @@ def _calibrated(calibration: Calibration, latitude_deg: float) -> tuple[Block, .
     if calibration.gyroscope is not None:
         blocks.append(parameter_table("gyroscope", calibration.gyroscope))
     return (*blocks, *_warnings(calibration.findings))
-
-
-def _verified(verification: Verification, before: float) -> tuple[Block, ...]:
-    uncalibrated = ("gravity error before", f"{in_mm_s2(before)} rms with the data sheet's scale")
-    return (Facts((uncalibrated, *facts_of(verification))), *_warnings(verification.findings))
 
 
 def _warnings(findings: tuple[Finding, ...]) -> tuple[Block, ...]:
@@ -144,6 +141,13 @@ def _next_steps() -> Facts:
 
 
 _MOST_NUMBERS = 6
+_FILES = {
+    "unit.csv": "the log of the unit",
+    "simulation.toml": "the simulation as it was",
+    "improved.toml": "the simulation with the parameters of the log; your comments stay",
+    "disagreement.html": "the whole diagnosis, with figures",
+    "sealed.json": "what was drawn",
+}
 
 
 def disagreement_report(
@@ -157,7 +161,8 @@ def disagreement_report(
     """Lay out the disagreement, differing parameters and missing effects, the improved simulation, the answer."""
     numbers = differing_numbers(found)
     more = len(numbers) - _MOST_NUMBERS
-    told = tuple(("", word) for word in numbers[:_MOST_NUMBERS]) + ((("", f"and {more} more"),) if more > 0 else ())
+    words = [*numbers[:_MOST_NUMBERS], *([f"and {more} more"] if more > 0 else ())]
+    told = [("", word) for word in words or ["none differs"]]
     is_right = [e.id for e in found.effects][:1] == [sealed["effect"]]
     beside = any(sealed["effect"] in e.confounded_with for e in found.effects[:1])
     answer = "Found: it is the first effect named." if is_right else "Not found: another effect is named first."
@@ -169,12 +174,12 @@ def disagreement_report(
         verdict=verdict_in_words(found),
         is_trustworthy=True,
         sections=(
-            Section("Parameters: this unit differs from the data sheet", (Facts(told or (("", "none differs"),)),)),
+            Section("Parameters: this unit differs from the data sheet", (Facts(tuple(told)),)),
             Section("Physics: effects missing from the simulation", effects_blocks(found)),
             Section("Stage by stage", stages_blocks(found, MEANING)),
             Section("The improved simulation, compared with the same log", (Paragraph(verdict_in_words(improved)),)),
             Section("The drawn effect", (*_opened(sealed, sizes), Paragraph(answer))),
-            Section("Files", (_files(folder),)),
+            Section("Files", (Facts(tuple((str(folder / name), what) for name, what in _FILES.items())),)),
         ),
     )
 
@@ -190,15 +195,3 @@ def _opened(sealed: Mapping[str, Any], sizes: Mapping[str, Mapping[str, Any]]) -
 def _numbers(value: Any) -> str:
     flat = np.ravel(np.asarray(value, dtype=np.float64))
     return listed([plain_number(float(v), 3) for v in flat])
-
-
-def _files(folder: Path) -> Facts:
-    return Facts(
-        (
-            (str(folder / "unit.csv"), "the log of the unit"),
-            (str(folder / "simulation.toml"), "the simulation as it was"),
-            (str(folder / "improved.toml"), "the simulation with the parameters of the log; your comments stay"),
-            (str(folder / "disagreement.html"), "the whole diagnosis, with figures"),
-            (str(folder / "sealed.json"), "what was drawn"),
-        )
-    )

@@ -183,17 +183,14 @@ def _parameters(effect: AcceptedEffect) -> str:
     for unit in units:
         members = [p for p in effect.parameters if p.unit == unit]
         scale, shared = parameter_unit(unit, max(abs(p.value) for p in members))
-        words = [
-            f"{_parameter(p.name)} {value_in_words(scale * p.value, scale * p.std)}" for p in members[:MOST_PARAMETERS]
-        ]
+        words = []
+        for p in members[:MOST_PARAMETERS]:
+            # A symbol with its axis (K2_x) stays as it is, words (accelerometer_delay) get spaces.
+            name = p.name if len(p.name.rpartition("_")[2]) <= LETTERS else p.name.replace("_", " ")
+            words.append(f"{name} {value_in_words(scale * p.value, scale * p.std)}")
         words += [f"{len(members) - MOST_PARAMETERS} more"] if len(members) > MOST_PARAMETERS else []
         groups.append(", ".join(words) + (f" [{shared}]" if shared else ""))
     return "; ".join(groups)
-
-
-def _parameter(name: str) -> str:
-    """A printed name: a symbol with its axis (``K2_x``) unchanged, words (``accelerometer_delay``) with spaces."""
-    return name if len(name.rpartition("_")[2]) <= LETTERS else name.replace("_", " ")
 
 
 def _evidence(effect: AcceptedEffect) -> str:

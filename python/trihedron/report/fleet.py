@@ -6,11 +6,14 @@ import statistics
 from collections import Counter
 from functools import partial
 
+import numpy as np
+
 from trihedron.records.fleet import FleetLog, FleetSummary
-from trihedron.records.sessions import Change, Parameter
+from trihedron.records.sessions import PARAMETERS, Parameter
 from trihedron.report.axes import axis_in_print
+from trihedron.report.chart import AXIS_COLOURS, Chart, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
-from trihedron.report.many_charts import fleet_chart
+from trihedron.report.drawn import said
 from trihedron.report.numbers import capital, how_many, plain_number, shown
 from trihedron.report.sessions import change_in_words, repeated_cells
 
@@ -36,7 +39,8 @@ def fleet_report(summary: FleetSummary) -> Document:
     devices = {log.serial for log in summary.logs if log.status == "done" and log.serial not in mixed}
     sections = [Section("Result", (Facts(_facts(summary)),))]
     if bad:
-        sections.append(Section("Logs that were not calibrated", (_bad(bad),)))
+        reasons = tuple((f"{log.serial}: {log.name}", f"{log.status}: {log.reason}") for log in bad)
+        sections.append(Section("Logs that were not calibrated", (Facts(reasons),)))
     if mixed:
         sections.append(Section("Logs taken for one device that are not", tuple(_mixed(summary))))
     if summary.n_diagnosed:
@@ -49,7 +53,11 @@ def fleet_report(summary: FleetSummary) -> Document:
         sections.append(Section("Outliers", tuple(_outliers(summary))))
     if summary.changes:
         sections.append(Section("Drift between sessions of one device", tuple(_drift(summary))))
+    lead = None
     if n_done:
+        caption = "The parameters that differ most beside their uncertainties: a point for each log, about the median "
+        caption += "of devices; bars: 1 σ."
+        lead = Picture("differ", caption, partial(fleet_chart, summary, MOST_NAMED))
         caption = "Every parameter by device, a point for each log (bars: 1 σ); the line is the median of devices."
         sections.append(Section("Distributions", (Picture("numbers", caption, partial(fleet_chart, summary)),)))
     sections.append(Section("Every log", (_logs(summary),)))
@@ -76,7 +84,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         verdict=verdict,
         is_trustworthy=n_usable > 0 and not mixed,
         sections=tuple(sections),
-        lead=_lead(summary) if n_done else None,
+        lead=lead,
         headlines=_headlines(summary),
         next_step="" if mixed else _next_step(summary, strays, moved),
         stated_level="usable" if n_usable and not mixed and (n_usable < n or n_open or strays or moved) else None,
@@ -134,12 +142,6 @@ def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
     return tuple(out)
 
 
-def _lead(summary: FleetSummary) -> Picture:
-    caption = "The parameters that differ most beside their uncertainties: a point for each log, about the median of "
-    caption += "devices; bars: 1 σ."
-    return Picture("differ", caption, partial(fleet_chart, summary, MOST_NAMED))
-
-
 def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
     status = Counter(log.status for log in summary.logs)
     doubtful = [log for log in summary.logs if log.status == "done" and not log.is_trustworthy]
@@ -162,10 +164,6 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
             ("work", f"{plain_number(sum(seconds), 3)} s in all, {plain_number(max(seconds), 2)} s the longest log")
         )
     return tuple(facts)
-
-
-def _bad(logs: list[FleetLog]) -> Facts:
-    return Facts(tuple((f"{log.serial}: {log.name}", f"{log.status}: {log.reason}") for log in logs))
 
 
 def _mixed(summary: FleetSummary) -> list[Block]:
@@ -238,17 +236,14 @@ def _drift(summary: FleetSummary) -> list[Block]:
     )
     if not moved:
         return [Paragraph(f"No calibration shift between sessions beyond uncertainty and drift: {tested}")]
-    rows = tuple((change.group, change.id, *_drift_cells(change)) for change in moved)
-    return [
-        Paragraph(f"Tested: {tested}"),
-        Table(("device", "parameter", "how", "by", "p"), rows, "Changes between sessions"),
-    ]
-
-
-def _drift_cells(change: Change) -> tuple[str, str, str]:
-    how, sizes, unit = change_in_words(change)
-    k = max(range(len(change.size)), key=lambda i: abs(change.size[i]))
-    return how, f"{sizes[k]} {unit} in {change.names[k]}", plain_number(change.p_adjusted, 1)
+    rows = []
+    for change in moved:
+        how, sizes, unit = change_in_words(change)
+        k = max(range(len(change.size)), key=lambda i: abs(change.size[i]))
+        size = f"{sizes[k]} {unit} in {change.names[k]}"
+        rows.append((change.group, change.id, how, size, plain_number(change.p_adjusted, 1)))
+    head = ("device", "parameter", "how", "by", "p")
+    return [Paragraph(f"Tested: {tested}"), Table(head, tuple(rows), "Changes between sessions")]
 
 
 def _logs(summary: FleetSummary) -> Table:
@@ -264,8 +259,41 @@ def _logs(summary: FleetSummary) -> Table:
         )
         for log in summary.logs
     )
-    return Table(
-        ("log", "device", "status", "verdict", "effects", "poses", "cross-validated [mm/s²]"),
-        rows,
-        "What became of every log",
-    )
+    head = ("log", "device", "status", "verdict", "effects", "poses", "cross-validated [mm/s²]")
+    return Table(head, rows, "What became of every log")
+
+
+def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
+    """One panel per parameter: devices along the axis, one point per log with its standard error, about the median.
+
+    ``most``: only that many parameters, those in which devices differ most relative to their standard errors.
+    """
+    logs = [log for log in summary.logs if log.numbers is not None and log.std is not None]
+    n = min((len(log.numbers) for log in logs if log.numbers is not None), default=0)
+    serials = list(dict.fromkeys(log.serial for log in logs))
+    strays = {(one.serial, one.parameter) for one in summary.outliers}
+    serial_of = np.array([serials.index(log.serial) for log in logs])
+    order = np.array([int(np.sum(serial_of[:k] == serial_of[k])) for k in range(len(logs))])
+    count = np.bincount(serial_of, minlength=len(serials))[serial_of]
+    across = 1.0 + serial_of + 0.5 * ((order + 0.5) / count - 0.5)
+    numbers = np.array([log.numbers[:n] for log in logs if log.numbers is not None])
+    errors = np.array([log.std[:n] for log in logs if log.std is not None])
+    x = Scale("device, in the order of the table", whole=True, limits=(0.5, len(serials) + 0.5), names=tuple(serials))
+    panels = []
+    apart = numbers - np.median(numbers, axis=0)
+    strength = np.sum((apart / np.where(errors > 0.0, errors, np.inf)) ** 2, axis=0)
+    chosen = range(n) if most is None else sorted(np.argsort(-strength)[:most].tolist())
+    for k in chosen:
+        parameter = PARAMETERS[k]
+        factor, unit = shown(parameter.unit)
+        centre = float(np.median([numbers[serial_of == s, k].mean() for s in range(len(serials))]))
+        values, error = (numbers[:, k] - centre) * factor, errors[:, k] * factor
+        is_stray = np.array([(log.serial, parameter) in strays for log in logs])
+        marks: list[Level | Points] = [Level(y=0.0)]
+        for part, colour, name in ((~is_stray, AXIS_COLOURS[0], "a log"), (is_stray, "accent", "unlike the others")):
+            if part.any():
+                told = [said(logs[i].serial, values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
+                marks.append(Points(across[part], values[part], told, error[part], name, colour))
+        y = Scale(f"{parameter.id} {axis_in_print(parameter.name)}  [{unit}]", unit)
+        panels.append(Panel(x, y, tuple(marks), height_px=150))
+    return Chart(tuple(panels), columns=3 if most is None else 2)

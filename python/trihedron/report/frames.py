@@ -23,6 +23,7 @@ from trihedron.records import (
     Verification,
 )
 from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.sessions import SessionsModel, Spread
 from trihedron.report.axes import calibrated_sensors
 from trihedron.report.channels import logged_sensors
 from trihedron.report.noise_units import PER_UNIT
@@ -140,3 +141,16 @@ def curve_columns(curve: AllanCurve) -> Columns:
         columns[name] = getattr(curve, name).reshape(k, -1).T.ravel()
     columns["unit"] = [unit for unit in curve.units for _ in range(k)]
     return columns
+
+
+def sessions_columns(model: SessionsModel) -> Columns:
+    """A row per parameter: common value, standard error, spreads with their intervals (SI)."""
+    columns: dict[str, list[Any]] = {
+        name: [getattr(one.parameter, name) for one in model.repeated] for name in ("id", "name", "unit")
+    }
+    columns |= {name: [getattr(one, name) for one in model.repeated] for name in ("value", "std")}
+    for kind in ("within", "between"):
+        spreads: list[Spread | None] = [getattr(one, kind) for one in model.repeated]
+        for part in ("sd", "low", "high"):
+            columns[f"{kind}_{part}"] = [None if s is None else getattr(s, part) for s in spreads]
+    return dict(columns)

@@ -95,11 +95,9 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
         ]
         marks.append(Points(pose, np.minimum(nis, 12.0), told, None, f"{name}: one pose", AXIS_COLOURS[k], True))
         marks.append(Line(pose[window - 1 :], mean, f"{name}: running mean", AXIS_COLOURS[k]))
-    low, high = (float(stats.chi2.ppf(p, window)) / window for p in (0.005, 0.995))
-    across = np.array([0.3, n + 0.7])
-    band = Band(
-        across, np.full(2, low), np.full(2, high), f"99 % of running means (of {window}) when the noise model is right"
-    )
+    low, high = (np.full(2, float(stats.chi2.ppf(p, window)) / window) for p in (0.005, 0.995))
+    name = f"99 % of running means (of {window}) when the noise model is right"
+    band = Band(np.array([0.3, n + 0.7]), low, high, name)
     y = Scale("innovation² / predicted variance", "", includes=(0.0,))
     return Chart((Panel(Scale("pose", limits=(0.3, n + 0.7), whole=True), y, (band, Level(y=1.0), *marks)),))
 

@@ -8,6 +8,7 @@ from typing import Any
 from trihedron.files.calibration import calibration_document, plain
 from trihedron.records import AllanCurve, Calibration, Finding, Recording, Segments, Verification
 from trihedron.records.published import published_figures
+from trihedron.records.sessions import Session, SessionsModel
 from trihedron.report.axes import calibrated_sensors
 from trihedron.report.channels import channels_record
 from trihedron.sanitise import printable_json
@@ -119,4 +120,35 @@ def check_record(
         "expected": expected,
         "channels": channels_record(recording),
         "findings": [finding.to_dict() for finding in findings],
+    }
+
+
+def session_record(session: Session) -> dict[str, object]:
+    """One recording's parameters for JSON: ``values`` with their ``covariance``, the variance of the bias drift."""
+    named = {"numbers": "values", "drift": "bias_drift_variance"}
+    record = {named.get(name, name): value for name, value in vars(session).items()}
+    return {**record, "temperature_range_degc": list(session.temperature_range_degc)}
+
+
+def sessions_record(model: SessionsModel) -> dict[str, object]:
+    """The content of the report as plain types (SI)."""
+    return {
+        "by": model.by,
+        "is_trustworthy": model.is_trustworthy,
+        "sessions": [session_record(session) for session in model.sessions],
+        "parameters": [
+            {
+                **vars(one.parameter),
+                "value": one.value,
+                "std": one.std,
+                "interval": [one.value - one.half_width, one.value + one.half_width],
+                "within": None if one.within is None else vars(one.within),
+                "between": None if one.between is None else vars(one.between),
+                "own_std": one.own_std,
+            }
+            for one in model.repeated
+        ],
+        "changes": [vars(change) for change in model.changes],
+        "excluded": [{"source": source, "reason": why} for source, why in model.left_out],
+        "findings": [finding.to_dict() for finding in model.findings],
     }

@@ -270,11 +270,9 @@ def kalibr_rows(noise: Noise) -> dict[str, str]:
 
 
 def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
-    caption = (
-        "Allan deviation with its 95 % interval, the parts of the fitted sum (thin, each named) and the sum (dashed); "
-        'N is read off at 1 s, K at 3 s; "K < 2" is in the sum and does not show by itself; '
-        "the orange mark is the least deviation."
-    )
+    caption = "Allan deviation with its 95 % interval, the parts of the fitted sum (thin, each named) and the sum "
+    caption += '(dashed); N is read off at 1 s, K at 3 s; "K < 2" is in the sum and does not show by itself; '
+    caption += "the orange mark is the least deviation."
     return Picture(f"allan-{axes[0].name.split()[0]}", caption, partial(allan_chart, noise.curve, unit, axes))
 
 

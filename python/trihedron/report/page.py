@@ -51,6 +51,7 @@ def to_html(document: Document) -> str:
     ]
     lead = None if document.lead is None else _shown(document.lead)
     script = _file("body.js") + _file("page.js")
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     told, others, place = _noticed(document)
     page = template("page.html.j2").render(
         told=told,
@@ -62,7 +63,7 @@ def to_html(document: Document) -> str:
         version=_version(),
         style=Markup(_file("page.css")),
         script=Markup(script),
-        policy=f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src '{_digest(script)}'",
+        policy=f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'",
     )
     return printable(page)
 
@@ -98,11 +99,6 @@ def stacked(text: str) -> Markup:
 def path(text: str) -> Markup:
     """A file name in which a line break is allowed after each folder."""
     return escape(text).replace("/", Markup("/<wbr>"))
-
-
-def _digest(script: str) -> str:
-    """Hash of the page's script, the only one that its policy allows."""
-    return f"sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}"
 
 
 @cache

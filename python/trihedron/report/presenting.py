@@ -39,7 +39,7 @@ from trihedron.report.ranking import ranking_record, ranking_report
 from trihedron.report.reference import calibration_result_report
 from trihedron.report.saved import written
 from trihedron.report.segments import recording_summary, segments_report
-from trihedron.report.sessions import sessions_columns, sessions_record, sessions_report
+from trihedron.report.sessions import sessions_report
 from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
 from trihedron.report.text import WIDTH, to_text
 from trihedron.report.verification import verification_report
@@ -80,7 +80,9 @@ _KINDS: dict[type, _Shown] = {
         lambda r: frames.calibration_columns(r.calibration),
     ),
     SessionsResult: _Shown(
-        lambda r: sessions_report(r.model), lambda r: sessions_record(r.model), lambda r: sessions_columns(r.model)
+        lambda r: sessions_report(r.model),
+        lambda r: machine.sessions_record(r.model),
+        lambda r: frames.sessions_columns(r.model),
     ),
     SharedDiagnosis: _Shown(shared_diagnosis_report, shared_diagnosis_record),
     Calibration: _Shown(calibration_report, calibration_document, frames.calibration_columns),

@@ -15,6 +15,9 @@ from trihedron.report.numbers import how_many, listed, plain_number, with_sigma
 from trihedron.report.verification import headlines_of, parameters_table
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_from_m_s2
 
+AGAIN = "Calibrate again: none of these fits this log."
+ROW_PX = 34
+INTERVAL = "95 % interval"
 MISTAKES = {
     "bias-sign": "the bias has the wrong sign",
     "bias-order": "the bias belongs to the other side of the matrix",
@@ -25,9 +28,6 @@ MISTAKES = {
     "axes": "axes are exchanged or mirrored (another frame)",
     "gravity": "it was made with another gravity",
 }
-
-
-AGAIN = "Calibrate again: none of these fits this log."
 
 
 def ranking_report(ranking: Ranking) -> Document:
@@ -145,18 +145,14 @@ def ranking_record(ranking: Ranking) -> dict[str, object]:
     }
 
 
-ROW_PX = 34
-INTERVAL = "95 % interval"
-
-
 def _ranking_chart(ranking: Ranking) -> Chart:
     """A row per calibration, the best first: gravity error in static poses, and tilt error after a rotation."""
     found = ranking.candidates
-    gravity = [(one.verification.norm_rms, *one.norm_interval) for one in found]
-    tilt = [(one.verification.angle_rms_deg, *one.angle_interval) for one in found]
-    panels = [_panel(ranking, "gravity error", "mm/s²", mm_s2_from_m_s2(1.0) * np.array(gravity))]
+    gravity = np.array([(one.verification.norm_rms, *one.norm_interval) for one in found])
+    tilt = np.array([(one.verification.angle_rms_deg, *one.angle_interval) for one in found])
+    panels = [_panel(ranking, "gravity error", "mm/s²", mm_s2_from_m_s2(1.0) * gravity)]
     if np.isfinite(tilt).any():
-        panels.append(_panel(ranking, "tilt error", "°", np.array(tilt)))
+        panels.append(_panel(ranking, "tilt error", "°", tilt))
     return Chart(tuple(panels), columns=len(panels))
 
 

@@ -55,7 +55,10 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
     facts.append(("gyro bias", _bias(found)))
     if found.accelerometer is not None:
         facts.append(("accelerometer", _left(found.accelerometer, mm_s2_from_m_s2(1.0), "mm/s²")))
-    facts += [(f"attitude, {r.stage}", _replayed(r.error_rad, r.horizon_s, r.n)) for r in found.replay]
+    for r in found.replay:
+        error, many = plain_number(degrees_from_radians(r.error_rad)), "once" if r.n == 1 else f"{r.n} times"
+        words = f"{error}° after {r.horizon_s:g} s by the gyro alone, cross-validated ({many})"
+        facts.append((f"attitude, {r.stage}", words))
     blocks: list[Block] = [Facts(tuple(facts)), _matrix("Gyro", "ω", "rad/s", found.gyroscope)]
     if found.accelerometer is not None:
         blocks.append(_matrix("Accelerometer", "f", "m/s²", found.accelerometer))
@@ -188,12 +191,6 @@ def _left(fit: FitToReference, scale: float, unit: str) -> str:
     if fit.n_left_out:
         text += f"; {fit.n_left_out} of {fit.n_rows} windows excluded"
     return text
-
-
-def _replayed(error_rad: float, horizon_s: float, n: int) -> str:
-    many = "once" if n == 1 else f"{n} times"
-    error = plain_number(degrees_from_radians(error_rad))
-    return f"{error}° after {horizon_s:g} s by the gyro alone, cross-validated ({many})"
 
 
 def _matrix(name: str, symbol: str, unit: str, fit: FitToReference) -> Table:

@@ -9,17 +9,18 @@ import numpy as np
 from trihedron.arrays import AXES, XYZ
 from trihedron.records import Recording, Segments, Severity, Truth
 from trihedron.report.channels import logged_sensors
-from trihedron.report.chart import AXIS_COLOURS, Chart, Line, Panel, Points, Scale, Span
+from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Line, Panel, Points, Scale, Span
 from trihedron.report.document import Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import envelope, said
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
+from trihedron.report.numbers import duration, each_with_sigma, how_many, plain_number, unit_in_print
 
 
 def segments_report(segments: Segments, recording: Recording | None = None) -> Document:
     """Lay out poses and moves, with properties, times and units of the recording where that is given."""
     findings = segments.findings if recording is None else (*recording.findings, *segments.findings)
-    found, still = _counted(segments), f"{duration(_still_s(segments))} in all"
+    found = f"{how_many(segments.n_poses, 'pose')}, {how_many(len(segments.moves), 'move')}"
+    still = f"{duration(_still_s(segments))} in all"
     facts = (("found", f"{found}, {still} still"),) if recording is None else recording_facts(recording, segments)
     return Document(
         title="Poses and moves",
@@ -62,33 +63,24 @@ def recording_facts(recording: Recording, segments: Segments | None = None) -> t
     return tuple(facts)
 
 
-def _counted(segments: Segments) -> str:
-    return f"{how_many(segments.n_poses, 'pose')}, {how_many(len(segments.moves), 'move')}"
-
-
 def _still_s(segments: Segments) -> float:
     return float(np.sum(segments.duration_s)) if segments.n_poses else 0.0
 
 
 def pose_table(segments: Segments, recording: Recording | None = None) -> Table:
     """Every pose with its means; with the recording also start, end and units."""
-    if recording is None:
-        columns = {
-            "middle [s]": [f"{t:.1f}" for t in segments.time_mid_s],
-            "length [s]": [f"{t:.1f}" for t in segments.duration_s],
-        }
-    else:
-        columns = {
-            "from [s]": [f"{recording.time_s[pose.start]:.2f}" for pose in segments.poses],
-            "to [s]": [f"{recording.time_s[pose.stop - 1]:.2f}" for pose in segments.poses],
-        }
+    times = {"middle [s]": segments.time_mid_s, "length [s]": segments.duration_s}
+    columns = {name: [f"{t:.1f}" for t in of] for name, of in times.items()}
+    if recording is not None:
+        ends = {"from [s]": [p.start for p in segments.poses], "to [s]": [p.stop - 1 for p in segments.poses]}
+        columns = {name: [f"{recording.time_s[at]:.2f}" for at in of] for name, of in ends.items()}
     for letter, sensor in (("a", "accelerometer"), ("w", "gyroscope")):
         mean, sigma = getattr(segments, f"{sensor}_mean"), getattr(segments, f"{sensor}_sigma_mean")
         unit = "" if recording is None else f" [{unit_in_print(getattr(recording, f'{sensor}_unit').value)}]"
         if mean is not None:
             sigma = np.full(mean.shape, np.nan) if sigma is None else sigma
             columns |= {
-                f"{letter}′_{axis}{unit}": [with_sigma(float(m), float(s)) for m, s in zip(of, error, strict=True)]
+                f"{letter}′_{axis}{unit}": each_with_sigma(of, error)
                 for axis, of, error in zip(AXES, mean.T, sigma.T, strict=True)
             }
     rows = tuple((str(k + 1), *(cells[k] for cells in columns.values())) for k in range(segments.n_poses))
@@ -106,22 +98,20 @@ def signals_picture(recording: Recording, segments: Segments) -> Picture:
 def signals_chart(recording: Recording, segments: Segments | None = None) -> Chart:
     """Both sensors over time; with segments, poses are shaded and disturbances marked."""
     poses = () if segments is None else segments.poses
-    time_s = recording.time_s
-    spans = [Span(float(time_s[h.start]), float(time_s[h.stop - 1]), "pose") for h in poses]
-    last = recording.n_samples - 1
-    bumps = [
-        Span(float(time_s[a]), float(time_s[min(b, last)]), "disturbed, excluded", "warn")
-        for pose in poses
-        for a, b in pose.disturbed
-    ]
+    spans = [_span(recording, pose.start, pose.stop - 1) for pose in poses]
+    bumps = [_span(recording, *part, "disturbed, excluded", "warn") for pose in poses for part in pose.disturbed]
     return _signals(recording, (*spans, *bumps))
+
+
+def _span(recording: Recording, first: int, last: int, name: str = "pose", colour: Colour = "shade") -> Span:
+    end = recording.n_samples - 1
+    start_s, stop_s = (float(recording.time_s[min(at, end)]) for at in (first, last))
+    return Span(start_s, stop_s, name, colour)
 
 
 def truth_chart(recording: Recording, truth: Truth) -> Chart:
     """Both sensors of a simulation over time, with the true static intervals shaded."""
-    time_s, last = recording.time_s, recording.n_samples - 1
-    spans = [Span(float(time_s[min(h.start, last)]), float(time_s[min(h.stop - 1, last)]), "pose") for h in truth.poses]
-    return _signals(recording, tuple(spans))
+    return _signals(recording, tuple(_span(recording, pose.start, pose.stop - 1) for pose in truth.poses))
 
 
 def _signals(recording: Recording, spans: tuple[Span, ...]) -> Chart:

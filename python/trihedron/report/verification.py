@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from trihedron.arrays import BoolArray
-from trihedron.records import Finding, FindingCode, Recording, Segments, Verification
+from trihedron.records import FindingCode, Recording, Segments, Verification
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
@@ -30,8 +30,11 @@ def verification_report(
     """Lay out a verification."""
     v = verification
     made_from = f"calibration of {v.calibration_source}" if v.calibration_source else "calibration of another program"
-    above = list({finding.code: _ABOVE_NOISE[finding.code] for finding in _above_noise(v)}.values())
-    usable = f"Doubtful: {listed(above)} above noise and uncertainty" if above else "Verified"
+    above = [finding for finding in v.findings if finding.code in _ABOVE_NOISE]
+    usable = "Verified"
+    if above:
+        errors = dict.fromkeys(_ABOVE_NOISE[finding.code] for finding in above)
+        usable = f"Doubtful: {listed(list(errors))} above noise and uncertainty"
     good = "Verified: errors are within noise and uncertainty."
     caption = (
         "Gravity error in every pose and tilt error after every rotation, beside what noise and uncertainty allow."
@@ -52,25 +55,14 @@ def verification_report(
         sections=tuple(sections),
         headlines=headlines_of(verification),
         lead=Picture("errors", caption, partial(verification_chart, v)),
-        next_step=_next_step(verification),
+        # Advice about the errors; else to use the calibration, unless it is rejected.
+        next_step=above[0].action if above else USE if v.is_passed else "",
     )
 
 
 def _expected(size: str, chi2_per_dof: float) -> str:
     """The expected size by noise and the calibration's uncertainty, and χ²/dof, which decides."""
     return f"expected {size}, χ²/dof {plain_number(chi2_per_dof, 2)}"
-
-
-def _next_step(v: Verification) -> str:
-    """The action of the finding about the errors; else advice to use the calibration; empty where it is rejected."""
-    above = _above_noise(v)
-    if above or not v.is_passed:
-        return above[0].action if above else ""
-    return USE
-
-
-def _above_noise(v: Verification) -> list[Finding]:
-    return [finding for finding in v.findings if finding.code in _ABOVE_NOISE]
 
 
 def headlines_of(v: Verification) -> tuple[Headline, ...]:
@@ -102,11 +94,13 @@ def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
     ]
     if len(v.angle_deg):
         worst = int(np.argmax(v.angle_deg))
+        without = ", ".join(str(k + 1) for k in v.moves_left_out)
+        without = f"; without move {without}, where the gyro was at its limit" if without else ""
         facts += [
             (
                 "tilt error after a rotation",
                 f"{plain_number(v.angle_rms_deg)}° rms over {how_many(len(v.angle_deg), 'move')}, worst "
-                f"{plain_number(float(v.angle_deg[worst]))}° in move {v.moves[worst] + 1}{_without(v)}",
+                f"{plain_number(float(v.angle_deg[worst]))}° in move {v.moves[worst] + 1}{without}",
             ),
             ("  expected", f"{plain_number(v.angle_expected_deg)}° {allowed} {plain_number(v.angle_chi2_per_dof, 2)}"),
         ]
@@ -117,12 +111,6 @@ def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
         changes = ", ".join(changed)
         facts.append(("gyro bias", f"changed by {changes} °/s (X, Y, Z) since the calibration"))
     return tuple(facts)
-
-
-def _without(v: Verification) -> str:
-    if not v.moves_left_out:
-        return ""
-    return f"; without move {', '.join(str(k + 1) for k in v.moves_left_out)}, where the gyro was at its limit"
 
 
 def parameters_table(v: Verification) -> Table:
