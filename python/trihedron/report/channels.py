@@ -71,7 +71,8 @@ def _filter(one: LowPass) -> str:
 
 
 def _filter_record(one: LowPass) -> dict[str, Any]:
-    if one.corner_hz is None:
+    corner = one.corner_hz
+    if corner is None:
         return {"corner_hz": None, "above_hz": one.above_hz}
-    return {"corner_hz": one.corner_hz.value, "lower_hz": one.corner_hz.lower, "upper_hz": one.corner_hz.upper,
-            "order": one.shape or None}  # fmt: skip
+    ends = {"lower_hz": corner.lower, "upper_hz": corner.upper}
+    return {"corner_hz": corner.value, **ends, "order": one.shape or None}

@@ -27,6 +27,15 @@ from trihedron.report.numbers import (
 )
 from trihedron.report.verification import facts_of
 
+_MOST_NUMBERS = 6
+_FILES = {
+    "unit.csv": "the log of the unit",
+    "simulation.toml": "the simulation as it was",
+    "improved.toml": "the simulation with the parameters of the log; your comments stay",
+    "disagreement.html": "the whole diagnosis, with figures",
+    "sealed.json": "what was drawn",
+}
+
 
 def demonstration_report(
     calibration: Calibration,
@@ -138,16 +147,6 @@ def _next_steps() -> Facts:
             ("use it", "trihedron apply calibration.json LOG -o corrected.csv"),
         )
     )
-
-
-_MOST_NUMBERS = 6
-_FILES = {
-    "unit.csv": "the log of the unit",
-    "simulation.toml": "the simulation as it was",
-    "improved.toml": "the simulation with the parameters of the log; your comments stay",
-    "disagreement.html": "the whole diagnosis, with figures",
-    "sealed.json": "what was drawn",
-}
 
 
 def disagreement_report(

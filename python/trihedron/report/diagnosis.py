@@ -13,14 +13,9 @@ from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.report.axes import LETTERS
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
-from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relations_blocks
+from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
 from trihedron.report.diagnosis_numbers import differing_blocks, noise_blocks, numbers_blocks, stages_blocks
-from trihedron.report.diagnosis_overview_charts import (
-    forest_picture,
-    ratios_picture,
-    strengths_picture,
-    traces_picture,
-)
+from trihedron.report.diagnosis_overview_charts import forest_picture, ratios_picture, strengths_picture, traces_picture
 from trihedron.report.diagnosis_words import (
     MEANING,
     differing_headline,
@@ -66,7 +61,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         sections.append(Section("Parameters that differ", about))
     sections += [
         Section("Missing effects", (*effects_blocks(diagnosis), *_physics(diagnosis))),
-        Section("Unexplained", (Paragraph(_remaining(diagnosis)), *relations_blocks(diagnosis))),
+        Section("Unexplained", (Paragraph(_remaining(diagnosis)), *map(relation_facts, diagnosis.relations))),
         Section("Cross-validation: before and after", _held_out(diagnosis)),
         Section("Candidates", candidates_blocks(diagnosis)),
         Section("Calibration and noise", models_blocks(diagnosis)),

@@ -17,6 +17,23 @@ from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import said
 from trihedron.report.numbers import SHOWN, plain_number, shown
 
+Side = tuple[str, FloatArray, FloatArray, FloatArray, tuple[str, ...]]
+WORDS = {
+    "static-accel": "gravity error in static poses",
+    "static-gyro": "gyro rate in static poses",
+    "moves": "tilt error after rotations",
+    "dynamics": "velocity error over a rotation",
+    "noise": "noise, octave by octave",
+}
+SLOPES: tuple[Colour, ...] = ("c1", "c2", "c3", "accent", "soft")
+FEWEST_STAGES = 3
+FEWEST_OCTAVES = 2
+PER_OCTAVE = 24
+"""Frequencies per octave of the integral: at the longest averaging time sin⁴ oscillates within the upper octaves."""
+SENSORS = ("accelerometer", "gyroscope")
+Spectrum = tuple[FloatArray, FloatArray, FloatArray]
+"""Edges (m, 2) [Hz], density of the model and of the recording (m,), printed unit/√Hz."""
+
 
 def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Chart:
     """Residuals of one domain before and after the effects on one scale; without effects a single panel."""
@@ -42,9 +59,6 @@ def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Char
         marks = _domain_marks(residuals, (time_s, factor * value, factor * sigma), names, unit)
         panels.append(Panel(x, y, marks, title=title, height_px=200))
     return Chart(tuple(panels), columns=len(panels))
-
-
-Side = tuple[str, FloatArray, FloatArray, FloatArray, tuple[str, ...]]
 
 
 def _limits(sides: Sequence[Side], factor: float, *, is_angle: bool) -> tuple[float, float]:
@@ -77,23 +91,6 @@ def _bars_of_noise(time_s: FloatArray, sigma: FloatArray, *, is_angle: bool) -> 
     x = np.column_stack([time_s, time_s, np.full(len(time_s), np.nan)]).ravel()
     y = np.column_stack([low, 2.0 * sigma, np.full(len(time_s), np.nan)]).ravel()
     return Line(x, y, "2 σ of noise", "shade")
-
-
-WORDS = {
-    "static-accel": "gravity error in static poses",
-    "static-gyro": "gyro rate in static poses",
-    "moves": "tilt error after rotations",
-    "dynamics": "velocity error over a rotation",
-    "noise": "noise, octave by octave",
-}
-SLOPES: tuple[Colour, ...] = ("c1", "c2", "c3", "accent", "soft")
-FEWEST_STAGES = 3
-FEWEST_OCTAVES = 2
-PER_OCTAVE = 24
-"""Frequencies per octave of the integral: at the longest averaging time sin⁴ oscillates within the upper octaves."""
-SENSORS = ("accelerometer", "gyroscope")
-Spectrum = tuple[FloatArray, FloatArray, FloatArray]
-"""Edges (m, 2) [Hz], density of the model and of the recording (m,), printed unit/√Hz."""
 
 
 def stages_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:

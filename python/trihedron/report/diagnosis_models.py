@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from trihedron.arrays import AXES
-from trihedron.records.diagnosis import Candidate, Diagnosis, Relation
+from trihedron.records.diagnosis import Diagnosis, Relation
 from trihedron.report.diagnosis_words import parameter_in_words, size_in_words, value_in_words
 from trihedron.report.document import Block, Facts, Table
 from trihedron.report.numbers import (
@@ -15,6 +15,8 @@ from trihedron.report.numbers import (
     power_of_ten,
     unit_in_print,
 )
+
+MOST_COEFFICIENTS = 6
 
 
 def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -89,13 +91,14 @@ def candidates_table(diagnosis: Diagnosis) -> Table:
     """Every effect that was tried: its score, the limit on its size, and the outcome."""
     accepted = {effect.id for effect in diagnosis.effects}
     tried = [c for c in diagnosis.candidates if c.applicable]
+    redundant = {c.id: f"redundant with {c.superseded_by}" for c in tried if c.superseded_by is not None}
     tried.sort(key=lambda c: 2.0 if c.p_value is None else c.p_value)
     rows = [
         (
             c.id,
             "–" if c.score is None else f"{round(c.score, 1) + 0.0:.1f}".replace("-", MINUS),
             "–" if c.limit95 is None or c.id in accepted else parameter_in_words(c.limit95, c.size[0].unit),
-            "accepted" if c.id in accepted else _outcome(c),
+            "accepted" if c.id in accepted else redundant.get(c.id) or c.reason or "not needed",
         )
         for c in tried
     ]
@@ -103,22 +106,8 @@ def candidates_table(diagnosis: Diagnosis) -> Table:
     return Table(("effect", "score", "at most (95 %)", "outcome"), tuple(rows), caption)
 
 
-def _outcome(candidate: Candidate) -> str:
-    """Why an effect that was tried was not accepted: redundant, a stated reason, or not needed."""
-    if candidate.superseded_by is not None:
-        return f"redundant with {candidate.superseded_by}"
-    return candidate.reason or "not needed"
-
-
-MOST_COEFFICIENTS = 6
-
-
-def relations_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """One block per empirical relation."""
-    return tuple(Facts(_rows(one)) for one in diagnosis.relations)
-
-
-def _rows(relation: Relation) -> tuple[tuple[str, str], ...]:
+def relation_facts(relation: Relation) -> Facts:
+    """An empirical relation with its coefficients, and what would confirm it."""
     shown = relation.coefficients[:MOST_COEFFICIENTS]
     words = [f"{c.name} {value_in_words(c.value, c.std)} {unit_in_print(c.unit)}" for c in shown]
     more = len(relation.coefficients) - len(shown)
@@ -130,4 +119,4 @@ def _rows(relation: Relation) -> tuple[tuple[str, str], ...]:
         rows.append(("", f"Similar to {listed(list(relation.resembles))}; similarity is no proof."))
     if relation.experiment:
         rows.append(("", f"To confirm it: {relation.experiment}."))
-    return tuple(rows)
+    return Facts(tuple(rows))

@@ -36,6 +36,11 @@ SENSOR_OF = {"accelerometer": "accelerometer", "gyro": "gyroscope"}
 CORRECTED = "corrected"
 RATIOS = ("N", "B", "K", "Q", "bandwidth", "resolution", "range", "rate", "correlation-time", "poses", "moves")
 """Terms whose ratio is drawn; octaves are drawn as spectra."""
+Models = tuple[Calibration | None, Calibration | None]
+"""The recording's own parameters and those of the simulation."""
+Side = tuple[str, tuple[FloatArray, str], FloatArray, FloatArray]
+"""Sensor; readings (n, 3) of the recording and their unit; the simulation's at the same times; their difference over
+the recording's noise."""
 
 
 def strengths_picture(diagnosis: Diagnosis) -> Picture | None:
@@ -156,10 +161,6 @@ def _ratio_words(n: NoiseDifference, name: str) -> str:
     return f"{_row_name(n)}: {plain_number(n.ratio)}{beside}, {name}"
 
 
-Models = tuple[Calibration | None, Calibration | None]
-"""The recording's own parameters and those of the simulation."""
-
-
 def traces_picture(
     recording: Recording, simulated: Recording, segments: Segments, models: Models = (None, None)
 ) -> Picture | None:
@@ -203,11 +204,6 @@ def traces_chart(
         y = Scale(f"{'reading' if is_as_read else CORRECTED} [{unit}]", unit)
         panels.append(Panel(x, y, lines, title=title, height_px=190))
     return Chart(tuple(panels), columns=len(panels), is_linked=True)
-
-
-Side = tuple[str, tuple[FloatArray, str], FloatArray, FloatArray]
-"""Sensor; readings (n, 3) of the recording and their unit; the simulation's at the same times; their difference over
-the recording's noise."""
 
 
 def _both_sides(recording: Recording, simulated: Recording, segments: Segments, models: Models) -> list[Side]:

@@ -132,15 +132,13 @@ def noise_columns(noise: Noise) -> Columns:
 def curve_columns(curve: AllanCurve) -> Columns:
     """A row per averaging time and channel: deviation with its interval."""
     k, channels = len(curve.clusters), curve.n_channels
-    columns: Columns = {
+    return {
         "channel": [name for name in curve.names for _ in range(k)],
         "tau_s": np.tile(curve.tau_s, channels),
         "cluster": np.tile(curve.clusters, channels),
+        **{name: getattr(curve, name).reshape(k, -1).T.ravel() for name in ("deviation", "lower", "upper", "edf")},
+        "unit": [unit for unit in curve.units for _ in range(k)],
     }
-    for name in ("deviation", "lower", "upper", "edf"):
-        columns[name] = getattr(curve, name).reshape(k, -1).T.ravel()
-    columns["unit"] = [unit for unit in curve.units for _ in range(k)]
-    return columns
 
 
 def sessions_columns(model: SessionsModel) -> Columns:

@@ -16,6 +16,15 @@ from trihedron.report.numbers import MINUS, power_of_ten
 
 UNITS = 10000
 """Width and height of a panel in its own units, about three times as fine as a 4k screen."""
+Tick = tuple[float, str]
+"""Position in data units and label (empty: a grid line without a label)."""
+Side = Literal["above", "below", "right", "left"]
+SIDES: tuple[Side, ...] = ("above", "below", "right", "left")
+WIDTH_PX = 250.0
+"""Width of the narrowest panel: labels that are apart there are apart in every panel."""
+LETTER_PX, GLYPH_PX, GAP_PX, RISE_PX, MARK_PX = 6.2, 10.0, 6.0, 12.0, 8.0
+Box = tuple[float, float, float, float]
+"""Left, top, right, bottom in pixels."""
 
 
 class Places:
@@ -41,10 +50,6 @@ def _placed(values: npt.ArrayLike, limits: tuple[float, float], *, is_log: bool)
         low, high = math.log10(low), math.log10(high)
     # Clipped, since renderers use float32.
     return np.clip((v - low) / ((high - low) or 1.0) * UNITS, -9 * UNITS, 10 * UNITS)
-
-
-Tick = tuple[float, str]
-"""Position in data units and label (empty: a grid line without a label)."""
 
 
 def ticks(low: float, high: float, *, is_log: bool, whole: bool = False, most: int = 6) -> list[Tick]:
@@ -96,16 +101,6 @@ def _word(value: float, places: int) -> str:
         digits = max(1, places + math.floor(math.log10(abs(value)))) if value else 1
         return f"{value:.{digits}e}".replace("e-0", "e-").replace("e+0", "e").replace("-", MINUS)
     return f"{value if round(value, places) else 0.0:.{places}f}".replace("-", MINUS)
-
-
-Side = Literal["above", "below", "right", "left"]
-SIDES: tuple[Side, ...] = ("above", "below", "right", "left")
-WIDTH_PX = 250.0
-"""Width of the narrowest panel: labels that are apart there are apart in every panel."""
-LETTER_PX, GLYPH_PX, GAP_PX, RISE_PX, MARK_PX = 6.2, 10.0, 6.0, 12.0, 8.0
-
-Box = tuple[float, float, float, float]
-"""Left, top, right, bottom in pixels."""
 
 
 def apart(notes: Sequence[Note], at: Places, height_px: float) -> list[Note]:

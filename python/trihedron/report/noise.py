@@ -8,15 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.records import (
-    AllanCurve,
-    Finding,
-    FindingCode,
-    Noise,
-    NoiseAxis,
-    NoiseTerm,
-    TermName,
-)
+from trihedron.records import AllanCurve, Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
 from trihedron.report.axes import axis_in_print
 from trihedron.report.document import Block, Code, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
@@ -32,6 +24,8 @@ _NO_UNIT = (
 NEXT = "Take N, B, K into a filter (trihedron export --noise); average for no longer than the best averaging time."
 SAY_COUNTS = """State the size of a count, for terms in SI: --gyro-lsb "X deg/s" and --accel-lsb "Y mg", X and Y from \
 the data sheet of this part at its range, or --calibration FILE."""
+MOST_ROWS = 12
+"""Rows of a curve's table, about; averaging times between them are omitted."""
 
 
 def noise_report(
@@ -285,10 +279,6 @@ def _lead(noise: Noise, groups: list[tuple[str, list[NoiseAxis]]]) -> Picture:
 def noise_picture(noise: Noise) -> Picture:
     """All curves of a log in one figure, a row for each sensor."""
     return Picture("allan", "Allan deviation of every axis.", partial(every_axis_chart, noise.curve, _groups(noise)))
-
-
-MOST_ROWS = 12
-"""Rows of a curve's table, about; averaging times between them are omitted."""
 
 
 def curve_summary(curve: AllanCurve) -> Document:

@@ -26,6 +26,7 @@ MARGIN = 1.6
 
 Limits = tuple[float, float]
 TIME = Scale("averaging time τ [s]", "s", is_log=True)
+BEST = "best averaging time"
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +98,6 @@ def _names(axis: NoiseAxis, symbol: str) -> tuple[str, str]:
         )
     limit = plain_number(term.limit, 2)
     return f"{symbol} < {limit}", f"{symbol} is in the sum, and does not show by itself: below {limit} {unit}"
-
-
-BEST = "best averaging time"
 
 
 def allan_chart(curve: AllanCurve, unit: str, axes: Sequence[NoiseAxis]) -> Chart:

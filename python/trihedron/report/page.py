@@ -41,6 +41,7 @@ _ASIDE = re.compile(r" \([^)]*\)")
 MOST_OTHERS = 2
 """Findings listed on the first screen after the foremost; the others are counted."""
 _DASHED = re.compile(r"(?<![\w-])-{1,2}[A-Za-z][\w/+-]*")
+_NOT_SHOWN = (Picture, FindingList, Code)
 
 
 def to_html(document: Document) -> str:
@@ -139,9 +140,6 @@ def _shown(block: Block) -> dict[str, Any]:
         shown["is_wordy"] = any(len(row[0]) > SHORT for row in block.rows)
         shown["words"] = [k > 0 and any(len(row[k]) > WORDY for row in block.rows) for k in range(len(block.head))]
     return shown
-
-
-_NOT_SHOWN = (Picture, FindingList, Code)
 
 
 def to_fragment(document: Document) -> str:

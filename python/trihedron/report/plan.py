@@ -23,7 +23,10 @@ FEWEST_SETS = 2
 
 def plan_report(plan: ExperimentPlan) -> Document:
     """Lay out the plan: turns by both routes, sets of poses, moves."""
-    turns, best = plan.turns, _enough(plan.poses)
+    turns = plan.turns
+    # The smallest set that determines all parameters without any one of its poses.
+    enough = [one for one in plan.poses if one.rank == ALL_NUMBERS and not any(math.isinf(w.loss) for w in one.worth)]
+    best = min(enough, key=lambda one: one.n_poses, default=None)
     angles = ", ".join(f"{angle:g}°" for angle in turns.angles_deg).replace("-", MINUS)
     return Document(
         title="Plan of an experiment",
@@ -64,12 +67,6 @@ def plan_report(plan: ExperimentPlan) -> Document:
             Section("Known turns", (_turns(plan),)),
         ),
     )
-
-
-def _enough(poses: tuple[PosePlan, ...]) -> PosePlan | None:
-    """The smallest set that determines all parameters without any one of its poses."""
-    enough = [one for one in poses if one.rank == ALL_NUMBERS and not any(math.isinf(w.loss) for w in one.worth)]
-    return min(enough, key=lambda one: one.n_poses, default=None)
 
 
 def _headlines(plan: ExperimentPlan, best: PosePlan | None) -> list[Headline]:

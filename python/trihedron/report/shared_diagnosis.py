@@ -15,6 +15,14 @@ from trihedron.report.diagnosis_words import p_in_words, parameter_unit, value_i
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.numbers import listed, plain_number, with_sigma
 
+TWO_SIGMA = 2.0
+ROW_PX = 26
+COLUMNS = 3
+BAR = 0.7
+"""Height of a bar as a fraction of its row."""
+LONGEST = 16
+"""Most letters of a name beside its row; recordings with longer names are numbered, as in the title."""
+
 
 def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
     """Lay out shared effects, and effects of single recordings."""
@@ -116,15 +124,6 @@ def shared_diagnosis_record(found: SharedDiagnosis) -> dict[str, Any]:
         "candidates": [one.to_dict() for one in found.candidates],
         "diagnoses": [one.to_dict() for one in found.diagnoses],
     }
-
-
-TWO_SIGMA = 2.0
-ROW_PX = 26
-COLUMNS = 3
-BAR = 0.7
-"""Height of a bar as a fraction of its row."""
-LONGEST = 16
-"""Most letters of a name beside its row; recordings with longer names are numbered, as in the title."""
 
 
 def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:

@@ -24,6 +24,8 @@ _FEWEST, _FEWEST_OF_HEADS = 16, 9
 # The sixteen ANSI colours, which follow the terminal's theme.
 _COLOURS = {"good": "1;32", "usable": "1;33", "bad": "1;31", "serious": "1;31", "warning": "1;33", "note": "1;36"}
 _BOLD, _DIM = "1", "2"
+Grid = list[list[list[str]]]
+"""Rows of cells, each of one line or more; the first row is the head."""
 
 
 @dataclass(frozen=True)
@@ -142,10 +144,6 @@ def _table(table: Table, style: Style) -> list[str]:
         out += [style.paint(line.rstrip(), _BOLD) for line in head]
         out += [line for row in body for line in row]
     return out
-
-
-Grid = list[list[list[str]]]
-"""Rows of cells, each of one line or more; the first row is the head."""
 
 
 def _as_it_is(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:

@@ -22,6 +22,10 @@ _ABOVE_NOISE = {
     FindingCode.RESIDUAL_ABOVE_NOISE: "gravity error in static poses",
     FindingCode.HELD_OUT_WORSE: "tilt error after rotations",
 }
+USE = "Use the calibration: trihedron apply, trihedron export."
+ALLOWED = "3 σ of noise and calibration uncertainty"
+LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
+"""Limit of the length of a two-component Gaussian error, over its rms, with the probability of 3σ (0.27 %)."""
 
 
 def verification_report(
@@ -128,9 +132,6 @@ def parameters_table(v: Verification) -> Table:
     return Table(head, tuple(rows), "Parameters that do not depend on the frame, against this log's own calibration")
 
 
-USE = "Use the calibration: trihedron apply, trihedron export."
-
-
 def _tables(v: Verification, segments: Segments | None) -> list[Block]:
     errors = each_with_sigma(v.norm_error, v.norm_sigma, mm_s2_from_m_s2(1.0))
     rows: tuple[tuple[str, ...], ...] = tuple(
@@ -152,11 +153,6 @@ def _tables(v: Verification, segments: Segments | None) -> list[Block]:
         caption = "Tilt error after every rotation: gravity predicted with the gyro against gravity measured"
         blocks.append(Table(head, rows, caption))
     return blocks
-
-
-ALLOWED = "3 σ of noise and calibration uncertainty"
-LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
-"""Limit of the length of a two-component Gaussian error, over its rms, with the probability of 3σ (0.27 %)."""
 
 
 def verification_chart(verification: Verification) -> Chart:

@@ -92,16 +92,14 @@ ACCELEROMETER = {
     ),
     "accel-quadratic": EffectWords("the accelerometers have a quadratic nonlinearity", BOTH_SIDES_OF_LEVEL),
     "accel-scale-asymmetry": EffectWords(
-        "the accelerometer scale differs between positive and negative force",
-        BOTH_SIDES_OF_LEVEL,
+        "the accelerometer scale differs between positive and negative force", BOTH_SIDES_OF_LEVEL
     ),
     "accel-hysteresis": EffectWords(
         "the accelerometer bias depends on the previous orientation",
         "reach the same pose from opposite directions, twice each",
     ),
     "accel-size-effect": EffectWords(
-        "the three accelerometers do not sit at one point",
-        "spin and shake the sensor about each axis in turn",
+        "the three accelerometers do not sit at one point", "spin and shake the sensor about each axis in turn"
     ),
     "accel-thermal-bias": EffectWords(
         "the accelerometer bias depends on temperature",
@@ -140,8 +138,7 @@ GYROSCOPE = {
         "keep each of the six faces up for a minute; turn the table by 180° to rule out Earth rate",
     ),
     "gyro-scale-nonlinearity": EffectWords(
-        "the gyro scale depends on rate",
-        "turn by the same angle slowly and fast, both ways, about each axis",
+        "the gyro scale depends on rate", "turn by the same angle slowly and fast, both ways, about each axis"
     ),
     "gyro-thermal-bias": EffectWords(
         "the gyro bias depends on temperature", UP_AND_DOWN, follows_temperature("gyro", "°/s")
@@ -174,8 +171,7 @@ GYROSCOPE = {
 
 SESSION = {
     "accel-gyro-time-offset": EffectWords(
-        "accelerometer and gyro samples with the same timestamp were taken at different times",
-        SHAKE,
+        "accelerometer and gyro samples with the same timestamp were taken at different times", SHAKE
     ),
     "sensor-lag": EffectWords("one sensor follows the motion through a low-pass filter", SHAKE),
     "axis-handedness": EffectWords(
@@ -193,8 +189,7 @@ SESSION = {
         "the readings depend on the supply voltage", "repeat one pose at two supply voltages"
     ),
     "vibration-rectification": EffectWords(
-        "the bias depends on the power of vibration",
-        "record one pose with the vibration on and off",
+        "the bias depends on the power of vibration", "record one pose with the vibration on and off"
     ),
     "quantisation": EffectWords(
         "the resolution (LSB) is too coarse for the noise: means of poses are quantised",

@@ -83,11 +83,9 @@ _MOVES = {
         _SAME_GRAVITY,
         "{advice:sentences}",
     ),
-    (Code.NOT_OBSERVABLE, "moves-weak", SERIOUS): Words(
-        "the moves hardly determine the {weakest}: see its σ in S.", _SAME_GRAVITY, "{advice:sentences}"
-    ),
-    (Code.WEAKLY_OBSERVABLE, "moves", WARNING): Words(
-        "the moves hardly determine the {weakest}: see its σ in S.", _SAME_GRAVITY, "{advice:sentences}"
+    **dict.fromkeys(
+        ((Code.NOT_OBSERVABLE, "moves-weak", SERIOUS), (Code.WEAKLY_OBSERVABLE, "moves", WARNING)),
+        Words("the moves hardly determine the {weakest}: see its σ in S.", _SAME_GRAVITY, "{advice:sentences}"),
     ),
     (Code.SAMPLES_LOST, "seen-in-motion", WARNING): Words(
         "Samples are missing though the timestamps run on evenly: {long_steps} of {steps} steps in motion are one "
@@ -146,18 +144,15 @@ _TURNS = {
         "turned by eye, without a wall.",
         "Push the case against a wall before and after each turn.",
     ),
-    (Code.TURN_NOT_A_MULTIPLE, "not-the-stated", WARNING): Words(
-        "turn {turn} about {axis:axis} is {seen_rad:.1f deg}, far from the stated {wanted_rad:.0f deg}; it is "
-        "excluded.",
-        "turned without a wall, or the nominal scale is far off.",
-        "Repeat it against a wall, or give its angle.",
-    ),
-    (Code.TURN_NOT_A_MULTIPLE, "no-multiple", WARNING): Words(
-        "turn {turn} about {axis:axis} is {seen_rad:.1f deg}, far from any multiple of {wanted_rad:.0f deg}; it is "
-        "excluded.",
-        "turned without a wall, or the nominal scale is far off.",
-        "Repeat it against a wall, or give its angle.",
-    ),
+    **{
+        (Code.TURN_NOT_A_MULTIPLE, case, WARNING): Words(
+            f"turn {{turn}} about {{axis:axis}} is {{seen_rad:.1f deg}}, far from {what} {{wanted_rad:.0f deg}}; it is "
+            "excluded.",
+            "turned without a wall, or the nominal scale is far off.",
+            "Repeat it against a wall, or give its angle.",
+        )
+        for case, what in (("not-the-stated", "the stated"), ("no-multiple", "any multiple of"))
+    },
     (Code.TURN_UNCHECKED, "", WARNING): Words(
         "only one turn about {axes:axes and}: a wrong angle would not show.",
         "a wrong angle goes into the scale unnoticed.",

@@ -64,20 +64,19 @@ _SPECTRUM = {
         "resampling, a narrow filter or periodic disturbance shapes the whole band.",
         "N and Q are not those of the sensor; log at its own rate without filtering.",
     ),
-    (Code.SPECTRUM_COLOURED, "falls", WARNING): Words(
-        "Above {highest_hz:.3g} Hz the spectrum leaves the noise terms and falls to {ratio:.3g %} of them at "
-        "{nyquist_hz:.3g} Hz.",
-        "a low-pass filter in the sensor or the logger, or averaging by a resampler.",
-        "All terms are quoted from below; averaging times under half a period of that frequency show the filter, and Q "
-        "cannot be separated from it.",
-    ),
-    (Code.SPECTRUM_COLOURED, "rises", WARNING): Words(
-        "Above {highest_hz:.3g} Hz the spectrum leaves the noise terms and rises to {ratio:.3g %} of them at "
-        "{nyquist_hz:.3g} Hz.",
-        "aliasing, resampling, a resonance or vibration.",
-        "All terms are quoted from below; averaging times under half a period of that frequency show the filter, and Q "
-        "cannot be separated from it.",
-    ),
+    **{
+        (Code.SPECTRUM_COLOURED, way, WARNING): Words(
+            f"Above {{highest_hz:.3g}} Hz the spectrum leaves the noise terms and {way} to {{ratio:.3g %}} of them at "
+            "{nyquist_hz:.3g} Hz.",
+            cause,
+            "All terms are quoted from below; averaging times under half a period of that frequency show the filter, "
+            "and Q cannot be separated from it.",
+        )
+        for way, cause in (
+            ("falls", "a low-pass filter in the sensor or the logger, or averaging by a resampler."),
+            ("rises", "aliasing, resampling, a resonance or vibration."),
+        )
+    },
     (Code.SPECTRUM_COLOURED, "curve", WARNING): Words(
         "Below {first_s:.3g} s the curve is not a sum of noise terms.",
         "a low-pass filter in the sensor or the logger, resampling, or a periodic disturbance.",
